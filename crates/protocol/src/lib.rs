@@ -1,1 +1,23 @@
-//! Placeholder.
+//! The contract between the simulator, the robots and the observers of a run.
+//!
+//! Three things live here and nowhere else: what is said ([`messages`]), where it is said ([`keys`]) and how it
+//! is written ([`codec`]). The [`bus`] carries it; it is the only module of the whole project that names the
+//! middleware, so that everything above it can be tested without a network.
+//!
+//! SI units and REP 103 throughout: meters, seconds, radians counter-clockwise from +x.
+
+pub mod bus;
+pub mod codec;
+pub mod keys;
+pub mod messages;
+pub mod name;
+pub mod random;
+pub mod runtime;
+
+pub use codec::{Malformed, Message, decode, encode};
+pub use messages::{Epoch, Generation, Seq, Tick};
+pub use name::{BadName, RobotName, RunName};
+
+/// Version of the contract. It is named where two sides first meet (join) and only a change that an old robot
+/// could not survive raises it: unknown fields are ignored, so a new optional field does not.
+pub const PROTOCOL_VERSION: u32 = 1;

@@ -1,0 +1,421 @@
+//! The bus: the middleware behind seven verbs, with the settings that a lock-step system needs.
+//!
+//! A simulator embeds the router and everything else is a client of it: one path between any two, which is what keeps
+//! messages in order. No multicast, no gossip, loopback unless an address says otherwise.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use zenoh::bytes::ZBytes;
+use zenoh::handlers::FifoChannelHandler;
+use zenoh::key_expr::KeyExpr;
+use zenoh::qos::CongestionControl;
+use zenoh::query::{ConsolidationMode, Query, QueryTarget, Reply};
+use zenoh::sample::{Sample, SampleKind};
+use zenoh::{Config, Session, Wait};
+
+/// Where a simulator listens and others connect unless told otherwise.
+pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
+
+/// Longest wait for an answer before the asker looks again whether the other side is still there.
+pub const QUERY_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// A failure of the bus itself.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// No session could be opened.
+    #[error("cannot {doing} {endpoint}: {reason}")]
+    Open {
+        /// What was tried.
+        doing: &'static str,
+        /// The address tried.
+        endpoint: String,
+        /// What the middleware says.
+        reason: String,
+    },
+    /// A session that was open cannot do what was asked.
+    #[error("bus: cannot {doing} {key}: {reason}")]
+    Use {
+        /// What was tried.
+        doing: &'static str,
+        /// The key concerned.
+        key: String,
+        /// What the middleware says.
+        reason: String,
+    },
+}
+
+/// How to take part.
+#[derive(Debug, Clone)]
+pub enum Role {
+    /// Listen at this endpoint and route for everybody: the simulator.
+    Router {
+        /// For example `tcp/127.0.0.1:7447`.
+        listen: String,
+    },
+    /// Connect to this endpoint: everybody else.
+    Client {
+        /// For example `tcp/127.0.0.1:7447`.
+        connect: String,
+        /// How long to go on trying to reach it.
+        patience: Duration,
+    },
+}
+
+/// A session. Clones share it; the last one closes it.
+#[derive(Debug, Clone)]
+pub struct Bus {
+    session: Session,
+}
+
+/// A declaration, alive until dropped.
+pub struct Declared {
+    _inner: Box<dyn Send + Sync>,
+}
+
+impl std::fmt::Debug for Declared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Declared")
+    }
+}
+
+fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T, BusError> {
+    result.map_err(|error| BusError::Use { doing, key: key.to_owned(), reason: error.to_string() })
+}
+
+impl Bus {
+    /// Opens a session. `overrides` is a configuration file of the middleware that replaces the built-in settings,
+    /// for set-ups across machines.
+    ///
+    /// # Errors
+    /// [`BusError::Open`] names the address that was tried and what went wrong.
+    pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
+        let (doing, endpoint) = match role {
+            Role::Router { listen } => ("listen at", listen),
+            Role::Client { connect, .. } => ("reach the simulator at", connect),
+        };
+        let failed = |reason: String| BusError::Open { doing, endpoint: endpoint.clone(), reason };
+        let config = configuration(role, overrides).map_err(&failed)?;
+        let session = zenoh::open(config).wait().map_err(|error| failed(error.to_string()))?;
+        Ok(Self { session })
+    }
+
+    /// An identity that no other session has.
+    #[must_use]
+    pub fn id(&self) -> String {
+        self.session.zid().to_string()
+    }
+
+    /// Declares that messages will be put on `key`.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
+        // The default would drop under pressure, and a lock-step system cannot afford a lost message.
+        let declared = self
+            .session
+            .declare_publisher(key.to_owned())
+            .congestion_control(CongestionControl::Block)
+            .wait();
+        let inner = used("publish on", key, declared)?;
+        let watched = Arc::new(AtomicBool::new(false));
+        let seen = watched.clone();
+        let listener = inner
+            .matching_listener()
+            .callback(move |status| seen.store(status.matching(), Ordering::Relaxed))
+            .background()
+            .wait();
+        used("watch subscribers of", key, listener)?;
+        let matching = used("watch subscribers of", key, inner.matching_status().wait())?.matching();
+        watched.fetch_or(matching, Ordering::Relaxed);
+        Ok(Publisher { inner, watched })
+    }
+
+    /// Puts one message.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
+        let put = self.session.put(key, message).congestion_control(CongestionControl::Block).wait();
+        used("put on", key, put)
+    }
+
+    /// Calls `handle(key, bytes)` for each message put on `keys`. It runs on the thread that reads the link: it must
+    /// hand over and return.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn subscribe(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, &[u8]) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        let declared = self
+            .session
+            .declare_subscriber(keys)
+            .callback(move |sample: Sample| handle(sample.key_expr().as_str(), &sample.payload().to_bytes()))
+            .wait();
+        Ok(Declared { _inner: Box::new(used("subscribe to", keys, declared)?) })
+    }
+
+    /// Calls `handle` for each question asked on `keys`. It must hand over and return.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn serve(&self, keys: &str, handle: impl Fn(Question) + Send + Sync + 'static) -> Result<Declared, BusError> {
+        let declared =
+            self.session.declare_queryable(keys).callback(move |query: Query| handle(Question { query })).wait();
+        Ok(Declared { _inner: Box::new(used("serve", keys, declared)?) })
+    }
+
+    /// Asks, and waits for the one answer: `None` if nobody answers within [`QUERY_TIMEOUT`].
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn ask(&self, key: &str, parameters: &str, body: Option<Vec<u8>>) -> Result<Option<AnswerOf>, BusError> {
+        let replies: FifoChannelHandler<Reply> = used(
+            "ask",
+            key,
+            self.get(key, parameters, body, QUERY_TIMEOUT)?.with(zenoh::handlers::FifoChannel::new(8)).wait(),
+        )?;
+        while let Ok(reply) = replies.recv() {
+            if let Some(answer) = AnswerOf::read(reply) {
+                return Ok(Some(answer));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Asks, and hands the one answer to `then`, or `None` if nobody answers within [`QUERY_TIMEOUT`]. `then` runs on
+    /// the thread that reads the link: it must hand over and return.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn ask_then(
+        &self,
+        key: &str,
+        parameters: &str,
+        then: impl FnOnce(Option<AnswerOf>) + Send + 'static,
+    ) -> Result<(), BusError> {
+        let pending = std::sync::Mutex::new(Pending(Some(Box::new(then))));
+        let asked = self
+            .get(key, parameters, None, QUERY_TIMEOUT)?
+            .callback(move |reply: Reply| {
+                if let (Some(answer), Ok(mut pending)) = (AnswerOf::read(reply), pending.lock()) {
+                    pending.settle(Some(answer));
+                }
+            })
+            .wait();
+        used("ask", key, asked)
+    }
+
+    fn get(
+        &self,
+        key: &str,
+        parameters: &str,
+        body: Option<Vec<u8>>,
+        timeout: Duration,
+    ) -> Result<zenoh::session::SessionGetBuilder<'_, 'static, zenoh::handlers::DefaultHandler>, BusError> {
+        let key_expr = used("ask", key, KeyExpr::new(key.to_owned()))?;
+        Ok(self
+            .session
+            .get(zenoh::query::Selector::owned(key_expr, parameters.to_owned()))
+            .payload(body.map_or_else(ZBytes::new, ZBytes::from))
+            .target(QueryTarget::All)
+            .consolidation(ConsolidationMode::None)
+            .congestion_control(CongestionControl::Block)
+            .timeout(timeout))
+    }
+
+    /// Shows that something is there, until dropped or until this process or its link is gone. To be declared last:
+    /// who sees it knows that everything declared before is in effect.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn token(&self, key: &str) -> Result<Declared, BusError> {
+        let declared = self.session.liveliness().declare_token(key.to_owned()).wait();
+        Ok(Declared { _inner: Box::new(used("declare", key, declared)?) })
+    }
+
+    /// Calls `handle(key, is_there)` for each token under `keys` that is there, comes or goes.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn watch(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, bool) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        let declared = self
+            .session
+            .liveliness()
+            .declare_subscriber(keys)
+            .history(true)
+            .callback(move |sample: Sample| handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put))
+            .wait();
+        Ok(Declared { _inner: Box::new(used("watch", keys, declared)?) })
+    }
+
+    /// Closes the session after everything that was put has left. A process that exits without it loses messages.
+    pub fn close(&self) {
+        if let Err(error) = self.session.close().wait() {
+            tracing::debug!(%error, "closing the session");
+        }
+    }
+}
+
+type Then = Box<dyn FnOnce(Option<AnswerOf>) + Send>;
+
+/// A continuation that is called exactly once: with the answer, or with `None` when the query ends without one.
+struct Pending(Option<Then>);
+
+impl Pending {
+    fn settle(&mut self, answer: Option<AnswerOf>) {
+        if let Some(then) = self.0.take() {
+            then(answer);
+        }
+    }
+}
+
+impl Drop for Pending {
+    fn drop(&mut self) {
+        self.settle(None);
+    }
+}
+
+/// A place to put messages of one kind.
+#[derive(Debug)]
+pub struct Publisher {
+    inner: zenoh::pubsub::Publisher<'static>,
+    watched: Arc<AtomicBool>,
+}
+
+impl Publisher {
+    /// Puts a message.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed.
+    pub fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
+        used("put on", self.inner.key_expr().as_str(), self.inner.put(message).wait())
+    }
+
+    /// Whether anybody subscribes: pictures that nobody looks at need not be painted.
+    #[must_use]
+    pub fn is_watched(&self) -> bool {
+        self.watched.load(Ordering::Relaxed)
+    }
+}
+
+/// An answer: bytes, or the reason why there are none.
+#[derive(Debug, Clone)]
+pub struct AnswerOf {
+    /// Key on which it came.
+    pub key: String,
+    /// The message, or the responder's refusal in words.
+    pub result: Result<Vec<u8>, String>,
+}
+
+impl AnswerOf {
+    /// `None` for the middleware's own notice that time is up.
+    fn read(reply: Reply) -> Option<Self> {
+        match reply.into_result() {
+            Ok(sample) => Some(Self {
+                key: sample.key_expr().to_string(),
+                result: Ok(sample.payload().to_bytes().into_owned()),
+            }),
+            Err(error) => {
+                let text = String::from_utf8_lossy(&error.payload().to_bytes()).into_owned();
+                (text != "Timeout").then_some(Self { key: String::new(), result: Err(text) })
+            }
+        }
+    }
+}
+
+/// A question that waits for an answer. One that is dropped unanswered ends at once at the asker.
+#[derive(Debug)]
+pub struct Question {
+    query: Query,
+}
+
+impl Question {
+    /// Key that was asked.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        self.query.key_expr().as_str()
+    }
+
+    /// The parameter called `name`, as in `?tick=12;epoch=1`.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<&str> {
+        self.query.parameters().get(name)
+    }
+
+    /// What came with it.
+    #[must_use]
+    pub fn body(&self) -> Vec<u8> {
+        self.query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default()
+    }
+
+    /// Answers on `key`.
+    pub fn answer(&self, key: &str, message: Vec<u8>) {
+        if let Err(error) = self.query.reply(key.to_owned(), message).wait() {
+            tracing::debug!(%error, key, "an answer could not be sent");
+        }
+    }
+
+    /// Refuses, in words.
+    pub fn refuse(&self, reason: &str) {
+        if let Err(error) = self.query.reply_err(reason.to_owned()).wait() {
+            tracing::debug!(%error, "a refusal could not be sent");
+        }
+    }
+}
+
+/// The settings that were measured to suit a lock-step system, on top of the middleware's defaults.
+fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, String> {
+    let mut config = match overrides {
+        Some(file) => Config::from_file(file).map_err(|error| error.to_string())?,
+        None => Config::default(),
+    };
+    let mut set = |key: &str, value: &str| {
+        config.insert_json5(key, value).map_err(|error| format!("setting {key} = {value}: {error}"))
+    };
+    match role {
+        Role::Router { listen } => {
+            set("mode", "\"router\"")?;
+            set("listen/endpoints", &format!("[{listen:?}]"))?;
+        }
+        Role::Client { connect, patience } => {
+            set("mode", "\"client\"")?;
+            set("connect/endpoints", &format!("[{connect:?}]"))?;
+            set("connect/timeout_ms", &patience.as_millis().to_string())?;
+            set("connect/retry", "{period_init_ms: 100, period_max_ms: 500, period_increase_factor: 2}")?;
+            // A connection attempt into a cut link must not outlive the cut by ten seconds.
+            set("transport/unicast/open_timeout", "1000")?;
+        }
+    }
+    if overrides.is_some() {
+        return Ok(config);
+    }
+    for (key, value) in [
+        // A router waits half a second for scouting that is switched off below.
+        ("scouting/delay", "0"),
+        ("scouting/multicast/enabled", "false"),
+        ("scouting/gossip/enabled", "false"),
+        // A process that hangs or a link that is cut is noticed within this time, milliseconds.
+        ("transport/link/tx/lease", "2000"),
+        ("transport/link/tx/keep_alive", "4"),
+        // A receiver that does not read holds the sender for at most this long, microseconds.
+        ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
+        ("transport/link/rx/max_message_size", "4194304"),
+        // Hundreds of robots may connect at the same moment.
+        ("transport/unicast/accept_pending", "1000"),
+        ("transport/unicast/max_sessions", "2000"),
+        ("transport/unicast/accept_timeout", "2000"),
+    ] {
+        set(key, value)?;
+    }
+    Ok(config)
+}

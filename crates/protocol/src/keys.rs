@@ -1,0 +1,156 @@
+//! Key expressions: where each message of a run is said. `cars/{run}/…`, robots addressed by name.
+
+use crate::name::{RobotName, RunName};
+
+/// Builds the keys of one run.
+///
+/// ```
+/// # use protocol::{keys::Keys, RobotName, RunName};
+/// let keys = Keys::new(&RunName::new("demo")?);
+/// let leguin = RobotName::new("Leguin")?;
+/// assert_eq!(keys.report(&leguin), "cars/demo/robot/Leguin/report");
+/// assert_eq!(Keys::robot_of("cars/demo/robot/Leguin/report"), Some("Leguin"));
+/// # Ok::<(), protocol::BadName>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Keys {
+    root: String,
+}
+
+/// The six queries of the common robot interface, as the last chunk of their keys (seed, Figure 7).
+pub const QUERIES: [&str; 6] =
+    ["location", "speed", "direction", "state_variables", "emotion_state", "behavior_state"];
+
+/// All six answers in one: what a robot asks for when it wants more than one of them in a tick. One reply costs
+/// half of what six do.
+pub const STATE: &str = "state";
+
+impl Keys {
+    /// The keys of run `run`.
+    #[must_use]
+    pub fn new(run: &RunName) -> Self {
+        Self { root: format!("cars/{run}") }
+    }
+
+    /// Simulator to all: a tick is granted.
+    #[must_use]
+    pub fn clock(&self) -> String {
+        format!("{}/clock", self.root)
+    }
+
+    /// Queryable at the simulator: a robot asks to take part.
+    #[must_use]
+    pub fn join(&self) -> String {
+        format!("{}/join", self.root)
+    }
+
+    /// Robot to simulator: its tick is done.
+    #[must_use]
+    pub fn report(&self, robot: &RobotName) -> String {
+        format!("{}/robot/{robot}/report", self.root)
+    }
+
+    /// All reports of the run.
+    #[must_use]
+    pub fn reports(&self) -> String {
+        format!("{}/robot/*/report", self.root)
+    }
+
+    /// Robot to simulator: it waits for another robot's answer.
+    #[must_use]
+    pub fn waiting(&self, robot: &RobotName) -> String {
+        format!("{}/robot/{robot}/waiting", self.root)
+    }
+
+    /// All notes of waiting of the run.
+    #[must_use]
+    pub fn all_waiting(&self) -> String {
+        format!("{}/robot/*/waiting", self.root)
+    }
+
+    /// Robot to robot: a command; the sender is in the key, so that access control can pin it.
+    #[must_use]
+    pub fn command(&self, to: &RobotName, from: &RobotName) -> String {
+        format!("{}/robot/{to}/command/{from}", self.root)
+    }
+
+    /// All commands to one robot.
+    #[must_use]
+    pub fn commands_to(&self, to: &RobotName) -> String {
+        format!("{}/robot/{to}/command/*", self.root)
+    }
+
+    /// Queryable at the robot: `what` is one of [`QUERIES`] or [`STATE`].
+    #[must_use]
+    pub fn query(&self, robot: &RobotName, what: &str) -> String {
+        format!("{}/robot/{robot}/{what}", self.root)
+    }
+
+    /// Queryable at the simulator: the bodies within the robot's sensing range.
+    #[must_use]
+    pub fn percept(&self, robot: &RobotName) -> String {
+        format!("{}/robot/{robot}/percept", self.root)
+    }
+
+    /// All percepts of the run.
+    #[must_use]
+    pub fn percepts(&self) -> String {
+        format!("{}/robot/*/percept", self.root)
+    }
+
+    /// Robot to observers: what it chooses to display.
+    #[must_use]
+    pub fn panel(&self, robot: &RobotName) -> String {
+        format!("{}/robot/{robot}/panel", self.root)
+    }
+
+    /// Queryable at the simulator: init, start, pause, step, stop, speed, command, status.
+    #[must_use]
+    pub fn control(&self) -> String {
+        format!("{}/control", self.root)
+    }
+
+    /// Simulator to observers: positions, at a display rate.
+    #[must_use]
+    pub fn world(&self) -> String {
+        format!("{}/world", self.root)
+    }
+
+    /// Simulator to observers: state changes as lines.
+    #[must_use]
+    pub fn log(&self) -> String {
+        format!("{}/log", self.root)
+    }
+
+    /// Liveliness token of the simulator.
+    #[must_use]
+    pub fn alive_sim(&self) -> String {
+        format!("{}/alive/sim", self.root)
+    }
+
+    /// Liveliness token of a robot; declared last, so that it means "ready".
+    #[must_use]
+    pub fn alive_robot(&self, robot: &RobotName) -> String {
+        format!("{}/alive/robot/{robot}", self.root)
+    }
+
+    /// All robots' liveliness tokens.
+    #[must_use]
+    pub fn alive_robots(&self) -> String {
+        format!("{}/alive/robot/*", self.root)
+    }
+
+    /// The robot that a key under `…/robot/{name}` is about.
+    #[must_use]
+    pub fn robot_of(key: &str) -> Option<&str> {
+        let mut chunks = key.split('/').skip_while(|chunk| *chunk != "robot");
+        chunks.next()?;
+        chunks.next()
+    }
+
+    /// The last chunk of a key: the sender of a command, or what a query asks for.
+    #[must_use]
+    pub fn last_chunk(key: &str) -> &str {
+        key.rsplit('/').next().unwrap_or(key)
+    }
+}

@@ -1,0 +1,174 @@
+//! People and the simulator: the CD-player buttons, and what the simulator says of itself.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Epoch, Generation, Tick, finite, short};
+use crate::codec::Message;
+use crate::name::{RobotName, RunName};
+
+/// A request to the simulator. It never goes through the barrier: it is answered at once, also while the clock is held.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "do", rename_all = "snake_case")]
+pub enum Control {
+    /// Start the next epoch: everything back to tick 0, with the same processes.
+    Init {
+        /// Another seed; without it the same.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        seed: Option<u64>,
+    },
+    /// Let the clock run.
+    Start,
+    /// Hold the clock after the current tick.
+    Pause,
+    /// Grant this many ticks, then pause. Answered with the tick that was reached.
+    Step {
+        /// How many.
+        n: u64,
+    },
+    /// End the run.
+    Stop,
+    /// Simulated seconds per second of wall clock; `null` is as fast as the barrier goes.
+    Speed {
+        /// The real-time factor.
+        factor: Option<f64>,
+    },
+    /// Nothing but the status.
+    Status,
+    /// A command from outside the roster; it takes effect at a tick boundary.
+    Command {
+        /// To whom.
+        to: RobotName,
+        /// What it says.
+        command: String,
+    },
+}
+
+impl Message for Control {
+    fn check(&self) -> Result<(), (String, String)> {
+        match self {
+            Self::Speed { factor: Some(factor) } => finite(*factor, "factor"),
+            Self::Command { command, .. } => short(command, "command"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The answer to a [`Control`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "answer", rename_all = "snake_case")]
+pub enum ControlAnswer {
+    /// Done; this is how things stand now.
+    Done(Box<Status>),
+    /// Not done.
+    Refused {
+        /// Why, and what to do about it.
+        explanation: String,
+    },
+}
+
+impl Message for ControlAnswer {}
+
+/// What the simulator is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// Robots of the roster are still missing.
+    Gathering,
+    /// Initialized; nothing has moved yet.
+    Ready,
+    /// The clock runs.
+    Running,
+    /// The clock is held by request.
+    Paused,
+    /// The run is over.
+    Ended,
+}
+
+impl std::fmt::Display for Phase {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Gathering => "gathering",
+            Self::Ready => "ready",
+            Self::Running => "running",
+            Self::Paused => "paused",
+            Self::Ended => "ended",
+        })
+    }
+}
+
+/// How things stand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Status {
+    /// The run.
+    pub run: RunName,
+    /// The epoch.
+    pub epoch: Epoch,
+    /// Last tick that is complete.
+    pub tick: Tick,
+    /// Ticks that were requested by `step` and are not done yet.
+    pub pending_steps: u64,
+    /// Simulated time at `tick`, seconds.
+    pub time_s: f64,
+    /// Simulated time at which the run ends, seconds.
+    pub duration_s: f64,
+    /// Seed of the epoch.
+    pub seed: u64,
+    /// What the simulator is doing.
+    pub phase: Phase,
+    /// Real-time factor; `null` is as fast as the barrier goes.
+    pub speed: Option<f64>,
+    /// For whom the clock waits now; empty when it does not.
+    pub awaiting: Vec<Awaited>,
+    /// The robots of the roster, by name.
+    pub robots: Vec<RobotStatus>,
+    /// Messages that were ignored so far, by reason.
+    pub ignored: std::collections::BTreeMap<String, u64>,
+}
+
+/// A robot that the clock waits for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Awaited {
+    /// Who.
+    pub name: RobotName,
+    /// For how long, seconds of wall clock.
+    pub since_s: f64,
+    /// What is known of it.
+    pub because: Reason,
+}
+
+/// What is known of a robot that is awaited.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// It has not joined yet.
+    NotJoined,
+    /// Its process or its link is gone.
+    Gone,
+    /// It is there and has not reported.
+    Silent,
+    /// It waits for another robot's answer.
+    WaitsFor(RobotName),
+}
+
+impl std::fmt::Display for Reason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NotJoined => f.write_str("has not joined"),
+            Self::Gone => f.write_str("is gone: its process or its link is down"),
+            Self::Silent => f.write_str("is there but has not reported"),
+            Self::WaitsFor(other) => write!(f, "waits for {other}"),
+        }
+    }
+}
+
+/// One robot of the roster.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RobotStatus {
+    /// Who.
+    pub name: RobotName,
+    /// Incarnation; 0 before the first.
+    pub generation: Generation,
+    /// Whether its process is there.
+    pub present: bool,
+}

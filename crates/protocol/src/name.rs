@@ -1,0 +1,130 @@
+//! Names of runs and robots: short, plain, safe inside a key expression and a file name.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Longest name, in bytes.
+pub const MAX_NAME_LEN: usize = 64;
+
+/// Sender of commands that come from outside the roster (a shell, a button on the console).
+pub const OPERATOR: &str = "operator";
+
+/// A name that cannot be used, and why.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{name:?} is not a usable name: {reason}")]
+pub struct BadName {
+    name: String,
+    reason: &'static str,
+}
+
+fn checked(name: &str) -> Result<String, BadName> {
+    let refuse = |reason| Err(BadName { name: name.chars().take(MAX_NAME_LEN).collect(), reason });
+    if name.is_empty() {
+        return refuse("it is empty");
+    }
+    if name.len() > MAX_NAME_LEN {
+        return refuse("it is longer than 64 characters");
+    }
+    if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-' || c == '.') || name.starts_with('.') {
+        return refuse("only letters, digits, '_', '-' and '.' may stand in it, and no leading '.'");
+    }
+    Ok(name.to_owned())
+}
+
+macro_rules! name_type {
+    ($(#[$doc:meta])* $type:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+        #[serde(try_from = "String", into = "String")]
+        #[schemars(with = "String")]
+        pub struct $type(std::sync::Arc<str>);
+
+        impl $type {
+            /// Checks a name: 1 to 64 letters, digits, `_`, `-` or `.`, not beginning with `.`.
+            ///
+            /// # Errors
+            /// [`BadName`] says what is wrong with it.
+            pub fn new(name: &str) -> Result<Self, BadName> {
+                checked(name).map(|name| Self(name.into()))
+            }
+
+            /// The name as text.
+            #[must_use]
+            pub fn as_str(&self) -> &str {
+                &self.0
+            }
+        }
+
+        impl TryFrom<String> for $type {
+            type Error = BadName;
+            fn try_from(name: String) -> Result<Self, BadName> {
+                Self::new(&name)
+            }
+        }
+
+        impl From<$type> for String {
+            fn from(name: $type) -> Self {
+                name.0.as_ref().to_owned()
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = BadName;
+            fn from_str(name: &str) -> Result<Self, BadName> {
+                Self::new(name)
+            }
+        }
+
+        impl fmt::Display for $type {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(&self.0)
+            }
+        }
+
+        impl std::borrow::Borrow<str> for $type {
+            fn borrow(&self) -> &str {
+                &self.0
+            }
+        }
+    };
+}
+
+name_type! {
+    /// Name of a robot of the roster; robots are addressed by it (seed, "Inter-Robot Communication").
+    RobotName
+}
+name_type! {
+    /// Name of a run; several runs can share a network.
+    RunName
+}
+
+impl RobotName {
+    /// The sender of commands from outside the roster; no robot may have this name.
+    #[must_use]
+    pub fn operator() -> Self {
+        Self(OPERATOR.into())
+    }
+
+    /// Whether this is the reserved sender from outside the roster.
+    #[must_use]
+    pub fn is_operator(&self) -> bool {
+        self.as_str() == OPERATOR
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_would_break_a_key_or_a_path_are_refused() {
+        for bad in ["", "a/b", "*", "a b", "..", "\u{e9}", &"x".repeat(65)] {
+            assert!(RobotName::new(bad).is_err(), "{bad:?} was accepted");
+        }
+        for good in ["Butler", "r-2_d.2", &"x".repeat(64)] {
+            assert_eq!(RobotName::new(good).unwrap().as_str(), good);
+        }
+    }
+}
