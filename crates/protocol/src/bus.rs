@@ -164,9 +164,16 @@ impl Bus {
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key expression is not legal.
-    pub fn serve(&self, keys: &str, handle: impl Fn(Question) + Send + Sync + 'static) -> Result<Declared, BusError> {
-        let declared =
-            self.session.declare_queryable(keys).callback(move |query: Query| handle(Question { query })).wait();
+    pub fn serve(
+        &self,
+        keys: &str,
+        handle: impl Fn(Question) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        let declared = self
+            .session
+            .declare_queryable(keys)
+            .callback(move |query: Query| handle(Question { query }))
+            .wait();
         Ok(Declared { _inner: Box::new(used("serve", keys, declared)?) })
     }
 
@@ -174,7 +181,12 @@ impl Bus {
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn ask(&self, key: &str, parameters: &str, body: Option<Vec<u8>>) -> Result<Option<AnswerOf>, BusError> {
+    pub fn ask(
+        &self,
+        key: &str,
+        parameters: &str,
+        body: Option<Vec<u8>>,
+    ) -> Result<Option<AnswerOf>, BusError> {
         let replies: FifoChannelHandler<Reply> = used(
             "ask",
             key,
@@ -217,7 +229,8 @@ impl Bus {
         parameters: &str,
         body: Option<Vec<u8>>,
         timeout: Duration,
-    ) -> Result<zenoh::session::SessionGetBuilder<'_, 'static, zenoh::handlers::DefaultHandler>, BusError> {
+    ) -> Result<zenoh::session::SessionGetBuilder<'_, 'static, zenoh::handlers::DefaultHandler>, BusError>
+    {
         let key_expr = used("ask", key, KeyExpr::new(key.to_owned()))?;
         Ok(self
             .session
@@ -253,7 +266,9 @@ impl Bus {
             .liveliness()
             .declare_subscriber(keys)
             .history(true)
-            .callback(move |sample: Sample| handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put))
+            .callback(move |sample: Sample| {
+                handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put)
+            })
             .wait();
         Ok(Declared { _inner: Box::new(used("watch", keys, declared)?) })
     }

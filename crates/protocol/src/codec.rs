@@ -43,8 +43,12 @@ pub fn encode<M: Message>(message: &M) -> Vec<u8> {
 /// # Errors
 /// [`Malformed`] names key, sender, field and reason.
 pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Malformed> {
-    let malformed =
-        |field: String, reason: String| Malformed { key: key.to_owned(), sender: sender.to_owned(), field, reason };
+    let malformed = |field: String, reason: String| Malformed {
+        key: key.to_owned(),
+        sender: sender.to_owned(),
+        field,
+        reason,
+    };
     if bytes.len() > MAX_MESSAGE_BYTES {
         let reason = format!("{} bytes, more than the {MAX_MESSAGE_BYTES} allowed", bytes.len());
         return Err(malformed(".".to_owned(), reason));

@@ -27,7 +27,9 @@ fn checked(name: &str) -> Result<String, BadName> {
     if name.len() > MAX_NAME_LEN {
         return refuse("it is longer than 64 characters");
     }
-    if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-' || c == '.') || name.starts_with('.') {
+    if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-' || c == '.')
+        || name.starts_with('.')
+    {
         return refuse("only letters, digits, '_', '-' and '.' may stand in it, and no leading '.'");
     }
     Ok(name.to_owned())

@@ -9,7 +9,8 @@ use std::os::unix::process::CommandExt;
 pub const RUNTIME_VARIABLE: &str = "ZENOH_RUNTIME";
 
 /// All duties handed over to one runtime with one worker.
-pub const ONE_THREAD: &str = "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))";
+pub const ONE_THREAD: &str =
+    "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))";
 
 /// Makes this process use the lock-step thread set-up unless the environment already chooses one.
 ///

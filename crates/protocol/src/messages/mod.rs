@@ -11,8 +11,8 @@ pub use control::{Awaited, Control, ControlAnswer, Phase, Reason, RobotStatus, S
 pub use observe::{Face, LogKind, LogRecord, MAX_WIDGETS, Panel, RobotFrame, Tone, Widget, WorldFrame};
 pub use state::{Answer, PublicState, StateVariables, Variable};
 pub use step::{
-    Clock, Command, CommandId, Correction, End, JoinAnswer, JoinRequest, News, Percept, Refusal, Report, SensedBody,
-    SensedKind, SensedRobot, SentCommand, Waiting, Welcome,
+    Clock, Command, CommandId, Correction, End, JoinAnswer, JoinRequest, News, Percept, Refusal, Report,
+    SensedBody, SensedKind, SensedRobot, SentCommand, Waiting, Welcome,
 };
 
 use schemars::JsonSchema;

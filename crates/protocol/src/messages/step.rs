@@ -6,9 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::state::check_variables;
-use super::{
-    Epoch, Generation, Parameters, Point, Seq, StateVariables, Tick, few, finite, is_false, short,
-};
+use super::{Epoch, Generation, Parameters, Point, Seq, StateVariables, Tick, few, finite, is_false, short};
 use crate::codec::Message;
 use crate::name::{RobotName, RunName};
 

@@ -1,0 +1,65 @@
+//! The `main` of a robot's program: the same arguments, the same log, the same exit status for all.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Parser;
+use protocol::bus::DEFAULT_ENDPOINT;
+use protocol::{RobotName, RunName};
+
+use crate::cri::Robot;
+use crate::host::{Host, HostError, HostOptions};
+
+/// What every robot's program understands.
+#[derive(Debug, Clone, Parser)]
+#[command(version, about = "A robot of the Cooperative Affective Robot Simulator")]
+pub struct RobotArgs {
+    /// Which robot of the roster this is; several names run several robots in this process.
+    #[arg(long = "name", value_name = "NAME")]
+    pub names: Vec<RobotName>,
+    /// The run to take part in.
+    #[arg(long, env = "CARS_RUN", default_value = "default")]
+    pub run: RunName,
+    /// Where its simulator listens.
+    #[arg(long, env = "CARS_CONNECT", default_value = DEFAULT_ENDPOINT, value_name = "ENDPOINT")]
+    pub connect: String,
+    /// How long to try to reach the simulator and to be let in, and to wait for it when it is gone, seconds.
+    #[arg(long, env = "CARS_PATIENCE_S", default_value_t = 20.0, value_name = "SECONDS")]
+    pub patience_s: f64,
+    /// A configuration file of the middleware instead of the built-in settings.
+    #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
+    pub zenoh_config: Option<PathBuf>,
+}
+
+impl RobotArgs {
+    fn options(&self) -> HostOptions {
+        let patience = Duration::try_from_secs_f64(self.patience_s).unwrap_or(Duration::from_secs(20));
+        let (run, connect) = (self.run.clone(), self.connect.clone());
+        HostOptions { run, connect, patience, zenoh_config: self.zenoh_config.clone() }
+    }
+}
+
+/// Runs a robot's program: `make` builds the robot for a name, `default_name` is used where the command line gives
+/// none. Returns when the run ends; the exit status is 0 if it ended as it should.
+pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> ExitCode {
+    protocol::runtime::use_one_thread();
+    let mut args = RobotArgs::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    if args.names.is_empty() {
+        args.names.extend(RobotName::new(default_name));
+    }
+    match take_part(&args, make) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn take_part(args: &RobotArgs, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> Result<(), HostError> {
+    let robots = args.names.iter().map(|name| (name.clone(), make(name))).collect();
+    Host::connect(robots, args.options())?.run().map(|_end| ())
+}
