@@ -1,0 +1,109 @@
+//! Halls to test with, and what is always true of a world.
+
+use proptest::prelude::*;
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use world::{Field, Guests, Hall, HallError, Point, Triangular, World};
+
+pub(crate) const FT: f64 = 0.3048;
+
+pub(crate) type TestWorld = World<Xoshiro256PlusPlus>;
+
+pub(crate) fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+pub(crate) fn triangular(min: f64, mode: f64, max: f64) -> Triangular {
+    Triangular::new(min, mode, max).unwrap()
+}
+
+/// The seed's hall: 50 ft by 50 ft, bodies of 2 ft, `count` guests, nothing else.
+pub(crate) fn reception(count: usize) -> Hall {
+    Hall {
+        field: Field { size_m: (50.0 * FT, 50.0 * FT), body_m: 2.0 * FT },
+        obstacles: Vec::new(),
+        guests: Guests { count, speed_mps: triangular(0.2, 0.6, 1.2), duration_s: triangular(1.0, 3.0, 8.0) },
+        robots: Vec::new(),
+        tick_s: 0.1,
+        max_speed_mps: 2.0 * FT,
+    }
+}
+
+/// The places of all bodies that must not overlap one another: robots, then guests.
+pub(crate) fn movers(world: &TestWorld) -> Vec<Point> {
+    world.robots().iter().chain(world.guests()).copied().collect()
+}
+
+/// Whether squares with these centers overlap, in the tests' own words; a nanometre counts as touching.
+pub(crate) fn overlap(body_m: f64, a: Point, b: Point) -> bool {
+    (a.x - b.x).abs().max((a.y - b.y).abs()) < body_m - 1e-9
+}
+
+pub(crate) fn is_inside(field: &Field, at: Point) -> bool {
+    let half_m = field.body_m / 2.0;
+    let (left, right) = (at.x - half_m, at.x + half_m);
+    let (bottom, top) = (at.y - half_m, at.y + half_m);
+    // Twice the tolerance leaves room for the rounding of this very test.
+    left >= -2e-9 && bottom >= -2e-9 && right <= field.size_m.0 + 2e-9 && top <= field.size_m.1 + 2e-9
+}
+
+/// The two promises of the crate: no body leaves the field, no two overlap (obstacles may among themselves).
+pub(crate) fn check_promises(world: &TestWorld) {
+    let (field, movers) = (world.field(), movers(world));
+    for (index, &at) in movers.iter().enumerate() {
+        assert!(is_inside(field, at), "body {index} at {at} left the field");
+        let others = movers[..index].iter().chain(world.obstacles());
+        let hit = others.copied().find(|&other| overlap(field.body_m, at, other));
+        assert_eq!(hit, None, "body {index} at {at} overlaps another");
+    }
+}
+
+/// Builds a world with the given share of the guests that fit; `hall.guests.count` is set accordingly.
+pub(crate) fn crowded(hall: &mut Hall, share: f64, seed: u64) -> TestWorld {
+    hall.guests.count = 1_000_000;
+    let Err(HallError::NoRoom { room, .. }) = World::new(hall, rng(seed)) else {
+        panic!("a million guests fit");
+    };
+    hall.guests.count = (share * room as f64).round() as usize;
+    World::new(hall, rng(seed)).unwrap()
+}
+
+prop_compose! {
+    /// A hall of 3 to 14 bodies a side, with obstacles and robots anywhere, and guests of any pace.
+    pub(crate) fn any_hall()(
+        body_m in 0.1..2.0,
+        sides in (3.0..14.0, 3.0..14.0),
+        is_whole in any::<bool>(),
+        obstacles in prop::collection::vec((0.0..=1.0, 0.0..=1.0), 0..8),
+        robots in prop::collection::vec((0.0..=1.0, 0.0..=1.0), 0..6),
+        bodies_a_tick in 0.0..1.5,
+        tick_s in 0.01..1.0,
+    ) -> Hall {
+        let round = |side: f64| if is_whole { side.round() } else { side };
+        let size_m = (round(sides.0) * body_m, round(sides.1) * body_m);
+        let field = Field { size_m, body_m };
+        let place = |(x, y): (f64, f64)| {
+            Point::new(body_m / 2.0 + x * (size_m.0 - body_m), body_m / 2.0 + y * (size_m.1 - body_m))
+        };
+        let obstacles: Vec<Point> = obstacles.into_iter().map(place).collect();
+        let mut apart: Vec<Point> = Vec::new();
+        for robot in robots.into_iter().map(place) {
+            if !obstacles.iter().chain(&apart).any(|&other| overlap(body_m, robot, other)) {
+                apart.push(robot);
+            }
+        }
+        let fastest = bodies_a_tick * body_m / tick_s;
+        Hall {
+            field,
+            obstacles,
+            guests: Guests {
+                count: 0,
+                speed_mps: triangular(0.0, fastest / 2.0, fastest),
+                duration_s: triangular(0.0, 3.0 * tick_s, 30.0 * tick_s),
+            },
+            robots: apart,
+            tick_s,
+            max_speed_mps: fastest,
+        }
+    }
+}
