@@ -1,1 +1,156 @@
-//! Placeholder.
+//! Affective Knowledge Representation (AKR): what a robot needs to have emotions, without the robot.
+//!
+//! Emotion-based control is easy to tell and hard to repeat: what is felt, from which measures, with which
+//! thresholds, and what it does to behavior usually lies scattered in a robot's code. This crate holds these
+//! parts separately, each usable alone, all of them pure: no clock, no randomness, no input or output, and
+//! no knowledge of any simulator or robot. The same inputs give the same feelings on every machine.
+//!
+//! | To | use |
+//! | --- | --- |
+//! | name a personality, a mood, an emotion, and be told what is illegal | [`akr`] |
+//! | look up an emotion's components, and let a robot account for it in words | [`Schemata`] |
+//! | measure progress | [`progress`] |
+//! | let a feeling rise and fall with progress, events and beliefs | [`Dynamics`], [`Ladder`] |
+//! | generate emotion from progress (ESG) | [`EmotionGenerator`] and the types that implement it |
+//! | generate behavior from progress and emotion (BSG) | [`behavior`] |
+//! | let emotion act on motor output, on the set of behaviors, on deliberation | [`levels`] |
+//!
+//! # Sources
+//!
+//! Much of the original work was not readable, so each item says where it comes from: **\[D: code\]** is
+//! documented, **\[I\]** is inferred or chosen here. Every chosen number is a parameter.
+//!
+//! | Code | Source |
+//! | --- | --- |
+//! | S | Lisetti, Glinos, Murphy, Tardif: AKR for Cooperative Affective Robots, AAAI FS-02-03, 2002 |
+//! | T | Murphy, Lisetti, Tardif, Irish, Gage: IEEE Trans. Robotics and Automation 18(5), 2002 (abstract) |
+//! | F2 | Lisetti, Nasoz: FLAIRS 2002 (part of the taxonomy figure) |
+//! | D1, D2 | Lisetti, Gmytrasiewicz: AAAI FS-00-04 and SS-00-02 (first pages) |
+//! | N | Guzzi et al.: artificial emotions for multi-robot systems, GECCO 2018 (code) |
+//! | W | W3C: vocabularies for EmotionML |
+//!
+//! # A robot with emotions of its own
+//!
+//! A guide that waits for visitors and becomes bored. It brings its own set of emotions, a schema for one of
+//! them, and composes the rest.
+//!
+//! ```
+//! use affect::akr::Valence;
+//! use affect::behavior::{BehaviorGenerator, Row, Then::{Go, Stay}};
+//! use affect::{Caution, Circumstances, Dynamics, DynamicGenerator, DynamicsParameters};
+//! use affect::{EmotionGenerator, EmotionLabel, Feeling, Ladder, ProgressEvent, Rung, Schemata, Stimulus};
+//!
+//! #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+//! enum Mind { Content, Restless, Bored }
+//!
+//! impl EmotionLabel for Mind {
+//!     fn name(self) -> &'static str {
+//!         match self {
+//!             Mind::Content => "CONTENT",
+//!             Mind::Restless => "RESTLESS",
+//!             Mind::Bored => "BORED",
+//!         }
+//!     }
+//!     fn valence(self) -> Valence {
+//!         if self == Mind::Content { Valence::Positive } else { Valence::Negative }
+//!     }
+//! }
+//!
+//! #[derive(Debug, Clone, Copy, PartialEq)]
+//! enum Task { Wait, Stroll }
+//! #[derive(Debug, Clone, Copy, PartialEq)]
+//! enum Act { Sigh, Greet }
+//!
+//! /// Progress measure: time without visitors, against the time that is bearable.
+//! struct Measures { alone_s: f64, bearable_s: f64, visitor_came: bool }
+//! struct Context { feeling: Feeling<Mind>, visitor_came: bool, has_sighed: bool }
+//!
+//! const ANY: &[Task] = &[Task::Wait, Task::Stroll];
+//! const TABLE: &[Row<Task, Context, Act>] = &[
+//!     Row { from: ANY, when: |c| c.visitor_came, act: &[Act::Greet], then: Go(Task::Wait) },
+//!     Row { from: &[Task::Wait], when: feels_restless, act: &[Act::Sigh], then: Stay },
+//!     Row { from: &[Task::Wait], when: feels_bored, act: &[], then: Go(Task::Stroll) },
+//! ];
+//! fn feels_restless(c: &Context) -> bool {
+//!     c.feeling.emotion == Mind::Restless && !c.has_sighed
+//! }
+//! fn feels_bored(c: &Context) -> bool {
+//!     c.feeling.emotion == Mind::Bored
+//! }
+//!
+//! const SCHEMA: &str = r#"
+//!     [BORED]
+//!     facial_expression = "sad"
+//!     valence = "negative"
+//!     agency = "other"
+//!     focality = "event"
+//!     novelty = "match"
+//!     controllability = "low"
+//!     modifiability = "medium"
+//!     certainty = "certain"
+//!     external_norms = "compatible"
+//!     internal_standards = "incompatible"
+//!     action_tendency = "change-current-strategy"
+//!     goal = "blocked"
+//!     causal_chain = [
+//!         { kind = "goal", text = "I want {g}" },
+//!         { kind = "event", text = "{a} did not come" },
+//!         { kind = "feeling", text = "because of this I want to be somewhere else" },
+//!     ]
+//! "#;
+//!
+//! fn appraise(measures: &Measures, task: &Task) -> Stimulus {
+//!     let need = if *task == Task::Wait { measures.alone_s / measures.bearable_s } else { 0.0 };
+//!     Stimulus::need(need).with_event(measures.visitor_came.then_some(ProgressEvent::GoalAchieved))
+//! }
+//!
+//! let rungs = vec![
+//!     Rung::new(Mind::Content, 0.0),
+//!     Rung::new(Mind::Restless, 0.3),
+//!     Rung::new(Mind::Bored, 0.7),
+//! ];
+//! let dynamics = Dynamics::new(Ladder::new(rungs)?, &DynamicsParameters::default(), Caution::default())?;
+//! let mut esg = DynamicGenerator::new(dynamics, appraise);
+//! let mut bsg = BehaviorGenerator::new(TABLE, Task::Wait);
+//! let (mut acts, mut measures) = (vec![], Measures { alone_s: 0.0, bearable_s: 10.0, visitor_came: false });
+//! while *bsg.current() == Task::Wait {
+//!     // One tick: state variables, then emotion, then behavior.
+//!     measures.alone_s += 0.5;
+//!     bsg.advance(0.5);
+//!     let feeling = esg.update(&measures, bsg.current(), 0.5);
+//!     let has_sighed = acts.contains(&Act::Sigh);
+//!     let context = Context { feeling, visitor_came: measures.visitor_came, has_sighed };
+//!     acts.extend(bsg.update(&context).actions);
+//! }
+//! assert_eq!((esg.feeling().emotion, &acts[..]), (Mind::Bored, &[Act::Sigh][..]));
+//!
+//! let circumstances =
+//!     Circumstances { other: Some("the group"), goal: Some("to show the exhibits"), ..Default::default() };
+//! let name = esg.feeling().emotion.name();
+//! let bored = Schemata::from_toml(SCHEMA)?.emotion(name, esg.feeling().intensity, &circumstances)?;
+//! assert_eq!(
+//!     bored.components().causal_chain.spoken(),
+//!     "I want to show the exhibits; the group did not come; because of this I want to be somewhere else."
+//! );
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod akr;
+pub mod behavior;
+mod dynamics;
+mod generator;
+mod label;
+mod ladder;
+pub mod levels;
+mod parameters;
+pub mod progress;
+mod scalar;
+mod schema;
+
+pub use dynamics::{Belief, Drive, Dynamics, EmotionState, ProgressEvent, Stimulus, Trend};
+pub use generator::{DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator, SteadyGenerator};
+pub use label::{EmotionLabel, Feeling, StandardEmotion};
+pub use ladder::{BeliefEmotions, Ladder, Rung};
+pub use parameters::{DynamicsParameters, ParameterError, StateSet};
+pub use scalar::{Caution, Intensity, IntensityLabel, OutOfRange};
+pub use schema::{AgencyRole, Circumstances, Schema, SchemaError, SchemaValence, Schemata};

@@ -1,0 +1,80 @@
+//! Mood: affect without an object.
+
+use super::Refusal;
+use super::affect::{Affect, Duration, Focality, Valence};
+use super::appraisal::Agency;
+use crate::scalar::Intensity;
+use serde::{Deserialize, Serialize};
+
+/// An affective state that lasts days, is about nothing in particular, and for which nobody is responsible
+/// [D: S].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "RawMood", into = "RawMood")]
+pub struct Mood {
+    affect: Affect,
+}
+
+impl Mood {
+    /// A mood is an affect and no more.
+    pub fn new(affect: Affect) -> Self {
+        Self { affect }
+    }
+
+    /// Valence and intensity.
+    pub fn affect(&self) -> Affect {
+        self.affect
+    }
+
+    /// Days.
+    pub fn duration(&self) -> Duration {
+        Duration::Days
+    }
+
+    /// Global.
+    pub fn focality(&self) -> Focality {
+        Focality::Global
+    }
+}
+
+/// What a file may say of a mood. Attributes that a mood has not are understood, so that the refusal can say
+/// what is wrong with them.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMood {
+    valence: Valence,
+    intensity: Intensity,
+    duration: Option<Duration>,
+    focality: Option<Focality>,
+    agency: Option<Agency>,
+}
+
+impl TryFrom<RawMood> for Mood {
+    type Error = Refusal;
+
+    fn try_from(raw: RawMood) -> Result<Self, Refusal> {
+        if raw.agency.is_some() {
+            return Err(Refusal::MoodAgency);
+        }
+        match raw.duration {
+            None | Some(Duration::Days) => {}
+            Some(other) => return Err(Refusal::MoodDuration(other)),
+        }
+        match raw.focality {
+            None | Some(Focality::Global) => {}
+            Some(_) => return Err(Refusal::MoodFocality),
+        }
+        Ok(Self::new(Affect { valence: raw.valence, intensity: raw.intensity }))
+    }
+}
+
+impl From<Mood> for RawMood {
+    fn from(mood: Mood) -> Self {
+        Self {
+            valence: mood.affect.valence,
+            intensity: mood.affect.intensity,
+            duration: Some(mood.duration()),
+            focality: Some(mood.focality()),
+            agency: None,
+        }
+    }
+}
