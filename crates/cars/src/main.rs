@@ -1,2 +1,78 @@
-//! Placeholder.
-fn main() {}
+//! `cars`: the command line of the Cooperative Affective Robot Simulator.
+
+mod bench;
+mod check;
+mod common;
+mod control;
+mod launch;
+mod run;
+mod table;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// The Cooperative Affective Robot Simulator.
+///
+/// `cars launch launch/hors_doeuvres.toml` plays the experiment of the paper as separate processes.
+#[derive(Debug, Parser)]
+#[command(name = "cars", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Start the processes of a launch file and run them to the end.
+    Launch(launch::LaunchArgs),
+    /// Run a scenario, or that of a launch file, in this process.
+    Run(run::RunArgs),
+    /// Check scenario and launch files without running anything.
+    Check(check::CheckArgs),
+    /// Control a run in progress: init, start, pause, step, stop, speed, status.
+    Ctl(control::CtlArgs),
+    /// Ask a robot of a run in progress something, for example `cars query Leguin emotion_state`.
+    Query(control::QueryArgs),
+    /// Send a robot of a run in progress a command, for example `cars command Leguin refill`.
+    Command(control::CommandArgs),
+    /// Show the log of a run; `-f` follows one in progress.
+    Log(control::LogArgs),
+    /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
+    Bench(bench::BenchArgs),
+    /// Print shell completions.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    #[command(hide = true)]
+    BenchRobot(robot::RobotArgs),
+    #[command(hide = true)]
+    BenchEcho {
+        /// Address of the raw TCP barrier.
+        address: String,
+    },
+}
+
+fn main() -> miette::Result<ExitCode> {
+    let cli = Cli::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| "warn,zenoh=error".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    match cli.command {
+        Command::Launch(args) => launch::launch(args),
+        Command::Run(args) => run::run(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Ctl(args) => control::ctl(&args),
+        Command::Query(args) => control::query(&args),
+        Command::Command(args) => control::command(&args),
+        Command::Log(args) => control::log(&args),
+        Command::Bench(args) => bench::bench(&args),
+        Command::BenchRobot(args) => bench::robot(&args),
+        Command::BenchEcho { address } => bench::echo(&address),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "cars", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}

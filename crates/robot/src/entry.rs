@@ -33,7 +33,9 @@ pub struct RobotArgs {
 }
 
 impl RobotArgs {
-    fn options(&self) -> HostOptions {
+    /// How these arguments say to reach a run.
+    #[must_use]
+    pub fn options(&self) -> HostOptions {
         let patience = Duration::try_from_secs_f64(self.patience_s).unwrap_or(Duration::from_secs(20));
         let (run, connect) = (self.run.clone(), self.connect.clone());
         HostOptions { run, connect, patience, zenoh_config: self.zenoh_config.clone() }

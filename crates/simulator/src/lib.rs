@@ -1,1 +1,23 @@
-//! Placeholder.
+//! The simulator: what a run is ([`scenario`]), one tick of it ([`Simulation::step`]), who takes part and how the
+//! clock is held for them ([`server`]), and what is kept of it ([`recorder`]).
+//!
+//! It owns the environment and the clock. It neither knows nor cares what a robot feels: there is no dependency on
+//! `affect`.
+
+pub mod diagnostic;
+pub mod digest;
+pub mod event;
+pub mod medium;
+pub mod recorder;
+pub mod roster;
+pub mod scenario;
+pub mod server;
+pub mod simulation;
+pub mod summary;
+pub mod units;
+
+pub use event::{Event, Line};
+pub use recorder::{Recorder, RunFolder};
+pub use scenario::{OnLate, Scenario};
+pub use simulation::{Barrier, Exchange, Simulation, TickRecord};
+pub use summary::Summary;

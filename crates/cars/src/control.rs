@@ -1,0 +1,269 @@
+//! A run in progress, from a shell: its buttons, the calls between robots, its log.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+use miette::{IntoDiagnostic, miette};
+use protocol::bus::{AnswerOf, Bus, Role};
+use protocol::keys::{Keys, QUERIES, STATE};
+use protocol::messages::{Control, ControlAnswer, LogRecord, Status};
+use protocol::{RobotName, RunName, decode, encode};
+use simulator::RunFolder;
+use simulator::event::log_line;
+use simulator::recorder::{ENDPOINT, LOG};
+
+use crate::common::{LATEST, Speed};
+
+/// How long to try to reach a run.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// A step may take as long as its ticks take.
+const STEP_PATIENCE: Duration = Duration::from_secs(3600);
+/// Lines of the past that `log -f` begins with.
+const TAIL: usize = 10;
+
+/// Which run is meant.
+#[derive(Debug, Args)]
+pub(crate) struct RunRef {
+    /// The run; without it the one that was started last.
+    #[arg(long, env = "CARS_RUN")]
+    run: Option<RunName>,
+    /// Where its simulator listens; without it, as its folder says.
+    #[arg(long, env = "CARS_CONNECT", value_name = "ENDPOINT")]
+    connect: Option<String>,
+    /// Where run folders are made.
+    #[arg(long, default_value = "runs", value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl RunRef {
+    fn run(&self) -> miette::Result<RunName> {
+        if let Some(run) = &self.run {
+            return Ok(run.clone());
+        }
+        let link = self.out.join(LATEST);
+        let target = std::fs::read_link(&link).map_err(|_| {
+            miette!(help = "name it with --run, or start one with `cars launch`", "no run is known in {}", self.out.display())
+        })?;
+        RunName::new(&target.to_string_lossy()).into_diagnostic()
+    }
+
+    fn folder(&self) -> miette::Result<RunFolder> {
+        Ok(RunFolder::new(&self.out, &self.run()?))
+    }
+
+    fn endpoint(&self) -> miette::Result<String> {
+        if let Some(connect) = &self.connect {
+            return Ok(connect.clone());
+        }
+        let (run, file) = (self.run()?, self.folder()?.file(ENDPOINT));
+        let text = std::fs::read_to_string(&file).map_err(|_| {
+            let help = "start one with `cars launch`, or say where its simulator listens with --connect";
+            miette!(help = help, "run {run} is not in progress: there is no {}", file.display())
+        })?;
+        Ok(text.trim().to_owned())
+    }
+
+    fn open(&self) -> miette::Result<(Bus, Keys)> {
+        let role = Role::Client { connect: self.endpoint()?, patience: PATIENCE };
+        Ok((Bus::open(&role, None).into_diagnostic()?, Keys::new(&self.run()?)))
+    }
+}
+
+/// `cars ctl`.
+#[derive(Debug, Args)]
+pub(crate) struct CtlArgs {
+    #[command(subcommand)]
+    button: Button,
+    #[command(flatten)]
+    run: RunRef,
+    /// Print the answer as JSON.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Button {
+    /// Back to tick 0, with the same processes.
+    Init {
+        /// Another seed.
+        #[arg(long)]
+        seed: Option<u64>,
+    },
+    /// Let the clock run.
+    Start,
+    /// Hold the clock.
+    Pause,
+    /// Grant ticks one by one.
+    Step {
+        /// How many.
+        #[arg(default_value_t = 1)]
+        n: u64,
+    },
+    /// End the run.
+    Stop,
+    /// Set simulated seconds per second.
+    Speed {
+        /// A number, or `max`.
+        #[arg(value_parser = |text: &str| simulator::scenario::parse_speed(text).map(Speed))]
+        factor: Speed,
+    },
+    /// Say how things stand.
+    Status,
+}
+
+impl Button {
+    fn control(&self) -> Control {
+        match self {
+            Self::Init { seed } => Control::Init { seed: *seed },
+            Self::Start => Control::Start,
+            Self::Pause => Control::Pause,
+            Self::Step { n } => Control::Step { n: *n },
+            Self::Stop => Control::Stop,
+            Self::Speed { factor } => Control::Speed { factor: factor.0 },
+            Self::Status => Control::Status,
+        }
+    }
+}
+
+/// Presses a button of a run in progress.
+pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
+    let status = request(&args.run, &args.button.control())?;
+    if args.json {
+        println!("{}", serde_json::to_string(&status).into_diagnostic()?);
+    } else {
+        print!("{}", describe(&status));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Asks the simulator for something; a refusal is an error with its reason.
+fn request(run: &RunRef, control: &Control) -> miette::Result<Status> {
+    let (bus, keys) = run.open()?;
+    let patience = if matches!(control, Control::Step { .. }) { STEP_PATIENCE } else { PATIENCE };
+    let answer = bus.ask_within(&keys.control(), "", Some(encode(control)), patience).into_diagnostic()?;
+    bus.close();
+    let bytes = bytes_of(answer, &format!("no simulator of run {} answers", run.run()?))?;
+    match decode(&keys.control(), "simulator", &bytes).into_diagnostic()? {
+        ControlAnswer::Done(status) => Ok(*status),
+        ControlAnswer::Refused { explanation } => Err(miette!("refused: {explanation}")),
+    }
+}
+
+fn bytes_of(answer: Option<AnswerOf>, nobody: &str) -> miette::Result<Vec<u8>> {
+    let answer = answer.ok_or_else(|| miette!("{nobody}"))?;
+    answer.result.map_err(|reason| miette!("refused: {reason}"))
+}
+
+fn describe(status: &Status) -> String {
+    let speed = status.speed.map_or("max".to_owned(), |speed| format!("{speed}x"));
+    let mut text = format!(
+        "{} {}  tick {}  {:.1} of {:.1} s  speed {speed}  seed {}  epoch {}\n",
+        status.run, status.phase, status.tick, status.time_s, status.duration_s, status.seed, status.epoch
+    );
+    if status.pending_steps > 0 {
+        text += &format!("{} steps are pending\n", status.pending_steps);
+    }
+    for awaited in &status.awaiting {
+        text += &format!("waiting for {} since {:.1} s: it {}\n", awaited.name, awaited.since_s, awaited.because);
+    }
+    for robot in &status.robots {
+        let presence = if robot.present { "present" } else { "absent" };
+        text += &format!("  {:<12} {presence}, incarnation {}\n", robot.name, robot.generation);
+    }
+    for (reason, count) in &status.ignored {
+        text += &format!("ignored {count} messages: {reason}\n");
+    }
+    text
+}
+
+/// `cars query`.
+#[derive(Debug, Args)]
+pub(crate) struct QueryArgs {
+    /// Whom to ask.
+    robot: RobotName,
+    /// What to ask; without it everything.
+    #[arg(value_parser = QUERIES, default_value = None)]
+    what: Option<String>,
+    #[command(flatten)]
+    run: RunRef,
+}
+
+/// Asks a robot of a run in progress what the other robots may ask it.
+pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
+    let (bus, keys) = args.run.open()?;
+    let what = args.what.as_deref().unwrap_or(STATE);
+    let answer = bus.ask(&keys.query(&args.robot, what), "", None).into_diagnostic()?;
+    bus.close();
+    let bytes = bytes_of(answer, &format!("no robot called {} answers in run {}", args.robot, args.run.run()?))?;
+    let answer: serde_json::Value = serde_json::from_slice(&bytes).into_diagnostic()?;
+    // The value is what was asked for; the tick around it is for programs.
+    let value = answer.get("value").unwrap_or(&answer);
+    match value.as_str() {
+        Some(text) => println!("{text}"),
+        None => println!("{}", serde_json::to_string_pretty(value).into_diagnostic()?),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `cars command`.
+#[derive(Debug, Args)]
+pub(crate) struct CommandArgs {
+    /// Whom to send it to.
+    robot: RobotName,
+    /// What it says, for example `refill`.
+    command: String,
+    #[command(flatten)]
+    run: RunRef,
+}
+
+/// Sends a command from outside the roster; it takes effect at the next tick boundary and is part of the record.
+pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
+    let control = Control::Command { to: args.robot.clone(), command: args.command.clone() };
+    let status = request(&args.run, &control)?;
+    println!("{} receives {:?} at the tick after {}", args.robot, args.command, status.tick);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `cars log`.
+#[derive(Debug, Args)]
+pub(crate) struct LogArgs {
+    /// Follow a run in progress until it ends.
+    #[arg(short, long)]
+    follow: bool,
+    #[command(flatten)]
+    run: RunRef,
+}
+
+/// Shows the log of a run.
+pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
+    let file = args.run.folder()?.file(LOG);
+    let past = std::fs::read_to_string(&file).map_err(|error| miette!("cannot read {}: {error}", file.display()));
+    if !args.follow {
+        print!("{}", past?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (bus, keys) = args.run.open()?;
+    let (lines, received) = std::sync::mpsc::sync_channel(1024);
+    let gone = lines.clone();
+    let subscribed = bus.subscribe(&keys.log(), move |key, bytes| {
+        // A reader that is too slow misses lines rather than hold the run; the file has them all.
+        if let Ok(line) = decode::<LogRecord>(key, "simulator", bytes) {
+            let _ = lines.try_send(Some(line));
+        }
+    });
+    let watched = bus.watch(&keys.alive_sim(), move |_, is_there| {
+        if !is_there {
+            let _ = gone.send(None);
+        }
+    });
+    let _declared = (subscribed.into_diagnostic()?, watched.into_diagnostic()?);
+    let past = past.unwrap_or_default();
+    let all: Vec<&str> = past.lines().collect();
+    all.iter().skip(all.len().saturating_sub(TAIL)).for_each(|line| println!("{line}"));
+    while let Ok(Some(line)) = received.recv() {
+        println!("{}", log_line(&line));
+    }
+    Ok(ExitCode::SUCCESS)
+}

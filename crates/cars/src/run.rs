@@ -1,0 +1,106 @@
+//! `cars run`: the same simulation and the same robots as a launch, in one process and without a network.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use miette::{IntoDiagnostic, miette};
+use protocol::RunName;
+use protocol::messages::{Clock, End};
+use robot::{BadParameters, LocalHost, Robot, Welcome};
+use simulator::{Barrier, Exchange, Recorder, RunFolder, Scenario, Simulation, Summary};
+
+use crate::common::ExecutionArgs;
+use crate::launch;
+use crate::table;
+
+/// `cars run`.
+#[derive(Debug, Args)]
+pub(crate) struct RunArgs {
+    /// A scenario file, or a launch file whose scenario is meant.
+    file: PathBuf,
+    #[command(flatten)]
+    execution: ExecutionArgs,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Runs a scenario in this process.
+pub(crate) fn run(args: &RunArgs) -> miette::Result<ExitCode> {
+    let file = launch::scenario_file(&args.file)?;
+    let scenario = Scenario::load(&file, &args.execution.changes())?;
+    let run = args.execution.run_name(&args.file)?;
+    let folder = args.execution.folder(&run, &scenario)?;
+    let speed = args.execution.speed.and_then(|speed| speed.0);
+    let summary = execute(scenario, &run, &folder, speed)?;
+    if !args.quiet {
+        table::print(&summary, folder.path());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// All robots here, behind the simulator's barrier.
+struct InProcess(LocalHost);
+
+impl Barrier for InProcess {
+    type Interrupt = BadParameters;
+
+    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, BadParameters> {
+        let reports = self.0.exchange(&clock, &mut |name| simulation.percept(name))?;
+        Ok(Exchange { reports, membership: Vec::new() })
+    }
+}
+
+/// Runs a scenario to its end and records it.
+pub(crate) fn execute(
+    scenario: Scenario,
+    run: &RunName,
+    folder: &RunFolder,
+    speed: Option<f64>,
+) -> miette::Result<Summary> {
+    let robots = make_robots(&scenario, Path::new("the scenario"))?;
+    let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
+    let mut recorder = Recorder::begin(folder, run, &simulation)?;
+    let seated = robots.into_iter().filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
+    let mut barrier = InProcess(LocalHost::new(seated.collect()));
+    let begun = Instant::now();
+    let record = simulation.init(&mut barrier).into_diagnostic()?;
+    recorder.write(&simulation, &record)?;
+    while simulation.tick() < simulation.scenario().ticks {
+        if let Some(speed) = speed {
+            let due = Duration::try_from_secs_f64(simulation.time_s(simulation.tick()) / speed);
+            std::thread::sleep(due.unwrap_or(Duration::MAX).saturating_sub(begun.elapsed()));
+        }
+        let record = simulation.step(&mut barrier).into_diagnostic()?;
+        recorder.write(&simulation, &record)?;
+    }
+    recorder.write(&simulation, &simulation.end(End::Finished))?;
+    Ok(recorder.finish(&simulation)?)
+}
+
+fn welcome(simulation: &Simulation, run: &RunName, name: &protocol::RobotName) -> Option<Welcome> {
+    simulation.welcome(run, name, 1)
+}
+
+/// One robot of the right class for each name of the roster.
+pub(crate) fn make_robots(
+    scenario: &Scenario,
+    file: &Path,
+) -> miette::Result<BTreeMap<protocol::RobotName, Box<dyn Robot>>> {
+    let make = |(name, spec): (&protocol::RobotName, &simulator::scenario::RobotSpec)| {
+        let robot = robots::make(&spec.class).ok_or_else(|| {
+            miette!(
+                help = "a robot of another kind runs as a process of its own: name it in a launch file and use `cars launch`",
+                "{}: robot {name} is of class {:?}, and only {} can run in this process",
+                file.display(),
+                spec.class,
+                robots::CLASSES.join(", ")
+            )
+        })?;
+        Ok((name.clone(), robot))
+    };
+    scenario.robots.iter().map(make).collect()
+}

@@ -1,0 +1,96 @@
+//! `cars-sim`: the simulator process of one run.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use miette::IntoDiagnostic;
+use protocol::RunName;
+use protocol::bus::{Bus, DEFAULT_ENDPOINT, Role};
+use protocol::messages::End;
+use simulator::recorder::ENDPOINT;
+use simulator::scenario::{Changes, Override, Scenario};
+use simulator::server::{Event, Options, Server};
+use simulator::units::Time;
+use simulator::{RunFolder, Summary};
+
+/// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Args {
+    /// The scenario file.
+    scenario: PathBuf,
+    /// Name of the run; its robots must name it, too.
+    #[arg(long, env = "CARS_RUN", default_value = "default")]
+    run: RunName,
+    /// Where to listen. Everything but loopback opens the run to the network.
+    #[arg(long, env = "CARS_LISTEN", default_value = DEFAULT_ENDPOINT, value_name = "ENDPOINT")]
+    listen: String,
+    /// Where run folders are made.
+    #[arg(long, default_value = "runs", value_name = "DIR")]
+    out: PathBuf,
+    /// Seed, instead of the scenario's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Simulated time, instead of the scenario's, for example "600 s".
+    #[arg(long)]
+    duration: Option<Time>,
+    /// Simulated seconds per second, or `max`.
+    #[arg(long, default_value = "max", value_parser = speed)]
+    speed: Speed,
+    /// Changes of the scenario, for example `guests.count=50`.
+    #[arg(long, value_name = "PATH=VALUE")]
+    set: Vec<Override>,
+    /// Wait for `start` once everybody is there.
+    #[arg(long)]
+    paused: bool,
+    /// After this many ticks in a row without a report a robot is lost, where the clock goes on without it.
+    #[arg(long, default_value_t = 10)]
+    lose_after: u32,
+    /// A configuration file of the middleware instead of the built-in settings.
+    #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
+    zenoh_config: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Speed(Option<f64>);
+
+fn speed(text: &str) -> Result<Speed, String> {
+    simulator::scenario::parse_speed(text).map(Speed)
+}
+
+fn main() -> miette::Result<ExitCode> {
+    protocol::runtime::use_one_thread();
+    let args = Args::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| "warn,zenoh=error".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    let summary = run(&args)?;
+    Ok(if summary.end == Some(End::Aborted) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn run(args: &Args) -> miette::Result<Summary> {
+    let duration_s = args.duration.map(|duration| duration.0);
+    let scenario =
+        Scenario::load(&args.scenario, &Changes { seed: args.seed, duration_s, set: args.set.clone() })?;
+    let folder = RunFolder::new(&args.out, &args.run);
+    folder.create(&scenario)?;
+    let role = Role::Router { listen: args.listen.clone() };
+    let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
+    let options = Options {
+        run: args.run.clone(),
+        speed: args.speed.0,
+        is_paused: args.paused,
+        lose_after: args.lose_after,
+    };
+    let server = Server::open(bus, &scenario, options).into_diagnostic()?;
+    let queue = server.queue();
+    // The queue is closed only when the run is over, and then there is nothing left to end.
+    ctrlc::set_handler(move || drop(queue.send(Event::Terminate))).into_diagnostic()?;
+    std::fs::write(folder.file(ENDPOINT), format!("{}\n", args.listen)).into_diagnostic()?;
+    let outcome = server.run(scenario, &folder).into_diagnostic();
+    if let Err(error) = std::fs::remove_file(folder.file(ENDPOINT)) {
+        tracing::debug!(%error, "the endpoint file is gone already");
+    }
+    outcome
+}

@@ -1,0 +1,88 @@
+//! Errors in files that people write: file, line, caret, and what to do.
+
+use std::ops::Range;
+use std::path::Path;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+
+/// A file that cannot be used, and where in it the reason stands.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub struct FileError {
+    message: String,
+    help: Option<String>,
+    source_code: Option<NamedSource<String>>,
+    label: Option<LabeledSpan>,
+}
+
+impl Diagnostic for FileError {
+    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
+    }
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.source_code.as_ref().map(|source| source as &dyn SourceCode)
+    }
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        self.label.clone().map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)
+    }
+}
+
+impl FileError {
+    /// An error that has no place in a text.
+    #[must_use]
+    pub fn new(message: impl Into<String>) -> Self {
+        Self { message: message.into(), help: None, source_code: None, label: None }
+    }
+
+    /// A file that cannot be read.
+    #[must_use]
+    pub fn unreadable(path: &Path, error: &std::io::Error) -> Self {
+        Self::new(format!("cannot read {}: {error}", path.display()))
+    }
+
+    /// An error at a place of a text.
+    #[must_use]
+    pub fn at(source: &Source, span: Option<Range<usize>>, message: &str) -> Self {
+        Self {
+            message: format!("{} cannot be used", source.name),
+            help: None,
+            source_code: Some(NamedSource::new(&source.name, source.text.clone()).with_language("toml")),
+            label: Some(LabeledSpan::at(span.unwrap_or(0..0), message)),
+        }
+    }
+
+    /// What to do about it.
+    #[must_use]
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+/// A text with the name under which people know it.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Usually a path.
+    pub name: String,
+    /// What it says.
+    pub text: String,
+}
+
+impl Source {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = std::fs::read_to_string(path).map_err(|error| FileError::unreadable(path, &error))?;
+        Ok(Self { name: path.display().to_string(), text })
+    }
+
+    /// Reads a TOML text into a type that refuses unknown keys.
+    ///
+    /// # Errors
+    /// [`FileError`] with line and caret.
+    pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, FileError> {
+        toml::from_str(&self.text).map_err(|error| FileError::at(self, error.span(), error.message()))
+    }
+}

@@ -1,0 +1,101 @@
+//! Digests: two runs are the same if and only if their digests are. Taken over typed values in one fixed order, not
+//! over the text that a robot happened to send.
+
+use protocol::messages::{Point, Report, StateVariables, Variable};
+use protocol::{RobotName, Tick};
+use xxhash_rust::xxh3::Xxh3;
+
+/// A chain of digests, one a tick; each covers everything before it.
+#[derive(Clone, Default)]
+pub struct Digest {
+    last: u128,
+}
+
+impl std::fmt::Display for Digest {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:032x}", self.last)
+    }
+}
+
+/// Collects the values of one tick.
+pub struct TickDigest {
+    hash: Xxh3,
+}
+
+impl Digest {
+    /// Begins a tick.
+    #[must_use]
+    pub fn tick(&self, tick: Tick) -> TickDigest {
+        let mut next = TickDigest { hash: Xxh3::new() };
+        next.hash.update(&self.last.to_le_bytes());
+        next.integer(tick);
+        next
+    }
+
+    /// Ends a tick.
+    pub fn close(&mut self, tick: &TickDigest) {
+        self.last = tick.hash.digest128();
+    }
+}
+
+impl TickDigest {
+    fn integer(&mut self, value: u64) {
+        self.hash.update(&value.to_le_bytes());
+    }
+
+    fn number(&mut self, value: f64) {
+        // Minus zero and zero are the same place.
+        let value = if value == 0.0 { 0.0 } else { value };
+        self.integer(value.to_bits());
+    }
+
+    fn text(&mut self, text: &str) {
+        // The length keeps neighbors apart.
+        self.integer(text.len() as u64);
+        self.hash.update(text.as_bytes());
+    }
+
+    /// Where a body is.
+    pub fn place(&mut self, x_m: f64, y_m: f64) {
+        self.number(x_m);
+        self.number(y_m);
+    }
+
+    fn point(&mut self, point: Point) {
+        self.place(point.x, point.y);
+    }
+
+    fn variables(&mut self, variables: &StateVariables) {
+        self.integer(variables.len() as u64);
+        for (name, value) in variables {
+            self.text(name);
+            match value {
+                Variable::Flag(flag) => self.integer(u64::from(*flag)),
+                Variable::Number(number) => self.number(*number),
+                Variable::Text(text) => self.text(text),
+            }
+        }
+    }
+
+    /// What a robot reported; nothing for one that did not.
+    pub fn report(&mut self, robot: &RobotName, report: Option<&Report>) {
+        self.text(robot.as_str());
+        let Some(report) = report else { return };
+        self.point(report.proposal);
+        self.number(report.speed_mps);
+        self.number(report.direction_rad);
+        self.text(&report.emotion_state);
+        self.text(&report.behavior_state);
+        self.variables(&report.state_variables);
+        for sent in &report.sent {
+            self.text(sent.to.as_str());
+            self.integer(sent.seq);
+            self.text(&sent.command);
+        }
+        for missing in &report.missing {
+            self.text(missing.from.as_str());
+            self.integer(missing.seq);
+        }
+        report.log.iter().for_each(|line| self.text(line));
+    }
+}

@@ -1,0 +1,205 @@
+//! What happened in a run: simulated facts only, no wall clock, no process ids. The same seed gives the same events,
+//! byte for byte.
+
+use protocol::messages::{End, LogKind, LogRecord, Point};
+use protocol::{Generation, RobotName, Seq, Tick};
+use serde::{Deserialize, Serialize};
+
+/// One line of `events.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// When.
+    pub tick: Tick,
+    /// What.
+    #[serde(flatten)]
+    pub event: Event,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Event {
+    /// The run begins.
+    Init {
+        /// Its seed.
+        seed: u64,
+        /// Version of the simulator.
+        version: String,
+        /// Version of the contract with the robots.
+        protocol: u32,
+        /// Length of a tick, simulated seconds.
+        tick_s: f64,
+    },
+    /// A robot takes part from this tick on.
+    Joined {
+        /// Who.
+        robot: RobotName,
+        /// Its incarnation; not said of those who were there from the beginning.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        generation: Option<Generation>,
+        /// Where it stands.
+        at: Point,
+    },
+    /// A robot takes part no more; its body stays.
+    Lost {
+        /// Who.
+        robot: RobotName,
+    },
+    /// A robot did not report this tick, and the clock went on without it; its body stays where it is.
+    Missed {
+        /// Who.
+        robot: RobotName,
+    },
+    /// A robot's move was refused; it stays where it is.
+    Blocked {
+        /// Who.
+        robot: RobotName,
+        /// By what: `edge`, `obstacle`, `guest`, `too_fast` or a robot's name.
+        by: String,
+        /// Where it stays.
+        at: Point,
+    },
+    /// A robot's emotion changed.
+    Emotion {
+        /// Who.
+        robot: RobotName,
+        /// Emotion before; none at the beginning.
+        from: Option<String>,
+        /// Emotion now.
+        to: String,
+    },
+    /// A robot's behavior changed.
+    Behavior {
+        /// Who.
+        robot: RobotName,
+        /// Behavior before; none at the beginning.
+        from: Option<String>,
+        /// Behavior now.
+        to: String,
+    },
+    /// A command was sent.
+    CommandSent {
+        /// By whom.
+        from: RobotName,
+        /// To whom.
+        to: RobotName,
+        /// Its number among the sender's.
+        seq: Seq,
+        /// What it says.
+        command: String,
+    },
+    /// A command arrives now.
+    CommandDelivered {
+        /// By whom.
+        from: RobotName,
+        /// To whom.
+        to: RobotName,
+        /// Its number among the sender's.
+        seq: Seq,
+    },
+    /// The medium lost a command.
+    CommandDropped {
+        /// By whom.
+        from: RobotName,
+        /// To whom.
+        to: RobotName,
+        /// Its number among the sender's.
+        seq: Seq,
+    },
+    /// A command should have arrived and was really lost on the wire.
+    CommandMissing {
+        /// By whom.
+        from: RobotName,
+        /// To whom.
+        to: RobotName,
+        /// Its number among the sender's.
+        seq: Seq,
+    },
+    /// A robot wrote a line to the log.
+    Say {
+        /// Who.
+        robot: RobotName,
+        /// The line.
+        text: String,
+    },
+    /// The tick is complete.
+    Tick {
+        /// Digest over everything up to and including this tick: bodies and reports.
+        digest: String,
+    },
+    /// The run is over.
+    End {
+        /// How.
+        reason: End,
+        /// Digest of the run: that of its last complete tick.
+        digest: String,
+    },
+}
+
+impl Line {
+    /// The line of `events.jsonl`, without its end of line.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).unwrap_or_else(|error| unreachable!("an event is always JSON: {error}"))
+    }
+}
+
+impl Event {
+    /// The event as a line of the readable log, with its source and kind; `None` for what only machines read.
+    #[must_use]
+    pub fn readable(&self) -> Option<(String, LogKind, String)> {
+        let simulator = |kind, text: String| Some(("simulator".to_owned(), kind, text));
+        let says = |robot: &RobotName, kind, text: String| Some((robot.to_string(), kind, text));
+        match self {
+            Self::Init { seed, .. } => simulator(LogKind::Run, format!("initialized, seed {seed}")),
+            Self::Joined { robot, generation: None, at } => {
+                says(robot, LogKind::Membership, format!("takes part, at {:.2} m, {:.2} m", at.x, at.y))
+            }
+            Self::Joined { robot, generation: Some(generation), .. } => {
+                says(robot, LogKind::Membership, format!("is back as incarnation {generation}"))
+            }
+            Self::Lost { robot } => says(robot, LogKind::Membership, "is lost".to_owned()),
+            Self::Missed { robot } => says(robot, LogKind::Membership, "missed the tick".to_owned()),
+            Self::Emotion { robot, from, to } => says(robot, LogKind::Emotion, change("emotion", from.as_ref(), to)),
+            Self::Behavior { robot, from, to } => {
+                says(robot, LogKind::Behavior, change("behavior", from.as_ref(), to))
+            }
+            Self::CommandSent { from, to, command, .. } => {
+                says(from, LogKind::Command, format!("-> {to}: {command}"))
+            }
+            Self::CommandDelivered { from, to, seq } => {
+                says(to, LogKind::Command, format!("receives command {seq} of {from}"))
+            }
+            Self::CommandDropped { from, to, seq } => {
+                says(to, LogKind::Command, format!("command {seq} of {from} was lost on the way"))
+            }
+            Self::CommandMissing { from, to, seq } => {
+                says(to, LogKind::Command, format!("command {seq} of {from} never came: a real loss on the wire"))
+            }
+            Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
+            Self::End { reason, digest } => {
+                let how = match reason {
+                    End::Finished => "finished",
+                    End::Stopped => "stopped",
+                    End::Aborted => "aborted",
+                };
+                simulator(LogKind::Run, format!("{how}, digest {digest}"))
+            }
+            // A blocked robot tries again every tick; the log would be nothing else.
+            Self::Blocked { .. } | Self::Tick { .. } => None,
+        }
+    }
+}
+
+fn change(what: &str, from: Option<&String>, to: &str) -> String {
+    match from {
+        Some(from) => format!("{what} {from} -> {to}"),
+        None => format!("{what} {to}"),
+    }
+}
+
+/// A line of the readable log, in columns: simulated time, source, text.
+#[must_use]
+pub fn log_line(record: &LogRecord) -> String {
+    format!("{:>9.1} s  {:<12} {}", record.time_s, record.source, record.text)
+}

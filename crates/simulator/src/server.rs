@@ -1,0 +1,526 @@
+//! The simulator as a process: who takes part, when a tick is granted, what people ask for.
+//!
+//! One loop, one queue. Everything that can happen is an [`Event`]; the loop sleeps until one arrives or something is
+//! due. Control is answered by the same loop, also while the clock is held, because the loop never waits for a robot.
+
+mod control;
+mod member;
+mod observers;
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::time::{Duration, Instant};
+
+use protocol::bus::{Bus, BusError, Declared, Publisher, Question};
+use protocol::keys::Keys;
+use protocol::messages::{Clock, Correction, End, Report, Waiting};
+use protocol::{Epoch, Malformed, RobotName, RunName, Tick, decode, encode};
+
+use crate::diagnostic::FileError;
+use crate::recorder::{Recorder, RunFolder};
+use crate::scenario::{OnLate, Scenario};
+use crate::simulation::{Barrier, Exchange, Membership, Simulation};
+use crate::summary::Summary;
+
+use control::Pace;
+use member::Member;
+use observers::Observers;
+
+/// Messages that may queue up before links are slowed down.
+const QUEUE: usize = 65_536;
+/// After this long without a report people are told for whom the clock waits.
+const SAY_AFTER: Duration = Duration::from_millis(500);
+/// While the clock is held it is repeated this often: whatever got lost on the wire is then sent again.
+const REPEAT_AFTER: Duration = Duration::from_secs(2);
+
+/// How a simulator process runs.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Name of the run.
+    pub run: RunName,
+    /// Simulated seconds per second; `None` is as fast as the barrier goes.
+    pub speed: Option<f64>,
+    /// Whether the clock waits for `start` once everybody is there.
+    pub is_paused: bool,
+    /// After this many ticks in a row without a report a robot is lost (`on_late = "continue"`).
+    pub lose_after: u32,
+}
+
+/// Why a simulator process ended before its time.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The record cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The environment cannot be set up.
+    #[error(transparent)]
+    Hall(#[from] world::HallError),
+}
+
+/// Everything that can happen to a simulator process.
+pub enum Event {
+    /// A robot has done its tick.
+    Report(Result<Report, Malformed>, String),
+    /// A robot waits for another one's answer.
+    Waiting(Result<Waiting, Malformed>, String),
+    /// A robot asks to take part.
+    Join(Question),
+    /// A robot asks what it senses.
+    Percept(Question),
+    /// Somebody asks for something.
+    Control(Question),
+    /// A robot's token came or went.
+    Token(String, bool),
+    /// The process is told to end.
+    Terminate,
+}
+
+/// Why a tick, or the wait for one, was given up.
+#[derive(Debug)]
+pub enum Interrupt {
+    /// Start the next epoch, perhaps with another seed.
+    Init(Option<u64>),
+    /// End the run.
+    End(End),
+    /// The process cannot go on.
+    Failed(ServerError),
+}
+
+impl From<BusError> for Interrupt {
+    fn from(error: BusError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+impl From<FileError> for Interrupt {
+    fn from(error: FileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// A simulator process.
+pub struct Server {
+    options: Options,
+    bus: Bus,
+    keys: Keys,
+    queue: SyncSender<Event>,
+    events: Receiver<Event>,
+    declared: Vec<Declared>,
+    clock: Publisher,
+    observers: Observers,
+    pace: Pace,
+    members: BTreeMap<RobotName, Member>,
+    on_late: OnLate,
+    deadline: Duration,
+    open: Open,
+    summary_wall: crate::summary::Wall,
+    /// Commands from outside the roster that take effect at the next tick boundary.
+    operator: Vec<(RobotName, String)>,
+}
+
+/// The tick that is under way.
+struct Open {
+    clock: Clock,
+    /// Whether its barrier is open.
+    is_open: bool,
+    since: Instant,
+    last_arrival: Instant,
+    reports: BTreeMap<RobotName, Report>,
+    membership: Vec<Membership>,
+    waits: BTreeMap<RobotName, RobotName>,
+    /// Whether people have been told that the clock is held.
+    is_announced: bool,
+    repeated: Instant,
+}
+
+impl Server {
+    /// Declares the simulator's side of the contract on an open bus.
+    ///
+    /// # Errors
+    /// [`BusError`] if something cannot be declared.
+    pub fn open(bus: Bus, scenario: &Scenario, options: Options) -> Result<Self, BusError> {
+        let keys = Keys::new(&options.run);
+        let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
+        let now = Instant::now();
+        let mut server = Self {
+            clock: bus.publisher(&keys.clock())?,
+            observers: Observers::new(&bus, &keys)?,
+            pace: Pace::new(options.speed, options.is_paused),
+            members: scenario.robots.keys().map(|name| (name.clone(), Member::default())).collect(),
+            on_late: scenario.on_late,
+            deadline: Duration::from_secs_f64(scenario.deadline_s),
+            open: Open {
+                clock: Clock::default(),
+                is_open: false,
+                since: now,
+                last_arrival: now,
+                reports: BTreeMap::new(),
+                membership: Vec::new(),
+                waits: BTreeMap::new(),
+                is_announced: false,
+                repeated: now,
+            },
+            summary_wall: crate::summary::Wall::default(),
+            operator: Vec::new(),
+            declared: Vec::new(),
+            options,
+            bus,
+            keys,
+            queue,
+            events,
+        };
+        server.listen()?;
+        Ok(server)
+    }
+
+    /// Where signals and tests put events.
+    #[must_use]
+    pub fn queue(&self) -> SyncSender<Event> {
+        self.queue.clone()
+    }
+
+    fn listen(&mut self) -> Result<(), BusError> {
+        // A send fails only when the process ends; then nobody is left to tell.
+        let queue = self.queue();
+        self.declared.push(self.bus.subscribe(&self.keys.reports(), move |key, bytes| {
+            let robot = Keys::robot_of(key).unwrap_or_default();
+            let _ = queue.send(Event::Report(decode(key, robot, bytes), robot.to_owned()));
+        })?);
+        let queue = self.queue();
+        self.declared.push(self.bus.subscribe(&self.keys.all_waiting(), move |key, bytes| {
+            let robot = Keys::robot_of(key).unwrap_or_default();
+            let _ = queue.send(Event::Waiting(decode(key, robot, bytes), robot.to_owned()));
+        })?);
+        for (key, event) in [
+            (self.keys.join(), Event::Join as fn(Question) -> Event),
+            (self.keys.percepts(), Event::Percept),
+            (self.keys.control(), Event::Control),
+        ] {
+            let queue = self.queue();
+            self.declared.push(self.bus.serve(&key, move |question| {
+                let _ = queue.send(event(question));
+            })?);
+        }
+        let queue = self.queue();
+        self.declared.push(self.bus.watch(&self.keys.alive_robots(), move |key, is_there| {
+            let robot = Keys::robot_of(key).unwrap_or_default();
+            let _ = queue.send(Event::Token(robot.to_owned(), is_there));
+        })?);
+        self.declared.push(self.bus.token(&self.keys.alive_sim())?);
+        Ok(())
+    }
+
+    /// Runs until the run ends: epoch after epoch, tick after tick.
+    ///
+    /// # Errors
+    /// [`ServerError`] if it cannot go on; what was recorded until then is kept.
+    pub fn run(mut self, mut scenario: Scenario, folder: &RunFolder) -> Result<Summary, ServerError> {
+        let mut epoch: Epoch = 1;
+        loop {
+            let mut simulation = Simulation::new(scenario.clone(), epoch)?;
+            let mut recorder = Recorder::begin(folder, &self.options.run, &simulation)?;
+            self.summary_wall = crate::summary::Wall::default();
+            let interrupt = match self.epoch(&mut simulation, &mut recorder) {
+                Ok(()) => Interrupt::End(End::Finished),
+                Err(interrupt) => interrupt,
+            };
+            match interrupt {
+                Interrupt::Init(seed) => {
+                    scenario.seed = seed.unwrap_or(scenario.seed);
+                    epoch += 1;
+                }
+                Interrupt::End(end) => return self.end(end, &simulation, recorder),
+                Interrupt::Failed(error) => return Err(error),
+            }
+        }
+    }
+
+    fn epoch(&mut self, simulation: &mut Simulation, recorder: &mut Recorder) -> Result<(), Interrupt> {
+        self.gather(simulation)?;
+        for member in self.members.values_mut() {
+            member.begin_epoch();
+        }
+        let record = simulation.init(self)?;
+        self.observers.log(&recorder.write(simulation, &record)?);
+        self.pace.ready();
+        let last = simulation.scenario().ticks;
+        while simulation.tick() < last {
+            self.wait_for_grant(simulation)?;
+            self.forward_operator(simulation);
+            let record = simulation.step(self)?;
+            self.observers.log(&recorder.write(simulation, &record)?);
+            self.after_tick(simulation);
+        }
+        Ok(())
+    }
+
+    /// Waits until every robot of the roster has joined and shown that it is ready.
+    fn gather(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
+        let mut since = Instant::now();
+        while self.members.values().any(|member| !member.is_ready()) {
+            match self.receive(SAY_AFTER.saturating_sub(since.elapsed())) {
+                Some(event) => self.handle(event, simulation)?,
+                // Said once; every robot that comes changes what there is to say.
+                None => {
+                    self.observers.held(simulation, &self.status(simulation));
+                    since = Instant::now() + Duration::from_secs(3600);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the commands that came from outside the roster on their way.
+    fn forward_operator(&mut self, simulation: &mut Simulation) {
+        for (to, command) in std::mem::take(&mut self.operator) {
+            let seq = simulation.command(&to, &command);
+            let (epoch, tick) = (simulation.epoch(), simulation.tick());
+            let message = protocol::messages::Command { epoch, tick, seq, command };
+            let key = self.keys.command(&to, &RobotName::operator());
+            if let Err(error) = self.bus.put(&key, encode(&message)) {
+                tracing::error!("{error}");
+            }
+        }
+    }
+
+    fn after_tick(&mut self, simulation: &Simulation) {
+        if let Some((question, _)) = self.pace.reached(simulation.tick()) {
+            self.answer_status(&question, simulation);
+        }
+        if self.observers.is_frame_due() {
+            self.observers.frame(simulation, &self.status(simulation));
+        }
+    }
+
+    /// Tells everybody that the run is over, and writes what came of it.
+    fn end(mut self, end: End, simulation: &Simulation, mut recorder: Recorder) -> Result<Summary, ServerError> {
+        self.pace.end();
+        let lines = recorder.write(simulation, &simulation.end(end))?;
+        self.observers.log(&lines);
+        self.observers.frame(simulation, &self.status(simulation));
+        recorder.summary().wall = std::mem::take(&mut self.summary_wall);
+        let summary = recorder.finish(simulation)?;
+        let clock = Clock { epoch: simulation.epoch(), tick: simulation.tick(), end: Some(end), ..Clock::default() };
+        self.clock.put(encode(&clock))?;
+        self.say_goodbye(simulation);
+        self.declared.clear();
+        self.bus.close();
+        Ok(summary)
+    }
+
+    /// Waits for the robots to go, but not for ever: whoever leaves late finds nobody.
+    fn say_goodbye(&mut self, simulation: &Simulation) {
+        let deadline = Instant::now() + Duration::from_secs(1);
+        while self.members.values().any(|member| member.is_present) && Instant::now() < deadline {
+            if let Some(event) = self.receive(deadline.saturating_duration_since(Instant::now())) {
+                // The run is over: whatever else is asked for changes nothing any more.
+                let _ = self.handle(event, simulation);
+            }
+        }
+    }
+
+    /// The next event, or `None` after `patience`.
+    fn receive(&self, patience: Duration) -> Option<Event> {
+        match self.events.recv_timeout(patience) {
+            Ok(event) => Some(event),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
+        }
+    }
+
+    /// One event. The arms call; they do not think.
+    fn handle(&mut self, event: Event, simulation: &Simulation) -> Result<(), Interrupt> {
+        match event {
+            Event::Report(Ok(report), robot) => self.on_report(&robot, report),
+            Event::Waiting(Ok(waiting), robot) => self.on_waiting(&robot, waiting, simulation),
+            Event::Report(Err(error), _) | Event::Waiting(Err(error), _) => self.ignore("malformed", &error.to_string()),
+            Event::Join(question) => self.on_join(&question, simulation),
+            Event::Percept(question) => self.on_percept(&question, simulation),
+            Event::Token(robot, is_there) => self.on_token(&robot, is_there, simulation)?,
+            Event::Control(question) => self.on_control(question, simulation)?,
+            Event::Terminate => return Err(Interrupt::End(End::Stopped)),
+        }
+        Ok(())
+    }
+
+    /// A message that changes nothing: counted, and said once in a while.
+    fn ignore(&mut self, reason: &str, text: &str) {
+        let count = self.summary_wall.ignored.entry(reason.to_owned()).or_default();
+        *count += 1;
+        if count.is_power_of_two() {
+            tracing::warn!(count = *count, "ignored a message, {reason}: {text}");
+        }
+    }
+
+    fn on_report(&mut self, robot: &str, report: Report) {
+        let open = (self.open.clock.epoch, self.open.clock.tick);
+        let Some((name, member)) = self.members.get_key_value(robot) else {
+            return self.ignore("unknown robot", robot);
+        };
+        if (report.epoch, report.tick) != open || !self.open.is_open || report.generation != member.generation {
+            return self.ignore("stale", robot);
+        }
+        let name = name.clone();
+        let now = Instant::now();
+        if self.awaited().eq([&name]) {
+            let waited_s = (now - self.open.last_arrival).as_secs_f64();
+            let held = self.summary_wall.held_up_by.entry(name.clone()).or_default();
+            held.ticks += 1;
+            held.waited_s += waited_s;
+            held.longest_s = held.longest_s.max(waited_s);
+        }
+        self.open.last_arrival = now;
+        self.open.waits.remove(&name);
+        // The first one counts; a repetition says the same.
+        self.open.reports.entry(name).or_insert(report);
+    }
+
+    fn on_waiting(&mut self, robot: &str, waiting: Waiting, simulation: &Simulation) {
+        let Some((name, _)) = self.members.get_key_value(robot) else { return self.ignore("unknown robot", robot) };
+        if (waiting.epoch, waiting.tick) == (self.open.clock.epoch, self.open.clock.tick) {
+            self.open.waits.insert(name.clone(), waiting.on);
+            if self.open.is_announced {
+                self.observers.held(simulation, &self.status(simulation));
+            }
+        }
+    }
+
+    fn on_percept(&mut self, question: &Question, simulation: &Simulation) {
+        match Keys::robot_of(question.key()).and_then(|name| self.members.get_key_value(name)) {
+            Some((name, _)) => question.answer(question.key(), encode(&simulation.percept(name))),
+            None => question.refuse("no robot of the roster has this name"),
+        }
+    }
+
+    /// Robots of the open tick whose report is still to come.
+    fn awaited(&self) -> impl Iterator<Item = &RobotName> {
+        let is_awaited = |(name, member): &(&RobotName, &Member)| {
+            self.open.is_open && !member.is_lost && !self.open.reports.contains_key(*name)
+        };
+        self.members.iter().filter(is_awaited).map(|(name, _)| name)
+    }
+
+    fn is_complete(&self) -> bool {
+        self.awaited().next().is_none()
+    }
+}
+
+impl Barrier for Server {
+    type Interrupt = Interrupt;
+
+    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, Interrupt> {
+        self.begin_tick(clock, simulation)?;
+        while !self.is_complete() {
+            match self.receive(self.next_look()) {
+                Some(event) => self.handle(event, simulation)?,
+                None => self.look_at_late(simulation)?,
+            }
+        }
+        Ok(self.close_tick(simulation))
+    }
+}
+
+impl Server {
+    fn begin_tick(&mut self, mut clock: Clock, simulation: &Simulation) -> Result<(), Interrupt> {
+        let mut membership = Vec::new();
+        for (name, member) in &mut self.members {
+            if let Some(generation) = member.take_pending() {
+                membership.push(Membership::Joined(name.clone(), generation));
+                introduce(&mut clock, name, generation, simulation);
+            }
+        }
+        let now = Instant::now();
+        self.open = Open {
+            clock,
+            is_open: true,
+            since: now,
+            last_arrival: now,
+            reports: BTreeMap::new(),
+            membership,
+            waits: BTreeMap::new(),
+            is_announced: false,
+            repeated: now,
+        };
+        Ok(self.clock.put(encode(&self.open.clock))?)
+    }
+
+    fn close_tick(&mut self, simulation: &Simulation) -> Exchange {
+        self.open.is_open = false;
+        for (name, member) in &mut self.members {
+            member.count_report(self.open.reports.contains_key(name));
+        }
+        if std::mem::take(&mut self.open.is_announced) {
+            self.observers.released(simulation, &self.status(simulation));
+        }
+        Exchange {
+            reports: std::mem::take(&mut self.open.reports),
+            membership: std::mem::take(&mut self.open.membership),
+        }
+    }
+
+    /// How long to sleep unless something happens: until people must be told, the clock repeated, a deadline met.
+    fn next_look(&self) -> Duration {
+        let announce = (!self.open.is_announced).then(|| SAY_AFTER.saturating_sub(self.open.since.elapsed()));
+        let repeat = REPEAT_AFTER.saturating_sub(self.open.repeated.elapsed());
+        let deadline =
+            (self.on_late != OnLate::Wait).then(|| self.deadline.saturating_sub(self.open.since.elapsed()));
+        announce.into_iter().chain(deadline).fold(repeat, Duration::min)
+    }
+
+    /// Nothing has happened for a while: say for whom the clock waits, ask everybody to repeat, act as the scenario
+    /// says.
+    fn look_at_late(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
+        if self.open.since.elapsed() >= SAY_AFTER && !self.open.is_announced {
+            self.open.is_announced = true;
+            self.observers.held(simulation, &self.status(simulation));
+            // Who steps by hand wants to know that the step hangs, now.
+            if let Some(question) = self.pace.give_up_stepping() {
+                self.answer_status(&question, simulation);
+            }
+        }
+        if self.open.repeated.elapsed() >= REPEAT_AFTER {
+            self.repeat_clock()?;
+        }
+        if self.open.since.elapsed() >= self.deadline {
+            match self.on_late {
+                OnLate::Wait => {}
+                OnLate::Abort => return Err(Interrupt::End(End::Aborted)),
+                OnLate::Continue => self.go_on_without_late(),
+            }
+        }
+        Ok(())
+    }
+
+    fn repeat_clock(&mut self) -> Result<(), BusError> {
+        self.open.repeated = Instant::now();
+        self.clock.put(encode(&self.open.clock))
+    }
+
+    fn go_on_without_late(&mut self) {
+        let late: Vec<RobotName> = self.awaited().cloned().collect();
+        for name in late {
+            if let Some(member) = self.members.get_mut(&name)
+                && member.miss(self.options.lose_after)
+            {
+                self.open.membership.push(Membership::Lost(name));
+            }
+        }
+        // Closes the barrier: `awaited` counts nobody of a tick that is not open.
+        self.open.is_open = false;
+    }
+
+    /// The tick as of which a newcomer would take part.
+    fn open_tick(&self) -> Option<Tick> {
+        self.open.is_open.then_some(self.open.clock.tick)
+    }
+}
+
+/// Names a newcomer in a clock, and tells it where it stands.
+fn introduce(clock: &mut Clock, name: &RobotName, generation: u32, simulation: &Simulation) {
+    let news = clock.news.entry(name.clone()).or_default();
+    news.joined = Some(generation);
+    if let (None, Some(location)) = (news.correction, simulation.location(name)) {
+        news.correction = Some(Correction { location, blocked: false });
+    }
+}

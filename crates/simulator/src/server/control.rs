@@ -1,0 +1,260 @@
+//! When a tick is granted, and the CD-player buttons.
+
+use std::time::{Duration, Instant};
+
+use protocol::bus::Question;
+use protocol::messages::{Awaited, Control, ControlAnswer, End, Phase, Reason, RobotStatus, Status};
+use protocol::random::MAX_SEED;
+use protocol::{Tick, decode, encode};
+
+use super::{Interrupt, Server};
+use crate::simulation::Simulation;
+
+/// Most ticks that one `step` may ask for.
+const MAX_STEPS: u64 = 1_000_000;
+/// A paced clock that has fallen behind by more than this does not try to catch up.
+const MAX_BEHIND: Duration = Duration::from_millis(500);
+
+/// The pace of the clock.
+pub(super) struct Pace {
+    phase: Phase,
+    /// What to do once everybody is there.
+    starts_paused: bool,
+    speed: Option<f64>,
+    due: Instant,
+    pending_steps: u64,
+    /// Who asked to step, and the tick at which the answer is due.
+    stepping: Option<(Question, Tick)>,
+}
+
+impl Pace {
+    pub(super) fn new(speed: Option<f64>, starts_paused: bool) -> Self {
+        Self { phase: Phase::Gathering, starts_paused, speed, due: Instant::now(), pending_steps: 0, stepping: None }
+    }
+
+    pub(super) fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Tick 0 is complete.
+    pub(super) fn ready(&mut self) {
+        self.phase = if self.starts_paused { Phase::Ready } else { Phase::Running };
+        // Whoever presses init later wants to press start, too.
+        self.starts_paused = true;
+        (self.pending_steps, self.stepping) = (0, None);
+        self.due = Instant::now();
+    }
+
+    pub(super) fn end(&mut self) {
+        self.phase = Phase::Ended;
+    }
+
+    /// Who is to be told that a tick is reached.
+    pub(super) fn reached(&mut self, tick: Tick) -> Option<(Question, Tick)> {
+        self.stepping.take_if(|(_, until)| tick >= *until)
+    }
+
+    /// Who is to be told that stepping hangs.
+    pub(super) fn give_up_stepping(&mut self) -> Option<Question> {
+        self.stepping.take().map(|(question, _)| question)
+    }
+
+    /// Takes one tick of what was granted. `Err` says how long to wait at most before looking again.
+    fn take_grant(&mut self, tick_s: f64) -> Result<(), Option<Duration>> {
+        if self.pending_steps > 0 {
+            self.pending_steps -= 1;
+            return Ok(());
+        }
+        if self.phase != Phase::Running {
+            return Err(None);
+        }
+        let Some(speed) = self.speed else { return Ok(()) };
+        let now = Instant::now();
+        if self.due > now {
+            return Err(Some(self.due - now));
+        }
+        // A speed is finite and positive, but a very slow one asks for a very long tick.
+        let tick = Duration::try_from_secs_f64(tick_s / speed).unwrap_or(Duration::MAX);
+        let from = if now - self.due > MAX_BEHIND { now } else { self.due };
+        self.due = from.checked_add(tick).unwrap_or(now + Duration::from_secs(86_400));
+        Ok(())
+    }
+}
+
+impl Server {
+    /// Returns when the next tick may begin.
+    pub(super) fn wait_for_grant(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
+        // What people ask for comes before the next tick, also when ticks follow without a pause.
+        while let Ok(event) = self.events.try_recv() {
+            self.handle(event, simulation)?;
+        }
+        loop {
+            let patience = match self.pace.take_grant(simulation.scenario().tick_s) {
+                Ok(()) => return Ok(()),
+                Err(patience) => patience,
+            };
+            let event = match patience {
+                Some(patience) => self.receive(patience),
+                None => self.events.recv().ok(),
+            };
+            if let Some(event) = event {
+                self.handle(event, simulation)?;
+            }
+        }
+    }
+
+    /// People ask for something; they are answered at once.
+    pub(super) fn on_control(&mut self, question: Question, simulation: &Simulation) -> Result<(), Interrupt> {
+        let control = match decode::<Control>(question.key(), "an operator", &question.body()) {
+            Ok(control) => control,
+            Err(error) => {
+                refuse(&question, &error.to_string());
+                return Ok(());
+            }
+        };
+        match control {
+            Control::Step { n } => {
+                self.on_step(n, question, simulation);
+                return Ok(());
+            }
+            Control::Init { seed } => self.on_init(seed, &question, simulation)?,
+            Control::Stop => {
+                self.answer_status(&question, simulation);
+                return Err(Interrupt::End(End::Stopped));
+            }
+            other => match self.act(&other) {
+                Ok(()) => self.answer_status(&question, simulation),
+                Err(explanation) => refuse(&question, &explanation),
+            },
+        }
+        if self.observers.is_watched() {
+            self.observers.frame(simulation, &self.status(simulation));
+        }
+        Ok(())
+    }
+
+    fn act(&mut self, control: &Control) -> Result<(), String> {
+        let phase = self.pace.phase;
+        match control {
+            Control::Start if matches!(phase, Phase::Ready | Phase::Paused | Phase::Running) => {
+                (self.pace.phase, self.pace.due) = (Phase::Running, Instant::now());
+            }
+            Control::Start if phase == Phase::Gathering => self.pace.starts_paused = false,
+            Control::Pause if matches!(phase, Phase::Running | Phase::Paused | Phase::Ready) => {
+                if phase == Phase::Running {
+                    self.pace.phase = Phase::Paused;
+                }
+                self.pace.pending_steps = 0;
+            }
+            Control::Pause if phase == Phase::Gathering => self.pace.starts_paused = true,
+            Control::Speed { factor } => {
+                if factor.is_some_and(|factor| factor <= 0.0) {
+                    return Err("a speed is more than zero; to hold the clock, pause".to_owned());
+                }
+                (self.pace.speed, self.pace.due) = (*factor, Instant::now());
+            }
+            Control::Command { to, command } => {
+                if !self.members.contains_key(to) {
+                    return Err(format!("no robot of this run is called {to}"));
+                }
+                if self.operator.len() >= 1024 {
+                    return Err("1024 commands are waiting for the next tick already".to_owned());
+                }
+                self.operator.push((to.clone(), command.clone()));
+            }
+            Control::Status => {}
+            Control::Start | Control::Pause => return Err(format!("the run is {phase}")),
+            Control::Init { .. } | Control::Step { .. } | Control::Stop => unreachable!("handled by on_control"),
+        }
+        Ok(())
+    }
+
+    fn on_init(&mut self, seed: Option<u64>, question: &Question, simulation: &Simulation) -> Result<(), Interrupt> {
+        if seed.is_some_and(|seed| seed > MAX_SEED) {
+            refuse(question, &format!("a seed is at most {MAX_SEED}"));
+            return Ok(());
+        }
+        match self.pace.phase {
+            Phase::Gathering | Phase::Ended => {
+                refuse(question, &format!("the run is {}", self.pace.phase));
+                Ok(())
+            }
+            _ => {
+                self.answer_status(question, simulation);
+                Err(Interrupt::Init(seed))
+            }
+        }
+    }
+
+    fn on_step(&mut self, n: u64, question: Question, simulation: &Simulation) {
+        if !matches!(self.pace.phase, Phase::Ready | Phase::Paused) {
+            return refuse(&question, &format!("the run is {}; pause it to step", self.pace.phase));
+        }
+        if n == 0 || n > MAX_STEPS {
+            return refuse(&question, &format!("a step is 1 to {MAX_STEPS} ticks"));
+        }
+        if self.pace.pending_steps + n > MAX_STEPS {
+            return refuse(&question, "too many steps are pending already");
+        }
+        self.pace.phase = Phase::Paused;
+        self.pace.pending_steps += n;
+        if self.open.is_announced {
+            return self.answer_status(&question, simulation);
+        }
+        // Only the last one to step is kept waiting; whoever came before is told how far things are.
+        let until = simulation.tick() + self.pace.pending_steps + u64::from(self.open.is_open);
+        if let Some((earlier, _)) = self.pace.stepping.replace((question, until.min(simulation.scenario().ticks))) {
+            self.answer_status(&earlier, simulation);
+        }
+    }
+
+    pub(super) fn answer_status(&self, question: &Question, simulation: &Simulation) {
+        let answer = ControlAnswer::Done(Box::new(self.status(simulation)));
+        question.answer(question.key(), encode(&answer));
+    }
+
+    /// How things stand.
+    pub(super) fn status(&self, simulation: &Simulation) -> Status {
+        let scenario = simulation.scenario();
+        Status {
+            run: self.options.run.clone(),
+            epoch: simulation.epoch(),
+            tick: simulation.tick(),
+            pending_steps: self.pace.pending_steps,
+            time_s: simulation.time_s(simulation.tick()),
+            duration_s: scenario.duration_s(),
+            seed: scenario.seed,
+            phase: self.pace.phase,
+            speed: self.pace.speed,
+            awaiting: self.awaiting(),
+            robots: self.members.iter().map(|(name, member)| RobotStatus {
+                name: name.clone(),
+                generation: member.generation,
+                present: member.is_present,
+            }).collect(),
+            ignored: self.summary_wall.ignored.clone(),
+        }
+    }
+
+    /// For whom the clock waits now, and what is known of them.
+    fn awaiting(&self) -> Vec<Awaited> {
+        let since_s = self.open.since.elapsed().as_secs_f64();
+        if self.pace.phase == Phase::Gathering && !self.open.is_open {
+            let missing = self.members.iter().filter(|(_, member)| !member.is_ready());
+            return missing
+                .map(|(name, _)| Awaited { name: name.clone(), since_s, because: Reason::NotJoined })
+                .collect();
+        }
+        let because = |name| match self.open.waits.get(name) {
+            _ if !self.members[name].is_present => Reason::Gone,
+            Some(other) => Reason::WaitsFor(other.clone()),
+            None => Reason::Silent,
+        };
+        self.awaited().map(|name| Awaited { name: name.clone(), since_s, because: because(name) }).collect()
+    }
+}
+
+fn refuse(question: &Question, explanation: &str) {
+    let answer = ControlAnswer::Refused { explanation: explanation.to_owned() };
+    question.answer(question.key(), encode(&answer));
+}

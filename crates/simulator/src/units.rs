@@ -1,0 +1,134 @@
+//! Quantities with units, as people write them: `"50 ft"`, `"2 ft/s"`, `"0.5 s"`. Inside everything is SI.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// What a unit measures, and how much of the SI unit it is.
+const UNITS: [(&str, Dimension, f64); 13] = [
+    ("m", Dimension::Length, 1.0),
+    ("cm", Dimension::Length, 0.01),
+    ("km", Dimension::Length, 1000.0),
+    // The international foot, exact by definition (1959).
+    ("ft", Dimension::Length, 0.3048),
+    ("m/s", Dimension::Speed, 1.0),
+    ("km/h", Dimension::Speed, 1.0 / 3.6),
+    ("ft/s", Dimension::Speed, 0.3048),
+    ("ms", Dimension::Time, 0.001),
+    ("s", Dimension::Time, 1.0),
+    ("min", Dimension::Time, 60.0),
+    ("h", Dimension::Time, 3600.0),
+    ("rad", Dimension::Angle, 1.0),
+    ("deg", Dimension::Angle, std::f64::consts::PI / 180.0),
+];
+
+/// What a quantity measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// Meters.
+    Length,
+    /// Meters per second.
+    Speed,
+    /// Seconds.
+    Time,
+    /// Radians.
+    Angle,
+}
+
+impl Dimension {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Length => "a length such as \"50 ft\" or \"15 m\"",
+            Self::Speed => "a speed such as \"2 ft/s\" or \"0.5 m/s\"",
+            Self::Time => "a time such as \"0.5 s\" or \"10 min\"",
+            Self::Angle => "an angle such as \"90 deg\"",
+        }
+    }
+}
+
+/// Reads a number with a unit: its value in SI units and what it measures. `None` if the text is something else.
+#[must_use]
+pub fn quantity(text: &str) -> Option<(f64, Dimension)> {
+    let text = text.trim();
+    let split = text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E')))?;
+    let (number, unit) = text.split_at(split);
+    let number: f64 = number.parse().ok().filter(|number: &f64| number.is_finite())?;
+    let unit = unit.trim();
+    UNITS.iter().find(|(name, ..)| *name == unit).map(|(_, dimension, factor)| (number * factor, *dimension))
+}
+
+macro_rules! quantity_type {
+    ($(#[$doc:meta])* $type:ident, $dimension:expr, $unit:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+        pub struct $type(pub f64);
+
+        impl std::str::FromStr for $type {
+            type Err = String;
+            fn from_str(text: &str) -> Result<Self, String> {
+                match quantity(text) {
+                    Some((value, dimension)) if dimension == $dimension => Ok(Self(value)),
+                    _ => Err(format!("{text:?} is not {}", $dimension.name())),
+                }
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $type {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct Visitor;
+                impl serde::de::Visitor<'_> for Visitor {
+                    type Value = $type;
+                    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        f.write_str($dimension.name())
+                    }
+                    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<$type, E> {
+                        text.parse().map_err(E::custom)
+                    }
+                }
+                deserializer.deserialize_str(Visitor)
+            }
+        }
+
+        impl Serialize for $type {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.collect_str(&format_args!("{} {}", self.0, $unit))
+            }
+        }
+    };
+}
+
+quantity_type! {
+    /// A length, meters.
+    Length, Dimension::Length, "m"
+}
+quantity_type! {
+    /// A speed, meters per second.
+    Speed, Dimension::Speed, "m/s"
+}
+quantity_type! {
+    /// A time, seconds.
+    Time, Dimension::Time, "s"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_read_and_anything_else_is_not() {
+        assert_eq!(quantity("50 ft"), Some((15.24, Dimension::Length)));
+        assert_eq!(quantity("2ft/s"), Some((0.6096, Dimension::Speed)));
+        assert_eq!(quantity("1e-1 s"), Some((0.1, Dimension::Time)));
+        for other in ["50", "ft", "50 furlong", "Leguin", "", "5 m5", "inf m"] {
+            assert_eq!(quantity(other), None, "{other:?}");
+        }
+        assert!("2 s".parse::<Length>().is_err());
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_to_the_bit() {
+        for text in ["50 ft", "0.1 ft", "33.333 cm"] {
+            let length: Length = text.parse().unwrap();
+            let again: Length = format!("{} m", length.0).parse().unwrap();
+            assert_eq!(length.0.to_bits(), again.0.to_bits());
+        }
+    }
+}
