@@ -187,10 +187,24 @@ impl Bus {
         parameters: &str,
         body: Option<Vec<u8>>,
     ) -> Result<Option<AnswerOf>, BusError> {
+        self.ask_within(key, parameters, body, QUERY_TIMEOUT)
+    }
+
+    /// The same with another limit, for answers that take their time.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn ask_within(
+        &self,
+        key: &str,
+        parameters: &str,
+        body: Option<Vec<u8>>,
+        timeout: Duration,
+    ) -> Result<Option<AnswerOf>, BusError> {
         let replies: FifoChannelHandler<Reply> = used(
             "ask",
             key,
-            self.get(key, parameters, body, QUERY_TIMEOUT)?.with(zenoh::handlers::FifoChannel::new(8)).wait(),
+            self.get(key, parameters, body, timeout)?.with(zenoh::handlers::FifoChannel::new(8)).wait(),
         )?;
         while let Ok(reply) = replies.recv() {
             if let Some(answer) = AnswerOf::read(reply) {
