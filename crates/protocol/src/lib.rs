@@ -13,6 +13,7 @@ pub mod messages;
 pub mod name;
 pub mod random;
 pub mod runtime;
+pub mod schema;
 
 pub use codec::{Malformed, Message, decode, encode};
 pub use messages::{Epoch, Generation, Seq, Tick};

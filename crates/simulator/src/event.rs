@@ -160,7 +160,9 @@ impl Event {
             }
             Self::Lost { robot } => says(robot, LogKind::Membership, "is lost".to_owned()),
             Self::Missed { robot } => says(robot, LogKind::Membership, "missed the tick".to_owned()),
-            Self::Emotion { robot, from, to } => says(robot, LogKind::Emotion, change("emotion", from.as_ref(), to)),
+            Self::Emotion { robot, from, to } => {
+                says(robot, LogKind::Emotion, change("emotion", from.as_ref(), to))
+            }
             Self::Behavior { robot, from, to } => {
                 says(robot, LogKind::Behavior, change("behavior", from.as_ref(), to))
             }
@@ -173,9 +175,11 @@ impl Event {
             Self::CommandDropped { from, to, seq } => {
                 says(to, LogKind::Command, format!("command {seq} of {from} was lost on the way"))
             }
-            Self::CommandMissing { from, to, seq } => {
-                says(to, LogKind::Command, format!("command {seq} of {from} never came: a real loss on the wire"))
-            }
+            Self::CommandMissing { from, to, seq } => says(
+                to,
+                LogKind::Command,
+                format!("command {seq} of {from} never came: a real loss on the wire"),
+            ),
             Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
             Self::End { reason, digest } => {
                 let how = match reason {

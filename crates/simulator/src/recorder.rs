@@ -55,7 +55,9 @@ impl RunFolder {
             return Err(FileError::new(text).with_help("choose another --run or --out, or move it away"));
         }
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
-        for file in self.superseded_events().into_iter().chain([EVENTS, LOG, SUMMARY, ENDPOINT].map(|f| self.file(f))) {
+        for file in
+            self.superseded_events().into_iter().chain([EVENTS, LOG, SUMMARY, ENDPOINT].map(|f| self.file(f)))
+        {
             if file.exists() {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
             }
@@ -128,15 +130,27 @@ impl Recorder {
     ///
     /// # Errors
     /// [`FileError`] if it cannot be written.
-    pub fn write(&mut self, simulation: &Simulation, record: &TickRecord) -> Result<Vec<LogRecord>, FileError> {
-        let failed = |error: std::io::Error| FileError::new(format!("cannot write the record of the run: {error}"));
+    pub fn write(
+        &mut self,
+        simulation: &Simulation,
+        record: &TickRecord,
+    ) -> Result<Vec<LogRecord>, FileError> {
+        let failed =
+            |error: std::io::Error| FileError::new(format!("cannot write the record of the run: {error}"));
         let mut lines = Vec::new();
         for line in record.lines() {
             writeln!(self.events, "{}", line.to_json()).map_err(failed)?;
             self.summary.count(simulation, &line);
             if let Some((source, kind, text)) = line.event.readable() {
                 let time_s = simulation.time_s(line.tick);
-                lines.push(LogRecord { epoch: simulation.epoch(), tick: line.tick, time_s, source, kind, text });
+                lines.push(LogRecord {
+                    epoch: simulation.epoch(),
+                    tick: line.tick,
+                    time_s,
+                    source,
+                    kind,
+                    text,
+                });
             }
         }
         for line in &lines {
@@ -161,7 +175,8 @@ impl Recorder {
     /// [`FileError`] if it cannot be written.
     pub fn finish(mut self, simulation: &Simulation) -> Result<Summary, FileError> {
         self.summary.finish(simulation);
-        let text = serde_json::to_string_pretty(&self.summary).map_err(|error| FileError::new(error.to_string()))?;
+        let text =
+            serde_json::to_string_pretty(&self.summary).map_err(|error| FileError::new(error.to_string()))?;
         let file = self.folder.file(SUMMARY);
         std::fs::write(file, text + "\n").map_err(|error| self.folder.failed("write to", &error))?;
         Ok(self.summary)

@@ -13,9 +13,7 @@ const MAX_ROBOTS: usize = 100;
 /// # Errors
 /// [`FileError`] names the line that is not a usable class name.
 pub fn scenario_of(roster: &Source) -> Result<Source, FileError> {
-    let mut text = String::from(
-        "[guests]\ncount = 100\n\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n",
-    );
+    let mut text = String::from("[guests]\ncount = 100\n\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n");
     let mut offset = 0;
     let mut count = 0;
     for line in roster.text.split_inclusive('\n') {

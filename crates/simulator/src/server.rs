@@ -258,17 +258,20 @@ impl Server {
 
     /// Waits until every robot of the roster has joined and shown that it is ready.
     fn gather(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
-        let mut since = Instant::now();
+        self.open.since = Instant::now();
         while self.members.values().any(|member| !member.is_ready()) {
-            match self.receive(SAY_AFTER.saturating_sub(since.elapsed())) {
+            let patience = if self.open.is_announced { REPEAT_AFTER } else { SAY_AFTER };
+            match self.receive(patience) {
                 Some(event) => self.handle(event, simulation)?,
-                // Said once; every robot that comes changes what there is to say.
-                None => {
+                // From now on every robot that comes changes what there is to say.
+                None if !self.open.is_announced && self.open.since.elapsed() >= SAY_AFTER => {
+                    self.open.is_announced = true;
                     self.observers.held(simulation, &self.status(simulation));
-                    since = Instant::now() + Duration::from_secs(3600);
                 }
+                None => {}
             }
         }
+        self.open.is_announced = false;
         Ok(())
     }
 
@@ -295,14 +298,20 @@ impl Server {
     }
 
     /// Tells everybody that the run is over, and writes what came of it.
-    fn end(mut self, end: End, simulation: &Simulation, mut recorder: Recorder) -> Result<Summary, ServerError> {
+    fn end(
+        mut self,
+        end: End,
+        simulation: &Simulation,
+        mut recorder: Recorder,
+    ) -> Result<Summary, ServerError> {
         self.pace.end();
         let lines = recorder.write(simulation, &simulation.end(end))?;
         self.observers.log(&lines);
         self.observers.frame(simulation, &self.status(simulation));
         recorder.summary().wall = std::mem::take(&mut self.summary_wall);
         let summary = recorder.finish(simulation)?;
-        let clock = Clock { epoch: simulation.epoch(), tick: simulation.tick(), end: Some(end), ..Clock::default() };
+        let clock =
+            Clock { epoch: simulation.epoch(), tick: simulation.tick(), end: Some(end), ..Clock::default() };
         self.clock.put(encode(&clock))?;
         self.say_goodbye(simulation);
         self.declared.clear();
@@ -334,7 +343,9 @@ impl Server {
         match event {
             Event::Report(Ok(report), robot) => self.on_report(&robot, report),
             Event::Waiting(Ok(waiting), robot) => self.on_waiting(&robot, waiting, simulation),
-            Event::Report(Err(error), _) | Event::Waiting(Err(error), _) => self.ignore("malformed", &error.to_string()),
+            Event::Report(Err(error), _) | Event::Waiting(Err(error), _) => {
+                self.ignore("malformed", &error.to_string())
+            }
             Event::Join(question) => self.on_join(&question, simulation),
             Event::Percept(question) => self.on_percept(&question, simulation),
             Event::Token(robot, is_there) => self.on_token(&robot, is_there, simulation)?,
@@ -358,7 +369,8 @@ impl Server {
         let Some((name, member)) = self.members.get_key_value(robot) else {
             return self.ignore("unknown robot", robot);
         };
-        if (report.epoch, report.tick) != open || !self.open.is_open || report.generation != member.generation {
+        if (report.epoch, report.tick) != open || !self.open.is_open || report.generation != member.generation
+        {
             return self.ignore("stale", robot);
         }
         let name = name.clone();
@@ -377,7 +389,9 @@ impl Server {
     }
 
     fn on_waiting(&mut self, robot: &str, waiting: Waiting, simulation: &Simulation) {
-        let Some((name, _)) = self.members.get_key_value(robot) else { return self.ignore("unknown robot", robot) };
+        let Some((name, _)) = self.members.get_key_value(robot) else {
+            return self.ignore("unknown robot", robot);
+        };
         if (waiting.epoch, waiting.tick) == (self.open.clock.epoch, self.open.clock.tick) {
             self.open.waits.insert(name.clone(), waiting.on);
             if self.open.is_announced {

@@ -180,7 +180,12 @@ impl Simulation {
     }
 
     /// The clock of a tick: exceptions only.
-    fn clock(&self, tick: Tick, verdicts: &[Verdict], mut delivered: BTreeMap<RobotName, Vec<CommandId>>) -> Clock {
+    fn clock(
+        &self,
+        tick: Tick,
+        verdicts: &[Verdict],
+        mut delivered: BTreeMap<RobotName, Vec<CommandId>>,
+    ) -> Clock {
         let mut news = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             let is_refused = verdicts.get(index).is_some_and(|verdict| self.blocker(*verdict).is_some());
@@ -231,11 +236,13 @@ impl Simulation {
 
     fn note_report(&mut self, tick: Tick, robot: &RobotName, report: Report, events: &mut Vec<Event>) {
         let before = self.reports.get(robot);
-        let change = |from: Option<&String>, to: &String| (from != Some(to)).then(|| (from.cloned(), to.clone()));
+        let change =
+            |from: Option<&String>, to: &String| (from != Some(to)).then(|| (from.cloned(), to.clone()));
         if let Some((from, to)) = change(before.map(|report| &report.emotion_state), &report.emotion_state) {
             events.push(Event::Emotion { robot: robot.clone(), from, to });
         }
-        if let Some((from, to)) = change(before.map(|report| &report.behavior_state), &report.behavior_state) {
+        if let Some((from, to)) = change(before.map(|report| &report.behavior_state), &report.behavior_state)
+        {
             events.push(Event::Behavior { robot: robot.clone(), from, to });
         }
         for sent in &report.sent {
@@ -267,7 +274,12 @@ impl Simulation {
         self.operator_seq += 1;
         let (from, seq) = (RobotName::operator(), self.operator_seq);
         self.medium.accept(self.tick, Underway { to: to.clone(), from: from.clone(), seq });
-        self.operator_sent.push(Event::CommandSent { from, to: to.clone(), seq, command: command.to_owned() });
+        self.operator_sent.push(Event::CommandSent {
+            from,
+            to: to.clone(),
+            seq,
+            command: command.to_owned(),
+        });
         seq
     }
 
@@ -284,7 +296,8 @@ impl Simulation {
         // Who is there from the beginning draws from a stream of its name alone, whatever happened to it in an
         // earlier epoch; a later incarnation must not draw the same again.
         let last = self.reports.get(name);
-        let stream = if last.is_some() { format!("robot/{name}#{generation}") } else { format!("robot/{name}") };
+        let stream =
+            if last.is_some() { format!("robot/{name}#{generation}") } else { format!("robot/{name}") };
         Some(Welcome {
             protocol: PROTOCOL_VERSION,
             run: run.clone(),
@@ -327,7 +340,8 @@ impl Simulation {
         let is_near = |other: &usize| {
             *other != of && robots[of].distance_m(robots[*other]) <= self.scenario.sensing_range_m
         };
-        let sensed = |other: usize| SensedRobot { name: self.names[other].clone(), location: to_wire(robots[other]) };
+        let sensed =
+            |other: usize| SensedRobot { name: self.names[other].clone(), location: to_wire(robots[other]) };
         (0..robots.len()).filter(is_near).map(sensed).collect()
     }
 

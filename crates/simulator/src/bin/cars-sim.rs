@@ -62,8 +62,8 @@ fn speed(text: &str) -> Result<Speed, String> {
 fn main() -> miette::Result<ExitCode> {
     protocol::runtime::use_one_thread();
     let args = Args::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
+    let filter =
+        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn,zenoh=error".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
     let summary = run(&args)?;
     Ok(if summary.end == Some(End::Aborted) { ExitCode::FAILURE } else { ExitCode::SUCCESS })

@@ -17,7 +17,8 @@ impl std::str::FromStr for Override {
     /// position from 0: `robot.Butler.params.refiller=Vonda`. The value is written as in a scenario file; what is no
     /// TOML value is a text.
     fn from_str(text: &str) -> Result<Self, String> {
-        let (path, value) = text.split_once('=').ok_or_else(|| format!("{text:?} is not of the form path=value"))?;
+        let (path, value) =
+            text.split_once('=').ok_or_else(|| format!("{text:?} is not of the form path=value"))?;
         let path: Vec<String> = path.trim().split('.').map(str::to_owned).collect();
         if path.iter().any(String::is_empty) {
             return Err(format!("{text:?}: a part of the path is empty"));
@@ -69,7 +70,8 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
 
 fn element<'a>(list: &'a mut [toml::Value], which: &str) -> Result<&'a mut toml::Value, String> {
     let is_named = |value: &toml::Value| value.get("name").and_then(toml::Value::as_str) == Some(which);
-    let index = list.iter().position(is_named).or_else(|| which.parse().ok().filter(|index| *index < list.len()));
+    let index =
+        list.iter().position(is_named).or_else(|| which.parse().ok().filter(|index| *index < list.len()));
     let len = list.len();
     let found = index.and_then(|index| list.get_mut(index));
     found.ok_or_else(|| format!("none of the {len} elements is called or numbered {which:?}"))

@@ -103,7 +103,8 @@ impl Scenario {
     /// From what is written to what it means.
     pub(super) fn check(self, source: &Source, folder: &Path) -> Result<super::Scenario, FileError> {
         let seed = match &self.seed {
-            Some(seed) => check_seed(*seed.get_ref()).map_err(|reason| FileError::at(source, Some(seed.span()), &reason))?,
+            Some(seed) => check_seed(*seed.get_ref())
+                .map_err(|reason| FileError::at(source, Some(seed.span()), &reason))?,
             None => DEFAULT_SEED,
         };
         let tick_s = positive(source, self.tick.as_ref(), 0.5, |time| time.0, "a tick")?;
@@ -115,8 +116,13 @@ impl Scenario {
         }
         let field = self.field.as_ref().map(Spanned::get_ref);
         let (speed, duration) = self.guest_courses(source)?;
-        let sensing_range_m =
-            positive(source, self.sensing.as_ref().map(|table| &table.range), SENSING_RANGE.0, |range| range.0, "the range")?;
+        let sensing_range_m = positive(
+            source,
+            self.sensing.as_ref().map(|table| &table.range),
+            SENSING_RANGE.0,
+            |range| range.0,
+            "the range",
+        )?;
         let scenario = super::Scenario {
             seed,
             tick_s,
@@ -274,8 +280,16 @@ impl From<&super::Scenario> for Scenario {
                     duration: Some(Spanned::new(0..0, duration)),
                 },
             )),
-            obstacles: scenario.obstacles.iter().map(|at| Obstacle { at: [Length(at.x), Length(at.y)] }).collect(),
-            robots: scenario.robots.iter().map(|(name, spec)| Spanned::new(0..0, Robot::from((name, spec)))).collect(),
+            obstacles: scenario
+                .obstacles
+                .iter()
+                .map(|at| Obstacle { at: [Length(at.x), Length(at.y)] })
+                .collect(),
+            robots: scenario
+                .robots
+                .iter()
+                .map(|(name, spec)| Spanned::new(0..0, Robot::from((name, spec))))
+                .collect(),
         }
     }
 }

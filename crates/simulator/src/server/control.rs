@@ -29,7 +29,14 @@ pub(super) struct Pace {
 
 impl Pace {
     pub(super) fn new(speed: Option<f64>, starts_paused: bool) -> Self {
-        Self { phase: Phase::Gathering, starts_paused, speed, due: Instant::now(), pending_steps: 0, stepping: None }
+        Self {
+            phase: Phase::Gathering,
+            starts_paused,
+            speed,
+            due: Instant::now(),
+            pending_steps: 0,
+            stepping: None,
+        }
     }
 
     pub(super) fn phase(&self) -> Phase {
@@ -104,7 +111,11 @@ impl Server {
     }
 
     /// People ask for something; they are answered at once.
-    pub(super) fn on_control(&mut self, question: Question, simulation: &Simulation) -> Result<(), Interrupt> {
+    pub(super) fn on_control(
+        &mut self,
+        question: Question,
+        simulation: &Simulation,
+    ) -> Result<(), Interrupt> {
         let control = match decode::<Control>(question.key(), "an operator", &question.body()) {
             Ok(control) => control,
             Err(error) => {
@@ -164,12 +175,19 @@ impl Server {
             }
             Control::Status => {}
             Control::Start | Control::Pause => return Err(format!("the run is {phase}")),
-            Control::Init { .. } | Control::Step { .. } | Control::Stop => unreachable!("handled by on_control"),
+            Control::Init { .. } | Control::Step { .. } | Control::Stop => {
+                unreachable!("handled by on_control")
+            }
         }
         Ok(())
     }
 
-    fn on_init(&mut self, seed: Option<u64>, question: &Question, simulation: &Simulation) -> Result<(), Interrupt> {
+    fn on_init(
+        &mut self,
+        seed: Option<u64>,
+        question: &Question,
+        simulation: &Simulation,
+    ) -> Result<(), Interrupt> {
         if seed.is_some_and(|seed| seed > MAX_SEED) {
             refuse(question, &format!("a seed is at most {MAX_SEED}"));
             return Ok(());
@@ -203,7 +221,9 @@ impl Server {
         }
         // Only the last one to step is kept waiting; whoever came before is told how far things are.
         let until = simulation.tick() + self.pace.pending_steps + u64::from(self.open.is_open);
-        if let Some((earlier, _)) = self.pace.stepping.replace((question, until.min(simulation.scenario().ticks))) {
+        if let Some((earlier, _)) =
+            self.pace.stepping.replace((question, until.min(simulation.scenario().ticks)))
+        {
             self.answer_status(&earlier, simulation);
         }
     }
@@ -227,11 +247,15 @@ impl Server {
             phase: self.pace.phase,
             speed: self.pace.speed,
             awaiting: self.awaiting(),
-            robots: self.members.iter().map(|(name, member)| RobotStatus {
-                name: name.clone(),
-                generation: member.generation,
-                present: member.is_present,
-            }).collect(),
+            robots: self
+                .members
+                .iter()
+                .map(|(name, member)| RobotStatus {
+                    name: name.clone(),
+                    generation: member.generation,
+                    present: member.is_present,
+                })
+                .collect(),
             ignored: self.summary_wall.ignored.clone(),
         }
     }

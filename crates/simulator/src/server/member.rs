@@ -94,7 +94,11 @@ impl Server {
         question.answer(question.key(), encode(&answer));
     }
 
-    fn judge_join(&mut self, question: &Question, simulation: &Simulation) -> Result<JoinAnswer, (Refusal, String)> {
+    fn judge_join(
+        &mut self,
+        question: &Question,
+        simulation: &Simulation,
+    ) -> Result<JoinAnswer, (Refusal, String)> {
         let request: JoinRequest = decode(question.key(), "a robot", &question.body())
             .map_err(|error| (Refusal::Malformed, error.to_string()))?;
         let (name, run) = (&request.name, &self.options.run);
@@ -126,7 +130,12 @@ impl Server {
         welcome.map(|welcome| JoinAnswer::Welcome(Box::new(welcome))).ok_or_else(unknown)
     }
 
-    pub(super) fn on_token(&mut self, robot: &str, is_there: bool, simulation: &Simulation) -> Result<(), Interrupt> {
+    pub(super) fn on_token(
+        &mut self,
+        robot: &str,
+        is_there: bool,
+        simulation: &Simulation,
+    ) -> Result<(), Interrupt> {
         let Some((name, _)) = self.members.get_key_value(robot) else {
             self.ignore("unknown robot", robot);
             return Ok(());
@@ -143,7 +152,7 @@ impl Server {
             }
             self.repeat_clock()?;
         }
-        if self.open.is_announced || self.pace.phase() == Phase::Gathering {
+        if self.open.is_announced {
             self.observers.held(simulation, &self.status(simulation));
         }
         Ok(())

@@ -20,7 +20,11 @@ pub(super) struct Observers {
 
 impl Observers {
     pub(super) fn new(bus: &Bus, keys: &Keys) -> Result<Self, BusError> {
-        Ok(Self { world: bus.publisher(&keys.world())?, log: bus.publisher(&keys.log())?, painted: Instant::now() })
+        Ok(Self {
+            world: bus.publisher(&keys.world())?,
+            log: bus.publisher(&keys.log())?,
+            painted: Instant::now(),
+        })
     }
 
     pub(super) fn is_watched(&self) -> bool {
@@ -61,7 +65,8 @@ impl Observers {
         tracing::warn!("{text}");
         let (epoch, tick) = (simulation.epoch(), simulation.tick());
         let (source, kind) = ("simulator".to_owned(), LogKind::Late);
-        let line = LogRecord { epoch, tick, time_s: simulation.time_s(tick), source, kind, text: text.to_owned() };
+        let line =
+            LogRecord { epoch, tick, time_s: simulation.time_s(tick), source, kind, text: text.to_owned() };
         show(&self.log, encode(&line));
     }
 }

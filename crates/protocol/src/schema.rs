@@ -1,0 +1,36 @@
+//! JSON Schemas of all messages, for authors in other languages. Generated from the types; `schemas/` holds them as
+//! files, and a test keeps both equal.
+
+use std::collections::BTreeMap;
+
+use schemars::{JsonSchema, Schema, schema_for};
+
+use crate::messages::{
+    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, Panel, Percept,
+    PublicState, Report, Waiting, WorldFrame,
+};
+
+/// The schema of every message, by the name of its file.
+#[must_use]
+pub fn all() -> BTreeMap<&'static str, Schema> {
+    fn one<M: JsonSchema>() -> Schema {
+        schema_for!(M)
+    }
+    [
+        ("answer", one::<Answer>()),
+        ("clock", one::<Clock>()),
+        ("command", one::<Command>()),
+        ("control", one::<Control>()),
+        ("control_answer", one::<ControlAnswer>()),
+        ("join_answer", one::<JoinAnswer>()),
+        ("join_request", one::<JoinRequest>()),
+        ("log_record", one::<LogRecord>()),
+        ("panel", one::<Panel>()),
+        ("percept", one::<Percept>()),
+        ("public_state", one::<PublicState>()),
+        ("report", one::<Report>()),
+        ("waiting", one::<Waiting>()),
+        ("world_frame", one::<WorldFrame>()),
+    ]
+    .into()
+}
