@@ -281,7 +281,7 @@ impl Bus {
             .declare_subscriber(keys)
             .history(true)
             .callback(move |sample: Sample| {
-                handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put)
+                handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put);
             })
             .wait();
         Ok(Declared { _inner: Box::new(used("watch", keys, declared)?) })

@@ -1,5 +1,7 @@
 //! The contract: what is written is read back, what is malformed is named, schemas are up to date.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use protocol::messages::{
     Clock, Command, CommandId, Control, Correction, Face, JoinRequest, News, Panel, Point, Report,
     SensedRobot, SentCommand, Tone, Variable, Widget,
@@ -17,7 +19,7 @@ fn report() -> Report {
         generation: 1,
         proposal: Point::new(0.1 + 0.2, 1e-300),
         speed_mps: 1.0 / 3.0,
-        direction_rad: -3.141_592,
+        direction_rad: -3.0,
         emotion_state: "HAPPY".into(),
         behavior_state: "SERVE".into(),
         state_variables: [

@@ -147,7 +147,7 @@ impl Link {
             Event::Clock(Ok(clock)) => self.file_clock(clock),
             Event::Command { to, from, command: Ok(command) } => self.file_command(to, from, command),
             Event::Clock(Err(error)) | Event::Command { command: Err(error), .. } => {
-                tracing::warn!("{error}")
+                tracing::warn!("{error}");
             }
             Event::State { of, asked, state } => self.file_state(of, asked, state),
             Event::Percept { of, asked, percept } => {

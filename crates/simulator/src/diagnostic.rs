@@ -11,8 +11,14 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 pub struct FileError {
     message: String,
     help: Option<String>,
-    source_code: Option<NamedSource<String>>,
-    label: Option<LabeledSpan>,
+    place: Option<Box<Place>>,
+}
+
+/// Where in a text an error stands.
+#[derive(Debug)]
+struct Place {
+    source: NamedSource<String>,
+    label: LabeledSpan,
 }
 
 impl Diagnostic for FileError {
@@ -20,12 +26,11 @@ impl Diagnostic for FileError {
         self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
     }
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.source_code.as_ref().map(|source| source as &dyn SourceCode)
+        self.place.as_ref().map(|place| &place.source as &dyn SourceCode)
     }
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        self.label
-            .clone()
-            .map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)
+        let label = self.place.as_ref().map(|place| place.label.clone());
+        label.map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)
     }
 }
 
@@ -33,7 +38,7 @@ impl FileError {
     /// An error that has no place in a text.
     #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: message.into(), help: None, source_code: None, label: None }
+        Self { message: message.into(), help: None, place: None }
     }
 
     /// A file that cannot be read.
@@ -45,12 +50,11 @@ impl FileError {
     /// An error at a place of a text.
     #[must_use]
     pub fn at(source: &Source, span: Option<Range<usize>>, message: &str) -> Self {
-        Self {
-            message: format!("{} cannot be used", source.name),
-            help: None,
-            source_code: Some(NamedSource::new(&source.name, source.text.clone()).with_language("toml")),
-            label: Some(LabeledSpan::at(span.unwrap_or(0..0), message)),
-        }
+        let place = Place {
+            source: NamedSource::new(&source.name, source.text.clone()).with_language("toml"),
+            label: LabeledSpan::at(span.unwrap_or(0..0), message),
+        };
+        Self { message: format!("{} cannot be used", source.name), help: None, place: Some(Box::new(place)) }
     }
 
     /// What to do about it.

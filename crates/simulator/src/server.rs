@@ -8,7 +8,7 @@ mod member;
 mod observers;
 
 use std::collections::BTreeMap;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Declared, Publisher, Question};
@@ -332,10 +332,7 @@ impl Server {
 
     /// The next event, or `None` after `patience`.
     fn receive(&self, patience: Duration) -> Option<Event> {
-        match self.events.recv_timeout(patience) {
-            Ok(event) => Some(event),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
-        }
+        self.events.recv_timeout(patience).ok()
     }
 
     /// One event. The arms call; they do not think.
@@ -344,7 +341,7 @@ impl Server {
             Event::Report(Ok(report), robot) => self.on_report(&robot, report),
             Event::Waiting(Ok(waiting), robot) => self.on_waiting(&robot, waiting, simulation),
             Event::Report(Err(error), _) | Event::Waiting(Err(error), _) => {
-                self.ignore("malformed", &error.to_string())
+                self.ignore("malformed", &error.to_string());
             }
             Event::Join(question) => self.on_join(&question, simulation),
             Event::Percept(question) => self.on_percept(&question, simulation),
