@@ -1,0 +1,61 @@
+//! The missing arrows between crates are invariants.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::Command;
+
+/// For each crate of this project: which others of this project it may depend on, tests included.
+const ALLOWED: [(&str, &[&str]); 9] = [
+    ("world", &[]),
+    ("affect", &[]),
+    ("protocol", &[]),
+    ("robot", &["protocol"]),
+    ("robots", &["robot", "affect"]),
+    ("simulator", &["world", "protocol"]),
+    ("console", &["protocol"]),
+    ("cars", &["simulator", "robot", "robots", "protocol"]),
+    ("system-tests", &["simulator", "robot", "robots", "protocol"]),
+];
+
+fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let output = cargo.current_dir(system_tests::root()).args(["metadata", "--format-version", "1", "--no-deps"]).output();
+    let metadata: serde_json::Value = serde_json::from_slice(&output.unwrap().stdout).unwrap();
+    let names = |list: &serde_json::Value| -> BTreeSet<String> {
+        list.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()
+    };
+    let packages = metadata["packages"].as_array().unwrap();
+    packages.iter().map(|p| (p["name"].as_str().unwrap().to_owned(), names(&p["dependencies"]))).collect()
+}
+
+#[test]
+fn crates_depend_only_on_what_their_layer_allows() {
+    let found = dependencies();
+    let ours: BTreeSet<&str> = ALLOWED.iter().map(|(name, _)| *name).collect();
+    assert_eq!(found.keys().map(String::as_str).collect::<BTreeSet<_>>(), ours, "a crate came or went");
+    for (name, allowed) in ALLOWED {
+        for dependency in found[name].iter().filter(|dependency| ours.contains(dependency.as_str())) {
+            assert!(allowed.contains(&dependency.as_str()), "{name} must not depend on {dependency}");
+        }
+    }
+}
+
+#[test]
+fn only_protocol_names_the_middleware() {
+    for (name, dependencies) in dependencies() {
+        assert_eq!(dependencies.contains("zenoh"), name == "protocol", "{name}");
+    }
+}
+
+#[test]
+fn the_pure_crates_know_no_clock_no_network_and_no_files() {
+    for (name, dependencies) in dependencies() {
+        if name == "world" || name == "affect" {
+            for impure in ["tokio", "tracing", "zenoh", "clap", "nix"] {
+                assert!(!dependencies.contains(impure), "{name} must not depend on {impure}");
+            }
+        }
+        if name == "world" {
+            assert!(!dependencies.contains("serde"), "the environment is not a message");
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! The CD-player buttons on a real launch.
+
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+use serde_json::Value;
+use system_tests::processes::{Running, send};
+use system_tests::{Lab, assert_same, eventually};
+
+const FILE: &str = "launch/hors_doeuvres.toml";
+
+fn status(lab: &Lab, run: &str) -> Value {
+    serde_json::from_str(&lab.ok(&["ctl", "status", "--json", "--run", run])).unwrap()
+}
+
+fn ctl(lab: &Lab, run: &str, args: &[&str]) -> Value {
+    let mut all = vec!["ctl"];
+    all.extend(args);
+    all.extend(["--json", "--run", run]);
+    serde_json::from_str(&lab.ok(&all)).unwrap()
+}
+
+/// A launch that has gathered its robots and waits for `start`.
+fn paused(lab: &Lab, run: &str, more: &[&str]) -> Running {
+    let mut args = vec!["launch", FILE, "--paused", "--speed", "max"];
+    args.extend(more);
+    let launch = lab.start(run, &args);
+    eventually("the launch to be ready", || {
+        let output = lab.cars(&["ctl", "status", "--json", "--run", run]).output().unwrap();
+        let status: Value = serde_json::from_slice(&output.stdout).ok()?;
+        (status["phase"] == "ready").then_some(())
+    });
+    launch
+}
+
+#[test]
+fn step_answers_with_the_tick_reached_and_the_buttons_do_what_they_say() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-buttons", &["--duration", "60 s"]);
+    assert_eq!(status(&lab, "ctl-buttons")["tick"], 0);
+    assert_eq!(ctl(&lab, "ctl-buttons", &["step", "10"])["tick"], 10);
+    assert_eq!(ctl(&lab, "ctl-buttons", &["step"])["tick"], 11);
+    assert_eq!(ctl(&lab, "ctl-buttons", &["speed", "2"])["speed"], 2.0);
+    assert_eq!(ctl(&lab, "ctl-buttons", &["start"])["phase"], "running");
+    let (code, text) = lab.fails(&["ctl", "step", "--run", "ctl-buttons"]);
+    assert!(code == 1 && text.contains("pause it to step"), "{text}");
+    assert_eq!(ctl(&lab, "ctl-buttons", &["pause"])["phase"], "paused");
+    let at = status(&lab, "ctl-buttons")["tick"].as_u64().unwrap();
+    assert_eq!(ctl(&lab, "ctl-buttons", &["step", "3"])["tick"], at + 3);
+    ctl(&lab, "ctl-buttons", &["speed", "max"]);
+    ctl(&lab, "ctl-buttons", &["start"]);
+    launch.finish();
+    assert_eq!(lab.summary("ctl-buttons")["ticks"], 120);
+}
+
+#[test]
+fn pausing_and_stepping_change_nothing_in_the_record() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-paused", &["--duration", "60 s"]);
+    ctl(&lab, "ctl-paused", &["step", "33"]);
+    ctl(&lab, "ctl-paused", &["start"]);
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "ctl-straight", "--duration", "60 s"]);
+    assert_same(("paused", &lab.bytes("ctl-paused")), ("straight", &lab.bytes("ctl-straight")));
+}
+
+#[test]
+fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-init", &["--duration", "60 s"]);
+    ctl(&lab, "ctl-init", &["step", "50"]);
+    let before = launch.processes();
+    ctl(&lab, "ctl-init", &["init"]);
+    let again = eventually("the new epoch", || {
+        let status = status(&lab, "ctl-init");
+        (status["phase"] == "ready" && status["epoch"] == 2).then_some(status)
+    });
+    assert_eq!(again["tick"], 0);
+    assert_eq!(launch.processes(), before);
+    ctl(&lab, "ctl-init", &["start"]);
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "ctl-fresh", "--duration", "60 s"]);
+    assert_same(("after init", &lab.bytes("ctl-init")), ("fresh", &lab.bytes("ctl-fresh")));
+    // Nothing is lost: what the first epoch recorded is kept, too, up to where it was left.
+    let kept = std::fs::read(lab.file("ctl-init", "events-epoch1.jsonl")).unwrap();
+    assert!(lab.bytes("ctl-fresh").starts_with(&kept), "the first epoch went the same way");
+    assert!(String::from_utf8(kept).unwrap().lines().count() > 50);
+}
+
+#[test]
+fn init_with_another_seed_is_another_run() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-seed", &["--duration", "30 s"]);
+    ctl(&lab, "ctl-seed", &["init", "--seed", "77"]);
+    eventually("the new epoch", || (status(&lab, "ctl-seed")["phase"] == "ready").then_some(()));
+    ctl(&lab, "ctl-seed", &["start"]);
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "ctl-77", "--duration", "30 s", "--seed", "77"]);
+    assert_same(("after init", &lab.bytes("ctl-seed")), ("fresh", &lab.bytes("ctl-77")));
+}
+
+#[test]
+fn control_answers_at_once_while_the_clock_is_held() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-held", &["--duration", "60 s"]);
+    ctl(&lab, "ctl-held", &["step", "5"]);
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    // Less than the time after which an asker gives up.
+    let begun = Instant::now();
+    let stepped = ctl(&lab, "ctl-held", &["step", "10"]);
+    assert!(begun.elapsed() < Duration::from_secs(10), "step took {:?}", begun.elapsed());
+    assert!(stepped["tick"].as_u64().unwrap() < 15, "{stepped}");
+    let awaited: Vec<&str> =
+        stepped["awaiting"].as_array().unwrap().iter().map(|awaited| awaited["name"].as_str().unwrap()).collect();
+    assert!(awaited.contains(&"Leguin"), "{stepped}");
+    assert_eq!(ctl(&lab, "ctl-held", &["pause"])["phase"], "paused");
+    assert_eq!(status(&lab, "ctl-held")["phase"], "paused");
+    send(leguin, Signal::SIGCONT);
+    ctl(&lab, "ctl-held", &["start"]);
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "ctl-not-held", "--duration", "60 s"]);
+    assert_same(("held", &lab.bytes("ctl-held")), ("not held", &lab.bytes("ctl-not-held")));
+}
+
+#[test]
+fn init_ends_a_tick_that_hangs() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-rescue", &["--duration", "30 s"]);
+    ctl(&lab, "ctl-rescue", &["step", "5"]);
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    ctl(&lab, "ctl-rescue", &["step", "10"]);
+    ctl(&lab, "ctl-rescue", &["init"]);
+    send(leguin, Signal::SIGCONT);
+    eventually("the new epoch", || (status(&lab, "ctl-rescue")["phase"] == "ready").then_some(()));
+    ctl(&lab, "ctl-rescue", &["start"]);
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "ctl-no-rescue", "--duration", "30 s"]);
+    assert_same(("rescued", &lab.bytes("ctl-rescue")), ("fresh", &lab.bytes("ctl-no-rescue")));
+}
+
+#[test]
+fn stop_ends_the_run_with_its_record_complete() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-stop", &[]);
+    ctl(&lab, "ctl-stop", &["step", "20"]);
+    lab.ok(&["ctl", "stop", "--run", "ctl-stop"]);
+    launch.finish();
+    let events = lab.events("ctl-stop");
+    let (end, tick) = (&events[events.len() - 1], &events[events.len() - 2]);
+    assert_eq!((&end["event"], &end["reason"], &end["tick"]), (&"end".into(), &"stopped".into(), &20.into()));
+    assert_eq!(end["digest"], tick["digest"]);
+    assert_eq!(lab.summary("ctl-stop")["end"], "stopped");
+    let (_, text) = lab.fails(&["ctl", "status", "--run", "ctl-stop"]);
+    assert!(text.contains("not in progress"), "{text}");
+}

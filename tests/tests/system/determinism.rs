@@ -1,0 +1,124 @@
+//! The promise: the same seed gives the same run, byte for byte, however it is executed.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use system_tests::{Lab, assert_same, root};
+
+const FILE: &str = "launch/hors_doeuvres.toml";
+/// Long enough for several exchanges, refills and interceptions.
+const LENGTH: [&str; 4] = ["--duration", "150 s", "--speed", "max"];
+
+fn launched(lab: &Lab, run: &str, file: &str, more: &[&str]) -> Vec<u8> {
+    let mut args = vec!["launch", file, "--run", run];
+    args.extend(LENGTH);
+    args.extend(more);
+    lab.ok(&args);
+    lab.bytes(run)
+}
+
+fn in_process(lab: &Lab, run: &str, file: &str, more: &[&str]) -> Vec<u8> {
+    let mut args = vec!["run", file, "--run", run];
+    args.extend(LENGTH);
+    args.extend(more);
+    lab.ok(&args);
+    lab.bytes(run)
+}
+
+#[test]
+fn a_launch_and_a_run_in_one_process_are_the_same() {
+    let lab = Lab::new();
+    let local = in_process(&lab, "same-local", FILE, &["--seed", "3"]);
+    let first = launched(&lab, "same-first", FILE, &["--seed", "3"]);
+    let second = launched(&lab, "same-second", FILE, &["--seed", "3"]);
+    assert_same(("run", &local), ("launch", &first));
+    assert_same(("first launch", &first), ("second launch", &second));
+    // Nothing would be shown by two runs in which nothing happens.
+    let text = String::from_utf8(local).unwrap();
+    for event in ["command_sent", "command_delivered", "emotion", "behavior", "blocked", "\"end\""] {
+        assert!(text.contains(event), "no {event} in the run");
+    }
+}
+
+#[test]
+fn another_seed_is_another_run() {
+    let lab = Lab::new();
+    assert_ne!(in_process(&lab, "a", FILE, &["--seed", "3"]), in_process(&lab, "b", FILE, &["--seed", "4"]));
+}
+
+#[test]
+fn three_robots_are_the_same_either_way() {
+    let lab = Lab::new();
+    let file = "launch/three_robots.toml";
+    let local = in_process(&lab, "three-local", file, &[]);
+    let launch = launched(&lab, "three-launch", file, &[]);
+    assert_same(("run", &local), ("launch", &launch));
+}
+
+#[test]
+fn the_order_in_which_robots_start_changes_nothing() {
+    let lab = Lab::new();
+    let scenario = root().join("configs/hors_doeuvres.toml");
+    let process = |name: &str| format!("[[process]]\nname = \"{name}\"\ncommand = [\"cars-{}\"]\n", name.to_lowercase());
+    let head = format!("scenario = {:?}\n", scenario.display().to_string());
+    let forward = lab.write("forward.toml", &(head.clone() + &process("Butler") + &process("Leguin")));
+    let backward = lab.write("backward.toml", &(head + &process("Leguin") + &process("Butler")));
+    let forward = launched(&lab, "order-forward", forward.to_str().unwrap(), &[]);
+    let backward = launched(&lab, "order-backward", backward.to_str().unwrap(), &[]);
+    assert_same(("forward", &forward), ("backward", &backward));
+}
+
+/// Keeps every core busy until dropped.
+struct Load(Arc<AtomicBool>, Vec<std::thread::JoinHandle<()>>);
+
+impl Load {
+    fn on_all_cores() -> Self {
+        let (stop, cores) = (Arc::new(AtomicBool::new(false)), std::thread::available_parallelism().unwrap().get());
+        let burn = |stop: Arc<AtomicBool>| move || while !stop.load(Ordering::Relaxed) {};
+        let threads = (0..2 * cores).map(|_| std::thread::spawn(burn(stop.clone()))).collect();
+        Self(stop, threads)
+    }
+}
+
+impl Drop for Load {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+        for thread in self.1.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+#[test]
+fn load_on_all_cores_changes_nothing() {
+    let lab = Lab::new();
+    let calm = in_process(&lab, "load-calm", FILE, &[]);
+    let load = Load::on_all_cores();
+    let busy = launched(&lab, "load-busy", FILE, &[]);
+    drop(load);
+    assert_same(("calm", &calm), ("busy", &busy));
+}
+
+#[test]
+fn several_robots_in_one_process_are_the_same() {
+    let lab = Lab::new();
+    let scenario = root().join("configs/three_robots.toml");
+    let text = format!(
+        "scenario = {:?}\n[[process]]\nname = \"refillers\"\ncommand = [\"cars-leguin\"]\nrobots = [\"Leguin\", \"Vonda\"]\n\
+         [[process]]\nname = \"Butler\"\ncommand = [\"cars-butler\"]\n",
+        scenario.display().to_string()
+    );
+    let file = lab.write("together.toml", &text);
+    let together = launched(&lab, "hosts-together", file.to_str().unwrap(), &[]);
+    let apart = in_process(&lab, "hosts-apart", "configs/three_robots.toml", &[]);
+    assert_same(("together", &together), ("apart", &apart));
+}
+
+#[test]
+fn the_resolved_scenario_of_a_run_gives_the_same_run() {
+    let lab = Lab::new();
+    let first = in_process(&lab, "resolved-first", FILE, &["--seed", "5", "--set", "guests.count=60"]);
+    let resolved = lab.file("resolved-first", "scenario.toml");
+    lab.ok(&["run", resolved.to_str().unwrap(), "--run", "resolved-second"]);
+    assert_same(("first", &first), ("second", &lab.bytes("resolved-second")));
+}

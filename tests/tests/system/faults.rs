@@ -1,0 +1,134 @@
+//! Processes that hang, die and come back.
+
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+use system_tests::processes::{find, send};
+use system_tests::{Lab, assert_same, eventually, root};
+
+const FILE: &str = "launch/hors_doeuvres.toml";
+
+/// A launch file of Butler and Leguin with something more in Leguin's process.
+fn launch_file(lab: &Lab, leguin: &str) -> String {
+    let scenario = root().join("configs/hors_doeuvres.toml");
+    let text = format!(
+        "scenario = {:?}\n[[process]]\nname = \"Butler\"\ncommand = [\"cars-butler\"]\n\
+         [[process]]\nname = \"Leguin\"\ncommand = [\"cars-leguin\"]\n{leguin}\n",
+        scenario.display().to_string()
+    );
+    lab.write("launch.toml", &text).to_str().unwrap().to_owned()
+}
+
+fn nobody_is_left(run: &str) {
+    eventually("the last process to be gone", || find(run).is_empty().then_some(()));
+}
+
+#[test]
+fn a_stopped_robot_holds_the_clock_costs_nothing_and_changes_nothing() {
+    let lab = Lab::new();
+    let mut launch = lab.start("hang", &["launch", FILE, "--duration", "60 s", "--speed", "10"]);
+    launch.prints("behavior");
+    let leguin = launch.process("cars-leguin");
+    let stopped = Instant::now();
+    send(leguin, Signal::SIGSTOP);
+    let said = launch.prints("waiting for");
+    println!("the terminal named whom it waits for after {:?}", said - stopped);
+    assert!(launch.printed().contains("Leguin (") , "{}", launch.printed());
+
+    // Long enough that its link is given up, too.
+    std::thread::sleep(Duration::from_secs(1));
+    let (before_s, begun) = (launch.cpu_s(), Instant::now());
+    std::thread::sleep(Duration::from_secs(4));
+    let share = (launch.cpu_s() - before_s) / begun.elapsed().as_secs_f64();
+    println!("all processes together used {:.2} % of a core while the clock was held", share * 100.0);
+    assert!(share < 0.02, "waiting used {:.1} % of a core", share * 100.0);
+
+    send(leguin, Signal::SIGCONT);
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "no-hang", "--duration", "60 s"]);
+    assert_same(("stopped and continued", &lab.bytes("hang")), ("undisturbed", &lab.bytes("no-hang")));
+    let held = lab.summary("hang")["wall"]["held_up_by"]["Leguin"]["longest_s"].as_f64().unwrap();
+    assert!(held > 1.0, "the summary says who held up the run: {held}");
+    nobody_is_left("hang");
+}
+
+#[test]
+fn a_killed_robot_that_is_required_ends_the_launch_with_its_status() {
+    let lab = Lab::new();
+    let mut launch = lab.start("kill", &["launch", FILE, "--speed", "10"]);
+    launch.prints("behavior");
+    send(launch.process("cars-leguin"), Signal::SIGKILL);
+    let status = launch.wait();
+    assert_eq!(status.code(), Some(128 + 9), "{}", launch.printed());
+    assert!(launch.printed().contains("Leguin"), "{}", launch.printed());
+    nobody_is_left("kill");
+    // What was recorded until then is whole: every line is JSON, and the last one ends the run.
+    let events = lab.events("kill");
+    assert_eq!(events.last().unwrap()["event"], "end");
+}
+
+#[test]
+fn a_killed_robot_that_is_restarted_takes_part_again() {
+    let lab = Lab::new();
+    let file = launch_file(&lab, "restart = \"on-failure\"\nbackoff = \"0.1 s\"");
+    let mut launch = lab.start("restart", &["launch", &file, "--speed", "20", "--duration", "120 s"]);
+    launch.prints("behavior");
+    send(launch.process("cars-leguin"), Signal::SIGKILL);
+    launch.finish();
+    nobody_is_left("restart");
+    let events = lab.events("restart");
+    let joined = events.iter().find(|event| event["event"] == "joined" && event["generation"] == 2);
+    assert_eq!(joined.expect("the second incarnation joined")["robot"], "Leguin");
+    assert_eq!(events.last().unwrap()["reason"], "finished");
+    assert_eq!(lab.summary("restart")["robots"]["Leguin"]["returns"], 1);
+}
+
+#[test]
+fn interrupting_a_launch_leaves_nothing_behind() {
+    let lab = Lab::new();
+    let mut launch = lab.start("interrupt", &["launch", FILE, "--speed", "10"]);
+    launch.prints("behavior");
+    launch.signal(Signal::SIGINT);
+    launch.wait();
+    nobody_is_left("interrupt");
+    assert_eq!(lab.events("interrupt").last().unwrap()["event"], "end");
+}
+
+#[test]
+fn a_crash_of_the_simulator_loses_at_most_the_current_tick() {
+    let lab = Lab::new();
+    let mut launch = lab.start("crash", &["launch", FILE, "--speed", "50"]);
+    launch.prints("behavior");
+    send(launch.process("cars-sim"), Signal::SIGKILL);
+    let status = launch.wait();
+    assert!(!status.success(), "{}", launch.printed());
+    nobody_is_left("crash");
+    let record = lab.bytes("crash");
+    lab.ok(&["run", FILE, "--run", "no-crash"]);
+    assert!(record.ends_with(b"\n") && lab.bytes("no-crash").starts_with(&record), "the record is whole");
+}
+
+#[test]
+fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
+    let lab = Lab::new();
+    for (mode, end) in [("abort", "aborted"), ("continue", "finished")] {
+        let run = format!("late-{mode}");
+        let set = format!("on_late={mode}");
+        let mut launch = lab.start(
+            &run,
+            &["launch", FILE, "--speed", "10", "--duration", "30 s", "--set", &set, "--set", "deadline=0.5 s"],
+        );
+        launch.prints("behavior");
+        let leguin = launch.process("cars-leguin");
+        send(leguin, Signal::SIGSTOP);
+        if mode == "continue" {
+            launch.prints("missed the tick");
+            send(leguin, Signal::SIGCONT);
+        }
+        let status = launch.wait();
+        assert_eq!(status.success(), mode == "continue", "{}", launch.printed());
+        let events = lab.events(&run);
+        assert_eq!(events.last().unwrap()["reason"], end, "{}", launch.printed());
+        nobody_is_left(&run);
+    }
+}

@@ -1,0 +1,11 @@
+//! The whole system: real processes, real zenoh, the shipped files.
+
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
+
+mod boundaries;
+mod control;
+mod determinism;
+mod experiment;
+mod faults;
+mod shell;
+mod wire;

@@ -1,0 +1,307 @@
+//! The contract on the wire, spoken by hand: what is refused and how, and that nothing breaks.
+
+use std::process::Command;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use protocol::bus::{Bus, Declared, Role};
+use protocol::keys::Keys;
+use protocol::messages::{Clock, Control, ControlAnswer, JoinAnswer, Point, PublicState, Refusal, Report, Status, Welcome};
+use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
+use serde_json::{Value, json};
+use system_tests::processes::Running;
+use system_tests::{Lab, PATIENCE, eventually, programs};
+
+/// A simulator with robots A and B, and a session of our own.
+struct Wire {
+    lab: Lab,
+    simulator: Running,
+    endpoint: String,
+    run: RunName,
+    bus: Bus,
+    keys: Keys,
+}
+
+const SCENARIO: &str = "duration = \"20 s\"\n[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n\
+                        [[robot]]\nname = \"B\"\nat = [\"3 m\", \"2 m\"]\n";
+
+fn name(name: &str) -> RobotName {
+    RobotName::new(name).unwrap()
+}
+
+impl Wire {
+    fn new(run: &str) -> Self {
+        let lab = Lab::new();
+        let scenario = lab.write("two.toml", SCENARIO);
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let mut command = Command::new(programs().join("cars-sim"));
+        command.arg(scenario).args(["--run", run, "--listen", &endpoint, "--paused", "--out"]).arg(lab.out());
+        let simulator = Running::start(command, run, lab.out().join(run));
+        let role = Role::Client { connect: endpoint.clone(), patience: Duration::from_secs(20) };
+        let bus = Bus::open(&role, None).unwrap();
+        let run = RunName::new(run).unwrap();
+        let keys = Keys::new(&run);
+        Self { lab, simulator, endpoint, run, bus, keys }
+    }
+
+    fn ask(&self, key: &str, parameters: &str, body: Vec<u8>) -> Result<Vec<u8>, String> {
+        let answer = eventually("an answer", || self.bus.ask(key, parameters, Some(body.clone())).unwrap());
+        answer.result
+    }
+
+    fn join(&self, request: &Value) -> JoinAnswer {
+        let bytes = self.ask(&self.keys.join(), "", request.to_string().into_bytes()).unwrap();
+        decode("join", "simulator", &bytes).unwrap()
+    }
+
+    fn request(&self, robot: &str, instance: &str) -> Value {
+        json!({ "protocol": PROTOCOL_VERSION, "run": self.run, "name": robot, "instance": instance })
+    }
+
+    fn refused(&self, request: &Value) -> (Refusal, String) {
+        match self.join(request) {
+            JoinAnswer::Refused { reason, explanation } => (reason, explanation),
+            JoinAnswer::Welcome(_) => panic!("welcomed: {request}"),
+        }
+    }
+
+    fn control(&self, control: &Control) -> Result<Status, String> {
+        let bytes = self.ask(&self.keys.control(), "", encode(control)).unwrap();
+        match decode("control", "simulator", &bytes).unwrap() {
+            ControlAnswer::Done(status) => Ok(*status),
+            ControlAnswer::Refused { explanation } => Err(explanation),
+        }
+    }
+
+    fn status(&self) -> Status {
+        self.control(&Control::Status).unwrap()
+    }
+}
+
+/// A robot by hand: a session, a token, and the clocks it gets.
+struct Hand {
+    bus: Bus,
+    keys: Keys,
+    name: RobotName,
+    welcome: Welcome,
+    clocks: Receiver<Clock>,
+    _declared: Vec<Declared>,
+}
+
+impl Hand {
+    fn join(wire: &Wire, robot: &str) -> Self {
+        let role = Role::Client { connect: wire.endpoint.clone(), patience: Duration::from_secs(20) };
+        let bus = Bus::open(&role, None).unwrap();
+        let (sender, clocks) = channel();
+        let subscribed = bus.subscribe(&wire.keys.clock(), move |key, bytes| {
+            let _ = sender.send(decode(key, "simulator", bytes).unwrap());
+        });
+        let JoinAnswer::Welcome(welcome) = wire.join(&wire.request(robot, &bus.id())) else { panic!("refused") };
+        let name = name(robot);
+        let token = bus.token(&wire.keys.alive_robot(&name)).unwrap();
+        let declared = vec![subscribed.unwrap(), token];
+        Self { bus, keys: wire.keys.clone(), name, welcome: *welcome, clocks, _declared: declared }
+    }
+
+    fn clock(&self) -> Clock {
+        self.clocks.recv_timeout(PATIENCE).expect("a clock")
+    }
+
+    fn report(&self, tick: u64) -> Report {
+        Report {
+            epoch: self.welcome.epoch,
+            tick,
+            generation: self.welcome.generation,
+            proposal: self.welcome.location,
+            speed_mps: 0.0,
+            direction_rad: 0.0,
+            emotion_state: "CALM".into(),
+            behavior_state: "IDLE".into(),
+            state_variables: [].into(),
+            sent: vec![],
+            missing: vec![],
+            log: vec![],
+        }
+    }
+
+    fn put(&self, report: &Report) {
+        self.bus.put(&self.keys.report(&self.name), encode(report)).unwrap();
+    }
+}
+
+/// Both robots by hand, tick 0 done.
+fn ready(run: &str) -> (Wire, Hand, Hand) {
+    let wire = Wire::new(run);
+    let (a, b) = (Hand::join(&wire, "A"), Hand::join(&wire, "B"));
+    for hand in [&a, &b] {
+        assert_eq!(hand.clock().tick, 0);
+        hand.put(&hand.report(0));
+    }
+    eventually("tick 0", || (wire.status().phase == protocol::messages::Phase::Ready).then_some(()));
+    (wire, a, b)
+}
+
+#[test]
+fn a_robot_is_refused_with_a_reason() {
+    let wire = Wire::new("wire-refuse");
+    let mut unknown = wire.request("Zed", "1");
+    let (reason, text) = wire.refused(&unknown);
+    assert!(reason == Refusal::UnknownName && text.contains("A, B"), "{text}");
+    unknown["name"] = "A/B".into();
+    let (reason, text) = wire.refused(&unknown);
+    assert!(reason == Refusal::Malformed && text.contains("field name"), "{text}");
+
+    let mut other = wire.request("A", "1");
+    other["protocol"] = 99.into();
+    let (reason, text) = wire.refused(&other);
+    assert!(reason == Refusal::OtherProtocol && text.contains("99"), "{text}");
+
+    let mut other = wire.request("A", "1");
+    other["run"] = "elsewhere".into();
+    let (reason, text) = wire.refused(&other);
+    assert!(reason == Refusal::OtherRun && text.contains("elsewhere"), "{text}");
+
+    let a = Hand::join(&wire, "A");
+    assert_eq!((a.welcome.location, a.welcome.generation), (Point::new(2.0, 2.0), 1));
+    let (reason, text) = wire.refused(&wire.request("A", "somebody else"));
+    assert!(reason == Refusal::NameTaken && text.contains("another living process"), "{text}");
+}
+
+#[test]
+fn unknown_fields_of_a_join_are_ignored() {
+    let wire = Wire::new("wire-unknown");
+    let mut request = wire.request("A", "1");
+    request["favorite_color"] = "red".into();
+    assert!(matches!(wire.join(&request), JoinAnswer::Welcome(_)));
+}
+
+#[test]
+fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
+    let (wire, a, b) = ready("wire-malformed");
+    wire.control(&Control::Start).unwrap();
+    for hand in [&a, &b] {
+        assert_eq!(hand.clock().tick, 1);
+    }
+    let report = a.keys.report(&a.name);
+    a.bus.put(&report, b"not json".to_vec()).unwrap();
+    a.bus.put(&report, br#"{"epoch":1,"tick":1}"#.to_vec()).unwrap();
+    a.put(&a.report(7));
+    a.put(&Report { generation: 9, ..a.report(1) });
+    a.put(&Report { epoch: 5, ..a.report(1) });
+    a.bus.put(&a.keys.report(&name("Nobody")), encode(&a.report(1))).unwrap();
+    let status = eventually("the counts", || {
+        let status = wire.status();
+        (status.ignored.values().sum::<u64>() == 6).then_some(status)
+    });
+    assert_eq!(status.tick, 0, "the tick is still open");
+    assert_eq!(status.ignored, [("malformed".into(), 2), ("stale".into(), 3), ("unknown robot".into(), 1)].into());
+    // The tick goes on as if nothing had happened.
+    a.put(&a.report(1));
+    b.put(&b.report(1));
+    assert_eq!(a.clock().tick, 2);
+}
+
+#[test]
+fn a_second_report_for_the_same_tick_changes_nothing() {
+    let (_wire, a, b) = ready("wire-twice");
+    let wire = _wire;
+    wire.control(&Control::Start).unwrap();
+    a.clock();
+    a.put(&a.report(1));
+    a.put(&Report { proposal: Point::new(2.2, 2.0), ..a.report(1) });
+    b.put(&b.report(1));
+    assert!(a.clock().news.get(&a.name).is_none_or(|news| news.correction.is_none()));
+    let lines = eventually("tick 1", || {
+        let text = std::fs::read_to_string(wire.lab.file("wire-twice", "events.jsonl")).unwrap();
+        text.contains("\"tick\":1,").then_some(text)
+    });
+    assert!(!lines.contains("blocked"));
+}
+
+#[test]
+fn malformed_and_impossible_controls_are_refused_with_a_reason() {
+    let (wire, ..) = ready("wire-control");
+    let raw = |text: &str| {
+        let bytes = wire.ask(&wire.keys.control(), "", text.as_bytes().to_vec()).unwrap();
+        match decode("control", "simulator", &bytes).unwrap() {
+            ControlAnswer::Refused { explanation } => explanation,
+            ControlAnswer::Done(_) => panic!("accepted: {text}"),
+        }
+    };
+    for (text, reason) in [
+        ("", "EOF"),
+        ("{\"do\":\"dance\"}", "unknown variant `dance`"),
+        ("{\"do\":\"step\"}", "missing field `n`"),
+        ("{\"do\":\"step\",\"n\":0}", "1 to"),
+        ("{\"do\":\"step\",\"n\":10000000}", "1 to"),
+        ("{\"do\":\"speed\",\"factor\":-1}", "more than zero"),
+        ("{\"do\":\"init\",\"seed\":9007199254740992}", "a seed is at most"),
+        ("{\"do\":\"command\",\"to\":\"Zed\",\"command\":\"x\"}", "no robot of this run is called Zed"),
+    ] {
+        let explanation = raw(text);
+        assert!(explanation.contains(reason), "{text}: {explanation}");
+    }
+    assert_eq!(wire.status().tick, 0);
+}
+
+#[test]
+fn a_lost_report_is_asked_for_again_by_repeating_the_clock() {
+    let (wire, a, b) = ready("wire-lost");
+    wire.control(&Control::Start).unwrap();
+    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    b.put(&b.report(1));
+    // A's report is lost. The same clock comes again, and the tick is done when A repeats.
+    assert_eq!(a.clock().tick, 1);
+    a.put(&a.report(1));
+    while b.clock().tick < 2 {}
+}
+
+#[test]
+fn queries_answer_with_the_tick_before() {
+    // A real robot asked by hand: Leguin, in a run that is stepped.
+    let lab = Lab::new();
+    let mut launch = lab.start("wire-query", &["launch", "launch/hors_doeuvres.toml", "--paused"]);
+    let endpoint = eventually("the endpoint", || {
+        std::fs::read_to_string(lab.file("wire-query", "endpoint")).ok().map(|text| text.trim().to_owned())
+    });
+    let bus = Bus::open(&Role::Client { connect: endpoint, patience: PATIENCE }, None).unwrap();
+    let keys = Keys::new(&RunName::new("wire-query").unwrap());
+    eventually("the run", || lab.cars(&["ctl", "step", "7", "--run", "wire-query"]).status().unwrap().success().then_some(()));
+    let ask = |what: &str, parameters: &str| {
+        let answer = bus.ask(&keys.query(&name("Leguin"), what), parameters, None).unwrap();
+        answer.expect("Leguin answers").result
+    };
+    let state = |parameters: &str| decode::<PublicState>("state", "Leguin", &ask("state", parameters).unwrap()).unwrap();
+    assert_eq!(state("").tick, 7);
+    assert_eq!(state("tick=8;epoch=1").tick, 7);
+    assert_eq!(state("tick=7;epoch=1").tick, 6);
+    assert!(ask("state", "tick=3;epoch=1").unwrap_err().contains("over"));
+    assert!(ask("state", "tick=x").unwrap_err().contains("not a whole number"));
+    for (what, expected) in [("behavior_state", json!("WAIT")), ("emotion_state", json!("HAPPY")), ("speed", json!(0.0))] {
+        let answer: Value = serde_json::from_slice(&ask(what, "").unwrap()).unwrap();
+        assert_eq!((&answer["value"], &answer["tick"]), (&expected, &json!(7)));
+    }
+    lab.ok(&["ctl", "stop", "--run", "wire-query"]);
+    launch.finish();
+}
+
+#[test]
+fn the_simulator_survives_rubbish_on_its_port() {
+    let (mut wire, a, b) = ready("wire-rubbish");
+    let address = wire.endpoint.trim_start_matches("tcp/").to_owned();
+    for rubbish in [&b"GET / HTTP/1.1\r\n\r\n"[..], &[0; 4096], &[0xff; 4096]] {
+        let mut stream = std::net::TcpStream::connect(&address).unwrap();
+        let _ = std::io::Write::write_all(&mut stream, rubbish);
+    }
+    wire.control(&Control::Start).unwrap();
+    for tick in 1..=40 {
+        for hand in [&a, &b] {
+            assert_eq!(hand.clock().tick, tick);
+            hand.put(&hand.report(tick));
+        }
+    }
+    assert_eq!(a.clock().end, Some(protocol::messages::End::Finished));
+    drop((a, b));
+    wire.simulator.finish();
+}
