@@ -103,8 +103,15 @@ impl Link {
     pub(crate) fn next_clock(&mut self, patience: Duration) -> Option<Clock> {
         let deadline = Instant::now() + patience;
         loop {
-            if let Some(clock) = self.clocks.pop_front() {
-                return Some(clock);
+            while let Some(clock) = self.clocks.pop_front() {
+                // Where the simulator has gone on without us, only its last clock can still be answered; the first clock
+                // of an epoch or of an incarnation must be seen all the same.
+                let is_first = clock.tick == 0 || clock.news.values().any(|news| news.joined.is_some());
+                let is_later = |later: &Clock| (later.epoch, later.tick) > (clock.epoch, clock.tick);
+                let is_superseded = self.clocks.iter().any(is_later) && !is_first;
+                if clock.end.is_some() || !is_superseded {
+                    return Some(clock);
+                }
             }
             if !self.pump(deadline.saturating_duration_since(Instant::now())) {
                 return None;
@@ -190,9 +197,10 @@ impl Link {
         };
     }
 
-    /// Whether a clock has arrived that ends the tick under way before it is done.
+    /// Whether a clock has arrived that ends the tick under way before it is done: the run is over, the next epoch
+    /// begins, or the simulator has gone on without us.
     fn is_interrupted(&self) -> bool {
-        self.clocks.iter().any(|clock| clock.epoch > self.current.0 || clock.end.is_some())
+        self.clocks.iter().any(|clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some())
     }
 
     fn ask_state(&mut self, of: &RobotName, asked: Asked) {

@@ -363,14 +363,16 @@ impl Server {
 
     fn on_report(&mut self, robot: &str, report: Report) {
         let open = (self.open.clock.epoch, self.open.clock.tick);
-        let Some((name, member)) = self.members.get_key_value(robot) else {
-            return self.ignore("unknown robot", robot);
-        };
+        let Ok(name) = RobotName::new(robot) else { return self.ignore("unknown robot", robot) };
+        let Some(member) = self.members.get_mut(&name) else { return self.ignore("unknown robot", robot) };
+        if member.is_lost && report.generation == member.generation {
+            member.is_heard_of();
+            return self.ignore("lost", robot);
+        }
         if (report.epoch, report.tick) != open || !self.open.is_open || report.generation != member.generation
         {
             return self.ignore("stale", robot);
         }
-        let name = name.clone();
         let now = Instant::now();
         if self.awaited().eq([&name]) {
             let waited_s = (now - self.open.last_arrival).as_secs_f64();

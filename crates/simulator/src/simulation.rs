@@ -72,6 +72,8 @@ pub struct Simulation {
     now: Tick,
     world: World<Stream>,
     medium: Medium,
+    /// Commands that the clock under way names, by target.
+    arriving: BTreeMap<RobotName, Vec<CommandId>>,
     /// What each robot reported last.
     reports: BTreeMap<RobotName, Report>,
     /// Robots whose report of the last tick is missing: they propose nothing, and nobody can query them.
@@ -98,6 +100,7 @@ impl Simulation {
             now: 0,
             world,
             medium: Medium::default(),
+            arriving: BTreeMap::new(),
             reports: BTreeMap::new(),
             silent: Vec::new(),
             operator_seq: 0,
@@ -122,7 +125,7 @@ impl Simulation {
             let at = self.location(name).unwrap_or_default();
             events.push(Event::Joined { robot: name.clone(), generation: None, at });
         }
-        let clock = self.clock(0, &[], BTreeMap::new());
+        let clock = self.clock(0, &[]);
         let exchange = barrier.exchange(clock, self)?;
         Ok(self.record(0, events, exchange))
     }
@@ -139,11 +142,11 @@ impl Simulation {
         let verdicts = self.world.advance(&self.proposals());
         self.note_moves(&verdicts, &mut events);
 
-        let delivered = self.medium.decide(tick);
-        note_deliveries(&delivered, &mut events);
+        self.arriving = self.medium.decide(tick);
 
-        let clock = self.clock(tick, &verdicts, delivered);
+        let clock = self.clock(tick, &verdicts);
         let exchange = barrier.exchange(clock, self)?;
+
         Ok(self.record(tick, events, exchange))
     }
 
@@ -180,12 +183,7 @@ impl Simulation {
     }
 
     /// The clock of a tick: exceptions only.
-    fn clock(
-        &self,
-        tick: Tick,
-        verdicts: &[Verdict],
-        mut delivered: BTreeMap<RobotName, Vec<CommandId>>,
-    ) -> Clock {
+    fn clock(&self, tick: Tick, verdicts: &[Verdict]) -> Clock {
         let mut news = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             let is_refused = verdicts.get(index).is_some_and(|verdict| self.blocker(*verdict).is_some());
@@ -194,7 +192,7 @@ impl Simulation {
                 .then(|| Correction { location: to_wire(self.world.robots()[index]), blocked: is_refused });
             let own = News {
                 correction,
-                commands: delivered.remove(name).unwrap_or_default(),
+                commands: self.arriving.get(name).cloned().unwrap_or_default(),
                 unreachable: self.silent.iter().filter(|silent| *silent != name).cloned().collect(),
                 sensed: self.sensed_robots(index),
                 joined: None,
@@ -217,6 +215,7 @@ impl Simulation {
                 Membership::Lost(robot) => Event::Lost { robot },
             });
         }
+        self.note_deliveries(tick, &exchange.reports, &mut events);
         self.silent.clear();
         let mut reports = exchange.reports;
         for name in self.names.clone() {
@@ -232,6 +231,27 @@ impl Simulation {
         self.close_digest();
         events.push(Event::Tick { digest: self.digest.to_string() });
         TickRecord { tick, events }
+    }
+
+    /// A command that was named has arrived, unless its target says that it never came. Whoever missed the tick has not
+    /// seen the clock that named it: the next one names it again.
+    fn note_deliveries(
+        &mut self,
+        tick: Tick,
+        reports: &BTreeMap<RobotName, Report>,
+        events: &mut Vec<Event>,
+    ) {
+        for (to, ids) in std::mem::take(&mut self.arriving) {
+            for id in ids {
+                match reports.get(&to) {
+                    None => self.medium.accept(tick, Underway { to: to.clone(), from: id.from, seq: id.seq }),
+                    Some(report) if report.missing.contains(&id) => {}
+                    Some(_) => {
+                        events.push(Event::CommandDelivered { from: id.from, to: to.clone(), seq: id.seq });
+                    }
+                }
+            }
+        }
     }
 
     fn note_report(&mut self, tick: Tick, robot: &RobotName, report: Report, events: &mut Vec<Event>) {
@@ -413,15 +433,5 @@ impl Simulation {
     #[must_use]
     pub fn digest(&self) -> String {
         self.digest.to_string()
-    }
-}
-
-fn note_deliveries(delivered: &BTreeMap<RobotName, Vec<CommandId>>, events: &mut Vec<Event>) {
-    for (to, ids) in delivered {
-        events.extend(ids.iter().map(|id| Event::CommandDelivered {
-            from: id.from.clone(),
-            to: to.clone(),
-            seq: id.seq,
-        }));
     }
 }

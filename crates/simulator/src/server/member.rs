@@ -28,6 +28,8 @@ pub(super) struct Member {
     is_seated: bool,
     /// Whether the clock goes on without it.
     pub(super) is_lost: bool,
+    /// Whether it was lost and has been heard of since.
+    has_returned: bool,
     missed: u32,
 }
 
@@ -40,15 +42,21 @@ impl Member {
     /// Everybody takes part in an epoch from its beginning.
     pub(super) fn begin_epoch(&mut self) {
         (self.is_seated, self.is_pending, self.is_lost, self.missed) = (true, false, false, 0);
+        self.has_returned = false;
     }
 
     /// The incarnation that the next clock must name, if there is one and its process is ready.
     pub(super) fn take_pending(&mut self) -> Option<Generation> {
-        if !(self.is_pending && self.is_present) {
+        if !((self.is_pending || self.has_returned) && self.is_present) {
             return None;
         }
-        (self.is_pending, self.is_lost, self.missed) = (false, false, 0);
+        (self.is_pending, self.has_returned, self.is_lost, self.missed) = (false, false, false, 0);
         Some(self.generation)
+    }
+
+    /// A report came from it although the clock goes on without it.
+    pub(super) fn is_heard_of(&mut self) {
+        self.has_returned = true;
     }
 
     /// A tick is over in which it reported, or not.
