@@ -1,0 +1,56 @@
+//! `cars check`: reads scenario and launch files as a run would, and runs nothing.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use simulator::Scenario;
+use simulator::diagnostic::FileError;
+use simulator::scenario::Changes;
+
+use crate::launch::file::LaunchFile;
+use crate::launch::is_launch_file;
+
+/// `cars check`.
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// Scenario and launch files.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+}
+
+/// Checks every file, also after a bad one.
+pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
+    let mut are_all_good = true;
+    for path in &args.files {
+        match describe(path) {
+            Ok(text) => println!("ok {}: {text}", path.display()),
+            Err(error) => {
+                are_all_good = false;
+                eprintln!("{:?}", miette::Report::new(error));
+            }
+        }
+    }
+    Ok(if are_all_good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What a file says, in one line.
+fn describe(path: &Path) -> Result<String, FileError> {
+    if !is_launch_file(path)? {
+        return Ok(content(&Scenario::load(path, &Changes::default())?));
+    }
+    let file = LaunchFile::load(path)?;
+    let scenario = Scenario::load(&file.scenario, &Changes::default())?;
+    file.check_robots(&scenario)?;
+    Ok(format!("{}, {}", count(file.processes.len(), "process", "processes"), content(&scenario)))
+}
+
+fn content(scenario: &Scenario) -> String {
+    let robots = count(scenario.robots.len(), "robot", "robots");
+    let guests = count(scenario.guests.count, "guest", "guests");
+    format!("{robots}, {guests}, {} ticks", scenario.ticks)
+}
+
+fn count(number: usize, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}

@@ -1,0 +1,169 @@
+//! What is started: the launch file with every program found and every argument in place.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use protocol::{RobotName, RunName};
+use simulator::RunFolder;
+use simulator::diagnostic::FileError;
+use simulator::recorder::SCENARIO;
+
+use super::file::{LaunchFile, Process, SIMULATOR};
+use super::program::{NotFound, Places};
+use super::restart::Restart;
+use crate::common::Speed;
+
+/// A command line with its environment.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CommandLine {
+    pub(super) program: PathBuf,
+    pub(super) args: Vec<String>,
+    /// In addition to the launcher's own.
+    pub(super) env: BTreeMap<String, String>,
+}
+
+/// One process to run.
+#[derive(Debug, Clone)]
+pub(super) struct Planned {
+    pub(super) name: String,
+    pub(super) command: CommandLine,
+    pub(super) restart: Restart,
+    pub(super) backoff: Duration,
+    /// Whether its failure ends the run.
+    pub(super) is_required: bool,
+    /// Whether somebody else starts it.
+    pub(super) is_extern: bool,
+    /// Whether the run is over when it is.
+    pub(super) is_simulator: bool,
+}
+
+/// What a run is called and where it happens.
+#[derive(Debug, Clone)]
+pub(super) struct Execution<'a> {
+    pub(super) run: &'a RunName,
+    pub(super) endpoint: &'a str,
+    /// Where run folders are made.
+    pub(super) out: &'a Path,
+    pub(super) speed: Speed,
+    pub(super) is_paused: bool,
+}
+
+/// All processes of a launch file, the simulator first.
+pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Planned>, FileError> {
+    let places = Places::new(&file.folder);
+    let mut planned = vec![simulator(file, execution, &places)?];
+    for process in &file.processes {
+        let mut env = process.env.clone();
+        env.insert("CARS_RUN".to_owned(), execution.run.to_string());
+        env.insert("CARS_CONNECT".to_owned(), execution.endpoint.to_owned());
+        let program = program(file, process, &places)?;
+        let args = process.command.iter().skip(1).cloned().chain(name_args(&process.robots)).collect();
+        planned.push(prepare(process, CommandLine { program, args, env }));
+    }
+    Ok(planned)
+}
+
+/// How a program is told which robots it runs.
+pub(super) fn name_args(robots: &[RobotName]) -> Vec<String> {
+    robots.iter().flat_map(|robot| ["--name".to_owned(), robot.to_string()]).collect()
+}
+
+/// How the clock's speed is written on a command line.
+pub(super) fn speed_arg(speed: Speed) -> String {
+    speed.0.map_or_else(|| "max".to_owned(), |factor| factor.to_string())
+}
+
+fn simulator(file: &LaunchFile, execution: &Execution, places: &Places) -> Result<Planned, FileError> {
+    let process = &file.simulator;
+    let scenario = RunFolder::new(execution.out, execution.run).file(SCENARIO);
+    let mut args: Vec<String> = process.command.iter().skip(1).cloned().collect();
+    args.extend([
+        scenario.display().to_string(),
+        format!("--run={}", execution.run),
+        format!("--listen={}", execution.endpoint),
+        format!("--out={}", execution.out.display()),
+        format!("--speed={}", speed_arg(execution.speed)),
+    ]);
+    args.extend(execution.is_paused.then(|| "--paused".to_owned()));
+    let program = program(file, process, places)?;
+    let command = CommandLine { program, args, env: process.env.clone() };
+    Ok(Planned { is_simulator: true, ..prepare(process, command) })
+}
+
+fn prepare(process: &Process, mut command: CommandLine) -> Planned {
+    let runtime = protocol::runtime::RUNTIME_VARIABLE;
+    let chosen = std::env::var(runtime).unwrap_or_else(|_| protocol::runtime::ONE_THREAD.to_owned());
+    command.env.entry(runtime.to_owned()).or_insert(chosen);
+    if !process.is_extern {
+        // Its output goes into a file, too, and files have no colors.
+        command.env.entry("NO_COLOR".to_owned()).or_insert_with(|| "1".to_owned());
+    }
+    Planned {
+        name: process.name.clone(),
+        command,
+        restart: process.restart,
+        backoff: process.backoff,
+        is_required: process.is_required,
+        is_extern: process.is_extern,
+        is_simulator: false,
+    }
+}
+
+/// The program of a process. What somebody else starts need not be here.
+fn program(file: &LaunchFile, process: &Process, places: &Places) -> Result<PathBuf, FileError> {
+    let name = &process.command[0];
+    match places.find(name) {
+        Ok(program) => Ok(program),
+        Err(_) if process.is_extern => Ok(PathBuf::from(name)),
+        Err(NotFound(searched)) => {
+            let help = format!(
+                "looked for {}\nthe programs of this project are built by `cargo build --release`",
+                searched.join(",\nand ")
+            );
+            let text = format!("there is no program {name}");
+            Err(match process.span.clone() {
+                None if process.name == SIMULATOR => FileError::new(text),
+                None => FileError::new(format!("{text}, which process {} is to run", process.name)),
+                span => FileError::at(&file.source, span, &text),
+            }
+            .with_help(help))
+        }
+    }
+}
+
+impl std::fmt::Display for CommandLine {
+    /// As a line for a shell.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (name, value) in &self.env {
+            write!(f, "{name}={} ", quote(value))?;
+        }
+        f.write_str(&quote(&self.program.display().to_string()))?;
+        self.args.iter().try_for_each(|arg| write!(f, " {}", quote(arg)))
+    }
+}
+
+/// A word for a shell.
+fn quote(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_line_can_be_pasted_into_a_shell() {
+        let command = CommandLine {
+            program: "/opt/my robots/butler".into(),
+            args: ["--name", "Butler", "it's", ""].map(str::to_owned).to_vec(),
+            env: BTreeMap::from([("ZENOH_RUNTIME".to_owned(), "(rx:1)".to_owned())]),
+        };
+        let line = r"ZENOH_RUNTIME='(rx:1)' '/opt/my robots/butler' --name Butler 'it'\''s' ''";
+        assert_eq!(command.to_string(), line);
+    }
+}

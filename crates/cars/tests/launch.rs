@@ -1,0 +1,243 @@
+//! `cars launch` as a process: what it prints, how it ends, and that it leaves nobody behind. Shells play simulator
+//! and robots; nothing here needs the bus.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on has failed")]
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+const SCENARIO: &str = "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n";
+const TIME: Duration = Duration::from_secs(20);
+
+/// A folder with a scenario and a launch file.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    /// A launch of two shells, each given as a script; `$DIR` is this folder.
+    fn new(simulator: &str, butler: &str, more: &str) -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        std::fs::write(folder.path("hall.toml"), SCENARIO).unwrap();
+        let text = format!(
+            "scenario = \"hall.toml\"\n\
+             [simulator]\ncommand = [\"sh\", \"-c\", '''{simulator}''']\n\
+             [[process]]\nname = \"Butler\"\ncommand = [\"sh\", \"-c\", '''{butler}''']\n{more}\n"
+        );
+        std::fs::write(folder.path("launch.toml"), text).unwrap();
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn cars(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cars"));
+        command.current_dir(self.0.path()).env("DIR", self.0.path()).env_remove("NO_COLOR");
+        command.arg("launch").arg("launch.toml").arg("--quiet").args(args);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    /// Waits until a shell has written this file.
+    #[track_caller]
+    fn wait_for(&self, name: &str) {
+        let begun = Instant::now();
+        while !self.path(name).exists() {
+            assert!(begun.elapsed() < TIME, "no {name}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap_or_default()
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn signal(child: &Child, signal: Signal) {
+    kill(Pid::from_raw(i32::try_from(child.id()).unwrap()), signal).unwrap();
+}
+
+/// Waits for the end of a launch, but not for ever.
+#[track_caller]
+fn end(mut child: Child) -> Output {
+    let begun = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        if begun.elapsed() > TIME {
+            let _ended = child.kill();
+            panic!("the launch does not end");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
+    child.stdout.take().unwrap().read_to_end(&mut stdout).unwrap();
+    child.stderr.take().unwrap().read_to_end(&mut stderr).unwrap();
+    Output { status, stdout, stderr }
+}
+
+#[track_caller]
+fn assert_gone(pid: &str) {
+    let begun = Instant::now();
+    let path = Path::new("/proc").join(pid.trim()).join("stat");
+    while std::fs::read_to_string(&path).is_ok_and(|stat| !stat.contains(") Z ")) {
+        assert!(begun.elapsed() < TIME, "process {pid} was left behind");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+const IN_ORDER: &str = "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
+const DEAF: &str = "trap '' TERM; (sleep 600; true) & echo $! > $DIR/child; touch $DIR/deaf; wait";
+
+#[test]
+fn a_run_that_finishes_exits_with_0_and_leaves_logs() {
+    let folder = Folder::new("echo hello; sleep 0.2", "echo ready >&2; sleep 0.1", "");
+    let output = folder.cars(&[]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert_eq!(text(&output.stderr), "Butler    | ready\n");
+    assert_eq!(folder.read("runs/launch/logs/simulator.log"), "hello\n");
+    assert_eq!(folder.read("runs/launch/logs/Butler.log"), "ready\n");
+    assert!(folder.path("runs/launch/scenario.toml").exists());
+}
+
+#[test]
+fn the_exit_status_is_that_of_the_first_required_failure() {
+    let folder =
+        Folder::new(IN_ORDER, "until [ -e $DIR/up ]; do sleep 0.01; done; echo broken >&2; exit 3", "");
+    let output = folder.cars(&[]).output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let stderr = text(&output.stderr);
+    let end = "error: Butler ended with exit status 3\n\
+               the last lines that it wrote as errors:\n  broken\nits log: runs/launch/logs/Butler.log\n";
+    assert!(stderr.ends_with(end), "{stderr}");
+    assert_eq!(folder.read("record"), "stopped\n");
+}
+
+#[test]
+fn ctrl_c_once_ends_all_in_good_order() {
+    for (asking, code) in [(Signal::SIGINT, 130), (Signal::SIGTERM, 143), (Signal::SIGHUP, 129)] {
+        let folder = Folder::new(IN_ORDER, "touch $DIR/robot; sleep 600", "");
+        let launch = folder.cars(&[]).spawn().unwrap();
+        folder.wait_for("up");
+        folder.wait_for("robot");
+        signal(&launch, asking);
+        assert_eq!(end(launch).status.code(), Some(code));
+        assert_eq!(folder.read("record"), "stopped\n");
+    }
+}
+
+#[test]
+fn ctrl_c_twice_kills_all_at_once() {
+    let folder = Folder::new(IN_ORDER, DEAF, "");
+    let mut launch = folder.cars(&["--grace", "10 min"]).spawn().unwrap();
+    folder.wait_for("up");
+    folder.wait_for("deaf");
+    signal(&launch, Signal::SIGINT);
+    folder.wait_for("record");
+    assert!(launch.try_wait().unwrap().is_none(), "one is still there, and has time");
+    signal(&launch, Signal::SIGINT);
+    assert_eq!(end(launch).status.code(), Some(130));
+    assert_gone(&folder.read("child"));
+}
+
+#[test]
+fn what_is_started_by_somebody_else_is_printed_and_not_started() {
+    let folder =
+        Folder::new("sleep 0.2", "touch $DIR/started", "extern = true\nenv = { LEVEL = \"two words\" }");
+    let output = folder.cars(&["--connect-port", "7999"]).output().unwrap();
+    let stderr = text(&output.stderr);
+    assert!(stderr.contains("Butler is yours to start"), "{stderr}");
+    assert!(stderr.contains("CARS_CONNECT=tcp/127.0.0.1:7999 CARS_RUN=launch LEVEL='two words'"), "{stderr}");
+    assert!(stderr.contains("--name Butler\n"), "{stderr}");
+    assert!(!folder.path("started").exists());
+}
+
+#[test]
+fn a_dry_run_prints_everything_and_starts_nothing() {
+    let folder = Folder::new("touch $DIR/started", "touch $DIR/started", "");
+    let args = ["--dry-run", "--connect-port", "7999", "--run", "demo", "--speed", "2", "--paused"];
+    let output = folder.cars(&args).output().unwrap();
+    let stdout = text(&output.stdout);
+    for part in [
+        "# simulator\n",
+        "runs/demo/scenario.toml --run=demo --listen=tcp/127.0.0.1:7999 --out=runs --speed=2 --paused\n",
+        "# Butler\n",
+        "CARS_CONNECT=tcp/127.0.0.1:7999 CARS_RUN=demo",
+        "--name Butler\n",
+    ] {
+        assert!(stdout.contains(part), "{part:?} is not in:\n{stdout}");
+    }
+    assert!(!folder.path("started").exists() && !folder.path("runs").exists());
+}
+
+#[test]
+fn where_somebody_else_is_faster_another_port_is_tried() {
+    // The simulator of the first attempt finds its port taken: this test has taken it in its name.
+    let simulator = "for a; do case $a in --listen=*) echo ${a##*:} >> $DIR/ports;; esac; done; \
+                     [ $(wc -l < $DIR/ports) = 1 ] || exit 0; until [ -e $DIR/taken ]; do sleep 0.01; done; exit 1";
+    let folder = Folder::new(simulator, "sleep 600", "");
+    let launch = folder.cars(&["--grace", "0.2 s"]).spawn().unwrap();
+    folder.wait_for("ports");
+    let port = loop {
+        // The file is there a moment before its line is.
+        if let Ok(port) = folder.read("ports").trim().parse::<u16>() {
+            break port;
+        }
+    };
+    let _taken = std::net::TcpListener::bind(("127.0.0.1", port)).unwrap();
+    std::fs::write(folder.path("taken"), "").unwrap();
+    let output = end(launch);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    assert!(stderr.contains("trying another port"), "{stderr}");
+    assert_eq!(folder.read("ports").lines().count(), 2);
+}
+
+#[test]
+fn a_program_that_is_nowhere_is_said_before_anything_starts() {
+    let folder = Folder::new("touch $DIR/started", "true", "");
+    let text_of = folder
+        .read("launch.toml")
+        .replace("command = [\"sh\", \"-c\", '''true''']", "command = [\"cars-nobody\"]");
+    std::fs::write(folder.path("launch.toml"), text_of).unwrap();
+    let output = folder.cars(&[]).output().unwrap();
+    let stderr = text(&output.stderr);
+    for part in ["launch.toml:6:", "there is no program cars-nobody", "PATH", "cargo build --release"] {
+        assert!(stderr.contains(part), "{part:?} is not in:\n{stderr}");
+    }
+    assert_eq!(output.status.code(), Some(1));
+    assert!(!folder.path("started").exists());
+}
+
+#[test]
+fn check_says_what_a_file_is_or_what_is_wrong_with_it() {
+    let folder = Folder::new("true", "true", "");
+    std::fs::write(folder.path("bad.toml"), "sede = 1\n").unwrap();
+    let check = |files: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cars"));
+        command.current_dir(folder.0.path()).arg("check").args(files).output().unwrap()
+    };
+    let output = check(&["launch.toml", "hall.toml"]);
+    let good = "ok launch.toml: 1 process, 1 robot, 0 guests, 1200 ticks\nok hall.toml: 1 robot, 0 guests, 1200 ticks\n";
+    assert_eq!(
+        (text(&output.stdout).as_str(), output.status.code()),
+        (good, Some(0)),
+        "{}",
+        text(&output.stderr)
+    );
+    let output = check(&["bad.toml", "hall.toml"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stdout).contains("ok hall.toml"), "the others are checked, too");
+    let stderr = text(&output.stderr);
+    assert!(stderr.contains("bad.toml:1:1") && stderr.contains("unknown field `sede`"), "{stderr}");
+}

@@ -1,0 +1,186 @@
+//! What Butler can be told about himself. SI units; a parameter file may say `"4 ft"`.
+
+use affect::progress::{ApproachParameters, RateParameters};
+use affect::{Caution, DynamicsParameters};
+use serde::{Deserialize, Serialize};
+
+use super::Behavior;
+use crate::FT_M;
+use crate::switch::{Switch, not_negative, positive};
+
+/// Butler's parameters. A name that is not among them is refused: a misspelled one would silently run another
+/// experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Parameters {
+    /// Whom he calls. Default "Leguin" \[D\].
+    pub refiller: String,
+    /// What he offers, in words for his panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
+    pub goods: String,
+    /// What he wants, in words that follow "I want". Default "to serve the guests" \[I\].
+    pub goal: String,
+    /// Whether he has emotions. `off` is a baseline that calls by the same measure of progress, and neither asks to
+    /// hurry nor intercepts. Default on \[I\].
+    pub affect: Switch,
+    /// Whether he repeats a message that shows no effect, by a timer. Default off \[I\].
+    pub resend: Switch,
+    /// After how long he repeats it, s. Default 5 \[I\].
+    pub resend_s: f64,
+    /// How cautious he is, 0 to 1. Default 0.5 \[I\]; that there is this trait \[D\].
+    pub caution: Caution,
+    /// Treats at the start and after every exchange. Default 30 \[D\].
+    pub treat_capacity: u32,
+    /// Mean time from one treat to the next, s. Default 1 \[I\]; that it is exponential \[D\].
+    pub treat_mean_s: f64,
+    /// Behaviors in which guests take treats. Default SERVE and GO_BACK \[D: seed; that he stops serving to intercept:
+    /// Murphy et al. 2002, abstract\].
+    pub consume_in: Vec<Behavior>,
+    /// Distance within which an exchange is possible, m. Default 4 ft \[D\].
+    pub exchange_radius_m: f64,
+    /// How long an exchange takes, s. Default 2 \[I\].
+    pub exchange_s: f64,
+    /// Speed while serving, m/s. Default 1 ft/s \[I\].
+    pub v_serve_mps: f64,
+    /// Speed while intercepting, m/s. Default 3 ft/s \[I\].
+    pub v_intercept_mps: f64,
+    /// Speed on the way back to the start, m/s. Default 2 ft/s \[I\].
+    pub v_goback_mps: f64,
+    /// The refiller's speed as far as he can foresee it, m/s. Default 3 ft/s \[I\].
+    pub v_refill_mps: f64,
+    /// Time for which he assumes that the refiller reloads, s. Default 2 \[I\].
+    pub reload_s: f64,
+    /// Where the refiller's table is, m. Default: where the refiller is first known to be \[I\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<[f64; 2]>,
+    /// How near to the start he has come back, m. Default 1.5 ft \[I\].
+    pub arrive_m: f64,
+    /// How near he drives to a refiller who could exchange and does not yet, m. Default 3 ft \[I\].
+    pub stand_off_m: f64,
+    /// How near he drives to a refiller who first has to go home, m. Default 8 ft \[I\]: nearer, he and the guests
+    /// between them pin her down.
+    pub leave_room_m: f64,
+    /// Whether he intercepts a refiller who is still at the table. Default true \[I\].
+    pub intercept_any: bool,
+    /// Age at which what he heard of the refiller counts as unknown, s. Default 5 \[I\].
+    pub query_stale_s: f64,
+    /// Mean time from one turn of the random walk to the next, s. Default 5 \[I\].
+    pub turn_mean_s: f64,
+    /// For how long he looks around before each step after one was refused, s. Default 2 \[I\].
+    pub look_s: f64,
+    /// Mean time from one joke to the next while he is HAPPY and serves, s. Default 60 \[I\].
+    pub joke_mean_s: f64,
+    /// Estimate of the rate at which treats go; `prior_interval_s` is set to `treat_mean_s`.
+    pub rate: Rate,
+    /// Estimate of the speed at which the refiller approaches; it starts at `v_refill_mps`.
+    pub approach: Approach,
+    /// Constants of his emotions.
+    pub dynamics: DynamicsParameters,
+}
+
+/// How the rate at which treats go is estimated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Rate {
+    /// How far back treats count, s of serving. Default 15 \[I\].
+    pub window_s: f64,
+    /// How many treats the expectation is worth. Default 5 \[I\].
+    pub prior_n: f64,
+}
+
+/// How the refiller's approach is estimated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Approach {
+    /// Least speed that counts for an arrival time, m/s. Default 0.3 ft/s \[I\].
+    pub floor_mps: f64,
+    /// Time constant, s. Default 3 \[I\].
+    pub tau_s: f64,
+}
+
+impl Default for Rate {
+    fn default() -> Self {
+        Self { window_s: 15.0, prior_n: 5.0 }
+    }
+}
+
+impl Default for Approach {
+    fn default() -> Self {
+        Self { floor_mps: 0.3 * FT_M, tau_s: 3.0 }
+    }
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            refiller: "Leguin".to_owned(),
+            goods: "treats".to_owned(),
+            goal: "to serve the guests".to_owned(),
+            affect: Switch::On,
+            resend: Switch::Off,
+            resend_s: 5.0,
+            caution: Caution::default(),
+            treat_capacity: 30,
+            treat_mean_s: 1.0,
+            consume_in: vec![Behavior::Serve, Behavior::GoBack],
+            exchange_radius_m: 4.0 * FT_M,
+            exchange_s: 2.0,
+            v_serve_mps: FT_M,
+            v_intercept_mps: 3.0 * FT_M,
+            v_goback_mps: 2.0 * FT_M,
+            v_refill_mps: 3.0 * FT_M,
+            reload_s: 2.0,
+            table: None,
+            arrive_m: 1.5 * FT_M,
+            stand_off_m: 3.0 * FT_M,
+            leave_room_m: 8.0 * FT_M,
+            intercept_any: true,
+            query_stale_s: 5.0,
+            turn_mean_s: 5.0,
+            look_s: 2.0,
+            joke_mean_s: 60.0,
+            rate: Rate::default(),
+            approach: Approach::default(),
+            dynamics: DynamicsParameters::default(),
+        }
+    }
+}
+
+impl Parameters {
+    /// Says what is wrong with the values, if anything is; those of estimators and dynamics are checked by what is made
+    /// of them.
+    pub(super) fn check(&self) -> Result<(), String> {
+        // Each treat is an event of its own: more than a thousand a second are no guests.
+        if !(self.treat_mean_s >= 1e-3 && self.treat_mean_s.is_finite()) {
+            return Err(format!("treat_mean_s must be at least 0.001 s, not {}", self.treat_mean_s));
+        }
+        positive("exchange_radius_m", self.exchange_radius_m)?;
+        positive("v_refill_mps", self.v_refill_mps)?;
+        positive("turn_mean_s", self.turn_mean_s)?;
+        positive("joke_mean_s", self.joke_mean_s)?;
+        positive("resend_s", self.resend_s)?;
+        not_negative("exchange_s", self.exchange_s)?;
+        not_negative("v_serve_mps", self.v_serve_mps)?;
+        not_negative("v_intercept_mps", self.v_intercept_mps)?;
+        not_negative("v_goback_mps", self.v_goback_mps)?;
+        not_negative("reload_s", self.reload_s)?;
+        not_negative("arrive_m", self.arrive_m)?;
+        not_negative("stand_off_m", self.stand_off_m)?;
+        not_negative("leave_room_m", self.leave_room_m)?;
+        not_negative("query_stale_s", self.query_stale_s)?;
+        not_negative("look_s", self.look_s)?;
+        if self.treat_capacity == 0 {
+            return Err("treat_capacity must be at least 1".to_owned());
+        }
+        Ok(())
+    }
+
+    pub(super) fn rate(&self) -> RateParameters {
+        let Rate { window_s, prior_n } = self.rate;
+        RateParameters { window_s, prior_n, prior_interval_s: self.treat_mean_s }
+    }
+
+    pub(super) fn approach(&self) -> ApproachParameters {
+        let Approach { floor_mps, tau_s } = self.approach;
+        ApproachParameters { expected_mps: self.v_refill_mps, floor_mps, tau_s }
+    }
+}

@@ -1,0 +1,141 @@
+//! What Leguin can be told about herself. SI units; a parameter file may say `"4 ft"`.
+
+use affect::{Caution, IntensityLabel};
+use serde::{Deserialize, Serialize};
+
+use crate::FT_M;
+use crate::switch::{Switch, not_negative, positive};
+
+/// Leguin's parameters. A name that is not among them is refused: a misspelled one would silently run another
+/// experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Parameters {
+    /// Whose tray she refills. Default "Butler" \[D\].
+    pub waiter: String,
+    /// What she brings, in words for her panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
+    pub goods: String,
+    /// Whether she has emotions. `off` is a baseline that never hurries and never gives up. Default on \[I\].
+    pub affect: Switch,
+    /// How cautious she is, 0 to 1. Default 0.5 \[I\]; that there is this trait \[D\].
+    pub caution: Caution,
+    /// Distance within which an exchange is possible, m. Default 4 ft \[D\].
+    pub exchange_radius_m: f64,
+    /// How long an exchange takes, s. Default 2 \[I\].
+    pub exchange_s: f64,
+    /// Speed on the way to the waiter and home, m/s. Default 3 ft/s \[I\].
+    pub v_refill_mps: f64,
+    /// Factor on it (dimensionless) while she is CONCERNED on the way to the waiter. Default 1.5 \[I\]; that she
+    /// increases her speed \[D\].
+    pub hurry_mult: f64,
+    /// Time from a call until she leaves the table, s. Default 1 \[I\].
+    pub prep_s: f64,
+    /// Time without progress after which she is FRUSTRATED with the way, s; divided by her gain. Default 60 \[I\]: well
+    /// above the waiter's own time to frustration, or she turns back before he can come to meet her.
+    pub block_patience_s: f64,
+    /// Time without being sent home after which she is FRUSTRATED with the waiter, s; divided by her gain. Default
+    /// 20 \[I\].
+    pub await_patience_s: f64,
+    /// Share of a step that counts as progress. Default 0.1 \[I\].
+    pub progress_share: f64,
+    /// How near to her place at the table she has come home, m. Default 1.5 ft \[I\].
+    pub arrive_m: f64,
+    /// Time without progress after which she makes do with a place near her own, s. Default 5 \[I\].
+    pub settle_s: f64,
+    /// How near that place must be, m. Default 6 ft \[I\]: three bodies.
+    pub settle_m: f64,
+    /// How near she drives to a waiter who does not exchange, m. Default 3 ft \[I\].
+    pub stand_off_m: f64,
+    /// Age at which what she heard of the waiter counts as unknown, s. Default 5 \[I\].
+    pub query_stale_s: f64,
+    /// Mean time from one turn to the next while she searches for a waiter of whom nothing is known, s. Default 5 \[I\].
+    pub turn_mean_s: f64,
+    /// For how long she looks around before each step after one was refused, s. Default 2 \[I\].
+    pub look_s: f64,
+    /// Mean time from one joke to the next while she is HAPPY and waits, s. Default 60 \[I\]; that she jokes \[D\].
+    pub joke_mean_s: f64,
+    /// Constants of her emotions.
+    pub dynamics: Feelings,
+}
+
+/// The constants of Leguin's emotions, named as those of Butler's dynamics.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Feelings {
+    /// Gain (dimensionless) without caution. Default 0.5 \[I\].
+    pub caution_gain_base: f64,
+    /// What full caution adds to the gain (dimensionless). Default 1 \[I\].
+    pub caution_gain_slope: f64,
+    /// Intensity of the concern of one who is told to hurry. Default 0.45 \[I\], where Butler's begins.
+    pub th_concerned: f64,
+    /// Intensities at which low, medium, high and very high begin. Default 0.2, 0.4, 0.6, 0.8 \[I\].
+    pub label_cuts: [f64; 4],
+}
+
+impl Default for Feelings {
+    fn default() -> Self {
+        Self {
+            caution_gain_base: 0.5,
+            caution_gain_slope: 1.0,
+            th_concerned: 0.45,
+            label_cuts: IntensityLabel::CUTS,
+        }
+    }
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            waiter: "Butler".to_owned(),
+            goods: "treats".to_owned(),
+            affect: Switch::On,
+            caution: Caution::default(),
+            exchange_radius_m: 4.0 * FT_M,
+            exchange_s: 2.0,
+            v_refill_mps: 3.0 * FT_M,
+            hurry_mult: 1.5,
+            prep_s: 1.0,
+            block_patience_s: 60.0,
+            await_patience_s: 20.0,
+            progress_share: 0.1,
+            arrive_m: 1.5 * FT_M,
+            settle_s: 5.0,
+            settle_m: 6.0 * FT_M,
+            stand_off_m: 3.0 * FT_M,
+            query_stale_s: 5.0,
+            turn_mean_s: 5.0,
+            look_s: 2.0,
+            joke_mean_s: 60.0,
+            dynamics: Feelings::default(),
+        }
+    }
+}
+
+impl Parameters {
+    /// How strongly she reacts: 1 with the defaults.
+    pub(super) fn gain(&self) -> f64 {
+        self.dynamics.caution_gain_base + self.dynamics.caution_gain_slope * self.caution.value()
+    }
+
+    /// Says what is wrong with the values, if anything is; `hurry_mult` and `th_concerned` are checked by what is made of
+    /// them.
+    pub(super) fn check(&self) -> Result<(), String> {
+        positive("exchange_radius_m", self.exchange_radius_m)?;
+        positive("block_patience_s", self.block_patience_s)?;
+        positive("await_patience_s", self.await_patience_s)?;
+        positive("turn_mean_s", self.turn_mean_s)?;
+        positive("joke_mean_s", self.joke_mean_s)?;
+        positive("dynamics.caution_gain_base", self.dynamics.caution_gain_base)?;
+        not_negative("dynamics.caution_gain_slope", self.dynamics.caution_gain_slope)?;
+        not_negative("exchange_s", self.exchange_s)?;
+        not_negative("v_refill_mps", self.v_refill_mps)?;
+        not_negative("prep_s", self.prep_s)?;
+        not_negative("progress_share", self.progress_share)?;
+        not_negative("arrive_m", self.arrive_m)?;
+        not_negative("settle_s", self.settle_s)?;
+        not_negative("settle_m", self.settle_m)?;
+        not_negative("stand_off_m", self.stand_off_m)?;
+        not_negative("query_stale_s", self.query_stale_s)?;
+        not_negative("look_s", self.look_s)
+    }
+}

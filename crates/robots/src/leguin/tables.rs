@@ -1,0 +1,139 @@
+//! What Leguin feels and what she does, as tables.
+//!
+//! One tick is: state variables, then emotion (from them), then behavior (from them and the emotion), then the next
+//! place. So "hurry" on the way is taken by the behavior table in the tick in which it arrives, and felt in the next.
+
+use affect::EmotionRow;
+use affect::Intensity;
+use affect::StandardEmotion::{self, Concerned, Confident, Frustrated, Happy};
+use affect::behavior::{
+    Row,
+    Then::{Go, Stay},
+};
+use serde::{Deserialize, Serialize};
+
+/// Leguin's behaviors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
+pub enum Behavior {
+    /// Stands at the table until she is called \[D\].
+    Wait,
+    /// Drives to the waiter \[D\].
+    Refill,
+    /// Hands over treats \[D\].
+    Exchange,
+    /// Stands until she is sent home \[D\].
+    AwaitGoHome,
+    /// Drives back to the table \[D\].
+    GoHome,
+}
+
+use Behavior::{AwaitGoHome, Exchange, GoHome, Refill, Wait};
+
+impl Behavior {
+    /// Every behavior.
+    pub const ALL: [Self; 5] = [Wait, Refill, Exchange, AwaitGoHome, GoHome];
+
+    /// The name under which it is published.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Wait => "WAIT",
+            Refill => "REFILL",
+            Exchange => "EXCHANGE",
+            AwaitGoHome => "AWAIT_GO_HOME",
+            GoHome => "GO_HOME",
+        }
+    }
+}
+
+/// What she was told to do and has not begun yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Errand {
+    /// "refill"
+    Refill,
+    /// "hurry"
+    Hurry,
+}
+
+/// The progress measures.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measures {
+    /// Whether she was told to hurry.
+    pub hurried: bool,
+    /// Time without progress on the way, as a share of her patience with that.
+    pub blocked: f64,
+    /// Time for which she has waited to be sent home, as a share of her patience with that.
+    pub waiting: f64,
+    /// Intensity of the concern of one who is told to hurry.
+    pub th_concerned: f64,
+}
+
+/// The emotion state generator: the refiller's column of the seed's Table 2. The first row that holds counts.
+#[rustfmt::skip]
+pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
+    EmotionRow { during: &[Wait, Exchange, GoHome], when: |_| true, feel: Happy },
+    EmotionRow { during: &[Refill], when: |m| m.blocked >= 1.0, feel: Frustrated },
+    EmotionRow { during: &[Refill], when: |m| m.hurried, feel: Concerned },
+    EmotionRow { during: &[Refill], when: |_| true, feel: Confident },
+    EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= 1.0, feel: Frustrated },
+    EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= 0.5, feel: Concerned },
+    EmotionRow { during: &[AwaitGoHome], when: |_| true, feel: Confident },
+];
+
+/// How strongly she feels it \[I\].
+pub fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
+    let hurry = if measures.hurried { measures.th_concerned } else { 0.0 };
+    Intensity::saturating(hurry.max(measures.blocked).max(measures.waiting))
+}
+
+/// What a row of the table has Leguin do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Act {
+    /// Sets out on the errand that she was told.
+    TakeErrand,
+    /// Hurries from now on.
+    Hurry,
+    /// What she was told before the exchange is done with.
+    FinishErrand,
+    /// Turns back.
+    GiveUp,
+    /// Counts the trip and obeys "go home".
+    TurnHome,
+    /// Tells a joke.
+    Joke,
+}
+
+/// What a row's guard can see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Context {
+    /// What she feels; `None` without emotions.
+    pub emotion: Option<StandardEmotion>,
+    /// What she was told to do and has not begun.
+    pub pending: Option<Errand>,
+    /// Whether the waiter needs her, as far as can be known, and is within the exchange radius.
+    pub waiter_is_needy_here: bool,
+    /// Whether an exchange has lasted as long as it takes.
+    pub exchange_is_over: bool,
+    /// Whether she was told to go home after the exchange.
+    pub sent_home: bool,
+    /// Whether she is back at the table.
+    pub is_home: bool,
+    /// Whether she has thought of a joke.
+    pub has_joke: bool,
+}
+
+/// The behavior state generator.
+#[rustfmt::skip]
+pub const TABLE: &[Row<Behavior, Context, Act>] = &[
+    Row { from: &[Wait, Refill], when: |c| c.waiter_is_needy_here, act: &[Act::FinishErrand], then: Go(Exchange) },
+    Row { from: &[Wait], when: |c| c.pending.is_some(), act: &[Act::TakeErrand], then: Go(Refill) },
+    Row { from: &[Refill], when: |c| c.pending == Some(Errand::Hurry), act: &[Act::Hurry], then: Stay },
+    Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[], then: Go(AwaitGoHome) },
+    Row { from: &[AwaitGoHome], when: |c| c.sent_home, act: &[Act::TurnHome], then: Go(GoHome) },
+    Row { from: &[AwaitGoHome, Refill], when: |c| c.emotion == Some(Frustrated), act: &[Act::GiveUp], then: Go(GoHome) },
+    Row { from: &[GoHome], when: |c| c.is_home, act: &[], then: Go(Wait) },
+    Row { from: &[Wait, GoHome], when: |c| c.emotion == Some(Happy) && c.has_joke, act: &[Act::Joke], then: Stay },
+];

@@ -1,0 +1,289 @@
+//! An open field in memory, for robots alone: no guests, no simulator. Bodies that would overlap stay; commands arrive at
+//! the next tick, unless the test drops them; questions are answered, unless the test cuts them.
+
+#![allow(dead_code, reason = "each test file uses its own part of the stage")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the failure")]
+
+pub(crate) mod asker;
+pub(crate) mod reborn;
+
+use std::collections::BTreeMap;
+
+use robot::{
+    Clock, LocalHost, Parameters, Percept, Point, Report, Robot, RobotName, RunName, SensedBody, SensedKind,
+    SensedRobot, Variable, Welcome,
+};
+use serde_json::{Value, json};
+
+pub(crate) const FT_M: f64 = 0.3048;
+pub(crate) const TICK_S: f64 = 0.5;
+const BODY_M: f64 = 2.0 * FT_M;
+const FIELD_M: f64 = 50.0 * FT_M;
+const SENSING_M: f64 = 6.0 * FT_M;
+
+pub(crate) fn name(text: &str) -> RobotName {
+    RobotName::new(text).unwrap()
+}
+
+/// A place in feet.
+pub(crate) fn feet(x: f64, y: f64) -> Point {
+    Point::new(x * FT_M, y * FT_M)
+}
+
+/// Parameters from TOML text, numbers in SI units.
+pub(crate) fn parameters(text: &str) -> Parameters {
+    let table: toml::Table = toml::from_str(text).unwrap();
+    table.into_iter().map(|(key, value)| (key, serde_json::to_value(value).unwrap())).collect()
+}
+
+/// One robot of the cast.
+pub(crate) struct Role {
+    pub(crate) name: &'static str,
+    pub(crate) at: Point,
+    pub(crate) robot: Box<dyn Robot>,
+    pub(crate) parameters: Parameters,
+}
+
+impl Role {
+    pub(crate) fn new(name: &'static str, class: &str, at: Point, text: &str) -> Self {
+        Self { name, at, robot: robots::make(class).unwrap(), parameters: parameters(text) }
+    }
+}
+
+/// A command as it was sent.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sent {
+    pub(crate) tick: u64,
+    pub(crate) from: String,
+    pub(crate) to: String,
+    pub(crate) command: String,
+}
+
+type Drops = Box<dyn Fn(&Sent) -> bool>;
+type Cuts = Box<dyn Fn(u64, &str, &str) -> bool>;
+
+/// The field and the robots on it.
+pub(crate) struct Stage {
+    host: LocalHost,
+    pub(crate) tick: u64,
+    pub(crate) places: BTreeMap<RobotName, Point>,
+    pub(crate) obstacles: Vec<Point>,
+    pub(crate) reports: BTreeMap<RobotName, Report>,
+    /// Every command, also a lost one.
+    pub(crate) sent: Vec<Sent>,
+    /// Whether a command is lost.
+    pub(crate) drops: Drops,
+    /// Whether, at this tick, the first robot cannot ask the second.
+    pub(crate) cuts: Cuts,
+    operator_seq: u64,
+    underway: BTreeMap<RobotName, Vec<Value>>,
+}
+
+impl Stage {
+    /// The field before tick 0.
+    pub(crate) fn new(seed: u64, cast: Vec<Role>) -> Self {
+        let roster: Vec<RobotName> = cast.iter().map(|role| name(role.name)).collect();
+        let places = cast.iter().map(|role| (name(role.name), role.at)).collect();
+        let seats = cast.into_iter().map(|role| {
+            let welcome = welcome(role.name, role.at, seed, &roster, role.parameters);
+            (role.robot, welcome)
+        });
+        Self {
+            host: LocalHost::new(seats.collect()),
+            tick: 0,
+            places,
+            obstacles: Vec::new(),
+            reports: BTreeMap::new(),
+            sent: Vec::new(),
+            drops: Box::new(|_| false),
+            cuts: Box::new(|_, _, _| false),
+            operator_seq: 0,
+            underway: BTreeMap::new(),
+        }
+    }
+
+    /// Butler in the middle and Leguin 30 ft away, with these parameters.
+    pub(crate) fn pair(seed: u64, butler: &str, leguin: &str) -> Self {
+        let mut stage = Self::new(
+            seed,
+            vec![
+                Role::new("Butler", "Butler", feet(25.0, 25.0), butler),
+                Role::new("Leguin", "Leguin", feet(4.0, 4.0), leguin),
+            ],
+        );
+        stage.begin();
+        stage
+    }
+
+    /// Tick 0.
+    pub(crate) fn begin(&mut self) {
+        self.exchange(&BTreeMap::new());
+    }
+
+    /// One tick: moves in the order of names, then the robots.
+    pub(crate) fn step(&mut self) {
+        self.tick += 1;
+        let blocked = self.advance();
+        self.exchange(&blocked);
+    }
+
+    /// Steps until `is_over`, and says whether that came within `limit_s`.
+    pub(crate) fn step_until(&mut self, limit_s: f64, mut is_over: impl FnMut(&Self) -> bool) -> bool {
+        let last = self.tick + (limit_s / TICK_S) as u64;
+        while self.tick < last {
+            self.step();
+            if is_over(self) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// A command from outside the roster; arrives at the next tick.
+    pub(crate) fn command(&mut self, to: &str, command: &str) {
+        self.operator_seq += 1;
+        let seq = self.operator_seq;
+        let message = json!({ "epoch": 1, "tick": self.tick, "seq": seq, "command": command });
+        let from = name("operator");
+        self.host.inject(&name(to), &from, serde_json::from_value(message).unwrap());
+        self.underway.entry(name(to)).or_default().push(json!({ "from": from, "seq": seq }));
+    }
+
+    pub(crate) fn report(&self, robot: &str) -> &Report {
+        &self.reports[&name(robot)]
+    }
+
+    pub(crate) fn emotion(&self, robot: &str) -> &str {
+        &self.report(robot).emotion_state
+    }
+
+    pub(crate) fn behavior(&self, robot: &str) -> &str {
+        &self.report(robot).behavior_state
+    }
+
+    pub(crate) fn number(&self, robot: &str, variable: &str) -> f64 {
+        self.report(robot).state_variables[variable].as_f64().unwrap()
+    }
+
+    pub(crate) fn flag(&self, robot: &str, variable: &str) -> bool {
+        self.report(robot).state_variables[variable] == Variable::Flag(true)
+    }
+
+    pub(crate) fn at(&self, robot: &str) -> Point {
+        self.places[&name(robot)]
+    }
+
+    pub(crate) fn apart_ft(&self, a: &str, b: &str) -> f64 {
+        self.at(a).distance_m(self.at(b)) / FT_M
+    }
+
+    /// What a robot said, in order.
+    pub(crate) fn commands_of(&self, robot: &str) -> Vec<&str> {
+        self.sent.iter().filter(|sent| sent.from == robot).map(|sent| sent.command.as_str()).collect()
+    }
+
+    fn advance(&mut self) -> BTreeMap<RobotName, bool> {
+        let mut blocked = BTreeMap::new();
+        for robot in self.places.keys().cloned().collect::<Vec<_>>() {
+            let proposal = self.reports[&robot].proposal;
+            let is_free = is_on_field(proposal)
+                && self.bodies_but(&robot).iter().all(|(_, body)| !overlap(*body, proposal));
+            if is_free {
+                self.places.insert(robot.clone(), proposal);
+            }
+            blocked.insert(robot, !is_free);
+        }
+        blocked
+    }
+
+    fn bodies_but(&self, robot: &RobotName) -> Vec<(SensedKind, Point)> {
+        let others = self.places.iter().filter(|(other, _)| *other != robot);
+        let robots = others.map(|(_, at)| (SensedKind::Robot, *at));
+        robots.chain(self.obstacles.iter().map(|at| (SensedKind::Obstacle, *at))).collect()
+    }
+
+    fn exchange(&mut self, blocked: &BTreeMap<RobotName, bool>) {
+        let mut news = serde_json::Map::new();
+        for robot in self.places.keys() {
+            let commands = self.underway.remove(robot).unwrap_or_default();
+            let own = self.news(robot, blocked.get(robot) == Some(&true), &commands);
+            news.insert(robot.as_str().to_owned(), own);
+        }
+        let clock = json!({ "epoch": 1, "tick": self.tick, "news": news });
+        let clock: Clock = serde_json::from_value(clock).unwrap();
+        let percepts: BTreeMap<RobotName, Percept> =
+            self.places.keys().map(|robot| (robot.clone(), self.percept(robot))).collect();
+        self.reports = self.host.exchange(&clock, &mut |robot| percepts[robot].clone()).unwrap();
+        self.note_commands();
+    }
+
+    fn news(&self, robot: &RobotName, is_blocked: bool, commands: &[Value]) -> Value {
+        let at = self.places[robot];
+        let others = || self.places.iter().filter(|(other, _)| *other != robot);
+        let sensed: Vec<SensedRobot> = others()
+            .filter(|(_, place)| at.distance_m(**place) <= SENSING_M)
+            .map(|(other, place)| SensedRobot { name: other.clone(), location: *place })
+            .collect();
+        let unreachable: Vec<&RobotName> = others()
+            .map(|(other, _)| other)
+            .filter(|other| (self.cuts)(self.tick, robot.as_str(), other.as_str()))
+            .collect();
+        json!({
+            "correction": { "location": at, "blocked": is_blocked },
+            "commands": commands,
+            "unreachable": unreachable,
+            "sensed": sensed,
+        })
+    }
+
+    fn percept(&self, robot: &RobotName) -> Percept {
+        let at = self.places[robot];
+        let near = self.bodies_but(robot).into_iter().filter(|(_, place)| at.distance_m(*place) <= SENSING_M);
+        let bodies = near.map(|(kind, location)| SensedBody { kind, location }).collect();
+        Percept { epoch: 1, tick: self.tick, bodies }
+    }
+
+    fn note_commands(&mut self) {
+        for (from, report) in &self.reports {
+            for sent in &report.sent {
+                let (to, command) = (sent.to.to_string(), sent.command.clone());
+                let note = Sent { tick: self.tick, from: from.to_string(), to, command };
+                if !(self.drops)(&note) {
+                    let id = json!({ "from": from, "seq": sent.seq });
+                    self.underway.entry(sent.to.clone()).or_default().push(id);
+                }
+                self.sent.push(note);
+            }
+        }
+    }
+}
+
+fn welcome(robot: &str, at: Point, seed: u64, roster: &[RobotName], parameters: Parameters) -> Welcome {
+    Welcome {
+        protocol: 1,
+        run: RunName::new("stage").unwrap(),
+        name: name(robot),
+        generation: 1,
+        epoch: 1,
+        tick: 0,
+        seed,
+        stream: format!("robot/{robot}"),
+        tick_s: TICK_S,
+        field_m: [FIELD_M, FIELD_M],
+        body_m: BODY_M,
+        sensing_range_m: SENSING_M,
+        location: at,
+        roster: roster.to_vec(),
+        parameters,
+        last_state_variables: None,
+    }
+}
+
+fn is_on_field(place: Point) -> bool {
+    let inside = BODY_M / 2.0 - 1e-9..=FIELD_M - BODY_M / 2.0 + 1e-9;
+    inside.contains(&place.x) && inside.contains(&place.y)
+}
+
+fn overlap(a: Point, b: Point) -> bool {
+    (a.x - b.x).abs() < BODY_M - 1e-9 && (a.y - b.y).abs() < BODY_M - 1e-9
+}
