@@ -51,20 +51,33 @@ fn draw(hall: &Hall) -> String {
     };
     for at in world.obstacles() {
         let (x, y) = (at.x * SCALE - side / 2.0, y(at.y) - side / 2.0);
-        put(format!("<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{side:.1}\" height=\"{side:.1}\" fill=\"#222\"/>"));
+        put(format!(
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{side:.1}\" height=\"{side:.1}\" fill=\"#222\"/>"
+        ));
     }
     for at in world.guests() {
         let (x, y, r) = (at.x * SCALE, y(at.y), side / 2.0);
-        put(format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r:.1}\" fill=\"#b9e3bd\" stroke=\"#3d8b46\"/>"));
+        put(format!(
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r:.1}\" fill=\"#b9e3bd\" stroke=\"#3d8b46\"/>"
+        ));
     }
     for (index, name) in hall.simulation.names().iter().enumerate() {
         let (at, r, name) = (hall.at(name.as_str()), side / 2.0, name.as_str());
         let (x, y) = (at.x * SCALE, y(at.y));
-        put(format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r:.1}\" fill=\"#ffe3e0\" stroke=\"#c62828\" stroke-width=\"2\"/>"));
-        put(format!("<text x=\"{x:.1}\" y=\"{:.1}\" font-size=\"10\" text-anchor=\"middle\" fill=\"#c62828\">{}</text>", y + 3.5, &name[..2]));
+        put(format!(
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r:.1}\" fill=\"#ffe3e0\" stroke=\"#c62828\" stroke-width=\"2\"/>"
+        ));
+        put(format!(
+            "<text x=\"{x:.1}\" y=\"{:.1}\" font-size=\"10\" text-anchor=\"middle\" fill=\"#c62828\">{}</text>",
+            y + 3.5,
+            &name[..2]
+        ));
         let (left, top) = (width + 30.0, 40.0 + 150.0 * index as f64);
         let line = |row: f64, size: u32, text: &str| {
-            format!("<text x=\"{left}\" y=\"{}\" font-size=\"{size}\" fill=\"#333\">{text}</text>", top + 24.0 * row)
+            format!(
+                "<text x=\"{left}\" y=\"{}\" font-size=\"{size}\" fill=\"#333\">{text}</text>",
+                top + 24.0 * row
+            )
         };
         put(line(0.0, 20, name));
         put(line(1.0, 15, &format!("feels {}", hall.emotion(name))));

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use processes::Running;
 
 /// Longest that anything here may take before it counts as hung.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(40);
 
 /// Root of the project.
 #[must_use]
@@ -95,7 +95,8 @@ impl Lab {
     /// Runs `cars` to its end and returns its exit status and all that it printed; it must fail.
     pub fn fails(&self, args: &[&str]) -> (i32, String) {
         let output = self.cars(args).output().unwrap();
-        let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let text =
+            format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         assert!(!output.status.success(), "cars {args:?} succeeded:\n{text}");
         (output.status.code().unwrap_or(-1), text)
     }
@@ -103,7 +104,8 @@ impl Lab {
     /// Runs `cars` with exactly these arguments and returns its exit status and all that it printed.
     pub fn cars_without_out(&self, args: &[&str]) -> (i32, String) {
         let output = Command::new(programs().join("cars")).current_dir(root()).args(args).output().unwrap();
-        let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let text =
+            format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         (output.status.code().unwrap_or(-1), text)
     }
 

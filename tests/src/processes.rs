@@ -42,12 +42,21 @@ impl Running {
         let printed = self.printed.clone();
         let begun = Instant::now();
         loop {
-            let found = printed.lock().expect("no reader panics").iter().find(|(_, line)| line.contains(text)).map(|(at, _)| *at);
+            let found = printed
+                .lock()
+                .expect("no reader panics")
+                .iter()
+                .find(|(_, line)| line.contains(text))
+                .map(|(at, _)| *at);
             if let Some(at) = found {
                 return at;
             }
             let is_over = self.child.try_wait().expect("it is our child").is_some();
-            assert!(!is_over && begun.elapsed() < PATIENCE, "it did not print {text:?} but\n{}", self.printed());
+            assert!(
+                !is_over && begun.elapsed() < PATIENCE,
+                "it did not print {text:?} but\n{}",
+                self.printed()
+            );
             std::thread::sleep(Duration::from_millis(5));
         }
     }
@@ -78,7 +87,9 @@ impl Running {
     /// The process of the run whose program is called `program`, once it is there.
     #[must_use]
     pub fn process(&self, program: &str) -> u32 {
-        eventually(program, || find(&self.run).into_iter().find(|(_, name)| name == program).map(|(pid, _)| pid))
+        eventually(program, || {
+            find(&self.run).into_iter().find(|(_, name)| name == program).map(|(pid, _)| pid)
+        })
     }
 
     /// The run's processes: those that carry its name in their environment or arguments, with their programs' names.
@@ -127,8 +138,12 @@ pub fn send(pid: u32, signal: Signal) {
 pub fn find(run: &str) -> Vec<(u32, String)> {
     let is_of_run = |pid: u32| {
         let read = |file: &str| std::fs::read(format!("/proc/{pid}/{file}")).unwrap_or_default();
-        let has = |bytes: Vec<u8>, text: String| bytes.split(|byte| *byte == 0).any(|part| part == text.as_bytes());
-        has(read("environ"), format!("CARS_RUN={run}")) || has(read("cmdline"), run.to_owned())
+        let holds =
+            |bytes: Vec<u8>, text: String| bytes.windows(text.len()).any(|part| part == text.as_bytes());
+        let arguments = |separator| format!("--run{separator}{run}\0");
+        holds(read("environ"), format!("CARS_RUN={run}\0"))
+            || holds(read("cmdline"), arguments('='))
+            || holds(read("cmdline"), arguments('\0'))
     };
     let pids = std::fs::read_dir("/proc").expect("this is Linux").flatten();
     let pids = pids.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
@@ -150,6 +165,7 @@ fn stat(pid: u32) -> Option<Vec<String>> {
 
 fn cpu_s(pid: u32) -> f64 {
     // proc(5): utime and stime are fields 14 and 15, in clock ticks of 10 ms.
-    let field = |stat: &[String], i: usize| stat.get(i).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
+    let field =
+        |stat: &[String], i: usize| stat.get(i).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
     stat(pid).map_or(0.0, |stat| (field(&stat, 11) + field(&stat, 12)) / 100.0)
 }

@@ -15,9 +15,9 @@ use simulator::recorder::SUMMARY;
 use simulator::scenario::{Changes, Scenario};
 use simulator::{RunFolder, Summary};
 use tabled::builder::Builder;
+use tabled::settings::Alignment;
 use tabled::settings::Style;
 use tabled::settings::object::Columns;
-use tabled::settings::Alignment;
 
 /// Size of what the raw barrier sends out and back; a clock and a report are about as long.
 const CLOCK_BYTES: usize = 64;
@@ -93,7 +93,8 @@ fn print_table(subjects: &[Subject]) {
     let mut table = Builder::default();
     table.push_record(["ticks per second", "median", "best", "worst", "of its floor"]);
     for subject in subjects {
-        let (best, worst) = subject.results.iter().fold((0.0_f64, f64::MAX), |(b, w), r| (b.max(*r), w.min(*r)));
+        let (best, worst) =
+            subject.results.iter().fold((0.0_f64, f64::MAX), |(b, w), r| (b.max(*r), w.min(*r)));
         // Pair by pair: the machine's speed drifts, and both drift with it.
         let pairs = subject.results.iter().zip(&subjects[subject.floor].results);
         let ratios: Vec<f64> = pairs.map(|(own, floor)| own / floor).collect();
@@ -152,7 +153,7 @@ pub(crate) fn echo(address: &str) -> miette::Result<ExitCode> {
 
 /// Lock-step with robots that only answer.
 fn bare(n: usize, ticks: u64, scratch: &Path) -> miette::Result<f64> {
-    let mut text = format!("duration = \"{} s\"\ntick = \"1 s\"\n", ticks);
+    let mut text = format!("duration = \"{ticks} s\"\ntick = \"1 s\"\n");
     for i in 0..n {
         let (x, y) = (1 + i % 7 * 2, 1 + i / 7 * 2);
         text += &format!("[[robot]]\nname = \"r{i}\"\nat = [\"{x} m\", \"{y} m\"]\n");
@@ -181,7 +182,8 @@ fn hall_processes(scenario: &Path, ticks: u64, scratch: &Path) -> miette::Result
 
 /// Starts a simulator and robots as processes and returns the rate that the simulator measured.
 fn processes(scenario: &Path, duration_s: f64, robots: Vec<Command>, scratch: &Path) -> miette::Result<f64> {
-    let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).into_diagnostic()?.port();
+    let port =
+        TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).into_diagnostic()?.port();
     let endpoint = format!("tcp/127.0.0.1:{port}");
     let mut simulator = Command::new(beside("cars-sim")?);
     simulator.arg(scenario).arg("--out").arg(scratch);

@@ -6,9 +6,9 @@ use clap::Args;
 use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::random::MAX_SEED;
+use simulator::RunFolder;
 use simulator::scenario::{Changes, Override, Scenario, parse_speed};
 use simulator::units::Time;
-use simulator::RunFolder;
 
 /// Options of one execution.
 #[derive(Debug, Clone, Args)]
@@ -57,7 +57,11 @@ fn draw_seed() -> Result<u64, String> {
 impl ExecutionArgs {
     /// What these options change of a scenario.
     pub(crate) fn changes(&self) -> Changes {
-        Changes { seed: self.seed, duration_s: self.duration.map(|duration| duration.0), set: self.set.clone() }
+        Changes {
+            seed: self.seed,
+            duration_s: self.duration.map(|duration| duration.0),
+            set: self.set.clone(),
+        }
     }
 
     /// Name of the run: as given, or as the file is called.

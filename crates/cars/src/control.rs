@@ -27,13 +27,13 @@ const TAIL: usize = 10;
 #[derive(Debug, Args)]
 pub(crate) struct RunRef {
     /// The run; without it the one that was started last.
-    #[arg(long, env = "CARS_RUN")]
+    #[arg(long, global = true, env = "CARS_RUN")]
     run: Option<RunName>,
     /// Where its simulator listens; without it, as its folder says.
-    #[arg(long, env = "CARS_CONNECT", value_name = "ENDPOINT")]
+    #[arg(long, global = true, env = "CARS_CONNECT", value_name = "ENDPOINT")]
     connect: Option<String>,
     /// Where run folders are made.
-    #[arg(long, default_value = "runs", value_name = "DIR")]
+    #[arg(long, global = true, default_value = "runs", value_name = "DIR")]
     out: PathBuf,
 }
 
@@ -44,7 +44,11 @@ impl RunRef {
         }
         let link = self.out.join(LATEST);
         let target = std::fs::read_link(&link).map_err(|_| {
-            miette!(help = "name it with --run, or start one with `cars launch`", "no run is known in {}", self.out.display())
+            miette!(
+                help = "name it with --run, or start one with `cars launch`",
+                "no run is known in {}",
+                self.out.display()
+            )
         })?;
         RunName::new(&target.to_string_lossy()).into_diagnostic()
     }
@@ -166,7 +170,8 @@ fn describe(status: &Status) -> String {
         text += &format!("{} steps are pending\n", status.pending_steps);
     }
     for awaited in &status.awaiting {
-        text += &format!("waiting for {} since {:.1} s: it {}\n", awaited.name, awaited.since_s, awaited.because);
+        text +=
+            &format!("waiting for {} since {:.1} s: it {}\n", awaited.name, awaited.since_s, awaited.because);
     }
     for robot in &status.robots {
         let presence = if robot.present { "present" } else { "absent" };
@@ -196,7 +201,8 @@ pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     let what = args.what.as_deref().unwrap_or(STATE);
     let answer = bus.ask(&keys.query(&args.robot, what), "", None).into_diagnostic()?;
     bus.close();
-    let bytes = bytes_of(answer, &format!("no robot called {} answers in run {}", args.robot, args.run.run()?))?;
+    let bytes =
+        bytes_of(answer, &format!("no robot called {} answers in run {}", args.robot, args.run.run()?))?;
     let answer: serde_json::Value = serde_json::from_slice(&bytes).into_diagnostic()?;
     // The value is what was asked for; the tick around it is for programs.
     let value = answer.get("value").unwrap_or(&answer);
@@ -239,7 +245,8 @@ pub(crate) struct LogArgs {
 /// Shows the log of a run.
 pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
     let file = args.run.folder()?.file(LOG);
-    let past = std::fs::read_to_string(&file).map_err(|error| miette!("cannot read {}: {error}", file.display()));
+    let past =
+        std::fs::read_to_string(&file).map_err(|error| miette!("cannot read {}: {error}", file.display()));
     if !args.follow {
         print!("{}", past?);
         return Ok(ExitCode::SUCCESS);

@@ -19,11 +19,11 @@ use clap::{CommandFactory, Parser, Subcommand};
 #[command(name = "cars", version, propagate_version = true)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    subcommand: Subcommands,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum Subcommands {
     /// Start the processes of a launch file and run them to the end.
     Launch(launch::LaunchArgs),
     /// Run a scenario, or that of a launch file, in this process.
@@ -56,21 +56,21 @@ enum Command {
 
 fn main() -> miette::Result<ExitCode> {
     let cli = Cli::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
+    let filter =
+        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn,zenoh=error".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
-    match cli.command {
-        Command::Launch(args) => launch::launch(args),
-        Command::Run(args) => run::run(&args),
-        Command::Check(args) => check::check(&args),
-        Command::Ctl(args) => control::ctl(&args),
-        Command::Query(args) => control::query(&args),
-        Command::Command(args) => control::command(&args),
-        Command::Log(args) => control::log(&args),
-        Command::Bench(args) => bench::bench(&args),
-        Command::BenchRobot(args) => bench::robot(&args),
-        Command::BenchEcho { address } => bench::echo(&address),
-        Command::Completions { shell } => {
+    match cli.subcommand {
+        Subcommands::Launch(args) => launch::launch(args),
+        Subcommands::Run(args) => run::run(&args),
+        Subcommands::Check(args) => check::check(&args),
+        Subcommands::Ctl(args) => control::ctl(&args),
+        Subcommands::Query(args) => control::query(&args),
+        Subcommands::Command(args) => control::command(&args),
+        Subcommands::Log(args) => control::log(&args),
+        Subcommands::Bench(args) => bench::bench(&args),
+        Subcommands::BenchRobot(args) => bench::robot(&args),
+        Subcommands::BenchEcho { address } => bench::echo(&address),
+        Subcommands::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "cars", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)
         }

@@ -64,7 +64,8 @@ pub(crate) fn execute(
     let robots = make_robots(&scenario, Path::new("the scenario"))?;
     let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
     let mut recorder = Recorder::begin(folder, run, &simulation)?;
-    let seated = robots.into_iter().filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
+    let seated =
+        robots.into_iter().filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
     let mut barrier = InProcess(LocalHost::new(seated.collect()));
     let begun = Instant::now();
     let record = simulation.init(&mut barrier).into_diagnostic()?;

@@ -73,7 +73,8 @@ fn bar(share: f64) -> String {
 }
 
 fn commands(robot: &RobotSummary) -> String {
-    let mut lines: Vec<String> = robot.sent.iter().map(|(command, count)| format!("{count} {command}")).collect();
+    let mut lines: Vec<String> =
+        robot.sent.iter().map(|(command, count)| format!("{count} {command}")).collect();
     lines.push(format!("{} received", robot.received));
     for (count, what) in [(robot.dropped, "lost on the way"), (robot.missing, "missing")] {
         if count > 0 {
@@ -97,7 +98,10 @@ fn moves(robot: &RobotSummary) -> String {
 fn held_up(summary: &Summary) -> String {
     let noticed = summary.wall.held_up_by.iter().filter(|(_, held)| held.longest_s >= 0.5);
     let line = |(name, held): (&protocol::RobotName, &simulator::summary::HeldUp)| {
-        format!("\nthe clock waited {:.1} s for {name}, at most {:.1} s at a time", held.waited_s, held.longest_s)
+        format!(
+            "\nthe clock waited {:.1} s for {name}, at most {:.1} s at a time",
+            held.waited_s, held.longest_s
+        )
     };
     noticed.map(line).collect()
 }

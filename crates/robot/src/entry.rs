@@ -48,7 +48,12 @@ pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> 
     protocol::runtime::use_one_thread();
     let mut args = RobotArgs::parse();
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .init();
     if args.names.is_empty() {
         args.names.extend(RobotName::new(default_name));
     }

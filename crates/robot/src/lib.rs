@@ -53,8 +53,8 @@ pub use entry::{RobotArgs, main};
 pub use host::{Host, HostError, HostOptions};
 pub use local::{LocalHost, Sense};
 pub use protocol::messages::{
-    Clock, End, Face, Panel, Parameters, Percept, Point, PublicState, Report, SensedBody, SensedKind,
-    SensedRobot, StateVariables, Tone, Variable, Welcome, Widget,
+    Clock, Command, CommandId, Correction, End, Face, News, Panel, Parameters, Percept, Point, PublicState,
+    Report, SensedBody, SensedKind, SensedRobot, StateVariables, Tone, Variable, Welcome, Widget,
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RunName, Tick};

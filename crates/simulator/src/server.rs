@@ -374,7 +374,9 @@ impl Server {
             return self.ignore("stale", robot);
         }
         let now = Instant::now();
-        if self.awaited().eq([&name]) {
+        // Who itself waits for another robot's answer holds nobody up.
+        let is_culprit = self.awaited().all(|other| *other == name || self.open.waits.contains_key(other));
+        if is_culprit && !self.open.waits.contains_key(&name) {
             let waited_s = (now - self.open.last_arrival).as_secs_f64();
             let held = self.summary_wall.held_up_by.entry(name.clone()).or_default();
             held.ticks += 1;

@@ -18,7 +18,10 @@ const ALLOWED: [(&str, &[&str]); 9] = [
 
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    let output = cargo.current_dir(system_tests::root()).args(["metadata", "--format-version", "1", "--no-deps"]).output();
+    let output = cargo
+        .current_dir(system_tests::root())
+        .args(["metadata", "--format-version", "1", "--no-deps"])
+        .output();
     let metadata: serde_json::Value = serde_json::from_slice(&output.unwrap().stdout).unwrap();
     let names = |list: &serde_json::Value| -> BTreeSet<String> {
         list.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()

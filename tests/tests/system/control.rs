@@ -111,8 +111,12 @@ fn control_answers_at_once_while_the_clock_is_held() {
     let stepped = ctl(&lab, "ctl-held", &["step", "10"]);
     assert!(begun.elapsed() < Duration::from_secs(10), "step took {:?}", begun.elapsed());
     assert!(stepped["tick"].as_u64().unwrap() < 15, "{stepped}");
-    let awaited: Vec<&str> =
-        stepped["awaiting"].as_array().unwrap().iter().map(|awaited| awaited["name"].as_str().unwrap()).collect();
+    let awaited: Vec<&str> = stepped["awaiting"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|awaited| awaited["name"].as_str().unwrap())
+        .collect();
     assert!(awaited.contains(&"Leguin"), "{stepped}");
     assert_eq!(ctl(&lab, "ctl-held", &["pause"])["phase"], "paused");
     assert_eq!(status(&lab, "ctl-held")["phase"], "paused");

@@ -59,7 +59,9 @@ fn three_robots_are_the_same_either_way() {
 fn the_order_in_which_robots_start_changes_nothing() {
     let lab = Lab::new();
     let scenario = root().join("configs/hors_doeuvres.toml");
-    let process = |name: &str| format!("[[process]]\nname = \"{name}\"\ncommand = [\"cars-{}\"]\n", name.to_lowercase());
+    let process = |name: &str| {
+        format!("[[process]]\nname = \"{name}\"\ncommand = [\"cars-{}\"]\n", name.to_lowercase())
+    };
     let head = format!("scenario = {:?}\n", scenario.display().to_string());
     let forward = lab.write("forward.toml", &(head.clone() + &process("Butler") + &process("Leguin")));
     let backward = lab.write("backward.toml", &(head + &process("Leguin") + &process("Butler")));
@@ -73,7 +75,8 @@ struct Load(Arc<AtomicBool>, Vec<std::thread::JoinHandle<()>>);
 
 impl Load {
     fn on_all_cores() -> Self {
-        let (stop, cores) = (Arc::new(AtomicBool::new(false)), std::thread::available_parallelism().unwrap().get());
+        let (stop, cores) =
+            (Arc::new(AtomicBool::new(false)), std::thread::available_parallelism().unwrap().get());
         let burn = |stop: Arc<AtomicBool>| move || while !stop.load(Ordering::Relaxed) {};
         let threads = (0..2 * cores).map(|_| std::thread::spawn(burn(stop.clone()))).collect();
         Self(stop, threads)

@@ -39,7 +39,10 @@ fn watch(file: &str, set: &[&str], mut look: impl FnMut(&Change<'_>)) {
 }
 
 fn sent(events: &[Event], what: &str) -> usize {
-    events.iter().filter(|event| matches!(event, Event::CommandSent { command, .. } if command == what)).count()
+    events
+        .iter()
+        .filter(|event| matches!(event, Event::CommandSent { command, .. } if command == what))
+        .count()
 }
 
 #[test]
@@ -109,40 +112,64 @@ fn item_21_a_crowd_makes_butler_intercept_and_no_crowd_does_not() {
         });
         from_intercept / exchanges
     };
-    let (none, some, many) = (intercepts("guests.count=0"), intercepts("guests.count=50"), intercepts("guests.count=100"));
-    println!("share of exchanges begun from INTERCEPT: {none:.2} without guests, {some:.2} with 50, {many:.2} with 100");
+    let (none, some, many) =
+        (intercepts("guests.count=0"), intercepts("guests.count=50"), intercepts("guests.count=100"));
+    println!(
+        "share of exchanges begun from INTERCEPT: {none:.2} without guests, {some:.2} with 50, {many:.2} with 100"
+    );
     assert!(none <= 0.05, "{none}");
     assert!(none < some && some < many, "{none} {some} {many}");
 }
 
 #[test]
 fn item_21_intercepting_is_moving_toward_leguin() {
-    let mut toward = (0_u32, 0_u32);
-    let mut before: Option<f64> = None;
-    watch(HALL, &[], |change| {
-        let apart_m = change.hall.at("Butler").distance_m(change.hall.at("Leguin"));
-        if let (("INTERCEPT", "INTERCEPT"), Some(before_m)) = (change.butler, before) {
-            toward.0 += u32::from(apart_m < before_m);
-            toward.1 += u32::from(apart_m > before_m);
-        }
-        before = Some(apart_m);
-    });
-    println!("intercepting: {} ticks closer, {} ticks farther", toward.0, toward.1);
-    assert!(toward.0 > 4 * toward.1, "{toward:?}");
+    /// Share of the moves that brought Butler nearer to where Leguin was.
+    fn share_toward(behavior: &str) -> f64 {
+        let (mut nearer, mut moves) = (0_u32, 0_u32);
+        let mut before: Option<(Point, Point)> = None;
+        watch(HALL, &[], |change| {
+            let now = (change.hall.at("Butler"), change.hall.at("Leguin"));
+            let has_way_to_go = matches!(change.leguin.0, "REFILL" | "WAIT");
+            if let (true, true, Some((butler, leguin))) = (
+                change.butler == (behavior, behavior),
+                has_way_to_go,
+                before.filter(|before| before.0 != now.0),
+            ) {
+                moves += 1;
+                nearer += u32::from(now.0.distance_m(leguin) < butler.distance_m(leguin));
+            }
+            before = Some(now);
+        });
+        f64::from(nearer) / f64::from(moves)
+    }
+    let (intercept, serve) = (share_toward("INTERCEPT"), share_toward("SERVE"));
+    println!("share of moves toward Leguin: {intercept:.2} intercepting, {serve:.2} serving");
+    assert!(intercept > 0.75, "he drives straight at her, around guests where he must: {intercept}");
+    assert!(serve < 0.65, "serving is a random walk: {serve}");
 }
 
 #[test]
 fn item_23_after_the_exchange_leguin_stands_until_she_is_sent_home() {
     let mut at: Option<Point> = None;
-    let mut waits = 0;
+    let (mut waits, mut departures) = (0, 0);
     watch(HALL, &[], |change| {
-        if change.leguin == ("AWAIT_GO_HOME", "AWAIT_GO_HOME") {
+        let delivered = change
+            .events
+            .iter()
+            .any(|event| matches!(event, Event::CommandDelivered { to, .. } if to.as_str() == "Leguin"));
+        // What she does in a tick moves her in the next: in the first tick of GO_HOME she still stands.
+        if matches!(change.leguin, ("EXCHANGE" | "AWAIT_GO_HOME", "AWAIT_GO_HOME" | "GO_HOME")) {
             waits += 1;
             assert_eq!(Some(change.hall.at("Leguin")), at, "seed {}", change.seed);
         }
+        if change.leguin == ("AWAIT_GO_HOME", "GO_HOME") {
+            departures += 1;
+            assert!(delivered, "seed {}: she left without having been sent", change.seed);
+        }
+        assert!(change.leguin != ("EXCHANGE", "GO_HOME"), "she stops and waits in between");
         at = Some(change.hall.at("Leguin"));
     });
-    assert!(waits > 0);
+    assert!(waits > 50 && departures > 50, "{waits} {departures}");
 }
 
 #[test]
@@ -151,7 +178,12 @@ fn item_24_at_the_table_leguin_waits_for_refill_or_hurry() {
     let mut at: Option<Point> = None;
     watch(HALL, &[], |change| {
         if change.leguin == ("WAIT", "WAIT") {
-            assert_eq!(Some(change.hall.at("Leguin")), at.or(Some(change.hall.at("Leguin"))), "seed {}", change.seed);
+            assert_eq!(
+                Some(change.hall.at("Leguin")),
+                at.or(Some(change.hall.at("Leguin"))),
+                "seed {}",
+                change.seed
+            );
         }
         if change.leguin == ("WAIT", "REFILL") {
             starts += 1;
@@ -172,7 +204,8 @@ fn item_26_the_state_of_figure_6_is_reached() {
             return;
         }
         let home = hall.simulation.scenario().robots.values().nth(1).unwrap().at;
-        let (done_m, left_m) = (hall.at("Leguin").distance_m(home), hall.at("Leguin").distance_m(hall.at("Butler")));
+        let (done_m, left_m) =
+            (hall.at("Leguin").distance_m(home), hall.at("Leguin").distance_m(hall.at("Butler")));
         let part = done_m / (done_m + left_m);
         if (change.butler.1, change.leguin.1) == ("SERVE", "REFILL") && (0.3..=0.7).contains(&part) {
             found.push((change.seed, hall.simulation.tick(), part));
@@ -214,7 +247,9 @@ fn the_readable_log_tells_the_story() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--run", "story", "--duration", "300 s"]);
     let log = std::fs::read_to_string(lab.file("story", "cars.log")).unwrap();
-    for part in ["emotion HAPPY -> CONFIDENT", "-> Leguin: refill", "behavior WAIT -> REFILL", "-> Leguin: go home"] {
+    for part in
+        ["emotion HAPPY -> CONFIDENT", "-> Leguin: refill", "behavior WAIT -> REFILL", "-> Leguin: go home"]
+    {
         assert!(log.contains(part), "no {part:?} in\n{log}");
     }
 }

@@ -33,7 +33,7 @@ fn a_stopped_robot_holds_the_clock_costs_nothing_and_changes_nothing() {
     send(leguin, Signal::SIGSTOP);
     let said = launch.prints("waiting for");
     println!("the terminal named whom it waits for after {:?}", said - stopped);
-    assert!(launch.printed().contains("Leguin (") , "{}", launch.printed());
+    assert!(launch.printed().contains("Leguin ("), "{}", launch.printed());
 
     // Long enough that its link is given up, too.
     std::thread::sleep(Duration::from_secs(1));
@@ -116,7 +116,18 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
         let set = format!("on_late={mode}");
         let mut launch = lab.start(
             &run,
-            &["launch", FILE, "--speed", "10", "--duration", "30 s", "--set", &set, "--set", "deadline=0.5 s"],
+            &[
+                "launch",
+                FILE,
+                "--speed",
+                "10",
+                "--duration",
+                "30 s",
+                "--set",
+                &set,
+                "--set",
+                "deadline=0.5 s",
+            ],
         );
         launch.prints("behavior");
         let leguin = launch.process("cars-leguin");

@@ -5,8 +5,11 @@ use system_tests::{Lab, eventually};
 #[test]
 fn a_robot_can_be_asked_and_commanded_from_a_shell() {
     let lab = Lab::new();
-    let mut launch = lab.start("shell", &["launch", "launch/hors_doeuvres.toml", "--paused", "--duration", "60 s"]);
-    eventually("the run", || lab.cars(&["ctl", "step", "--run", "shell"]).status().unwrap().success().then_some(()));
+    let mut launch =
+        lab.start("shell", &["launch", "launch/hors_doeuvres.toml", "--paused", "--duration", "60 s"]);
+    eventually("the run", || {
+        lab.cars(&["ctl", "step", "--run", "shell"]).status().unwrap().success().then_some(())
+    });
     let ask = |what| lab.ok(&["query", "Leguin", what, "--run", "shell"]);
     assert_eq!(ask("emotion_state").trim(), "HAPPY");
     assert_eq!(ask("behavior_state").trim(), "WAIT");
@@ -24,7 +27,9 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
     lab.ok(&["ctl", "stop", "--run", "shell"]);
     launch.finish();
     let events = lab.events("shell");
-    let find = |kind: &str| events.iter().find(|event| event["event"] == kind && event["from"] == "operator").cloned();
+    let find = |kind: &str| {
+        events.iter().find(|event| event["event"] == kind && event["from"] == "operator").cloned()
+    };
     assert_eq!(find("command_sent").expect("it is recorded")["command"], "refill");
     assert_eq!(find("command_delivered").expect("it is recorded")["to"], "Leguin");
     let log = lab.ok(&["log", "--run", "shell"]);
@@ -34,8 +39,11 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
 #[test]
 fn the_log_can_be_followed_to_the_end() {
     let lab = Lab::new();
-    let mut launch = lab.start("follow", &["launch", "launch/hors_doeuvres.toml", "--paused", "--duration", "60 s"]);
-    eventually("the run", || lab.cars(&["ctl", "step", "--run", "follow"]).status().unwrap().success().then_some(()));
+    let mut launch =
+        lab.start("follow", &["launch", "launch/hors_doeuvres.toml", "--paused", "--duration", "60 s"]);
+    eventually("the run", || {
+        lab.cars(&["ctl", "step", "--run", "follow"]).status().unwrap().success().then_some(())
+    });
     let mut log = lab.start("follow", &["log", "-f"]);
     log.prints("initialized");
     lab.ok(&["ctl", "speed", "max", "--run", "follow"]);
@@ -62,7 +70,17 @@ fn files_are_checked_with_line_and_place() {
 fn a_plain_roster_plays() {
     let lab = Lab::new();
     let roster = lab.write("CARSConfig.txt", "Butler\nLeguin\nVonda\n");
-    let args = ["launch", "--roster", roster.to_str().unwrap(), "--run", "roster", "--duration", "30 s", "--speed", "max"];
+    let args = [
+        "launch",
+        "--roster",
+        roster.to_str().unwrap(),
+        "--run",
+        "roster",
+        "--duration",
+        "30 s",
+        "--speed",
+        "max",
+    ];
     let printed = lab.ok(&args);
     assert!(printed.contains("Vonda"), "{printed}");
     assert_eq!(lab.summary("roster")["ticks"], 60);
@@ -81,7 +99,8 @@ fn a_dry_run_says_what_it_would_start_and_starts_nothing() {
 #[test]
 fn a_run_is_three_processes_and_leaves_a_whole_folder() {
     let lab = Lab::new();
-    let mut launch = lab.start("folder", &["launch", "launch/hors_doeuvres.toml", "--duration", "60 s", "--speed", "20"]);
+    let mut launch =
+        lab.start("folder", &["launch", "launch/hors_doeuvres.toml", "--duration", "60 s", "--speed", "20"]);
     for program in ["cars-sim", "cars-butler", "cars-leguin"] {
         assert!(launch.process(program) > 0);
     }
@@ -89,7 +108,11 @@ fn a_run_is_three_processes_and_leaves_a_whole_folder() {
     for file in ["scenario.toml", "events.jsonl", "cars.log", "summary.json", "logs"] {
         assert!(lab.file("folder", file).exists(), "no {file}");
     }
-    assert!(launch.printed().contains("Butler") && launch.printed().contains("digest"), "{}", launch.printed());
+    assert!(
+        launch.printed().contains("Butler") && launch.printed().contains("digest"),
+        "{}",
+        launch.printed()
+    );
     let summary = lab.summary("folder");
     assert_eq!((&summary["ticks"], &summary["end"]), (&120.into(), &"finished".into()));
     let last = lab.events("folder").pop().unwrap();

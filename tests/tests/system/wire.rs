@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use protocol::bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
-use protocol::messages::{Clock, Control, ControlAnswer, JoinAnswer, Point, PublicState, Refusal, Report, Status, Welcome};
+use protocol::messages::{
+    Clock, Control, ControlAnswer, JoinAnswer, Point, PublicState, Refusal, Report, Status, Welcome,
+};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
 use system_tests::processes::Running;
@@ -45,13 +47,13 @@ impl Wire {
         Self { lab, simulator, endpoint, run, bus, keys }
     }
 
-    fn ask(&self, key: &str, parameters: &str, body: Vec<u8>) -> Result<Vec<u8>, String> {
-        let answer = eventually("an answer", || self.bus.ask(key, parameters, Some(body.clone())).unwrap());
+    fn ask(&self, key: &str, parameters: &str, body: &[u8]) -> Result<Vec<u8>, String> {
+        let answer = eventually("an answer", || self.bus.ask(key, parameters, Some(body.to_vec())).unwrap());
         answer.result
     }
 
     fn join(&self, request: &Value) -> JoinAnswer {
-        let bytes = self.ask(&self.keys.join(), "", request.to_string().into_bytes()).unwrap();
+        let bytes = self.ask(&self.keys.join(), "", request.to_string().as_bytes()).unwrap();
         decode("join", "simulator", &bytes).unwrap()
     }
 
@@ -67,7 +69,7 @@ impl Wire {
     }
 
     fn control(&self, control: &Control) -> Result<Status, String> {
-        let bytes = self.ask(&self.keys.control(), "", encode(control)).unwrap();
+        let bytes = self.ask(&self.keys.control(), "", &encode(control)).unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Done(status) => Ok(*status),
             ControlAnswer::Refused { explanation } => Err(explanation),
@@ -97,7 +99,9 @@ impl Hand {
         let subscribed = bus.subscribe(&wire.keys.clock(), move |key, bytes| {
             let _ = sender.send(decode(key, "simulator", bytes).unwrap());
         });
-        let JoinAnswer::Welcome(welcome) = wire.join(&wire.request(robot, &bus.id())) else { panic!("refused") };
+        let JoinAnswer::Welcome(welcome) = wire.join(&wire.request(robot, &bus.id())) else {
+            panic!("refused")
+        };
         let name = name(robot);
         let token = bus.token(&wire.keys.alive_robot(&name)).unwrap();
         let declared = vec![subscribed.unwrap(), token];
@@ -195,7 +199,10 @@ fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
         (status.ignored.values().sum::<u64>() == 6).then_some(status)
     });
     assert_eq!(status.tick, 0, "the tick is still open");
-    assert_eq!(status.ignored, [("malformed".into(), 2), ("stale".into(), 3), ("unknown robot".into(), 1)].into());
+    assert_eq!(
+        status.ignored,
+        [("malformed".into(), 2), ("stale".into(), 3), ("unknown robot".into(), 1)].into()
+    );
     // The tick goes on as if nothing had happened.
     a.put(&a.report(1));
     b.put(&b.report(1));
@@ -223,7 +230,7 @@ fn a_second_report_for_the_same_tick_changes_nothing() {
 fn malformed_and_impossible_controls_are_refused_with_a_reason() {
     let (wire, ..) = ready("wire-control");
     let raw = |text: &str| {
-        let bytes = wire.ask(&wire.keys.control(), "", text.as_bytes().to_vec()).unwrap();
+        let bytes = wire.ask(&wire.keys.control(), "", text.as_bytes()).unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Refused { explanation } => explanation,
             ControlAnswer::Done(_) => panic!("accepted: {text}"),
@@ -267,18 +274,24 @@ fn queries_answer_with_the_tick_before() {
     });
     let bus = Bus::open(&Role::Client { connect: endpoint, patience: PATIENCE }, None).unwrap();
     let keys = Keys::new(&RunName::new("wire-query").unwrap());
-    eventually("the run", || lab.cars(&["ctl", "step", "7", "--run", "wire-query"]).status().unwrap().success().then_some(()));
+    eventually("the run", || {
+        lab.cars(&["ctl", "step", "7", "--run", "wire-query"]).status().unwrap().success().then_some(())
+    });
     let ask = |what: &str, parameters: &str| {
         let answer = bus.ask(&keys.query(&name("Leguin"), what), parameters, None).unwrap();
         answer.expect("Leguin answers").result
     };
-    let state = |parameters: &str| decode::<PublicState>("state", "Leguin", &ask("state", parameters).unwrap()).unwrap();
+    let state = |parameters: &str| {
+        decode::<PublicState>("state", "Leguin", &ask("state", parameters).unwrap()).unwrap()
+    };
     assert_eq!(state("").tick, 7);
     assert_eq!(state("tick=8;epoch=1").tick, 7);
     assert_eq!(state("tick=7;epoch=1").tick, 6);
     assert!(ask("state", "tick=3;epoch=1").unwrap_err().contains("over"));
     assert!(ask("state", "tick=x").unwrap_err().contains("not a whole number"));
-    for (what, expected) in [("behavior_state", json!("WAIT")), ("emotion_state", json!("HAPPY")), ("speed", json!(0.0))] {
+    for (what, expected) in
+        [("behavior_state", json!("WAIT")), ("emotion_state", json!("HAPPY")), ("speed", json!(0.0))]
+    {
         let answer: Value = serde_json::from_slice(&ask(what, "").unwrap()).unwrap();
         assert_eq!((&answer["value"], &answer["tick"]), (&expected, &json!(7)));
     }

@@ -64,7 +64,12 @@ fn main() -> miette::Result<ExitCode> {
     let args = Args::parse();
     let filter =
         tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn,zenoh=error".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .init();
     let summary = run(&args)?;
     Ok(if summary.end == Some(End::Aborted) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

@@ -51,13 +51,18 @@ impl Observers {
         if status.awaiting.is_empty() {
             return;
         }
-        self.late(simulation, &format!("waiting for {}", name_all(&status.awaiting)));
+        let text = format!(
+            "the clock is held at {:.1} s: waiting for {}",
+            status.time_s,
+            name_all(&status.awaiting)
+        );
+        self.late(simulation, &text);
         self.frame(simulation, status);
     }
 
     /// The clock goes on.
     pub(super) fn released(&mut self, simulation: &Simulation, status: &Status) {
-        self.late(simulation, "going on");
+        self.late(simulation, "the clock goes on");
         self.frame(simulation, status);
     }
 
@@ -79,7 +84,8 @@ fn show(to: &Publisher, message: Vec<u8>) {
 }
 
 fn name_all(awaiting: &[Awaited]) -> String {
-    let one = |awaited: &Awaited| format!("{} ({})", awaited.name, awaited.because);
+    let one =
+        |awaited: &Awaited| format!("{} ({}, since {:.1} s)", awaited.name, awaited.because, awaited.since_s);
     awaiting.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
