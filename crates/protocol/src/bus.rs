@@ -113,12 +113,21 @@ impl Bus {
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key is not legal.
     pub fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
-        // The default would drop under pressure, and a lock-step system cannot afford a lost message.
-        let declared = self
-            .session
-            .declare_publisher(key.to_owned())
-            .congestion_control(CongestionControl::Block)
-            .wait();
+        // The middleware's default would drop under pressure, and a lock-step system cannot afford a lost message.
+        self.declare_publisher(key, CongestionControl::Block)
+    }
+
+    /// Declares that pictures and lines for observers will be put on `key`. Where an observer does not keep up, they
+    /// are dropped: nobody who watches may hold the clock.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn observer_publisher(&self, key: &str) -> Result<Publisher, BusError> {
+        self.declare_publisher(key, CongestionControl::Drop)
+    }
+
+    fn declare_publisher(&self, key: &str, congestion: CongestionControl) -> Result<Publisher, BusError> {
+        let declared = self.session.declare_publisher(key.to_owned()).congestion_control(congestion).wait();
         let inner = used("publish on", key, declared)?;
         let watched = Arc::new(AtomicBool::new(false));
         let seen = watched.clone();

@@ -38,6 +38,11 @@ impl Board {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// A robot of this process; others are not asked about here.
+    pub(crate) fn host(&self, robot: &RobotName) {
+        self.lock().states.entry(robot.clone()).or_default();
+    }
+
     /// Shows a new state, and answers who asked for it too early.
     pub(crate) fn show(&self, robot: &RobotName, state: Arc<PublicState>) {
         let mut inner = self.lock();
@@ -78,7 +83,7 @@ impl Inner {
     fn judge(&self, question: &Question) -> Verdict {
         let never = |reason: &str| Verdict::Never(reason.to_owned());
         let Some(states) = Keys::robot_of(question.key()).and_then(|name| self.states.get(name)) else {
-            return Verdict::Early;
+            return never("ask one robot by its name");
         };
         let Some(newest) = states.back() else { return Verdict::Early };
         let Some(tick) = question.parameter("tick") else { return Verdict::Answer(newest.clone()) };
@@ -92,9 +97,10 @@ impl Inner {
             }
         }
         // Asked during tick t, everybody answers with the state reported for t - 1.
-        match states.iter().find(|state| state.tick + 1 == tick) {
+        match states.iter().find(|state| state.tick.checked_add(1) == Some(tick)) {
             Some(state) => Verdict::Answer(state.clone()),
-            None if tick > newest.tick + 1 => Verdict::Early,
+            None if tick.checked_sub(2) == Some(newest.tick) => Verdict::Early,
+            None if tick > newest.tick => never("that tick is far away"),
             None => never("that tick is over"),
         }
     }

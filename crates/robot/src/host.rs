@@ -82,6 +82,7 @@ struct Member {
     /// Whether the clock that names it has come, and it takes part.
     is_seated: bool,
     report: Publisher,
+    state: Publisher,
     panel: Publisher,
     painted: Option<Instant>,
     /// The last report, for the case that it got lost.
@@ -105,16 +106,22 @@ impl Host {
         let role = Role::Client { connect: options.connect.clone(), patience: options.patience };
         let bus = Bus::open(&role, options.zenoh_config.as_ref())?;
         let keys = Keys::new(&options.run);
-        let link = Link::new(bus.clone(), keys.clone());
+        let link = Link::new(bus.clone(), keys.clone(), options.patience);
         let mut host = Self { options, bus, keys, link, members: BTreeMap::new(), declared: Vec::new() };
         let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
         host.listen(&names)?;
         for (name, robot) in robots {
+            let welcome = host.join(&name)?;
+            // Others may still ask for what the previous incarnation reported last.
+            if let Some(last) = &welcome.last_state {
+                host.link.board.show(&name, Arc::new(last.clone()));
+            }
             let member = Member {
-                seat: Seat::new(robot, host.join(&name)?),
+                seat: Seat::new(robot, welcome),
                 is_seated: false,
                 report: host.bus.publisher(&host.keys.report(&name))?,
-                panel: host.bus.publisher(&host.keys.panel(&name))?,
+                state: host.bus.publisher(&host.keys.query(&name, STATE))?,
+                panel: host.bus.observer_publisher(&host.keys.panel(&name))?,
                 painted: None,
                 last: None,
             };
@@ -139,6 +146,7 @@ impl Host {
         })?);
         for name in names {
             self.link.host(name);
+            self.link.board.host(name);
             let (queue, to) = (self.link.queue(), name.clone());
             self.declared.push(self.bus.subscribe(&self.keys.commands_to(name), move |key, bytes| {
                 let Ok(from) = RobotName::new(Keys::last_chunk(key)) else { return };
@@ -215,7 +223,13 @@ impl Host {
 
     /// One tick of every robot of the process, in the order of their names.
     fn on_clock(&mut self, clock: &Clock) -> Result<(), HostError> {
-        self.link.begin(clock.epoch, clock.tick);
+        let (asked, current) = ((clock.epoch, clock.tick), self.link.current());
+        if asked < current {
+            return Ok(()); // An echo: the clock has gone on since.
+        }
+        if asked > current {
+            self.link.begin(clock.epoch, clock.tick);
+        }
         let names: Vec<RobotName> = self.members.keys().cloned().collect();
         for name in &names {
             self.rejoin_if_new_epoch(name, clock)?;
@@ -223,7 +237,6 @@ impl Host {
                 member.answer(name, clock, &mut self.link)?;
             }
         }
-        self.link.ask_ahead();
         Ok(())
     }
 
@@ -234,7 +247,7 @@ impl Host {
             return Ok(());
         }
         let welcome = self.join(name)?;
-        if let Some(member) = self.members.get_mut(name) {
+        if let Some(member) = self.members.get_mut(name).filter(|_| welcome.epoch == clock.epoch) {
             member.seat.start_over(welcome);
             (member.is_seated, member.last) = (false, None);
         }
@@ -263,6 +276,10 @@ impl Member {
         }
         let Some((report, state)) = self.tick(clock, joined.is_some(), link)? else { return Ok(()) };
         // First what others may ask for, then the report: after it the clock may go on and they will ask.
+        // Who follows has the state before the next clock, because both come the same way.
+        if self.state.is_watched() {
+            self.state.put(encode(&state))?;
+        }
         link.board.show(name, Arc::new(state));
         let report = encode(&report);
         self.report.put(report.clone())?;

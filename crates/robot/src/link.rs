@@ -1,12 +1,12 @@
 //! The robots' side of the bus: everything that arrives goes through one queue to the robots' loop, and a robot that
 //! needs an answer in the middle of its tick keeps that queue moving while it waits.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
-use protocol::bus::{AnswerOf, Bus};
+use protocol::bus::{AnswerOf, Bus, Declared};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{Clock, Command, CommandId, Percept, PublicState, Waiting};
 use protocol::{Epoch, Malformed, Message, RobotName, Tick, decode, encode};
@@ -22,7 +22,9 @@ const COMMAND_PATIENCE: Duration = Duration::from_secs(10);
 /// A robot that waits looks this often at what else limits its wait; after one of them it tells whom it waits for.
 const LOOK_AGAIN: Duration = Duration::from_millis(250);
 /// Between two attempts to ask a robot that does not answer.
-const ASK_AGAIN: Duration = Duration::from_millis(200);
+const ASK_AGAIN: Duration = Duration::from_millis(500);
+/// What was not asked for in so many ticks is followed no more.
+const UNUSED_TICKS: Tick = 64;
 /// Commands that are kept for a robot before a clock names them; the oldest make room.
 const MAX_COMMANDS: usize = 4096;
 
@@ -32,10 +34,10 @@ pub(crate) enum Event {
     Clock(Result<Clock, Malformed>),
     /// A command arrived.
     Command { to: RobotName, from: RobotName, command: Result<Command, Malformed> },
-    /// A robot answered a query, or did not.
-    State { of: RobotName, asked: Asked, state: Option<PublicState> },
-    /// The simulator answered a percept query, or did not.
-    Percept { of: RobotName, asked: Asked, percept: Option<Percept> },
+    /// Another robot let its state be known, asked or followed.
+    State { of: RobotName, state: PublicState },
+    /// The simulator let a robot know what it senses, asked or followed.
+    Percept { of: RobotName, percept: Percept },
     /// The simulator came or went.
     Simulator(bool),
 }
@@ -43,10 +45,10 @@ pub(crate) enum Event {
 /// Epoch and tick of the state that was asked for.
 pub(crate) type Asked = (Epoch, Tick);
 
-/// What is known of a state that was asked for.
-enum Known {
-    Asked,
-    Here(Arc<PublicState>),
+/// Something that is asked for so often that it is sent without being asked.
+struct Followed {
+    _subscription: Declared,
+    last_used: Tick,
 }
 
 pub(crate) struct Link {
@@ -61,20 +63,21 @@ pub(crate) struct Link {
     current: Asked,
     /// Commands that arrived and were not named yet, by target.
     commands: BTreeMap<RobotName, BTreeMap<CommandId, Command>>,
-    /// States of other processes' robots, as asked for.
-    states: BTreeMap<(RobotName, Asked), Known>,
-    /// Whom the robots asked in this tick, and so will probably ask in the next.
-    asked: BTreeSet<RobotName>,
+    /// States of other processes' robots.
+    states: BTreeMap<(RobotName, Asked), Arc<PublicState>>,
     percepts: BTreeMap<(RobotName, Asked), Percept>,
+    /// What is followed, by key.
+    followed: BTreeMap<String, Followed>,
     /// Commands of the last two ticks, for those who missed them.
     sent: VecDeque<(RobotName, RobotName, Command)>,
     /// Since when the simulator is away.
     pub(crate) simulator_gone: Option<Instant>,
-    pub(crate) simulator_seen: bool,
+    /// How long to go on without a simulator.
+    patience: Duration,
 }
 
 impl Link {
-    pub(crate) fn new(bus: Bus, keys: Keys) -> Self {
+    pub(crate) fn new(bus: Bus, keys: Keys, patience: Duration) -> Self {
         let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
         Self {
             bus,
@@ -86,11 +89,11 @@ impl Link {
             current: (0, 0),
             commands: BTreeMap::new(),
             states: BTreeMap::new(),
-            asked: BTreeSet::new(),
             percepts: BTreeMap::new(),
+            followed: BTreeMap::new(),
             sent: VecDeque::new(),
             simulator_gone: None,
-            simulator_seen: false,
+            patience,
         }
     }
 
@@ -119,6 +122,11 @@ impl Link {
         }
     }
 
+    /// The clock that is being answered: epoch and tick.
+    pub(crate) fn current(&self) -> Asked {
+        self.current
+    }
+
     /// A tick begins: what was known for the one before is of no use any more.
     pub(crate) fn begin(&mut self, epoch: Epoch, tick: Tick) {
         if epoch != self.current.0 {
@@ -126,18 +134,10 @@ impl Link {
             self.sent.clear();
         }
         self.current = (epoch, tick);
-        self.asked.clear();
         self.states.retain(|(_, asked), _| *asked >= (epoch, tick.saturating_sub(1)));
-        self.percepts.clear();
-        self.sent.retain(|(_, _, command)| command.tick + 2 > tick);
-    }
-
-    /// A tick is done: ask now for what will be asked in the next one. The answer exists as soon as the other robot
-    /// has reported, so it travels while the barrier closes and the clock comes back.
-    pub(crate) fn ask_ahead(&mut self) {
-        for robot in std::mem::take(&mut self.asked) {
-            self.ask_state(&robot, self.current);
-        }
+        self.percepts.retain(|(_, asked), _| *asked >= (epoch, tick));
+        self.followed.retain(|_, followed| tick.saturating_sub(followed.last_used) < UNUSED_TICKS);
+        self.sent.retain(|(_, _, command)| command.tick.saturating_add(2) > tick);
     }
 
     /// Sends again what others may have missed.
@@ -156,13 +156,20 @@ impl Link {
             Event::Clock(Err(error)) | Event::Command { command: Err(error), .. } => {
                 tracing::warn!("{error}");
             }
-            Event::State { of, asked, state } => self.file_state(of, asked, state),
-            Event::Percept { of, asked, percept } => {
-                if let Some(percept) = percept {
-                    self.percepts.insert((of, asked), percept);
+            Event::State { of, state } => {
+                let asked = (state.epoch, state.tick);
+                // Nobody asks for anything else, and an answer does not change within a tick.
+                if asked.0 == self.current.0 && asked.1.abs_diff(self.current.1) <= 1 {
+                    self.states.entry((of, asked)).or_insert_with(|| Arc::new(state));
                 }
             }
-            Event::Simulator(true) => (self.simulator_gone, self.simulator_seen) = (None, true),
+            Event::Percept { of, percept } => {
+                let asked = (percept.epoch, percept.tick);
+                if asked.0.abs_diff(self.current.0) <= 1 && asked.1.saturating_sub(1) <= self.current.1 {
+                    self.percepts.entry((of, asked)).or_insert(percept);
+                }
+            }
+            Event::Simulator(true) => self.simulator_gone = None,
             Event::Simulator(false) => self.simulator_gone = Some(Instant::now()),
         }
         true
@@ -190,52 +197,74 @@ impl Link {
         held.insert(CommandId { from, seq: command.seq }, command);
     }
 
-    fn file_state(&mut self, of: RobotName, asked: Asked, state: Option<PublicState>) {
-        match state.filter(|state| (state.epoch, state.tick) == asked) {
-            Some(state) => self.states.insert((of, asked), Known::Here(Arc::new(state))),
-            None => self.states.remove(&(of, asked)),
-        };
-    }
-
     /// Whether a clock has arrived that ends the tick under way before it is done: the run is over, the next epoch
     /// begins, or the simulator has gone on without us.
     fn is_interrupted(&self) -> bool {
         self.clocks.iter().any(|clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some())
     }
 
-    fn ask_state(&mut self, of: &RobotName, asked: Asked) {
-        let (queue, robot) = (self.queue(), of.clone());
-        let file = move |answer: Option<AnswerOf>| {
-            let state = read::<PublicState>(answer, &robot);
-            // The loop is gone only when the process ends.
-            let _ = queue.try_send(Event::State { of: robot, asked, state });
-        };
-        if self.ask(&self.keys.query(of, STATE), asked.1 + 1, asked.0, file) {
-            self.states.entry((of.clone(), asked)).or_insert(Known::Asked);
-        }
-    }
-
-    fn ask_percept(&mut self, of: &RobotName, asked: Asked) {
-        let (queue, robot) = (self.queue(), of.clone());
-        let file = move |answer: Option<AnswerOf>| {
-            let percept = read::<Percept>(answer, &robot);
-            let _ = queue.try_send(Event::Percept { of: robot, asked, percept });
-        };
-        self.ask(&self.keys.percept(of), asked.1, asked.0, file);
-    }
-
-    fn ask(
-        &self,
+    /// Asks for a message once, and follows its key from then on: whoever serves it sends it without being asked, before
+    /// what must come after it, so that the next question finds its answer here already.
+    fn ask<M: Message + 'static>(
+        &mut self,
         key: &str,
         tick: Tick,
-        epoch: Epoch,
-        then: impl FnOnce(Option<AnswerOf>) + Send + 'static,
-    ) -> bool {
-        let asked = self.bus.ask_then(key, &format!("tick={tick};epoch={epoch}"), then);
-        if let Err(error) = &asked {
+        of: &RobotName,
+        event: fn(RobotName, M) -> Event,
+    ) {
+        let (queue, sender) = (self.queue(), of.clone());
+        let file = move |answer: Option<AnswerOf>| {
+            if let Some(message) = read(answer, &sender) {
+                // The queue is closed only when the process ends; a full one drops the answer, and it is asked again.
+                let _ = queue.try_send(event(sender, message));
+            }
+        };
+        if let Err(error) = self.bus.ask_then(key, &format!("tick={tick};epoch={}", self.current.0), file) {
             tracing::warn!("{error}");
         }
-        asked.is_ok()
+        if !self.followed.contains_key(key) {
+            self.follow(key, of, event);
+        }
+    }
+
+    fn follow<M: Message + 'static>(&mut self, key: &str, of: &RobotName, event: fn(RobotName, M) -> Event) {
+        let (queue, sender) = (self.queue(), of.clone());
+        let subscribed =
+            self.bus.subscribe(key, move |key, bytes| match decode(key, sender.as_str(), bytes) {
+                Ok(message) => drop(queue.send(event(sender.clone(), message))),
+                Err(error) => tracing::warn!("{error}"),
+            });
+        match subscribed {
+            Ok(subscription) => {
+                let followed = Followed { _subscription: subscription, last_used: self.current.1 };
+                self.followed.insert(key.to_owned(), followed);
+            }
+            Err(error) => tracing::warn!("{error}"),
+        }
+    }
+
+    /// What `here` finds, asked for where it is not here yet.
+    fn obtain<M: Message + 'static, T>(
+        &mut self,
+        key: &str,
+        tick: Tick,
+        of: &RobotName,
+        event: fn(RobotName, M) -> Event,
+        here: impl Fn(&Self) -> Option<T>,
+    ) -> Result<T, Undelivered> {
+        if let Some(followed) = self.followed.get_mut(key) {
+            followed.last_used = self.current.1;
+        }
+        let mut asked_at: Option<Instant> = None;
+        self.wait(of, None, |link| {
+            let found = here(link);
+            // A question that finds nobody ends at once and without an error: it is asked again.
+            if found.is_none() && asked_at.is_none_or(|at| at.elapsed() >= ASK_AGAIN) {
+                asked_at = Some(Instant::now());
+                link.ask(key, tick, of, event);
+            }
+            found
+        })
     }
 
     pub(crate) fn put<M: Message>(&self, key: &str, message: &M) {
@@ -247,7 +276,7 @@ impl Link {
     /// Keeps the queue moving until `ready` has something, the epoch is over, or `patience` is.
     fn wait<T>(
         &mut self,
-        who: Option<&RobotName>,
+        who: &RobotName,
         patience: Option<Duration>,
         mut ready: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<T, Undelivered> {
@@ -257,14 +286,16 @@ impl Link {
             if let Some(found) = ready(self) {
                 return Ok(found);
             }
-            if self.is_interrupted() {
+            if self.is_interrupted()
+                || self.simulator_gone.is_some_and(|since| since.elapsed() > self.patience)
+            {
                 return Err(Undelivered::Interrupted);
             }
             if patience.is_some_and(|patience| begun.elapsed() > patience) {
                 return Err(Undelivered::Lost);
             }
             let has_news = self.pump(LOOK_AGAIN);
-            if let (false, false, Some(who)) = (has_news, told, who) {
+            if !has_news && !told && !self.commands.contains_key(who) {
                 told = true;
                 self.tell_waiting(who);
             }
@@ -301,36 +332,16 @@ impl Network for Link {
         if self.commands.contains_key(target) {
             return self.board.get(target, epoch, tick).ok_or(Undelivered::Lost);
         }
-        self.asked.insert(target.clone());
-        let key = (target.clone(), (epoch, tick));
-        let mut asked_at: Option<Instant> = None;
-        self.wait(Some(target), None, |link| match link.states.get(&key) {
-            Some(Known::Here(state)) => Some(state.clone()),
-            Some(Known::Asked) => None,
-            // Not asked yet, or it did not answer: a query that finds nobody ends at once and without an error.
-            None => {
-                if asked_at.is_none_or(|at| at.elapsed() >= ASK_AGAIN) {
-                    asked_at = Some(Instant::now());
-                    link.ask_state(target, (epoch, tick));
-                }
-                None
-            }
-        })
+        let (key, wanted) = (self.keys.query(target, STATE), (target.clone(), (epoch, tick)));
+        let event = |of, state| Event::State { of, state };
+        // Asked during a tick, everybody answers with the state reported for the tick before.
+        self.obtain(&key, tick + 1, target, event, |link| link.states.get(&wanted).cloned())
     }
 
     fn percept(&mut self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Result<Percept, Undelivered> {
-        let key = (robot.clone(), (epoch, tick));
-        let mut asked_at: Option<Instant> = None;
-        self.wait(None, None, |link| {
-            if let Some(percept) = link.percepts.get(&key) {
-                return Some(percept.clone());
-            }
-            if asked_at.is_none_or(|at| at.elapsed() > Duration::from_secs(1)) {
-                asked_at = Some(Instant::now());
-                link.ask_percept(robot, (epoch, tick));
-            }
-            None
-        })
+        let (key, wanted) = (self.keys.percept(robot), (robot.clone(), (epoch, tick)));
+        let event = |of, percept| Event::Percept { of, percept };
+        self.obtain(&key, tick, robot, event, |link| link.percepts.get(&wanted).cloned())
     }
 
     fn send(&mut self, from: &RobotName, to: &RobotName, command: &Command) {
@@ -339,7 +350,7 @@ impl Network for Link {
     }
 
     fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command> {
-        let found = self.wait(Some(&id.from), Some(COMMAND_PATIENCE), |link| {
+        let found = self.wait(&id.from, Some(COMMAND_PATIENCE), |link| {
             let held = link.commands.get_mut(to)?;
             if held.get(id)?.epoch == epoch { held.remove(id) } else { None }
         });

@@ -60,7 +60,8 @@ impl Seat {
     pub fn new(robot: Box<dyn Robot>, welcome: Welcome) -> Self {
         let random = stream(welcome.seed, &welcome.stream);
         let proposal = welcome.location;
-        Self { robot, welcome: Arc::new(welcome), random, outbox: Outbox::default(), proposal }
+        let outbox = Outbox { last_seq: welcome.last_seq, ..Outbox::default() };
+        Self { robot, welcome: Arc::new(welcome), random, outbox, proposal }
     }
 
     /// What it was told when it joined.
@@ -72,7 +73,7 @@ impl Seat {
     /// The same robot in a new epoch.
     pub fn start_over(&mut self, welcome: Welcome) {
         self.random = stream(welcome.seed, &welcome.stream);
-        self.outbox = Outbox::default();
+        self.outbox = Outbox { last_seq: welcome.last_seq, ..Outbox::default() };
         self.proposal = welcome.location;
         self.welcome = Arc::new(welcome);
     }
@@ -114,10 +115,12 @@ impl Seat {
         let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
         let (robot, mut cars) = self.enter(&welcome, clock.tick, &news, &mut log, network);
         robot.init_robot(&mut cars)?;
-        if let Some(last) = &welcome.last_state_variables {
-            robot.resume(&mut cars, last);
+        if let Some(last) = &welcome.last_state {
+            robot.resume(&mut cars, &last.state_variables);
         }
-        Ok(self.tick(clock, network))
+        let (mut report, state) = self.tick(clock, network);
+        report.log.splice(0..0, log);
+        Ok((report, state))
     }
 
     /// One tick, in the order of the seed's Figure 5.

@@ -1,4 +1,4 @@
-//! What is simulated. A file is read as it is written ([`raw`]), then checked and turned into what it means
+//! What is simulated. A file is read as it is written (module `raw`), then checked and turned into what it means
 //! ([`Scenario`]): SI units, defaults filled in, every name and number legal.
 
 mod overrides;

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Declared, Publisher, Question};
 use protocol::keys::Keys;
-use protocol::messages::{Clock, Correction, End, Report, Waiting};
+use protocol::messages::{Clock, Command, Correction, End, Report, Waiting};
 use protocol::{Epoch, Malformed, RobotName, RunName, Tick, decode, encode};
 
 use crate::diagnostic::FileError;
@@ -112,12 +112,16 @@ pub struct Server {
     observers: Observers,
     pace: Pace,
     members: BTreeMap<RobotName, Member>,
+    /// What each robot senses, for those who follow it instead of asking every tick.
+    percepts: BTreeMap<RobotName, Publisher>,
     on_late: OnLate,
     deadline: Duration,
     open: Open,
     summary_wall: crate::summary::Wall,
     /// Commands from outside the roster that take effect at the next tick boundary.
     operator: Vec<(RobotName, String)>,
+    /// Those of the last two ticks with their keys, for targets that missed them.
+    operator_sent: Vec<(String, Command)>,
 }
 
 /// The tick that is under way.
@@ -148,6 +152,11 @@ impl Server {
             clock: bus.publisher(&keys.clock())?,
             observers: Observers::new(&bus, &keys)?,
             pace: Pace::new(options.speed, options.is_paused),
+            percepts: scenario
+                .robots
+                .keys()
+                .map(|name| Ok((name.clone(), bus.publisher(&keys.percept(name))?)))
+                .collect::<Result<_, BusError>>()?,
             members: scenario.robots.keys().map(|name| (name.clone(), Member::default())).collect(),
             on_late: scenario.on_late,
             deadline: Duration::from_secs_f64(scenario.deadline_s),
@@ -164,6 +173,7 @@ impl Server {
             },
             summary_wall: crate::summary::Wall::default(),
             operator: Vec::new(),
+            operator_sent: Vec::new(),
             declared: Vec::new(),
             options,
             bus,
@@ -238,6 +248,11 @@ impl Server {
     }
 
     fn epoch(&mut self, simulation: &mut Simulation, recorder: &mut Recorder) -> Result<(), Interrupt> {
+        // Nothing of an epoch before may reach into this one.
+        (self.open.is_open, self.open.is_announced) = (false, false);
+        self.operator.clear();
+        self.operator_sent.clear();
+        self.pace.gather();
         self.gather(simulation)?;
         for member in self.members.values_mut() {
             member.begin_epoch();
@@ -280,11 +295,18 @@ impl Server {
         for (to, command) in std::mem::take(&mut self.operator) {
             let seq = simulation.command(&to, &command);
             let (epoch, tick) = (simulation.epoch(), simulation.tick());
-            let message = protocol::messages::Command { epoch, tick, seq, command };
+            let message = Command { epoch, tick, seq, command };
             let key = self.keys.command(&to, &RobotName::operator());
-            if let Err(error) = self.bus.put(&key, encode(&message)) {
-                tracing::error!("{error}");
-            }
+            self.put_operator(&key, &message);
+            self.operator_sent.push((key, message));
+        }
+        let tick = simulation.tick();
+        self.operator_sent.retain(|(_, command)| command.tick + 2 > tick);
+    }
+
+    fn put_operator(&self, key: &str, command: &Command) {
+        if let Err(error) = self.bus.put(key, encode(command)) {
+            tracing::error!("{error}");
         }
     }
 
@@ -305,6 +327,9 @@ impl Server {
         mut recorder: Recorder,
     ) -> Result<Summary, ServerError> {
         self.pace.end();
+        if let Some(question) = self.pace.give_up_stepping() {
+            self.answer_status(&question, simulation);
+        }
         let lines = recorder.write(simulation, &simulation.end(end))?;
         self.observers.log(&lines);
         self.observers.frame(simulation, &self.status(simulation));
@@ -368,6 +393,9 @@ impl Server {
         if member.is_lost && report.generation == member.generation {
             member.is_heard_of();
             return self.ignore("lost", robot);
+        }
+        if report.generation < member.generation {
+            member.hears_predecessor();
         }
         if (report.epoch, report.tick) != open || !self.open.is_open || report.generation != member.generation
         {
@@ -444,6 +472,9 @@ impl Server {
                 membership.push(Membership::Joined(name.clone(), generation));
                 introduce(&mut clock, name, generation, simulation);
             }
+            if let Some(generation) = member.take_reminder() {
+                clock.news.entry(name.clone()).or_default().joined = Some(generation);
+            }
         }
         let now = Instant::now();
         self.open = Open {
@@ -457,6 +488,10 @@ impl Server {
             is_announced: false,
             repeated: now,
         };
+        // Before the clock, on the same way: whoever follows has it when the tick begins.
+        for (name, publisher) in self.percepts.iter().filter(|(_, publisher)| publisher.is_watched()) {
+            publisher.put(encode(&simulation.percept(name)))?;
+        }
         Ok(self.clock.put(encode(&self.open.clock))?)
     }
 
@@ -509,6 +544,7 @@ impl Server {
 
     fn repeat_clock(&mut self) -> Result<(), BusError> {
         self.open.repeated = Instant::now();
+        self.operator_sent.iter().for_each(|(key, command)| self.put_operator(key, command));
         self.clock.put(encode(&self.open.clock))
     }
 

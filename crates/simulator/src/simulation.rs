@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{
-    Clock, CommandId, Correction, End, News, Percept, Point, Report, SensedBody, SensedKind, SensedRobot,
-    StateVariables, Welcome,
+    Clock, CommandId, Correction, End, News, Percept, Point, PublicState, Report, SensedBody, SensedKind,
+    SensedRobot, StateVariables, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Generation, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
@@ -37,7 +37,7 @@ pub struct Exchange {
 }
 
 /// A change of who takes part.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Membership {
     /// A further incarnation takes part from this tick on.
     Joined(RobotName, Generation),
@@ -76,6 +76,10 @@ pub struct Simulation {
     arriving: BTreeMap<RobotName, Vec<CommandId>>,
     /// What each robot reported last.
     reports: BTreeMap<RobotName, Report>,
+    /// Where each robot stood at the last complete tick, in the order of names.
+    stood_at: Vec<Point>,
+    /// Number of the last command of each robot.
+    last_seq: BTreeMap<RobotName, Seq>,
     /// Robots whose report of the last tick is missing: they propose nothing, and nobody can query them.
     silent: Vec<RobotName>,
     blocked: Vec<bool>,
@@ -102,6 +106,8 @@ impl Simulation {
             medium: Medium::default(),
             arriving: BTreeMap::new(),
             reports: BTreeMap::new(),
+            stood_at: Vec::new(),
+            last_seq: BTreeMap::new(),
             silent: Vec::new(),
             operator_seq: 0,
             operator_sent: Vec::new(),
@@ -206,7 +212,9 @@ impl Simulation {
 
     /// The end of a tick: what the robots did, and the digest.
     fn record(&mut self, tick: Tick, mut events: Vec<Event>, exchange: Exchange) -> TickRecord {
-        for change in exchange.membership {
+        let mut membership = exchange.membership;
+        membership.sort();
+        for change in membership {
             events.push(match change {
                 Membership::Joined(robot, generation) => {
                     let at = self.location(&robot).unwrap_or_default();
@@ -215,7 +223,7 @@ impl Simulation {
                 Membership::Lost(robot) => Event::Lost { robot },
             });
         }
-        self.note_deliveries(tick, &exchange.reports, &mut events);
+        self.note_deliveries(&exchange.reports, &mut events);
         self.silent.clear();
         let mut reports = exchange.reports;
         for name in self.names.clone() {
@@ -228,28 +236,23 @@ impl Simulation {
             }
         }
         self.tick = tick;
+        self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
         self.close_digest();
         events.push(Event::Tick { digest: self.digest.to_string() });
         TickRecord { tick, events }
     }
 
-    /// A command that was named has arrived, unless its target says that it never came. Whoever missed the tick has not
-    /// seen the clock that named it: the next one names it again.
-    fn note_deliveries(
-        &mut self,
-        tick: Tick,
-        reports: &BTreeMap<RobotName, Report>,
-        events: &mut Vec<Event>,
-    ) {
+    /// A command that was named has arrived, unless its target says that it never came, or has missed the tick.
+    fn note_deliveries(&mut self, reports: &BTreeMap<RobotName, Report>, events: &mut Vec<Event>) {
         for (to, ids) in std::mem::take(&mut self.arriving) {
             for id in ids {
-                match reports.get(&to) {
-                    None => self.medium.accept(tick, Underway { to: to.clone(), from: id.from, seq: id.seq }),
-                    Some(report) if report.missing.contains(&id) => {}
-                    Some(_) => {
-                        events.push(Event::CommandDelivered { from: id.from, to: to.clone(), seq: id.seq });
-                    }
-                }
+                let (to, from, seq) = (to.clone(), id.from.clone(), id.seq);
+                let has_arrived = reports.get(&to).is_some_and(|report| !report.missing.contains(&id));
+                events.push(if has_arrived {
+                    Event::CommandDelivered { from, to, seq }
+                } else {
+                    Event::CommandMissing { from, to, seq }
+                });
             }
         }
     }
@@ -267,12 +270,10 @@ impl Simulation {
         }
         for sent in &report.sent {
             let (from, to, seq) = (robot.clone(), sent.to.clone(), sent.seq);
+            let last_seq = self.last_seq.entry(robot.clone()).or_default();
+            *last_seq = seq.max(*last_seq);
             events.push(Event::CommandSent { from, to, seq, command: sent.command.clone() });
             self.medium.accept(tick, Underway { to: sent.to.clone(), from: robot.clone(), seq });
-        }
-        for missing in &report.missing {
-            let (from, to, seq) = (missing.from.clone(), robot.clone(), missing.seq);
-            events.push(Event::CommandMissing { from, to, seq });
         }
         events.extend(report.log.iter().map(|text| Event::Say { robot: robot.clone(), text: text.clone() }));
         self.reports.insert(robot.clone(), report);
@@ -334,7 +335,10 @@ impl Simulation {
             location: self.location(name)?,
             roster: self.names.clone(),
             parameters: spec.parameters.clone(),
-            last_state_variables: last.map(|report| report.state_variables.clone()),
+            last_state: last
+                .zip(self.index(name))
+                .and_then(|(report, index)| Some(public_state(report, *self.stood_at.get(index)?))),
+            last_seq: self.last_seq.get(name).copied().unwrap_or(0),
         })
     }
 
@@ -433,5 +437,19 @@ impl Simulation {
     #[must_use]
     pub fn digest(&self) -> String {
         self.digest.to_string()
+    }
+}
+
+/// What the other robots may learn of one that reported this from there.
+pub(crate) fn public_state(report: &Report, location: Point) -> PublicState {
+    PublicState {
+        epoch: report.epoch,
+        tick: report.tick,
+        location,
+        speed_mps: report.speed_mps,
+        direction_rad: report.direction_rad,
+        state_variables: report.state_variables.clone(),
+        emotion_state: report.emotion_state.clone(),
+        behavior_state: report.behavior_state.clone(),
     }
 }

@@ -68,6 +68,11 @@ fn finite(value: f64, field: &str) -> Result<(), (String, String)> {
     if value.is_finite() { Ok(()) } else { Err((field.to_owned(), "not a finite number".to_owned())) }
 }
 
+/// Ticks are integers that every language can hold and that can be counted on from.
+fn counted(tick: Tick, field: &str) -> Result<(), (String, String)> {
+    if tick < 1 << 53 { Ok(()) } else { Err((field.to_owned(), "not below 2^53".to_owned())) }
+}
+
 fn short(text: &str, field: &str) -> Result<(), (String, String)> {
     if text.len() <= MAX_TEXT_BYTES {
         return Ok(());

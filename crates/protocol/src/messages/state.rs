@@ -6,7 +6,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Epoch, Point, Tick, few, finite, short};
+use super::{Epoch, Point, Tick, counted, few, finite, short};
 use crate::codec::Message;
 
 /// A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
@@ -126,6 +126,7 @@ pub struct PublicState {
 
 impl Message for PublicState {
     fn check(&self) -> Result<(), (String, String)> {
+        counted(self.tick, "tick")?;
         self.location.check("location")?;
         finite(self.speed_mps, "speed_mps")?;
         finite(self.direction_rad, "direction_rad")?;

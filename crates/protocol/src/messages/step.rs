@@ -6,7 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::state::check_variables;
-use super::{Epoch, Generation, Parameters, Point, Seq, StateVariables, Tick, few, finite, is_false, short};
+use super::{
+    Epoch, Generation, Parameters, Point, PublicState, Seq, StateVariables, Tick, counted, few, finite,
+    is_false, short,
+};
 use crate::codec::Message;
 use crate::name::{RobotName, RunName};
 
@@ -101,9 +104,13 @@ pub struct Welcome {
     pub roster: Vec<RobotName>,
     /// Its parameters.
     pub parameters: Parameters,
-    /// State variables that its previous incarnation reported last, if it had one in this epoch.
+    /// What its previous incarnation reported last, if it had one in this epoch. Others may still ask for it: the robot
+    /// must answer with it until it has reported itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub last_state_variables: Option<StateVariables>,
+    pub last_state: Option<PublicState>,
+    /// Number of the last command that its previous incarnation sent in this epoch.
+    #[serde(default)]
+    pub last_seq: Seq,
 }
 
 /// The simulator grants a tick. It carries exceptions only: a robot that is not named moved as it proposed and has no
@@ -125,7 +132,11 @@ pub struct Clock {
     pub end: Option<End>,
 }
 
-impl Message for Clock {}
+impl Message for Clock {
+    fn check(&self) -> Result<(), (String, String)> {
+        counted(self.tick, "tick")
+    }
+}
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -270,6 +281,7 @@ pub struct Command {
 
 impl Message for Command {
     fn check(&self) -> Result<(), (String, String)> {
+        counted(self.tick, "tick")?;
         short(&self.command, "command")
     }
 }
@@ -298,7 +310,11 @@ pub struct Percept {
     pub bodies: Vec<SensedBody>,
 }
 
-impl Message for Percept {}
+impl Message for Percept {
+    fn check(&self) -> Result<(), (String, String)> {
+        counted(self.tick, "tick")
+    }
+}
 
 /// One sensed body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -275,7 +275,8 @@ fn welcome(robot: &str, at: Point, seed: u64, roster: &[RobotName], parameters: 
         location: at,
         roster: roster.to_vec(),
         parameters,
-        last_state_variables: None,
+        last_state: None,
+        last_seq: 0,
     }
 }
 

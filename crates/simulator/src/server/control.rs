@@ -43,6 +43,11 @@ impl Pace {
         self.phase
     }
 
+    /// An epoch begins: robots are awaited.
+    pub(super) fn gather(&mut self) {
+        self.phase = Phase::Gathering;
+    }
+
     /// Tick 0 is complete.
     pub(super) fn ready(&mut self) {
         self.phase = if self.starts_paused { Phase::Ready } else { Phase::Running };
@@ -134,7 +139,12 @@ impl Server {
                 return Err(Interrupt::End(End::Stopped));
             }
             other => match self.act(&other) {
-                Ok(()) => self.answer_status(&question, simulation),
+                Ok(()) => {
+                    if let (Control::Pause, Some(stepping)) = (&other, self.pace.give_up_stepping()) {
+                        self.answer_status(&stepping, simulation);
+                    }
+                    self.answer_status(&question, simulation);
+                }
                 Err(explanation) => refuse(&question, &explanation),
             },
         }
@@ -198,6 +208,9 @@ impl Server {
                 Ok(())
             }
             _ => {
+                if let Some(stepping) = self.pace.give_up_stepping() {
+                    self.answer_status(&stepping, simulation);
+                }
                 self.answer_status(question, simulation);
                 Err(Interrupt::Init(seed))
             }

@@ -7,7 +7,7 @@ use protocol::messages::{JoinAnswer, JoinRequest, Phase, Refusal};
 use protocol::{Generation, PROTOCOL_VERSION, decode, encode};
 
 use super::{Interrupt, Server, introduce};
-use crate::simulation::{Membership, Simulation};
+use crate::simulation::{Membership, Simulation, public_state};
 
 /// A robot that has joined shows its token within this time, or its place is free again.
 const TOKEN_PATIENCE: Duration = Duration::from_secs(2);
@@ -30,6 +30,8 @@ pub(super) struct Member {
     pub(super) is_lost: bool,
     /// Whether it was lost and has been heard of since.
     has_returned: bool,
+    /// Whether an earlier incarnation still speaks, and must be told that it has been replaced.
+    has_predecessor: bool,
     missed: u32,
 }
 
@@ -57,6 +59,16 @@ impl Member {
     /// A report came from it although the clock goes on without it.
     pub(super) fn is_heard_of(&mut self) {
         self.has_returned = true;
+    }
+
+    /// A report came from an incarnation that has been replaced and does not know it.
+    pub(super) fn hears_predecessor(&mut self) {
+        self.has_predecessor = true;
+    }
+
+    /// The generation that the next clock must repeat, so that a predecessor learns of it.
+    pub(super) fn take_reminder(&mut self) -> Option<Generation> {
+        std::mem::take(&mut self.has_predecessor).then_some(self.generation)
     }
 
     /// A tick is over in which it reported, or not.
@@ -133,7 +145,12 @@ impl Server {
         }
         member.take_place(request.instance.clone());
         let generation = member.generation;
-        let welcome = simulation.welcome(run, name, generation);
+        let mut welcome = simulation.welcome(run, name, generation);
+        // Its predecessor had done the tick that is under way.
+        if let (Some(welcome), Some(report)) = (&mut welcome, self.open.reports.get(name)) {
+            welcome.last_state = Some(public_state(report, welcome.location));
+            welcome.last_seq = report.sent.iter().map(|sent| sent.seq).fold(welcome.last_seq, u64::max);
+        }
         let unknown = || (Refusal::UnknownName, format!("no robot of this run is called {name}"));
         welcome.map(|welcome| JoinAnswer::Welcome(Box::new(welcome))).ok_or_else(unknown)
     }

@@ -21,8 +21,8 @@ pub(super) struct Observers {
 impl Observers {
     pub(super) fn new(bus: &Bus, keys: &Keys) -> Result<Self, BusError> {
         Ok(Self {
-            world: bus.publisher(&keys.world())?,
-            log: bus.publisher(&keys.log())?,
+            world: bus.observer_publisher(&keys.world())?,
+            log: bus.observer_publisher(&keys.log())?,
             painted: Instant::now(),
         })
     }
