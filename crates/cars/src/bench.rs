@@ -209,7 +209,7 @@ fn hall_local(scenario: &Path, ticks: u64, scratch: &Path) -> miette::Result<f64
     scenario.ticks = ticks;
     let run = RunName::new("bench-local").into_diagnostic()?;
     let folder = RunFolder::new(scratch, &run);
-    folder.create(&scenario)?;
+    let _lock = folder.create(&scenario)?;
     let summary = crate::run::execute(scenario, &run, &folder, None)?;
     Ok(summary.ticks as f64 / summary.wall.elapsed_s)
 }

@@ -7,6 +7,7 @@ use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::random::MAX_SEED;
 use simulator::RunFolder;
+use simulator::recorder::RunLock;
 use simulator::scenario::{Changes, Override, Scenario, parse_speed};
 use simulator::units::Time;
 
@@ -70,12 +71,13 @@ impl ExecutionArgs {
         self.run.clone().map_or_else(from_file, Ok).into_diagnostic()
     }
 
-    /// Makes the folder of the run, with the resolved scenario in it, and points `latest` at it.
-    pub(crate) fn folder(&self, run: &RunName, scenario: &Scenario) -> miette::Result<RunFolder> {
+    /// Makes the folder of the run, with the resolved scenario in it, and points `latest` at it. Whoever writes the
+    /// record keeps the lock.
+    pub(crate) fn folder(&self, run: &RunName, scenario: &Scenario) -> miette::Result<(RunFolder, RunLock)> {
         let folder = RunFolder::new(&self.out, run);
-        folder.create(scenario)?;
+        let lock = folder.create(scenario)?;
         point_latest(&self.out, run);
-        Ok(folder)
+        Ok((folder, lock))
     }
 }
 

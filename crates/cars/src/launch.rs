@@ -176,7 +176,9 @@ impl Launch {
         loop {
             let endpoint = self.endpoint()?;
             let planned = self.plan(&endpoint)?;
-            let folder = self.args.execution.folder(&self.run, &self.scenario)?;
+            // The simulator takes the lock over.
+            let (folder, lock) = self.args.execution.folder(&self.run, &self.scenario)?;
+            drop(lock);
             clear_logs(&folder);
             self.announce(&endpoint, &folder);
             let outcome = self.supervise(planned, &endpoint, &folder)?;

@@ -33,7 +33,7 @@ pub(crate) fn run(args: &RunArgs) -> miette::Result<ExitCode> {
     let file = launch::scenario_file(&args.file)?;
     let scenario = Scenario::load(&file, &args.execution.changes())?;
     let run = args.execution.run_name(&args.file)?;
-    let folder = args.execution.folder(&run, &scenario)?;
+    let (folder, _lock) = args.execution.folder(&run, &scenario)?;
     let speed = args.execution.speed.and_then(|speed| speed.0);
     let summary = execute(scenario, &run, &folder, speed)?;
     if !args.quiet {

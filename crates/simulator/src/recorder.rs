@@ -25,6 +25,8 @@ pub const SUMMARY: &str = "summary.json";
 pub const LOGS: &str = "logs";
 /// Where the simulator of a run in progress listens.
 pub const ENDPOINT: &str = "endpoint";
+/// Held by the process that writes the record, as long as it lives.
+const LOCK: &str = ".lock";
 
 /// The folder of a run: `OUT/NAME`.
 #[derive(Debug, Clone)]
@@ -47,14 +49,17 @@ impl RunFolder {
 
     /// Makes the folder, empty of an earlier run with this name, and writes the resolved scenario into it.
     ///
+    /// The folder is the caller's as long as the returned lock lives: nobody overwrites a run in progress.
+    ///
     /// # Errors
-    /// [`FileError`] if that cannot be done, or if the folder holds something that is not a run.
-    pub fn create(&self, scenario: &Scenario) -> Result<(), FileError> {
+    /// [`FileError`] if that cannot be done, if the folder holds something that is not a run, or a run in progress.
+    pub fn create(&self, scenario: &Scenario) -> Result<RunLock, FileError> {
         if self.path.exists() && !self.file(SCENARIO).exists() && has_entries(&self.path) {
             let text = format!("{} is there and is not the folder of a run", self.path.display());
             return Err(FileError::new(text).with_help("choose another --run or --out, or move it away"));
         }
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
+        let lock = self.lock()?;
         for file in
             self.superseded_events().into_iter().chain([EVENTS, LOG, SUMMARY, ENDPOINT].map(|f| self.file(f)))
         {
@@ -62,7 +67,18 @@ impl RunFolder {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
             }
         }
-        std::fs::write(self.file(SCENARIO), scenario.to_toml()?).map_err(|error| self.failed("write", &error))
+        std::fs::write(self.file(SCENARIO), scenario.to_toml()?)
+            .map_err(|error| self.failed("write", &error))?;
+        Ok(lock)
+    }
+
+    fn lock(&self) -> Result<RunLock, FileError> {
+        let file = File::create(self.file(LOCK)).map_err(|error| self.failed("lock", &error))?;
+        file.try_lock().map_err(|_| {
+            FileError::new(format!("the run in {} is in progress", self.path.display()))
+                .with_help("choose another --run, or end it with `cars ctl stop`")
+        })?;
+        Ok(RunLock { _file: file })
     }
 
     /// Event files of epochs that `init` ended.
@@ -90,6 +106,12 @@ impl RunFolder {
     fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
         FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
     }
+}
+
+/// The right to write a run's folder; the operating system takes it back when the process ends, however it ends.
+#[derive(Debug)]
+pub struct RunLock {
+    _file: File,
 }
 
 fn has_entries(path: &Path) -> bool {

@@ -130,7 +130,8 @@ struct Open {
     /// Whether its barrier is open.
     is_open: bool,
     since: Instant,
-    last_arrival: Instant,
+    /// Who holds the clock up: awaited when people were told, and not waiting for another one.
+    culprits: Vec<RobotName>,
     reports: BTreeMap<RobotName, Report>,
     membership: Vec<Membership>,
     waits: BTreeMap<RobotName, RobotName>,
@@ -164,7 +165,7 @@ impl Server {
                 clock: Clock::default(),
                 is_open: false,
                 since: now,
-                last_arrival: now,
+                culprits: Vec::new(),
                 reports: BTreeMap::new(),
                 membership: Vec::new(),
                 waits: BTreeMap::new(),
@@ -401,17 +402,6 @@ impl Server {
         {
             return self.ignore("stale", robot);
         }
-        let now = Instant::now();
-        // Who itself waits for another robot's answer holds nobody up.
-        let is_culprit = self.awaited().all(|other| *other == name || self.open.waits.contains_key(other));
-        if is_culprit && !self.open.waits.contains_key(&name) {
-            let waited_s = (now - self.open.last_arrival).as_secs_f64();
-            let held = self.summary_wall.held_up_by.entry(name.clone()).or_default();
-            held.ticks += 1;
-            held.waited_s += waited_s;
-            held.longest_s = held.longest_s.max(waited_s);
-        }
-        self.open.last_arrival = now;
         self.open.waits.remove(&name);
         // The first one counts; a repetition says the same.
         self.open.reports.entry(name).or_insert(report);
@@ -481,7 +471,7 @@ impl Server {
             clock,
             is_open: true,
             since: now,
-            last_arrival: now,
+            culprits: Vec::new(),
             reports: BTreeMap::new(),
             membership,
             waits: BTreeMap::new(),
@@ -499,6 +489,13 @@ impl Server {
         self.open.is_open = false;
         for (name, member) in &mut self.members {
             member.count_report(self.open.reports.contains_key(name));
+        }
+        let held_s = self.open.since.elapsed().as_secs_f64();
+        for name in std::mem::take(&mut self.open.culprits) {
+            let held = self.summary_wall.held_up_by.entry(name).or_default();
+            held.ticks += 1;
+            held.waited_s += held_s;
+            held.longest_s = held.longest_s.max(held_s);
         }
         if std::mem::take(&mut self.open.is_announced) {
             self.observers.released(simulation, &self.status(simulation));
@@ -523,6 +520,8 @@ impl Server {
     fn look_at_late(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
         if self.open.since.elapsed() >= SAY_AFTER && !self.open.is_announced {
             self.open.is_announced = true;
+            let is_culprit = |name: &&RobotName| !self.open.waits.contains_key(*name);
+            self.open.culprits = self.awaited().filter(is_culprit).cloned().collect();
             self.observers.held(simulation, &self.status(simulation));
             // Who steps by hand wants to know that the step hangs, now.
             if let Some(question) = self.pace.give_up_stepping() {

@@ -71,8 +71,7 @@ pub struct RobotSummary {
 pub struct Wall {
     /// How long the run took, seconds.
     pub elapsed_s: f64,
-    /// Who held up the run: for each robot, how often it was the last to report, and for how long the others had been
-    /// done by then.
+    /// Who held up the run: robots for which the clock was held long enough for people to be told.
     pub held_up_by: BTreeMap<RobotName, HeldUp>,
     /// Messages that were ignored, by reason.
     pub ignored: BTreeMap<String, u64>,
@@ -81,9 +80,9 @@ pub struct Wall {
 /// How much a robot held up a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeldUp {
-    /// Ticks in which it was the last to report.
+    /// Ticks in which the clock was held for it.
     pub ticks: u64,
-    /// Time the clock waited for it alone, seconds.
+    /// Time that these ticks took, seconds.
     pub waited_s: f64,
     /// The longest of these waits, seconds.
     pub longest_s: f64,

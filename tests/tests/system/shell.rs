@@ -122,3 +122,19 @@ fn a_run_is_three_processes_and_leaves_a_whole_folder() {
         assert!(!text.contains("127.0.0.1") && !text.contains("pid"), "a simulated fact only: {text}");
     }
 }
+
+#[test]
+fn a_run_in_progress_is_not_overwritten() {
+    let lab = Lab::new();
+    let mut launch = lab.start("twice", &["launch", "launch/hors_doeuvres.toml", "--paused"]);
+    eventually("the run", || {
+        lab.cars(&["ctl", "step", "--run", "twice"]).status().unwrap().success().then_some(())
+    });
+    for how in ["launch", "run"] {
+        let (_, text) = lab.fails(&[how, "launch/hors_doeuvres.toml", "--run", "twice"]);
+        assert!(text.contains("is in progress"), "{text}");
+    }
+    lab.ok(&["ctl", "stop", "--run", "twice"]);
+    launch.finish();
+    assert_eq!(lab.events("twice").last().unwrap()["event"], "end");
+}

@@ -79,7 +79,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
     let scenario =
         Scenario::load(&args.scenario, &Changes { seed: args.seed, duration_s, set: args.set.clone() })?;
     let folder = RunFolder::new(&args.out, &args.run);
-    folder.create(&scenario)?;
+    let _lock = folder.create(&scenario)?;
     let role = Role::Router { listen: args.listen.clone() };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
     let options = Options {
