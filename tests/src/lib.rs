@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use processes::Running;
 
 /// Longest that anything here may take before it counts as hung.
-pub const PATIENCE: Duration = Duration::from_secs(40);
+pub const PATIENCE: Duration = Duration::from_secs(90);
 
 /// Root of the project.
 #[must_use]
