@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use protocol::messages::{News, Percept, Point, PublicState, SensedRobot, StateVariables, Welcome};
+use protocol::messages::{
+    MAX_ENTRIES, MAX_TEXT_BYTES, News, Percept, Point, PublicState, SensedRobot, StateVariables, Welcome,
+};
 use protocol::random::Stream;
 use protocol::{RobotName, Seq, Tick};
 
@@ -112,9 +114,17 @@ impl Cars<'_> {
         self.network.percept(&self.welcome.name, epoch, tick).map_err(|_| CallError::Interrupted)
     }
 
-    /// Writes a line to the log of the run.
+    /// Writes a line to the log of the run. It is cut to what a message may hold, and so is their number in a tick.
     pub fn log(&mut self, line: impl Into<String>) {
-        self.log.push(line.into());
+        let mut line = line.into();
+        if line.len() > MAX_TEXT_BYTES {
+            let end = (0..=MAX_TEXT_BYTES).rev().find(|at| line.is_char_boundary(*at)).unwrap_or(0);
+            line.truncate(end);
+        }
+        // Room is left for what the seat itself may have to say.
+        if self.log.len() < MAX_ENTRIES / 2 {
+            self.log.push(line);
+        }
     }
 
     /// Sends a command to another robot (`setRobotCommand`). It arrives at a later tick, if the network lets it.

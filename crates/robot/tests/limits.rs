@@ -1,0 +1,57 @@
+//! A robot that talks too much does not hold the run: its report stays within what a message may hold.
+
+use protocol::Message;
+use protocol::messages::{Clock, JoinAnswer};
+use robot::{BadParameters, Cars, LocalHost, Percept, Point, Robot, RobotName, StateVariables};
+
+struct Chatterbox;
+
+impl Robot for Chatterbox {
+    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        (0..5000).for_each(|_| cars.log("\u{e9}".repeat(5000)));
+        Ok(())
+    }
+    fn speed(&self) -> f64 {
+        f64::NAN
+    }
+    fn direction(&self) -> f64 {
+        0.0
+    }
+    fn update_state_variables(&mut self, _: &mut Cars<'_>) {}
+    fn state_variables(&self) -> StateVariables {
+        [("x".to_owned(), f64::INFINITY.into())].into()
+    }
+    fn current_location(&self) -> Point {
+        Point::new(1.0, 1.0)
+    }
+    fn project_location(&mut self, _: &mut Cars<'_>) -> Point {
+        Point::new(f64::NAN, 1.0)
+    }
+    fn set_current_location(&mut self, _: &mut Cars<'_>, _: Point) {}
+    fn set_command(&mut self, _: &mut Cars<'_>, _: &RobotName, _: &str) {}
+    fn update_emotion_state(&mut self, _: &mut Cars<'_>) {}
+    fn emotion_state(&self) -> &str {
+        "CALM"
+    }
+    fn update_behavior_state(&mut self, _: &mut Cars<'_>) {}
+    fn behavior_state(&self) -> &str {
+        "TALK"
+    }
+}
+
+#[test]
+fn reports_stay_within_the_limits_of_a_message() {
+    let welcome = br#"{"answer":"welcome","protocol":1,"run":"r","name":"A","generation":1,"epoch":1,"tick":0,"seed":1,
+        "stream":"robot/A","tick_s":0.5,"field_m":[9,9],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":1},
+        "roster":["A"],"parameters":{}}"#;
+    let JoinAnswer::Welcome(welcome) = protocol::decode("join", "simulator", welcome).unwrap() else {
+        unreachable!("it is a welcome")
+    };
+    let mut host = LocalHost::new(vec![(Box::new(Chatterbox), *welcome)]);
+    let clock = Clock { epoch: 1, ..Clock::default() };
+    let reports = host.exchange(&clock, &mut |_| Percept::default()).unwrap();
+    let report = reports.values().next().unwrap();
+    assert_eq!(report.check(), Ok(()));
+    assert!(report.log.last().unwrap().contains("state variable x is not a finite number"));
+    assert_eq!(report.proposal, Point::new(1.0, 1.0));
+}
