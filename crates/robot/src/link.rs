@@ -25,7 +25,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(250);
 const ASK_AGAIN: Duration = Duration::from_millis(500);
 /// What was not asked for in so many ticks is followed no more.
 const UNUSED_TICKS: Tick = 64;
-/// Commands that are kept for a robot before a clock names them; the oldest make room.
+/// Commands that are kept for a robot before a clock names them; beyond that the first by sender and number makes room.
 const MAX_COMMANDS: usize = 4096;
 
 /// All that can happen to a process of robots.
@@ -191,7 +191,7 @@ impl Link {
             return;
         }
         if held.len() >= MAX_COMMANDS {
-            tracing::warn!(%from, "too many commands are waiting; the oldest is dropped");
+            tracing::warn!(%from, "too many commands are waiting; the first by sender and number is dropped");
             held.pop_first();
         }
         held.insert(CommandId { from, seq: command.seq }, command);
