@@ -7,12 +7,12 @@ use std::time::Duration;
 use clap::{Args, Subcommand};
 use miette::{IntoDiagnostic, miette};
 use protocol::bus::{AnswerOf, Bus, Role};
+use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Control, ControlAnswer, LogRecord, Status};
+use protocol::messages::{Control, ControlAnswer, LogRecord, Presence, Status};
 use protocol::{RobotName, RunName, decode, encode};
 use simulator::RunFolder;
-use simulator::event::log_line;
-use simulator::recorder::{ENDPOINT, LOG};
+use simulator::recorder::ENDPOINT;
 
 use crate::common::{LATEST, Speed};
 
@@ -120,7 +120,7 @@ enum Button {
 impl Button {
     fn control(&self) -> Control {
         match self {
-            Self::Init { seed } => Control::Init { seed: *seed },
+            Self::Init { seed } => Control::Init { seed: *seed, setup: None },
             Self::Start => Control::Start,
             Self::Pause => Control::Pause,
             Self::Step { n } => Control::Step { n: *n },
@@ -151,7 +151,8 @@ fn request(run: &RunRef, control: &Control) -> miette::Result<Status> {
     let bytes = bytes_of(answer, &format!("no simulator of run {} answers", run.run()?))?;
     match decode(&keys.control(), "simulator", &bytes).into_diagnostic()? {
         ControlAnswer::Done(status) => Ok(*status),
-        ControlAnswer::Refused { explanation } => Err(miette!("refused: {explanation}")),
+        ControlAnswer::Setup(_) => Err(miette!("the simulator answers something else than was asked")),
+        ControlAnswer::Refused { explanation, .. } => Err(miette!("refused: {explanation}")),
     }
 }
 
@@ -174,7 +175,11 @@ fn describe(status: &Status) -> String {
             &format!("waiting for {} since {:.1} s: it {}\n", awaited.name, awaited.since_s, awaited.because);
     }
     for robot in &status.robots {
-        let presence = if robot.present { "present" } else { "absent" };
+        let presence = match robot.presence {
+            Presence::Here => "present",
+            Presence::Gone => "absent",
+            Presence::Lost => "lost",
+        };
         text += &format!("  {:<12} {presence}, incarnation {}\n", robot.name, robot.generation);
     }
     for (reason, count) in &status.ignored {
@@ -244,7 +249,7 @@ pub(crate) struct LogArgs {
 
 /// Shows the log of a run.
 pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
-    let file = args.run.folder()?.file(LOG);
+    let file = args.run.folder()?.log();
     let past =
         std::fs::read_to_string(&file).map_err(|error| miette!("cannot read {}: {error}", file.display()));
     if !args.follow {

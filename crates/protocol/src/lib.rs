@@ -8,6 +8,7 @@
 
 pub mod bus;
 pub mod codec;
+pub mod event;
 pub mod keys;
 pub mod messages;
 pub mod name;
@@ -16,6 +17,7 @@ pub mod runtime;
 pub mod schema;
 
 pub use codec::{Malformed, Message, decode, encode};
+pub use event::{Event, Line};
 pub use messages::{Epoch, Generation, Seq, Tick};
 pub use name::{BadName, RobotName, RunName};
 

@@ -7,7 +7,8 @@
 //! 2. `s` = `seed XOR h`;
 //! 3. xoshiro256++ whose four words are the first four outputs of `SplitMix64` started at `s`.
 
-use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// The generator behind every draw of a run.
 pub type Stream = Xoshiro256PlusPlus;
@@ -21,6 +22,11 @@ pub fn stream(seed: u64, name: &str) -> Stream {
     Stream::seed_from_u64(seed ^ fnv1a(name.as_bytes()))
 }
 
+/// The next draw as a number from 0 up to but not including 1: its upper 53 bits over 2^53.
+pub fn unit(stream: &mut Stream) -> f64 {
+    (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// FNV-1a, 64 bit: spreads short names over the seed space; no security is asked of it.
 fn fnv1a(bytes: &[u8]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
@@ -31,7 +37,6 @@ fn fnv1a(bytes: &[u8]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::Rng;
 
     /// `SplitMix64` and xoshiro256++ written out, as an author in another language would.
     fn reference(seed: u64, name: &str) -> [u64; 3] {

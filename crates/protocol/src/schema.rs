@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::messages::{
     Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, Panel, Percept,
-    PublicState, Report, Waiting, WorldFrame,
+    PublicState, RecordedTick, RecordingHeader, Report, Waiting, WorldFrame,
 };
 
 /// The schema of every message, by the name of its file.
@@ -22,6 +22,7 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("command", one::<Command>()),
         ("control", one::<Control>()),
         ("control_answer", one::<ControlAnswer>()),
+        ("event", one::<crate::event::Line>()),
         ("join_answer", one::<JoinAnswer>()),
         ("join_request", one::<JoinRequest>()),
         ("log_record", one::<LogRecord>()),
@@ -29,6 +30,8 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("percept", one::<Percept>()),
         ("public_state", one::<PublicState>()),
         ("report", one::<Report>()),
+        ("recorded_tick", one::<RecordedTick>()),
+        ("recording_header", one::<RecordingHeader>()),
         ("waiting", one::<Waiting>()),
         ("world_frame", one::<WorldFrame>()),
     ]

@@ -3,8 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use protocol::messages::{
-    Clock, Command, CommandId, Control, Correction, Face, JoinRequest, News, Panel, Point, Report,
-    SensedRobot, SentCommand, Tone, Variable, Widget,
+    Clock, Command, CommandId, Control, Correction, Face, JoinRequest, News, Panel, Performative, Point,
+    Report, SensedRobot, SentCommand, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode, schema};
 
@@ -28,7 +28,12 @@ fn report() -> Report {
             ("who".into(), "x".into()),
         ]
         .into(),
-        sent: vec![SentCommand { to: name("Leguin"), seq: 3, command: "refill".into() }],
+        sent: vec![SentCommand {
+            to: name("Leguin"),
+            seq: 3,
+            performative: Performative::Achieve,
+            command: "refill".into(),
+        }],
         missing: vec![CommandId { from: name("Vonda"), seq: 1 }],
         log: vec!["jokes".into()],
     }
@@ -55,7 +60,13 @@ fn what_is_written_is_read_back_to_the_last_bit() {
         joined: Some(2),
     };
     round_trip(&Clock { epoch: 2, tick: 7, news: [(name("Leguin"), news)].into(), end: None });
-    round_trip(&Command { epoch: 1, tick: 2, seq: 3, command: "hurry".into() });
+    round_trip(&Command {
+        epoch: 1,
+        tick: 2,
+        seq: 3,
+        performative: Performative::Tell,
+        command: "hurry".into(),
+    });
     round_trip(&Control::Step { n: 10 });
     let widgets = vec![
         Widget::Face { face: Face::Happy, intensity: 0.5 },

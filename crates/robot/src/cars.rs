@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use protocol::messages::{
-    MAX_ENTRIES, MAX_TEXT_BYTES, News, Percept, Point, PublicState, SensedRobot, StateVariables, Welcome,
+    MAX_ENTRIES, MAX_TEXT_BYTES, News, Percept, Performative, Point, PublicState, SensedRobot,
+    StateVariables, Welcome,
 };
 use protocol::random::Stream;
 use protocol::{RobotName, Seq, Tick};
@@ -134,15 +135,16 @@ impl Cars<'_> {
     pub fn set_robot_command(&mut self, to: &str, command: impl Into<String>) -> Result<Seq, CallError> {
         let to = self.known(to)?;
         self.outbox.last_seq += 1;
-        let (seq, command) = (self.outbox.last_seq, command.into());
+        let (seq, performative, command) = (self.outbox.last_seq, Performative::Achieve, command.into());
         let message = protocol::messages::Command {
             epoch: self.welcome.epoch,
             tick: self.tick,
             seq,
+            performative,
             command: command.clone(),
         };
         self.network.send(&self.welcome.name, &to, &message);
-        self.outbox.sent.push(protocol::messages::SentCommand { to, seq, command });
+        self.outbox.sent.push(protocol::messages::SentCommand { to, seq, performative, command });
         Ok(seq)
     }
 

@@ -57,6 +57,16 @@ impl FileError {
         Self { message: format!("{} cannot be used", source.name), help: None, place: Some(Box::new(place)) }
     }
 
+    /// The error in one line, for where no file can be shown: the line it is at, and the reason.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let Some(place) = &self.place else { return self.message.clone() };
+        let before = place.source.inner().get(..place.label.offset()).unwrap_or_default();
+        let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
+        let reason = place.label.label().unwrap_or(&self.message);
+        format!("line {line}: {reason}")
+    }
+
     /// What to do about it.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {

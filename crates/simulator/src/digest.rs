@@ -90,6 +90,7 @@ impl TickDigest {
         for sent in &report.sent {
             self.text(sent.to.as_str());
             self.integer(sent.seq);
+            self.text(sent.performative.name());
             self.text(&sent.command);
         }
         for missing in &report.missing {

@@ -6,7 +6,6 @@
 
 pub mod diagnostic;
 pub mod digest;
-pub mod event;
 pub mod medium;
 pub mod recorder;
 pub mod roster;
@@ -16,7 +15,7 @@ pub mod simulation;
 pub mod summary;
 pub mod units;
 
-pub use event::{Event, Line};
+pub use protocol::{Event, Line};
 pub use recorder::{Recorder, RunFolder};
 pub use scenario::{OnLate, Scenario};
 pub use simulation::{Barrier, Exchange, Simulation, TickRecord};

@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use protocol::messages::LogRecord;
-use protocol::{Epoch, RunName};
+use protocol::event::log_line;
+use protocol::messages::{LogRecord, RecordedRobot, RecordedTick, RecordingHeader};
+use protocol::{Epoch, Event, RobotName, RunName};
 
 use crate::diagnostic::FileError;
-use crate::event::log_line;
 use crate::scenario::Scenario;
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::Summary;
@@ -19,6 +19,8 @@ pub const SCENARIO: &str = "scenario.toml";
 pub const EVENTS: &str = "events.jsonl";
 /// What happened, for people.
 pub const LOG: &str = "cars.log";
+/// Where everything was after every tick, for the console to play again.
+pub const RECORDING: &str = "recording.jsonl";
 /// What came of it.
 pub const SUMMARY: &str = "summary.json";
 /// What each process printed.
@@ -27,6 +29,22 @@ pub const LOGS: &str = "logs";
 pub const ENDPOINT: &str = "endpoint";
 /// Held by the process that writes the record, as long as it lives.
 const LOCK: &str = ".lock";
+
+/// Refuses a name for the readable log that is no plain file name, or that the run's folder needs for something else.
+pub(crate) fn check_log_name(name: &str) -> Result<(), String> {
+    let is_plain = !name.is_empty()
+        && name.len() <= 100
+        && !name.starts_with('.')
+        && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
+    if !is_plain {
+        return Err(format!("{name:?} is no file name of letters, digits, `.`, `_` and `-`"));
+    }
+    let is_taken = [EVENTS, RECORDING, SUMMARY, LOGS, ENDPOINT].contains(&name)
+        || name.starts_with("scenario")
+        || name.starts_with("events")
+        || name.starts_with("recording");
+    if is_taken { Err(format!("the run keeps something else in {name}")) } else { Ok(()) }
+}
 
 /// The folder of a run: `OUT/NAME`.
 #[derive(Debug, Clone)]
@@ -60,9 +78,8 @@ impl RunFolder {
         }
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
         let lock = self.lock()?;
-        for file in
-            self.superseded_events().into_iter().chain([EVENTS, LOG, SUMMARY, ENDPOINT].map(|f| self.file(f)))
-        {
+        let (log, own) = (self.log(), [EVENTS, RECORDING, SUMMARY, ENDPOINT].map(|name| self.file(name)));
+        for file in self.superseded().into_iter().chain(own).chain([log]) {
             if file.exists() {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
             }
@@ -81,14 +98,36 @@ impl RunFolder {
         Ok(RunLock { _file: file })
     }
 
-    /// Event files of epochs that `init` ended.
-    fn superseded_events(&self) -> Vec<PathBuf> {
+    /// Files of epochs that `init` ended.
+    fn superseded(&self) -> Vec<PathBuf> {
         let entries = std::fs::read_dir(&self.path).into_iter().flatten().flatten();
         let is_superseded = |path: &PathBuf| {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            name.starts_with("events-epoch")
+            PER_EPOCH.iter().any(|file| name.starts_with(&superseded_prefix(file)))
         };
         entries.map(|entry| entry.path()).filter(is_superseded).collect()
+    }
+
+    /// Keeps the files of the epoch before this one under its number.
+    fn keep(&self, epoch: Epoch) -> Result<(), FileError> {
+        for name in PER_EPOCH {
+            let (file, suffix) = (self.file(name), name.rsplit('.').next().unwrap_or_default());
+            if file.exists() {
+                let kept =
+                    self.file(&format!("{}{}.{suffix}", superseded_prefix(name), epoch.saturating_sub(1)));
+                std::fs::rename(&file, kept).map_err(|error| self.failed("keep files in", &error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The readable log, wherever the scenario of the run puts it.
+    #[must_use]
+    pub fn log(&self) -> PathBuf {
+        let scenario = std::fs::read_to_string(self.file(SCENARIO)).unwrap_or_default();
+        let scenario: toml::Table = toml::from_str(&scenario).unwrap_or_default();
+        let name = scenario.get("record").and_then(|record| record.get("log_name")?.as_str());
+        self.file(name.filter(|name| check_log_name(name).is_ok()).unwrap_or(LOG))
     }
 
     /// A file of the folder.
@@ -122,30 +161,39 @@ fn has_entries(path: &Path) -> bool {
 pub struct Recorder {
     folder: RunFolder,
     events: BufWriter<File>,
-    log: BufWriter<File>,
+    log: Option<BufWriter<File>>,
+    recording: Option<BufWriter<File>>,
     summary: Summary,
 }
 
 impl Recorder {
-    /// Begins an epoch. The events of an epoch before it are kept under its number, `events-epoch1.jsonl`.
+    /// Begins an epoch. What an epoch before it left is kept under its number, `events-epoch1.jsonl`.
     ///
     /// # Errors
     /// [`FileError`] if the files cannot be made.
     pub fn begin(folder: &RunFolder, run: &RunName, simulation: &Simulation) -> Result<Self, FileError> {
-        let (events, epoch) = (folder.file(EVENTS), simulation.epoch());
-        if events.exists() {
-            let kept = folder.file(&superseded(epoch.saturating_sub(1)));
-            std::fs::rename(&events, kept).map_err(|error| folder.failed("keep events in", &error))?;
+        let (scenario, epoch) = (simulation.scenario(), simulation.epoch());
+        if epoch > 1 {
+            folder.keep(epoch)?;
         }
+        std::fs::write(folder.file(SCENARIO), scenario.to_toml()?)
+            .map_err(|error| folder.failed("write to", &error))?;
         let make = |name| File::create(folder.file(name)).map_err(|error| folder.failed("write to", &error));
-        let append = File::options().create(true).append(true).open(folder.file(LOG));
-        let log = append.map_err(|error| folder.failed("write to", &error))?;
-        Ok(Self {
+        let log = || {
+            let file = File::options().create(true).append(true).open(folder.file(&scenario.record.log_name));
+            file.map(BufWriter::new).map_err(|error| folder.failed("write to", &error))
+        };
+        let mut recorder = Self {
             folder: folder.clone(),
             events: BufWriter::new(make(EVENTS)?),
-            log: BufWriter::new(log),
+            log: scenario.record.log.then(log).transpose()?,
+            recording: scenario.record.frames.then(|| make(RECORDING).map(BufWriter::new)).transpose()?,
             summary: Summary::begin(run, simulation),
-        })
+        };
+        if let Some(recording) = &mut recorder.recording {
+            writeln!(recording, "{}", json(&header(run, simulation))).map_err(unwritable)?;
+        }
+        Ok(recorder)
     }
 
     /// Writes a tick; returns the lines of the readable log, for observers.
@@ -157,32 +205,34 @@ impl Recorder {
         simulation: &Simulation,
         record: &TickRecord,
     ) -> Result<Vec<LogRecord>, FileError> {
-        let failed =
-            |error: std::io::Error| FileError::new(format!("cannot write the record of the run: {error}"));
         let mut lines = Vec::new();
         for line in record.lines() {
-            writeln!(self.events, "{}", line.to_json()).map_err(failed)?;
+            writeln!(self.events, "{}", line.to_json()).map_err(unwritable)?;
             self.summary.count(simulation, &line);
             if let Some((source, kind, text)) = line.event.readable() {
-                let time_s = simulation.time_s(line.tick);
-                lines.push(LogRecord {
-                    epoch: simulation.epoch(),
-                    tick: line.tick,
-                    time_s,
-                    source,
-                    kind,
-                    text,
-                });
+                let (epoch, tick) = (simulation.epoch(), line.tick);
+                let time_s = simulation.time_s(tick);
+                lines.push(LogRecord { epoch, tick, time_s, source, kind, text });
             }
         }
-        for line in &lines {
-            writeln!(self.log, "{}", log_line(line)).map_err(failed)?;
-        }
-        self.events.flush().map_err(failed)?;
-        if !lines.is_empty() {
-            self.log.flush().map_err(failed)?;
+        self.events.flush().map_err(unwritable)?;
+        self.write_log(&lines).map_err(unwritable)?;
+        // The end of a run is no tick of its own.
+        if !matches!(record.events.last(), Some(Event::End { .. }))
+            && let Some(recording) = &mut self.recording
+        {
+            writeln!(recording, "{}", json(&recorded(simulation))).map_err(unwritable)?;
+            recording.flush().map_err(unwritable)?;
         }
         Ok(lines)
+    }
+
+    fn write_log(&mut self, lines: &[LogRecord]) -> std::io::Result<()> {
+        let Some(log) = self.log.as_mut().filter(|_| !lines.is_empty()) else { return Ok(()) };
+        for line in lines {
+            writeln!(log, "{}", log_line(line))?;
+        }
+        log.flush()
     }
 
     /// What has been counted so far.
@@ -205,6 +255,57 @@ impl Recorder {
     }
 }
 
-fn superseded(epoch: Epoch) -> String {
-    format!("events-epoch{epoch}.jsonl")
+/// Files of which every epoch has its own.
+const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];
+
+fn superseded_prefix(file: &str) -> String {
+    format!("{}-epoch", file.split('.').next().unwrap_or(file))
+}
+
+fn unwritable(error: std::io::Error) -> FileError {
+    FileError::new(format!("cannot write the record of the run: {error}"))
+}
+
+fn json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_else(|error| unreachable!("a record is always JSON: {error}"))
+}
+
+fn header(run: &RunName, simulation: &Simulation) -> RecordingHeader {
+    let scenario = simulation.scenario();
+    RecordingHeader {
+        run: run.clone(),
+        epoch: simulation.epoch(),
+        seed: scenario.seed,
+        tick_s: scenario.tick_s,
+        duration_s: scenario.duration_s(),
+        field_m: scenario.field_m,
+        body_m: scenario.body_m,
+        obstacles: scenario.obstacles.iter().map(|at| [at.x, at.y]).collect(),
+    }
+}
+
+fn recorded(simulation: &Simulation) -> RecordedTick {
+    let robot = |name: &RobotName| {
+        let report = simulation.report(name)?;
+        Some(RecordedRobot {
+            name: name.clone(),
+            location: simulation.location(name)?,
+            speed_mps: report.speed_mps,
+            direction_rad: report.direction_rad,
+            blocked: simulation.is_blocked(name),
+            missed: report.tick != simulation.tick(),
+            emotion_state: report.emotion_state.clone(),
+            behavior_state: report.behavior_state.clone(),
+            state_variables: report.state_variables.clone(),
+        })
+    };
+    let guests = simulation.world().guests().iter();
+    RecordedTick {
+        tick: simulation.tick(),
+        robots: simulation.names().iter().filter_map(robot).collect(),
+        guests_mm: guests
+            .flat_map(|guest| [guest.x, guest.y])
+            .map(|at_m| (at_m * 1000.0).round() as i64)
+            .collect(),
+    }
 }

@@ -1,8 +1,10 @@
 //! What is simulated. A file is read as it is written (module `raw`), then checked and turned into what it means
 //! ([`Scenario`]): SI units, defaults filled in, every name and number legal.
 
+pub mod network;
 mod overrides;
 mod raw;
+mod setup;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,6 +14,7 @@ use protocol::random::MAX_SEED;
 use protocol::{RobotName, Tick};
 use world::{Field, Guests, Hall, Triangular};
 
+pub use network::Network;
 pub use overrides::Override;
 
 use crate::diagnostic::{FileError, Source};
@@ -46,6 +49,27 @@ pub struct Scenario {
     pub on_late: OnLate,
     /// After how long without a report a robot is late, seconds of wall clock.
     pub deadline_s: f64,
+    /// The network between the robots.
+    pub network: Network,
+    /// What is kept of the run.
+    pub record: Record,
+}
+
+/// What is kept of a run, beside its events and its summary.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Record {
+    /// Whether the readable log is written.
+    pub log: bool,
+    /// Its name in the run's folder.
+    pub log_name: String,
+    /// Whether the field is recorded after every tick, for the console to play again.
+    pub frames: bool,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self { log: true, log_name: crate::recorder::LOG.to_owned(), frames: true }
+    }
 }
 
 /// A robot of the scenario.
@@ -105,6 +129,14 @@ impl Scenario {
     /// [`FileError`] with line and caret.
     pub fn parse(source: &Source, folder: &Path) -> Result<Self, FileError> {
         source.parse::<raw::Scenario>()?.check(source, folder)
+    }
+
+    /// Reads and checks a scenario text that comes from outside: it may name no other file.
+    ///
+    /// # Errors
+    /// [`FileError`] with line and caret.
+    pub fn parse_alone(source: &Source) -> Result<Self, FileError> {
+        source.parse::<raw::Scenario>()?.refuse_files(source)?.check(source, Path::new("."))
     }
 
     /// The scenario as a file that says everything and gives the same run.

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Declared, Publisher, Question};
 use protocol::keys::Keys;
-use protocol::messages::{Clock, Command, Correction, End, Report, Waiting};
+use protocol::messages::{Clock, Command, Correction, End, Performative, Report, Waiting};
 use protocol::{Epoch, Malformed, RobotName, RunName, Tick, decode, encode};
 
 use crate::diagnostic::FileError;
@@ -81,8 +81,8 @@ pub enum Event {
 /// Why a tick, or the wait for one, was given up.
 #[derive(Debug)]
 pub enum Interrupt {
-    /// Start the next epoch, perhaps with another seed.
-    Init(Option<u64>),
+    /// Start the next epoch with this scenario.
+    Init(Box<Scenario>),
     /// End the run.
     End(End),
     /// The process cannot go on.
@@ -238,8 +238,8 @@ impl Server {
                 Err(interrupt) => interrupt,
             };
             match interrupt {
-                Interrupt::Init(seed) => {
-                    scenario.seed = seed.unwrap_or(scenario.seed);
+                Interrupt::Init(next) => {
+                    scenario = *next;
                     epoch += 1;
                 }
                 Interrupt::End(end) => return self.end(end, &simulation, recorder),
@@ -258,7 +258,10 @@ impl Server {
         for member in self.members.values_mut() {
             member.begin_epoch();
         }
+        self.on_late = simulation.scenario().on_late;
+        self.deadline = Duration::from_secs_f64(simulation.scenario().deadline_s);
         let record = simulation.init(self)?;
+        self.observers.note(&record);
         self.observers.log(&recorder.write(simulation, &record)?);
         self.pace.ready();
         let last = simulation.scenario().ticks;
@@ -266,6 +269,7 @@ impl Server {
             self.wait_for_grant(simulation)?;
             self.forward_operator(simulation);
             let record = simulation.step(self)?;
+            self.observers.note(&record);
             self.observers.log(&recorder.write(simulation, &record)?);
             self.after_tick(simulation);
         }
@@ -296,7 +300,7 @@ impl Server {
         for (to, command) in std::mem::take(&mut self.operator) {
             let seq = simulation.command(&to, &command);
             let (epoch, tick) = (simulation.epoch(), simulation.tick());
-            let message = Command { epoch, tick, seq, command };
+            let message = Command { epoch, tick, seq, performative: Performative::Achieve, command };
             let key = self.keys.command(&to, &RobotName::operator());
             self.put_operator(&key, &message);
             self.operator_sent.push((key, message));

@@ -3,15 +3,14 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{
-    Clock, CommandId, Correction, End, News, Percept, Point, PublicState, Report, SensedBody, SensedKind,
-    SensedRobot, StateVariables, Welcome,
+    Clock, CommandId, Correction, Cut, End, News, Percept, Performative, Point, PublicState, Report,
+    SensedBody, SensedKind, SensedRobot, StateVariables, Welcome,
 };
 use protocol::random::{Stream, stream};
-use protocol::{Epoch, Generation, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
+use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
 use world::{Blocker, Body, HallError, Verdict, World};
 
 use crate::digest::Digest;
-use crate::event::{Event, Line};
 use crate::medium::{Medium, Underway};
 use crate::scenario::{Scenario, to_wire};
 
@@ -103,7 +102,7 @@ impl Simulation {
             tick: 0,
             now: 0,
             world,
-            medium: Medium::default(),
+            medium: Medium::new(scenario.seed, scenario.network.clone()),
             arriving: BTreeMap::new(),
             reports: BTreeMap::new(),
             stood_at: Vec::new(),
@@ -148,7 +147,11 @@ impl Simulation {
         let verdicts = self.world.advance(&self.proposals());
         self.note_moves(&verdicts, &mut events);
 
-        self.arriving = self.medium.decide(tick);
+        let decision = self.medium.decide(tick);
+        self.arriving = decision.delivered;
+        for Underway { to, from, seq } in decision.dropped {
+            events.push(Event::CommandDropped { from, to, seq });
+        }
 
         let clock = self.clock(tick, &verdicts);
         let exchange = barrier.exchange(clock, self)?;
@@ -272,7 +275,8 @@ impl Simulation {
             let (from, to, seq) = (robot.clone(), sent.to.clone(), sent.seq);
             let last_seq = self.last_seq.entry(robot.clone()).or_default();
             *last_seq = seq.max(*last_seq);
-            events.push(Event::CommandSent { from, to, seq, command: sent.command.clone() });
+            let (performative, command) = (sent.performative, sent.command.clone());
+            events.push(Event::CommandSent { from, to, seq, performative, command });
             self.medium.accept(tick, Underway { to: sent.to.clone(), from: robot.clone(), seq });
         }
         events.extend(report.log.iter().map(|text| Event::Say { robot: robot.clone(), text: text.clone() }));
@@ -299,6 +303,7 @@ impl Simulation {
             from,
             to: to.clone(),
             seq,
+            performative: Performative::Achieve,
             command: command.to_owned(),
         });
         seq
@@ -431,6 +436,12 @@ impl Simulation {
     #[must_use]
     pub fn state_variables(&self, name: &RobotName) -> Option<&StateVariables> {
         self.report(name).map(|report| &report.state_variables)
+    }
+
+    /// Pairs of robots between which the medium lets nothing through now.
+    #[must_use]
+    pub fn cuts(&self) -> Vec<Cut> {
+        self.medium.cuts()
     }
 
     /// Digest of the run so far.

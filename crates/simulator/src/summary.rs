@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use protocol::messages::{End, StateVariables};
-use protocol::{RobotName, RunName, Tick};
+use protocol::{Event, Line, RobotName, RunName, Tick};
 use serde::{Deserialize, Serialize};
 
-use crate::event::{Event, Line};
 use crate::simulation::Simulation;
 
 /// `summary.json`.

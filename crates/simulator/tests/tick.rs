@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use std::path::Path;
 
 use protocol::RobotName;
-use protocol::messages::{Clock, CommandId, Point, Report, SentCommand};
+use protocol::messages::{Clock, CommandId, Performative, Point, Report, SentCommand};
 use simulator::diagnostic::Source;
 use simulator::{Barrier, Event, Exchange, Scenario, Simulation, TickRecord};
 
@@ -112,8 +112,12 @@ fn nobody_leaves_the_field_or_jumps() {
 
 #[test]
 fn a_command_sent_in_a_tick_is_named_by_the_next_clock_in_the_order_of_senders() {
-    let sends =
-        |to: &str, seq| SentCommand { to: RobotName::new(to).unwrap(), seq, command: format!("c{seq}") };
+    let sends = |to: &str, seq| SentCommand {
+        to: RobotName::new(to).unwrap(),
+        seq,
+        performative: Performative::Achieve,
+        command: format!("c{seq}"),
+    };
     let (_, clocks, records) = play(TWO, 3, |_, clock, report| {
         if clock.tick == 1 {
             report.sent = vec![sends("A", 1), sends("B", 2), sends("A", 3)];
@@ -213,7 +217,10 @@ fn every_value_that_a_robot_reports_is_in_the_digest() {
         |report| report.emotion_state = "CALN".into(),
         |report| report.behavior_state = "IDLF".into(),
         |report| drop(report.state_variables.insert("x".into(), 1.0.into())),
-        |report| report.sent = vec![SentCommand { to: RobotName::operator(), seq: 1, command: "x".into() }],
+        |report| {
+            let (to, performative) = (RobotName::operator(), Performative::Achieve);
+            report.sent = vec![SentCommand { to, seq: 1, performative, command: "x".into() }];
+        },
         |report| report.log = vec!["x".into()],
     ];
     let mut seen = vec![same];

@@ -72,7 +72,8 @@ impl Wire {
         let bytes = self.ask(&self.keys.control(), "", &encode(control)).unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Done(status) => Ok(*status),
-            ControlAnswer::Refused { explanation } => Err(explanation),
+            ControlAnswer::Setup(setup) => panic!("not asked for: {setup:?}"),
+            ControlAnswer::Refused { explanation, .. } => Err(explanation),
         }
     }
 
@@ -232,8 +233,8 @@ fn malformed_and_impossible_controls_are_refused_with_a_reason() {
     let raw = |text: &str| {
         let bytes = wire.ask(&wire.keys.control(), "", text.as_bytes()).unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
-            ControlAnswer::Refused { explanation } => explanation,
-            ControlAnswer::Done(_) => panic!("accepted: {text}"),
+            ControlAnswer::Refused { explanation, .. } => explanation,
+            ControlAnswer::Done(_) | ControlAnswer::Setup(_) => panic!("accepted: {text}"),
         }
     };
     for (text, reason) in [

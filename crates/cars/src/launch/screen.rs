@@ -8,8 +8,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use protocol::event::log_line;
 use protocol::messages::{LogKind, LogRecord};
-use simulator::event::log_line;
 
 use super::bar::{Bar, Progress};
 use super::lines::harmless;

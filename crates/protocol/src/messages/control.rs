@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Epoch, Generation, Tick, finite, short};
+use super::observe::Presence;
+use super::{Epoch, Generation, Point, Tick, finite, short};
 use crate::codec::Message;
 use crate::name::{RobotName, RunName};
 
@@ -16,7 +17,17 @@ pub enum Control {
         /// Another seed; without it the same.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         seed: Option<u64>,
+        /// Another set-up; without it the same. A refusal names the fields that are wrong, and changes nothing.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        setup: Option<Box<Setup>>,
     },
+    /// Start the next epoch with the scenario that this TOML text describes; its roster must be that of the run.
+    Load {
+        /// The text of a scenario file that says everything itself (no `params_from`).
+        scenario: String,
+    },
+    /// What the run is set up with: answered with [`ControlAnswer::Setup`].
+    Setup,
     /// Let the clock run.
     Start,
     /// Hold the clock after the current tick.
@@ -49,6 +60,7 @@ impl Message for Control {
         match self {
             Self::Speed { factor: Some(factor) } => finite(*factor, "factor"),
             Self::Command { command, .. } => short(command, "command"),
+            Self::Init { setup: Some(setup), .. } => setup.check(),
             _ => Ok(()),
         }
     }
@@ -60,14 +72,98 @@ impl Message for Control {
 pub enum ControlAnswer {
     /// Done; this is how things stand now.
     Done(Box<Status>),
+    /// What the run is set up with.
+    Setup(Box<SetupAnswer>),
     /// Not done.
     Refused {
         /// Why, and what to do about it.
         explanation: String,
+        /// Of a set-up: what is wrong with which of its fields.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        fields: Vec<FieldError>,
     },
 }
 
+/// What is wrong with one field of a set-up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FieldError {
+    /// The field, as a path in the [`Setup`]: `guests`, `guest_speed_mps`, `robots.Butler`, `obstacles`.
+    pub field: String,
+    /// What is wrong with it and what would be right.
+    pub reason: String,
+}
+
+/// The set-up of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SetupAnswer {
+    /// What a person can change before the next epoch.
+    pub setup: Setup,
+    /// The whole scenario as a file, to keep.
+    pub scenario: String,
+}
+
+/// What a person can change between two epochs: the set-up screen of the paper ("Overall Architecture"). Everything else
+/// of the scenario stays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Setup {
+    /// Where all chance of the epoch comes from.
+    pub seed: u64,
+    /// Simulated time, seconds.
+    pub duration_s: f64,
+    /// Width and height of the field, meters.
+    pub field_m: [f64; 2],
+    /// Number of guests.
+    pub guests: u32,
+    /// Triangular distribution of the guests' speeds, m/s.
+    pub guest_speed_mps: Range,
+    /// Triangular distribution of the times after which a guest draws a new speed and direction, seconds.
+    pub guest_duration_s: Range,
+    /// Centers of the fixed obstacles, meters.
+    pub obstacles: Vec<Point>,
+    /// Where each robot starts, meters.
+    pub robots: std::collections::BTreeMap<RobotName, Point>,
+    /// The readable log.
+    pub log_file: LogFile,
+}
+
+/// A triangular distribution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Range {
+    /// Least value.
+    pub min: f64,
+    /// Most likely value.
+    pub mode: f64,
+    /// Largest value.
+    pub max: f64,
+}
+
+/// The readable log of a run, in the run's folder.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LogFile {
+    /// Whether it is written.
+    pub enabled: bool,
+    /// Its name, without a folder.
+    pub name: String,
+}
+
 impl Message for ControlAnswer {}
+
+impl Setup {
+    /// Numbers that are numbers and lists that are bounded; whether they make sense is the simulator's to say.
+    fn check(&self) -> Result<(), (String, String)> {
+        finite(self.duration_s, "setup.duration_s")?;
+        self.field_m.iter().try_for_each(|size| finite(*size, "setup.field_m"))?;
+        for (range, name) in [
+            (self.guest_speed_mps, "setup.guest_speed_mps"),
+            (self.guest_duration_s, "setup.guest_duration_s"),
+        ] {
+            [range.min, range.mode, range.max].iter().try_for_each(|value| finite(*value, name))?;
+        }
+        self.obstacles.iter().try_for_each(|at| at.check("setup.obstacles"))?;
+        short(&self.log_file.name, "setup.log_file.name")?;
+        self.robots.values().try_for_each(|at| at.check("setup.robots"))
+    }
+}
 
 /// What the simulator is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -170,5 +266,5 @@ pub struct RobotStatus {
     /// Incarnation; 0 before the first.
     pub generation: Generation,
     /// Whether its process is there.
-    pub present: bool,
+    pub presence: Presence,
 }

@@ -7,12 +7,18 @@ mod step;
 
 use std::collections::BTreeMap;
 
-pub use control::{Awaited, Control, ControlAnswer, Phase, Reason, RobotStatus, Status};
-pub use observe::{Face, LogKind, LogRecord, MAX_WIDGETS, Panel, RobotFrame, Tone, Widget, WorldFrame};
+pub use control::{
+    Awaited, Control, ControlAnswer, FieldError, LogFile, Phase, Range, Reason, RobotStatus, Setup,
+    SetupAnswer, Status,
+};
+pub use observe::{
+    Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, Presence, RecordedRobot,
+    RecordedTick, RecordingHeader, RobotFrame, Tone, Widget, WorldFrame,
+};
 pub use state::{Answer, PublicState, StateVariables, Variable};
 pub use step::{
-    Clock, Command, CommandId, Correction, End, JoinAnswer, JoinRequest, News, Percept, Refusal, Report,
-    SensedBody, SensedKind, SensedRobot, SentCommand, Waiting, Welcome,
+    Clock, Command, CommandId, Correction, End, JoinAnswer, JoinRequest, News, Percept, Performative,
+    Refusal, Report, SensedBody, SensedKind, SensedRobot, SentCommand, Waiting, Welcome,
 };
 
 use schemars::JsonSchema;

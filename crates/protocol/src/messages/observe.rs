@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Awaited, Epoch, Phase, Point, Tick, finite, short};
+use super::{Awaited, Epoch, Generation, Phase, Point, Seq, StateVariables, Tick, finite, is_false, short};
 use crate::codec::Message;
 use crate::name::{RobotName, RunName};
 
@@ -20,6 +20,12 @@ pub struct WorldFrame {
     pub time_s: f64,
     /// Simulated time at which the run ends, seconds.
     pub duration_s: f64,
+    /// Length of a tick, simulated seconds.
+    pub tick_s: f64,
+    /// Seed of the epoch.
+    pub seed: u64,
+    /// Real-time factor; `null` is as fast as the barrier goes.
+    pub speed: Option<f64>,
     /// What the simulator is doing.
     pub phase: Phase,
     /// For whom the clock waits; empty when it does not.
@@ -34,6 +40,60 @@ pub struct WorldFrame {
     pub guests: Vec<[f64; 2]>,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
+    /// Commands that were sent, or whose fate was decided, since the frame before; the newest [`MAX_FLIGHTS`] of them.
+    #[serde(default)]
+    pub flights: Vec<Flight>,
+    /// Pairs of robots between which the medium lets nothing through now.
+    #[serde(default)]
+    pub cuts: Vec<Cut>,
+}
+
+/// Most commands that one frame shows.
+pub const MAX_FLIGHTS: usize = 256;
+
+/// A command on its way, as observers see it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Flight {
+    /// Tick of what is told here.
+    pub tick: Tick,
+    /// Who sent it.
+    pub from: RobotName,
+    /// To whom.
+    pub to: RobotName,
+    /// Its number among the sender's.
+    pub seq: Seq,
+    /// What it says; only where it was sent just now.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub command: String,
+    /// What became of it.
+    pub fate: Fate,
+}
+
+/// What became of a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// It was sent and is on its way.
+    Sent,
+    /// It reached its target.
+    Delivered,
+    /// The medium lost it.
+    Dropped,
+    /// It was really lost on the wire.
+    Missing,
+}
+
+/// A link that the medium has cut, one way.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Cut {
+    /// Who cannot reach the other.
+    pub from: RobotName,
+    /// The other.
+    pub to: RobotName,
+    /// Whether commands are cut.
+    pub commands: bool,
+    /// Whether queries are cut.
+    pub queries: bool,
 }
 
 impl Message for WorldFrame {}
@@ -45,13 +105,96 @@ pub struct RobotFrame {
     pub name: RobotName,
     /// Where.
     pub location: Point,
+    /// Magnitude of its velocity, m/s.
+    pub speed_mps: f64,
+    /// Direction of motion, radians counter-clockwise from +x.
+    pub direction_rad: f64,
     /// Whether its last move was refused.
     pub blocked: bool,
     /// Its emotion state.
     pub emotion_state: String,
     /// Its behavior state.
     pub behavior_state: String,
+    /// What it publishes about itself.
+    pub state_variables: StateVariables,
+    /// Incarnation; above 1 it has returned.
+    pub generation: Generation,
+    /// Whether it is there.
+    pub presence: Presence,
 }
+
+/// Whether a robot is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Presence {
+    /// Its process is there.
+    Here,
+    /// Its process or its link is down, and the run has not given it up.
+    Gone,
+    /// The run goes on without it.
+    Lost,
+}
+
+/// The recording of an epoch begins with this line: what does not change during it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordingHeader {
+    /// The run.
+    pub run: RunName,
+    /// The epoch.
+    pub epoch: Epoch,
+    /// Its seed.
+    pub seed: u64,
+    /// Length of a tick, simulated seconds.
+    pub tick_s: f64,
+    /// Simulated time at which the run was to end, seconds.
+    pub duration_s: f64,
+    /// Width and height of the field, meters.
+    pub field_m: [f64; 2],
+    /// Side of every body, meters.
+    pub body_m: f64,
+    /// Centers of the fixed obstacles, meters.
+    pub obstacles: Vec<[f64; 2]>,
+}
+
+/// Every further line of a recording: the field after a tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordedTick {
+    /// The tick.
+    pub tick: Tick,
+    /// The robots, by name.
+    pub robots: Vec<RecordedRobot>,
+    /// Centers of the guests in whole millimeters, x and y in turn: small, and more than an eye can tell.
+    pub guests_mm: Vec<i64>,
+}
+
+/// A robot in a [`RecordedTick`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordedRobot {
+    /// Who.
+    pub name: RobotName,
+    /// Where.
+    pub location: Point,
+    /// Magnitude of its velocity, m/s.
+    pub speed_mps: f64,
+    /// Direction of motion, radians counter-clockwise from +x.
+    pub direction_rad: f64,
+    /// Whether its last move was refused.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub blocked: bool,
+    /// Whether its report of this tick is missing, so that what follows is older.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub missed: bool,
+    /// Its emotion state.
+    pub emotion_state: String,
+    /// Its behavior state.
+    pub behavior_state: String,
+    /// What it publishes about itself.
+    pub state_variables: StateVariables,
+}
+
+impl Message for RecordingHeader {}
+
+impl Message for RecordedTick {}
 
 /// One line of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -6,7 +6,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Epoch, Point, Tick, counted, few, finite, short};
+use super::{Epoch, Performative, Point, Tick, counted, few, finite, short};
 use crate::codec::Message;
 
 /// A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
@@ -139,12 +139,19 @@ impl Message for PublicState {
 /// The answer to one of the six queries.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Answer {
+    /// That it is an answer: always `tell`.
+    #[serde(default = "tell")]
+    pub performative: Performative,
     /// Epoch of the report it is taken from.
     pub epoch: Epoch,
     /// Tick of the report it is taken from.
     pub tick: Tick,
     /// What was asked for: a point, a number, a map of variables or a text.
     pub value: serde_json::Value,
+}
+
+fn tell() -> Performative {
+    Performative::Tell
 }
 
 impl Message for Answer {}
@@ -162,6 +169,6 @@ impl PublicState {
             "behavior_state" => self.behavior_state.clone().into(),
             _ => return None,
         };
-        Some(Answer { epoch: self.epoch, tick: self.tick, value })
+        Some(Answer { performative: Performative::Tell, epoch: self.epoch, tick: self.tick, value })
     }
 }

@@ -8,7 +8,8 @@ use protocol::messages::{Parameters, Point};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::{DEFAULT_SEED, OnLate, RobotSpec, check_seed};
+use super::network::{Channel, Link};
+use super::{DEFAULT_SEED, Network, OnLate, Record, RobotSpec, check_seed};
 use crate::diagnostic::{FileError, Source};
 use crate::units::{Length, Speed, Time, quantity};
 
@@ -27,6 +28,8 @@ pub(super) struct Scenario {
     field: Option<Spanned<FieldTable>>,
     sensing: Option<SensingTable>,
     guests: Option<Spanned<GuestsTable>>,
+    network: Option<NetworkTable>,
+    record: Option<RecordTable>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
@@ -61,6 +64,30 @@ struct Range<Q> {
     min: Q,
     mode: Q,
     max: Q,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct NetworkTable {
+    commands: Option<Spanned<Channel>>,
+    #[serde(default, rename = "link", skip_serializing_if = "Vec::is_empty")]
+    links: Vec<LinkTable>,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct LinkTable {
+    from: Spanned<RobotName>,
+    to: Spanned<RobotName>,
+    commands: Spanned<Channel>,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct RecordTable {
+    log: Option<bool>,
+    log_name: Option<Spanned<String>>,
+    frames: Option<bool>,
 }
 
 /// A triangular distribution in SI units, not checked yet.
@@ -100,6 +127,17 @@ const MAX_SPEED: Speed = Speed(3.048);
 const SENSING_RANGE: Length = Length(1.8288);
 
 impl Scenario {
+    /// Refuses to name files: what comes from outside must not make this process read them.
+    pub(super) fn refuse_files(self, source: &Source) -> Result<Self, FileError> {
+        match self.robots.iter().find(|robot| robot.get_ref().params_from.is_some()) {
+            Some(robot) => {
+                let reason = "`params_from` names a file; write its parameters out under `params`";
+                Err(FileError::at(source, Some(robot.span()), reason))
+            }
+            None => Ok(self),
+        }
+    }
+
     /// From what is written to what it means.
     pub(super) fn check(self, source: &Source, folder: &Path) -> Result<super::Scenario, FileError> {
         let seed = match &self.seed {
@@ -140,7 +178,11 @@ impl Scenario {
             on_late: self.on_late.unwrap_or(OnLate::Wait),
             deadline_s: positive(source, self.deadline.as_ref(), 2.0, |time| time.0, "the deadline")?,
             robots: robots(self.robots, source, folder)?,
+            network: super::Network::default(),
+            record: record(self.record, source)?,
         };
+        let network = network(self.network, &scenario.robots, source)?;
+        let scenario = super::Scenario { network, ..scenario };
         scenario.check_hall(source, self.guests.as_ref().map(Spanned::span))?;
         Ok(scenario)
     }
@@ -170,13 +212,59 @@ impl super::Scenario {
     }
 
     /// The environment counts its robots; people know their names.
-    fn name_robots(&self, error: &world::HallError) -> String {
+    pub(super) fn name_robots(&self, error: &world::HallError) -> String {
         let mut text = error.to_string();
         for (index, name) in self.robots.keys().enumerate() {
             text = text.replace(&format!("robot {index} "), &format!("robot {name} "));
         }
         text
     }
+}
+
+/// The network, every link between two robots of the roster and every probability one.
+fn network(
+    raw: Option<NetworkTable>,
+    robots: &BTreeMap<RobotName, RobotSpec>,
+    source: &Source,
+) -> Result<Network, FileError> {
+    let Some(raw) = raw else { return Ok(Network::default()) };
+    let known = |name: Spanned<RobotName>| {
+        let span = name.span();
+        let name = name.into_inner();
+        if robots.contains_key(&name) || name.is_operator() {
+            return Ok(name);
+        }
+        Err(FileError::at(source, Some(span), &format!("no robot of this scenario is called {name}")))
+    };
+    let mut links = Vec::new();
+    for link in raw.links {
+        let commands = channel(link.commands, source)?;
+        links.push(Link { from: known(link.from)?, to: known(link.to)?, commands });
+    }
+    let commands = raw.commands.map(|commands| channel(commands, source)).transpose()?;
+    Ok(Network { commands: commands.unwrap_or_default(), links })
+}
+
+fn channel(raw: Spanned<Channel>, source: &Source) -> Result<Channel, FileError> {
+    let (span, channel) = (raw.span(), raw.into_inner());
+    if (0.0..=1.0).contains(&channel.loss) {
+        return Ok(channel);
+    }
+    Err(FileError::at(source, Some(span), "a loss is a probability, from 0 to 1"))
+}
+
+fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError> {
+    let standard = Record::default();
+    let Some(raw) = raw else { return Ok(standard) };
+    if let Some(name) = &raw.log_name {
+        crate::recorder::check_log_name(name.get_ref())
+            .map_err(|reason| FileError::at(source, Some(name.span()), &reason))?;
+    }
+    Ok(Record {
+        log: raw.log.unwrap_or(standard.log),
+        log_name: raw.log_name.map_or(standard.log_name, Spanned::into_inner),
+        frames: raw.frames.unwrap_or(standard.frames),
+    })
 }
 
 fn robots(
@@ -280,6 +368,12 @@ impl From<&super::Scenario> for Scenario {
                     duration: Some(Spanned::new(0..0, duration)),
                 },
             )),
+            network: NetworkTable::of(&scenario.network),
+            record: Some(RecordTable {
+                log: Some(scenario.record.log),
+                log_name: Some(Spanned::new(0..0, scenario.record.log_name.clone())),
+                frames: Some(scenario.record.frames),
+            }),
             obstacles: scenario
                 .obstacles
                 .iter()
@@ -291,6 +385,24 @@ impl From<&super::Scenario> for Scenario {
                 .map(|(name, spec)| Spanned::new(0..0, Robot::from((name, spec))))
                 .collect(),
         }
+    }
+}
+
+impl NetworkTable {
+    /// The table of a network; a perfect one needs none.
+    fn of(network: &Network) -> Option<Self> {
+        if *network == Network::default() {
+            return None;
+        }
+        let link = |link: &Link| LinkTable {
+            from: Spanned::new(0..0, link.from.clone()),
+            to: Spanned::new(0..0, link.to.clone()),
+            commands: Spanned::new(0..0, link.commands),
+        };
+        Some(Self {
+            commands: Some(Spanned::new(0..0, network.commands)),
+            links: network.links.iter().map(link).collect(),
+        })
     }
 }
 

@@ -3,11 +3,15 @@
 use std::time::{Duration, Instant};
 
 use protocol::bus::Question;
-use protocol::messages::{Awaited, Control, ControlAnswer, End, Phase, Reason, RobotStatus, Status};
+use protocol::messages::{
+    Awaited, Control, ControlAnswer, End, FieldError, Phase, Reason, RobotStatus, Setup, SetupAnswer, Status,
+};
 use protocol::random::MAX_SEED;
 use protocol::{Tick, decode, encode};
 
 use super::{Interrupt, Server};
+use crate::diagnostic::Source;
+use crate::scenario::Scenario;
 use crate::simulation::Simulation;
 
 /// Most ticks that one `step` may ask for.
@@ -133,7 +137,14 @@ impl Server {
                 self.on_step(n, question, simulation);
                 return Ok(());
             }
-            Control::Init { seed } => self.on_init(seed, &question, simulation)?,
+            Control::Init { seed, setup } => {
+                let next = next_scenario(simulation.scenario(), seed, setup.as_deref());
+                self.on_init(next, &question, simulation)?;
+            }
+            Control::Load { scenario } => {
+                self.on_init(load(&scenario, simulation.scenario()), &question, simulation)?;
+            }
+            Control::Setup => return Ok(answer_setup(&question, simulation.scenario())),
             Control::Stop => {
                 self.answer_status(&question, simulation);
                 return Err(Interrupt::End(End::Stopped));
@@ -185,7 +196,11 @@ impl Server {
             }
             Control::Status => {}
             Control::Start | Control::Pause => return Err(format!("the run is {phase}")),
-            Control::Init { .. } | Control::Step { .. } | Control::Stop => {
+            Control::Init { .. }
+            | Control::Load { .. }
+            | Control::Setup
+            | Control::Step { .. }
+            | Control::Stop => {
                 unreachable!("handled by on_control")
             }
         }
@@ -194,14 +209,17 @@ impl Server {
 
     fn on_init(
         &mut self,
-        seed: Option<u64>,
+        next: Result<Scenario, Refusal>,
         question: &Question,
         simulation: &Simulation,
     ) -> Result<(), Interrupt> {
-        if seed.is_some_and(|seed| seed > MAX_SEED) {
-            refuse(question, &format!("a seed is at most {MAX_SEED}"));
-            return Ok(());
-        }
+        let next = match next {
+            Ok(next) => next,
+            Err(refusal) => {
+                question.answer(question.key(), encode(&ControlAnswer::from(refusal)));
+                return Ok(());
+            }
+        };
         match self.pace.phase {
             Phase::Gathering | Phase::Ended => {
                 refuse(question, &format!("the run is {}", self.pace.phase));
@@ -212,7 +230,7 @@ impl Server {
                     self.answer_status(&stepping, simulation);
                 }
                 self.answer_status(question, simulation);
-                Err(Interrupt::Init(seed))
+                Err(Interrupt::Init(Box::new(next)))
             }
         }
     }
@@ -266,7 +284,7 @@ impl Server {
                 .map(|(name, member)| RobotStatus {
                     name: name.clone(),
                     generation: member.generation,
-                    present: member.is_present,
+                    presence: member.presence(),
                 })
                 .collect(),
             ignored: self.summary_wall.ignored.clone(),
@@ -291,7 +309,59 @@ impl Server {
     }
 }
 
+/// Why something is not done.
+struct Refusal {
+    explanation: String,
+    fields: Vec<FieldError>,
+}
+
+impl From<String> for Refusal {
+    fn from(explanation: String) -> Self {
+        Self { explanation, fields: Vec::new() }
+    }
+}
+
+impl From<Refusal> for ControlAnswer {
+    fn from(Refusal { explanation, fields }: Refusal) -> Self {
+        Self::Refused { explanation, fields }
+    }
+}
+
+/// The scenario of the next epoch.
+fn next_scenario(running: &Scenario, seed: Option<u64>, setup: Option<&Setup>) -> Result<Scenario, Refusal> {
+    if seed.is_some_and(|seed| seed > MAX_SEED) {
+        return Err(format!("a seed is at most {MAX_SEED}").into());
+    }
+    let next = setup.map_or_else(|| Ok(running.clone()), |setup| running.with_setup(setup));
+    let next = next.map_err(|fields| Refusal {
+        explanation: fields
+            .iter()
+            .map(|e| format!("{}: {}", e.field, e.reason))
+            .collect::<Vec<_>>()
+            .join("\n"),
+        fields,
+    })?;
+    Ok(Scenario { seed: seed.unwrap_or(next.seed), ..next })
+}
+
+/// The scenario that a text from outside describes, for the robots that are there.
+fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
+    let source = Source { name: "the scenario".to_owned(), text: text.to_owned() };
+    let loaded = Scenario::parse_alone(&source).map_err(|error| error.in_words())?;
+    Ok(loaded.with_roster_of(running)?)
+}
+
+fn answer_setup(question: &Question, scenario: &Scenario) {
+    match scenario.to_toml() {
+        Ok(text) => {
+            let answer = SetupAnswer { setup: scenario.setup(), scenario: text };
+            question.answer(question.key(), encode(&ControlAnswer::Setup(Box::new(answer))));
+        }
+        Err(error) => refuse(question, &error.to_string()),
+    }
+}
+
 fn refuse(question: &Question, explanation: &str) {
-    let answer = ControlAnswer::Refused { explanation: explanation.to_owned() };
+    let answer = ControlAnswer::from(Refusal::from(explanation.to_owned()));
     question.answer(question.key(), encode(&answer));
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use protocol::bus::Question;
-use protocol::messages::{JoinAnswer, JoinRequest, Phase, Refusal};
+use protocol::messages::{JoinAnswer, JoinRequest, Phase, Presence, Refusal};
 use protocol::{Generation, PROTOCOL_VERSION, decode, encode};
 
 use super::{Interrupt, Server, introduce};
@@ -39,6 +39,15 @@ impl Member {
     /// Whether it can take part in a new epoch.
     pub(super) fn is_ready(&self) -> bool {
         self.is_present && self.instance.is_some()
+    }
+
+    /// Whether it is there, for people.
+    pub(super) fn presence(&self) -> Presence {
+        match (self.is_lost, self.is_present) {
+            (true, _) => Presence::Lost,
+            (false, true) => Presence::Here,
+            (false, false) => Presence::Gone,
+        }
     }
 
     /// Everybody takes part in an epoch from its beginning.

@@ -1,13 +1,17 @@
 //! What is shown to those who watch. Nobody watching costs nothing, and no watcher can hold the clock.
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Publisher};
 use protocol::encode;
 use protocol::keys::Keys;
-use protocol::messages::{Awaited, LogKind, LogRecord, RobotFrame, Status, WorldFrame};
+use protocol::messages::{
+    Awaited, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, Presence, RobotFrame, Status, WorldFrame,
+};
+use protocol::{Event, RobotName};
 
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, TickRecord};
 
 /// Pictures are for eyes: no more often than this.
 const FRAME_INTERVAL: Duration = Duration::from_millis(33);
@@ -16,6 +20,8 @@ pub(super) struct Observers {
     world: Publisher,
     log: Publisher,
     painted: Instant,
+    /// What became of commands since the last frame.
+    flights: VecDeque<Flight>,
 }
 
 impl Observers {
@@ -24,6 +30,7 @@ impl Observers {
             world: bus.observer_publisher(&keys.world())?,
             log: bus.observer_publisher(&keys.log())?,
             painted: Instant::now(),
+            flights: VecDeque::new(),
         })
     }
 
@@ -37,7 +44,21 @@ impl Observers {
 
     pub(super) fn frame(&mut self, simulation: &Simulation, status: &Status) {
         self.painted = Instant::now();
-        show(&self.world, encode(&paint(simulation, status)));
+        let flights = std::mem::take(&mut self.flights);
+        show(&self.world, encode(&paint(simulation, status, flights.into())));
+    }
+
+    /// Notes what the next frame tells of a tick.
+    pub(super) fn note(&mut self, record: &TickRecord) {
+        if !self.world.is_watched() {
+            return;
+        }
+        for flight in record.events.iter().filter_map(|event| flight(record.tick, event)) {
+            if self.flights.len() == MAX_FLIGHTS {
+                self.flights.pop_front();
+            }
+            self.flights.push_back(flight);
+        }
     }
 
     pub(super) fn log(&self, lines: &[LogRecord]) {
@@ -89,16 +110,34 @@ fn name_all(awaiting: &[Awaited]) -> String {
     awaiting.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
+/// What an event says of a command; `None` if it is about something else.
+fn flight(tick: protocol::Tick, event: &Event) -> Option<Flight> {
+    let (from, to, seq, command, fate) = match event {
+        Event::CommandSent { from, to, seq, command, .. } => (from, to, *seq, command.as_str(), Fate::Sent),
+        Event::CommandDelivered { from, to, seq } => (from, to, *seq, "", Fate::Delivered),
+        Event::CommandDropped { from, to, seq } => (from, to, *seq, "", Fate::Dropped),
+        Event::CommandMissing { from, to, seq } => (from, to, *seq, "", Fate::Missing),
+        _ => return None,
+    };
+    Some(Flight { tick, from: from.clone(), to: to.clone(), seq, command: command.to_owned(), fate })
+}
+
+fn paint(simulation: &Simulation, status: &Status, flights: Vec<Flight>) -> WorldFrame {
     let (world, scenario) = (simulation.world(), simulation.scenario());
-    let robot = |name: &protocol::RobotName| {
+    let robot = |name: &RobotName| {
         let report = simulation.report(name);
+        let process = status.robots.iter().find(|robot| robot.name == *name);
         RobotFrame {
             name: name.clone(),
             location: simulation.location(name).unwrap_or_default(),
+            speed_mps: report.map_or(0.0, |report| report.speed_mps),
+            direction_rad: report.map_or(0.0, |report| report.direction_rad),
             blocked: simulation.is_blocked(name),
             emotion_state: report.map(|report| report.emotion_state.clone()).unwrap_or_default(),
             behavior_state: report.map(|report| report.behavior_state.clone()).unwrap_or_default(),
+            state_variables: report.map(|report| report.state_variables.clone()).unwrap_or_default(),
+            generation: process.map_or(0, |process| process.generation),
+            presence: process.map_or(Presence::Gone, |process| process.presence),
         }
     };
     WorldFrame {
@@ -107,6 +146,9 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
         tick: status.tick,
         time_s: status.time_s,
         duration_s: status.duration_s,
+        tick_s: scenario.tick_s,
+        seed: status.seed,
+        speed: status.speed,
         phase: status.phase,
         awaiting: status.awaiting.clone(),
         field_m: scenario.field_m,
@@ -114,5 +156,7 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
         robots: simulation.names().iter().map(robot).collect(),
         guests: world.guests().iter().map(|guest| [guest.x, guest.y]).collect(),
         obstacles: world.obstacles().iter().map(|obstacle| [obstacle.x, obstacle.y]).collect(),
+        flights,
+        cuts: simulation.cuts(),
     }
 }

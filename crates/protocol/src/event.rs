@@ -1,12 +1,15 @@
 //! What happened in a run: simulated facts only, no wall clock, no process ids. The same seed gives the same events,
 //! byte for byte.
 
-use protocol::messages::{End, LogKind, LogRecord, Point};
-use protocol::{Generation, RobotName, Seq, Tick};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::messages::{End, LogKind, LogRecord, Performative, Point};
+use crate::name::RobotName;
+use crate::{Generation, Seq, Tick};
+
 /// One line of `events.jsonl`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Line {
     /// When.
     pub tick: Tick,
@@ -16,7 +19,7 @@ pub struct Line {
 }
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
     /// The run begins.
@@ -85,6 +88,8 @@ pub enum Event {
         to: RobotName,
         /// Its number among the sender's.
         seq: Seq,
+        /// What it is meant to do.
+        performative: Performative,
         /// What it says.
         command: String,
     },
@@ -166,8 +171,8 @@ impl Event {
             Self::Behavior { robot, from, to } => {
                 says(robot, LogKind::Behavior, change("behavior", from.as_ref(), to))
             }
-            Self::CommandSent { from, to, command, .. } => {
-                says(from, LogKind::Command, format!("-> {to}: {command}"))
+            Self::CommandSent { from, to, performative, command, .. } => {
+                says(from, LogKind::Command, format!("-> {to}: {command} ({performative})"))
             }
             Self::CommandDelivered { from, to, seq } => {
                 says(to, LogKind::Command, format!("receives command {seq} of {from}"))
