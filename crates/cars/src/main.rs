@@ -4,8 +4,10 @@ mod bench;
 mod check;
 mod common;
 mod control;
+mod experiment;
 mod launch;
 mod run;
+mod statistics;
 mod table;
 
 use std::process::ExitCode;
@@ -28,6 +30,8 @@ enum Subcommands {
     Launch(launch::LaunchArgs),
     /// Run a scenario, or that of a launch file, in this process.
     Run(run::RunArgs),
+    /// Play an experiment that ships with the project, over many seeds.
+    Experiment(experiment::ExperimentArgs),
     /// Check scenario and launch files without running anything.
     Check(check::CheckArgs),
     /// Control a run in progress: init, start, pause, step, stop, speed, status.
@@ -62,6 +66,7 @@ fn main() -> miette::Result<ExitCode> {
     match cli.subcommand {
         Subcommands::Launch(args) => launch::launch(args),
         Subcommands::Run(args) => run::run(&args),
+        Subcommands::Experiment(args) => experiment::experiment(&args),
         Subcommands::Check(args) => check::check(&args),
         Subcommands::Ctl(args) => control::ctl(&args),
         Subcommands::Query(args) => control::query(&args),

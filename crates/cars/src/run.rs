@@ -10,7 +10,7 @@ use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
 use protocol::messages::{Clock, End};
 use robot::{BadParameters, LocalHost, Robot, Welcome};
-use simulator::{Barrier, Exchange, Recorder, RunFolder, Scenario, Simulation, Summary};
+use simulator::{Barrier, Exchange, Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
 
 use crate::common::ExecutionArgs;
 use crate::launch;
@@ -61,25 +61,43 @@ pub(crate) fn execute(
     folder: &RunFolder,
     speed: Option<f64>,
 ) -> miette::Result<Summary> {
-    let robots = make_robots(&scenario, Path::new("the scenario"))?;
-    let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
-    let mut recorder = Recorder::begin(folder, run, &simulation)?;
-    let seated =
-        robots.into_iter().filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
-    let mut barrier = InProcess(LocalHost::new(seated.collect()));
+    let mut recorder = None;
     let begun = Instant::now();
-    let record = simulation.init(&mut barrier).into_diagnostic()?;
-    recorder.write(&simulation, &record)?;
-    while simulation.tick() < simulation.scenario().ticks {
+    let simulation = play(scenario, run, |simulation, record| {
+        let recorder = match &mut recorder {
+            Some(recorder) => recorder,
+            none => none.insert(Recorder::begin(folder, run, simulation)?),
+        };
+        recorder.write(simulation, record)?;
         if let Some(speed) = speed {
             let due = Duration::try_from_secs_f64(simulation.time_s(simulation.tick()) / speed);
             std::thread::sleep(due.unwrap_or(Duration::MAX).saturating_sub(begun.elapsed()));
         }
-        let record = simulation.step(&mut barrier).into_diagnostic()?;
-        recorder.write(&simulation, &record)?;
-    }
-    recorder.write(&simulation, &simulation.end(End::Finished))?;
+        Ok(())
+    })?;
+    let recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
     Ok(recorder.finish(&simulation)?)
+}
+
+/// Plays a scenario to its end in this process and shows every tick to `each`, the end of the run included.
+pub(crate) fn play(
+    scenario: Scenario,
+    run: &RunName,
+    mut each: impl FnMut(&Simulation, &TickRecord) -> miette::Result<()>,
+) -> miette::Result<Simulation> {
+    let robots = make_robots(&scenario, Path::new("the scenario"))?;
+    let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
+    let seated =
+        robots.into_iter().filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
+    let mut barrier = InProcess(LocalHost::new(seated.collect()));
+    let record = simulation.init(&mut barrier).into_diagnostic()?;
+    each(&simulation, &record)?;
+    while simulation.tick() < simulation.scenario().ticks {
+        let record = simulation.step(&mut barrier).into_diagnostic()?;
+        each(&simulation, &record)?;
+    }
+    each(&simulation, &simulation.end(End::Finished))?;
+    Ok(simulation)
 }
 
 fn welcome(simulation: &Simulation, run: &RunName, name: &protocol::RobotName) -> Option<Welcome> {

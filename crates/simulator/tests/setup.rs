@@ -1,0 +1,93 @@
+//! What a person can change between two epochs, and what is said of mistakes.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::path::Path;
+
+use protocol::RobotName;
+use protocol::messages::{Point, Range, Setup};
+use simulator::Scenario;
+use simulator::diagnostic::Source;
+
+fn scenario() -> Scenario {
+    let text = "seed = 7\nduration = \"33 s\"\n[guests]\ncount = 5\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n\
+                [[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams = { x = 1 }\n[[robot]]\nname = \"B\"\nat = [\"7 m\", \"5 m\"]\n";
+    Scenario::parse(&Source { name: "hall".into(), text: text.into() }, Path::new(".")).unwrap()
+}
+
+fn name(name: &str) -> RobotName {
+    RobotName::new(name).unwrap()
+}
+
+/// The fields that are blamed for a set-up.
+fn blamed(change: impl FnOnce(&mut Setup)) -> Vec<String> {
+    let mut setup = scenario().setup();
+    change(&mut setup);
+    scenario().with_setup(&setup).unwrap_err().into_iter().map(|error| error.field).collect()
+}
+
+#[test]
+fn the_set_up_of_a_scenario_gives_the_same_scenario() {
+    let scenario = scenario();
+    let same = scenario.with_setup(&scenario.setup()).unwrap();
+    assert_eq!(format!("{same:?}"), format!("{scenario:?}"));
+}
+
+#[test]
+fn what_is_changed_is_changed_and_the_rest_stays() {
+    let mut setup = scenario().setup();
+    setup.seed = 9;
+    setup.guests = 20;
+    setup.field_m = [20.0, 12.0];
+    setup.obstacles = vec![Point::new(1.0, 1.0), Point::new(2.0, 2.0)];
+    setup.robots.insert(name("A"), Point::new(3.0, 4.0));
+    setup.log_file.name = "evening.log".into();
+    let changed = scenario().with_setup(&setup).unwrap();
+    assert_eq!(changed.setup(), setup);
+    assert_eq!(changed.robots[&name("A")].parameters["x"], 1);
+}
+
+#[test]
+fn every_mistake_is_told_beside_its_field() {
+    assert_eq!(blamed(|setup| setup.seed = u64::MAX), ["seed"]);
+    assert_eq!(blamed(|setup| setup.duration_s = 0.0), ["duration_s"]);
+    assert_eq!(blamed(|setup| setup.duration_s = 1e300), ["duration_s"]);
+    let wrong = Range { min: 3.0, mode: 1.0, max: 2.0 };
+    assert_eq!(blamed(|setup| setup.guest_speed_mps = wrong), ["guest_speed_mps"]);
+    assert_eq!(blamed(|setup| setup.guest_duration_s = wrong), ["guest_duration_s"]);
+    assert_eq!(blamed(|setup| setup.guests = 100_000), ["guests"]);
+    assert_eq!(blamed(|setup| setup.guests = u32::MAX), ["guests"]);
+    assert_eq!(blamed(|setup| setup.field_m = [0.1, 5.0]), ["field_m"]);
+    assert_eq!(blamed(|setup| setup.field_m = [1e9, 5.0]), ["field_m"]);
+    assert_eq!(blamed(|setup| setup.obstacles.push(Point::new(-1.0, 1.0))), ["obstacles"]);
+    assert_eq!(blamed(|setup| setup.robots.extend([(name("B"), Point::new(99.0, 1.0))])), ["robots.B"]);
+    assert_eq!(blamed(|setup| setup.robots.extend([(name("B"), Point::new(5.1, 5.0))])), ["robots.B"]);
+    assert_eq!(blamed(|setup| setup.robots.extend([(name("C"), Point::new(1.0, 9.0))])), ["robots.C"]);
+    assert_eq!(blamed(|setup| drop(setup.robots.remove(&name("A")))), ["robots.A"]);
+    for bad in ["", "../x", "a/b", ".hidden", "events.jsonl", "scenario.toml", "recording.jsonl", "x\n"] {
+        assert_eq!(blamed(|setup| setup.log_file.name = bad.into()), ["log_file.name"], "{bad:?}");
+    }
+    // Several mistakes are told at once.
+    assert_eq!(
+        blamed(|setup| {
+            setup.seed = u64::MAX;
+            setup.guest_speed_mps = wrong;
+        }),
+        ["seed", "guest_speed_mps"]
+    );
+}
+
+#[test]
+fn a_scenario_for_other_robots_is_refused_with_both_rosters() {
+    let text = "[[robot]]\nname = \"Z\"\nat = [\"5 m\", \"5 m\"]\n";
+    let other = Scenario::parse_alone(&Source { name: "z".into(), text: text.into() }).unwrap();
+    let reason = other.with_roster_of(&scenario()).unwrap_err();
+    assert!(reason.contains('Z') && reason.contains('A') && reason.contains('B'), "{reason}");
+}
+
+#[test]
+fn a_scenario_from_outside_reads_no_files() {
+    let text = "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams_from = \"/etc/passwd\"\n";
+    let error = Scenario::parse_alone(&Source { name: "x".into(), text: text.into() }).unwrap_err();
+    assert!(error.in_words().contains("params_from"), "{}", error.in_words());
+}
