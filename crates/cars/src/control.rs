@@ -13,6 +13,7 @@ use protocol::messages::{Control, ControlAnswer, LogRecord, Presence, Status};
 use protocol::{RobotName, RunName, decode, encode};
 use simulator::RunFolder;
 use simulator::recorder::ENDPOINT;
+use simulator::scenario::{Changes, Scenario};
 
 use crate::common::{LATEST, Speed};
 
@@ -115,11 +116,18 @@ enum Button {
     },
     /// Say how things stand.
     Status,
+    /// Back to tick 0 with another scenario for the same robots.
+    Load {
+        /// The scenario file.
+        file: PathBuf,
+    },
+    /// Print the scenario of the run as a file.
+    Scenario,
 }
 
 impl Button {
-    fn control(&self) -> Control {
-        match self {
+    fn control(&self) -> miette::Result<Control> {
+        Ok(match self {
             Self::Init { seed } => Control::Init { seed: *seed, setup: None },
             Self::Start => Control::Start,
             Self::Pause => Control::Pause,
@@ -127,13 +135,25 @@ impl Button {
             Self::Stop => Control::Stop,
             Self::Speed { factor } => Control::Speed { factor: factor.0 },
             Self::Status => Control::Status,
-        }
+            // Resolved here, where the files are that it names.
+            Self::Load { file } => {
+                Control::Load { scenario: Scenario::load(file, &Changes::default())?.to_toml()? }
+            }
+            Self::Scenario => Control::Setup,
+        })
     }
 }
 
 /// Presses a button of a run in progress.
 pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
-    let status = request(&args.run, &args.button.control())?;
+    let status = match ask(&args.run, &args.button.control()?)? {
+        ControlAnswer::Done(status) => *status,
+        ControlAnswer::Setup(answer) => {
+            print!("{}", answer.scenario);
+            return Ok(ExitCode::SUCCESS);
+        }
+        refusal @ ControlAnswer::Refused { .. } => return Err(refused(&refusal)),
+    };
     if args.json {
         println!("{}", serde_json::to_string(&status).into_diagnostic()?);
     } else {
@@ -142,18 +162,22 @@ pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Asks the simulator for something; a refusal is an error with its reason.
-fn request(run: &RunRef, control: &Control) -> miette::Result<Status> {
+/// Why what was asked for was not done.
+fn refused(answer: &ControlAnswer) -> miette::Report {
+    match answer {
+        ControlAnswer::Refused { explanation, .. } => miette!("refused: {explanation}"),
+        _ => miette!("the simulator answers something else than was asked"),
+    }
+}
+
+/// Asks the simulator for something.
+fn ask(run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
     let (bus, keys) = run.open()?;
     let patience = if matches!(control, Control::Step { .. }) { STEP_PATIENCE } else { PATIENCE };
     let answer = bus.ask_within(&keys.control(), "", Some(encode(control)), patience).into_diagnostic()?;
     bus.close();
     let bytes = bytes_of(answer, &format!("no simulator of run {} answers", run.run()?))?;
-    match decode(&keys.control(), "simulator", &bytes).into_diagnostic()? {
-        ControlAnswer::Done(status) => Ok(*status),
-        ControlAnswer::Setup(_) => Err(miette!("the simulator answers something else than was asked")),
-        ControlAnswer::Refused { explanation, .. } => Err(miette!("refused: {explanation}")),
-    }
+    decode(&keys.control(), "simulator", &bytes).into_diagnostic()
 }
 
 fn bytes_of(answer: Option<AnswerOf>, nobody: &str) -> miette::Result<Vec<u8>> {
@@ -232,9 +256,13 @@ pub(crate) struct CommandArgs {
 /// Sends a command from outside the roster; it takes effect at the next tick boundary and is part of the record.
 pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
     let control = Control::Command { to: args.robot.clone(), command: args.command.clone() };
-    let status = request(&args.run, &control)?;
-    println!("{} receives {:?} at the tick after {}", args.robot, args.command, status.tick);
-    Ok(ExitCode::SUCCESS)
+    match ask(&args.run, &control)? {
+        ControlAnswer::Done(status) => {
+            println!("{} receives {:?} at the tick after {}", args.robot, args.command, status.tick);
+            Ok(ExitCode::SUCCESS)
+        }
+        other => Err(refused(&other)),
+    }
 }
 
 /// `cars log`.

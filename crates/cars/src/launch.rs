@@ -60,6 +60,12 @@ pub(crate) struct LaunchArgs {
     /// Wait for `cars ctl start` once everybody is there.
     #[arg(long)]
     paused: bool,
+    /// Open the console in a browser.
+    #[arg(long, conflicts_with = "no_console")]
+    open: bool,
+    /// Start no console.
+    #[arg(long)]
+    no_console: bool,
     /// Print nothing but warnings and errors.
     #[arg(long, short)]
     quiet: bool,
@@ -149,7 +155,15 @@ impl Launch {
 
     fn plan(&self, endpoint: &str) -> Result<Vec<Planned>, FileError> {
         let (run, out) = (&self.run, self.args.execution.out.as_path());
-        let execution = Execution { run, endpoint, out, speed: self.speed(), is_paused: self.args.paused };
+        let execution = Execution {
+            run,
+            endpoint,
+            out,
+            speed: self.speed(),
+            is_paused: self.args.paused,
+            has_console: !self.args.no_console,
+            opens_browser: self.args.open,
+        };
         plan::plan(&self.file, &execution)
     }
 

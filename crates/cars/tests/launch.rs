@@ -23,7 +23,7 @@ impl Folder {
         let folder = Self(tempfile::tempdir().unwrap());
         std::fs::write(folder.path("hall.toml"), SCENARIO).unwrap();
         let text = format!(
-            "scenario = \"hall.toml\"\n\
+            "scenario = \"hall.toml\"\n[console]\nenabled = false\n\
              [simulator]\ncommand = [\"sh\", \"-c\", '''{simulator}''']\n\
              [[process]]\nname = \"Butler\"\ncommand = [\"sh\", \"-c\", '''{butler}''']\n{more}\n"
         );
@@ -212,7 +212,7 @@ fn a_program_that_is_nowhere_is_said_before_anything_starts() {
     std::fs::write(folder.path("launch.toml"), text_of).unwrap();
     let output = folder.cars(&[]).output().unwrap();
     let stderr = text(&output.stderr);
-    for part in ["launch.toml:6:", "there is no program cars-nobody", "PATH", "cargo build --release"] {
+    for part in ["launch.toml:8:", "there is no program cars-nobody", "PATH", "cargo build --release"] {
         assert!(stderr.contains(part), "{part:?} is not in:\n{stderr}");
     }
     assert_eq!(output.status.code(), Some(1));

@@ -159,3 +159,36 @@ fn stop_ends_the_run_with_its_record_complete() {
     let (_, text) = lab.fails(&["ctl", "status", "--run", "ctl-stop"]);
     assert!(text.contains("not in progress"), "{text}");
 }
+
+#[test]
+fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-load", &["--duration", "60 s"]);
+    ctl(&lab, "ctl-load", &["step", "20"]);
+    let processes = launch.processes();
+    let scenario = lab.ok(&["ctl", "scenario", "--run", "ctl-load"]);
+    assert!(scenario.contains("count = 100"), "{scenario}");
+    let fewer = lab.write(
+        "fewer.toml",
+        &scenario.replace("count = 100", "count = 7").replace("seed = 2002", "seed = 5"),
+    );
+    let fewer = fewer.to_str().unwrap();
+    ctl(&lab, "ctl-load", &["load", fewer]);
+    eventually("the new epoch", || {
+        let status = status(&lab, "ctl-load");
+        (status["phase"] == "ready" && status["epoch"] == 2 && status["seed"] == 5).then_some(())
+    });
+    assert_eq!(launch.processes(), processes);
+    let (_, text) = lab.fails(&["ctl", "load", "configs/three_robots.toml", "--run", "ctl-load"]);
+    assert!(text.contains("Vonda"), "{text}");
+    ctl(&lab, "ctl-load", &["start"]);
+    launch.finish();
+    // What is kept of the second epoch is what a fresh run of its scenario gives, and the first epoch is kept, too.
+    lab.ok(&["run", fewer, "--run", "ctl-loaded"]);
+    assert_same(("loaded", &lab.bytes("ctl-load")), ("fresh", &lab.bytes("ctl-loaded")));
+    let read = |run, name| std::fs::read(lab.file(run, name)).unwrap();
+    assert_eq!(read("ctl-load", "scenario.toml"), read("ctl-loaded", "scenario.toml"));
+    for kept in ["events-epoch1.jsonl", "scenario-epoch1.toml", "recording-epoch1.jsonl"] {
+        assert!(lab.file("ctl-load", kept).exists(), "{kept}");
+    }
+}

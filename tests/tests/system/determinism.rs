@@ -125,3 +125,29 @@ fn the_resolved_scenario_of_a_run_gives_the_same_run() {
     lab.ok(&["run", resolved.to_str().unwrap(), "--run", "resolved-second"]);
     assert_same(("first", &first), ("second", &lab.bytes("resolved-second")));
 }
+
+#[test]
+fn a_lossy_network_is_part_of_the_seed() {
+    let lab = Lab::new();
+    let args = [
+        "--duration",
+        "120 s",
+        "--set",
+        "network.commands.loss=0.4",
+        "--set",
+        "robot.Butler.params.resend=on",
+    ];
+    let with = |first: [&'static str; 4]| first.into_iter().chain(args).collect::<Vec<_>>();
+    lab.ok(&with(["run", "configs/hors_doeuvres.toml", "--run", "lossy-run"]));
+    lab.start("lossy-launch", &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"])).finish();
+    assert_same(("run", &lab.bytes("lossy-run")), ("launch", &lab.bytes("lossy-launch")));
+    // The recording of both is the same, too.
+    let recording = |run: &str| std::fs::read(lab.file(run, "recording.jsonl")).unwrap();
+    let without_name = |run: &str| String::from_utf8(recording(run)).unwrap().replace(run, "");
+    assert!(without_name("lossy-run") == without_name("lossy-launch"));
+    let dropped = lab.events("lossy-run").iter().filter(|event| event["event"] == "command_dropped").count();
+    let sent: Vec<_> =
+        lab.events("lossy-run").into_iter().filter(|event| event["event"] == "command_sent").collect();
+    assert!(dropped > 0 && dropped < sent.len(), "{dropped} of {}", sent.len());
+    assert!(sent.iter().all(|event| event["performative"] == "achieve"));
+}

@@ -138,3 +138,39 @@ fn a_run_in_progress_is_not_overwritten() {
     launch.finish();
     assert_eq!(lab.events("twice").last().unwrap()["event"], "end");
 }
+
+#[test]
+fn the_deadlock_experiment_gives_the_same_table_for_any_number_of_jobs() {
+    let lab = Lab::new();
+    let experiment = |jobs: &str| {
+        let args = [
+            "experiment",
+            "deadlock",
+            "--seeds",
+            "8",
+            "--loss",
+            "0,1",
+            "--duration",
+            "200 s",
+            "--json",
+            "--jobs",
+            jobs,
+        ];
+        let (code, text) = lab.cars_without_out(&args);
+        assert_eq!(code, 0, "{text}");
+        text
+    };
+    let one = experiment("1");
+    assert_eq!(one, experiment("3"));
+    let all: serde_json::Value = serde_json::from_str(&one).unwrap();
+    assert_eq!(all["runs"].as_array().unwrap().len(), 2 * 4 * 8);
+    let exchanges = |loss: f64, arm: &str| {
+        let cells = all["estimates"].as_array().unwrap().iter();
+        let cell = cells.filter(|cell| cell["loss"] == loss && cell["arm"] == arm).collect::<Vec<_>>();
+        cell[0]["exchanges"]["mean"].as_f64().unwrap()
+    };
+    // Every command lost: who has no emotions never gets treats, timer or not.
+    assert!(exchanges(1.0, "affectless") < 1.0 && exchanges(1.0, "timer repeat") < 1.0);
+    assert!(exchanges(1.0, "affect only") > 1.5, "{}", exchanges(1.0, "affect only"));
+    assert!(exchanges(0.0, "affectless") > 1.5);
+}

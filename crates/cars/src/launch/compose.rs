@@ -1,5 +1,6 @@
 //! The same launch as containers: one service for each process.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
@@ -7,7 +8,7 @@ use protocol::RunName;
 use protocol::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use simulator::diagnostic::FileError;
 
-use super::file::{LaunchFile, Process, SIMULATOR};
+use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
 use super::plan::{name_args, speed_arg};
 use super::restart::Restart;
 use crate::common::Speed;
@@ -22,6 +23,8 @@ const FIRST_HOST: usize = 10;
 /// Most services that find an address.
 const MAX_SERVICES: usize = 240;
 const PORT: u16 = 7447;
+/// Port of the console.
+const CONSOLE_PORT: u16 = 7007;
 
 /// Explains the file to those who meet it first.
 const HEAD: &str = "\
@@ -29,8 +32,8 @@ const HEAD: &str = "\
 #
 # The image has the binaries that are built here; docker/Dockerfile says how. Then
 #     docker-compose up --exit-code-from simulator
-# plays the run and leaves its folder in ./runs. Nothing is published: the services reach each other, and nobody
-# else reaches them.
+# plays the run and leaves its folder in ./runs. The services reach each other, and nobody else reaches them but a
+# browser on this machine: the console's log shows the address.
 ";
 
 /// Writes the compose file of a launch file; paths in it are relative to the folder it is put in, the current one.
@@ -45,10 +48,17 @@ pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<S
     for (index, process) in file.processes.iter().enumerate() {
         robot_service(&mut text, process, run, FIRST_HOST + 1 + index);
     }
+    if let Some(console) = &file.console {
+        console_service(&mut text, console, run, FIRST_HOST + 1 + file.processes.len());
+    }
     let _infallible = write!(
         text,
         "networks:\n  cars:\n    internal: true\n    ipam:\n      config:\n        - subnet: {NETWORK}.0/24\n"
     );
+    if file.console.is_some() {
+        // A private network publishes nothing; the browser comes in by another one.
+        text += "  browser: {}\n";
+    }
     Ok(text)
 }
 
@@ -78,14 +88,32 @@ fn simulator_service(
     Ok(())
 }
 
-fn robot_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
-    let command: Vec<String> = process.command.iter().cloned().chain(name_args(&process.robots)).collect();
+/// The console, for a browser on the same machine. It is bound to more than loopback in its container, so its address
+/// has a token; the log of the service shows it.
+fn console_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
+    let mut command = process.command.clone();
+    command.retain(|word| !word.starts_with("--bind"));
+    command.push(format!("--bind=0.0.0.0:{CONSOLE_PORT}"));
+    let mut service = Service::begin(text, CONSOLE, &command);
+    service.map("environment", guest_env(process, run).iter());
+    service.list("depends_on", &[SIMULATOR.to_owned()]);
+    service.list("ports", &[format!("127.0.0.1:{CONSOLE_PORT}:{CONSOLE_PORT}")]);
+    service.end_in(host, "      browser: {}\n");
+}
+
+/// Environment of a service that connects to the simulator.
+fn guest_env(process: &Process, run: &RunName) -> BTreeMap<String, String> {
     let mut env = process.env.clone();
     env.insert("CARS_RUN".to_owned(), run.to_string());
     env.insert("CARS_CONNECT".to_owned(), format!("tcp/{NETWORK}.{FIRST_HOST}:{PORT}"));
     env.entry(RUNTIME_VARIABLE.to_owned()).or_insert_with(|| ONE_THREAD.to_owned());
+    env
+}
+
+fn robot_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
+    let command: Vec<String> = process.command.iter().cloned().chain(name_args(&process.robots)).collect();
     let mut service = Service::begin(text, &process.name.to_lowercase(), &command);
-    service.map("environment", env.iter());
+    service.map("environment", guest_env(process, run).iter());
     service.list("depends_on", &[SIMULATOR.to_owned()]);
     match process.restart {
         Restart::Never => {}
@@ -135,7 +163,13 @@ impl<'a> Service<'a> {
     }
 
     fn end(self, host: usize) {
-        *self.text += &format!("    networks:\n      cars:\n        ipv4_address: {NETWORK}.{host}\n\n");
+        self.end_in(host, "");
+    }
+
+    /// The end of a service that is in other networks, too.
+    fn end_in(self, host: usize, others: &str) {
+        let own = format!("      cars:\n        ipv4_address: {NETWORK}.{host}\n");
+        *self.text += &format!("    networks:\n{own}{others}\n");
     }
 }
 

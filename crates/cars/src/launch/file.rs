@@ -19,6 +19,10 @@ use crate::common::Speed;
 
 /// Name under which the simulator's process is known; no other process may have it.
 pub(crate) const SIMULATOR: &str = "simulator";
+/// Name under which the console's process is known; no other process may have it.
+pub(crate) const CONSOLE: &str = "console";
+/// Program of the console.
+const CONSOLE_PROGRAM: &str = "cars-console";
 /// Program of the simulator, unless the file says otherwise.
 const SIMULATOR_PROGRAM: &str = "cars-sim";
 /// First wait before a restart, unless the file says otherwise.
@@ -38,6 +42,8 @@ pub(crate) struct LaunchFile {
     pub(crate) speed: Option<Speed>,
     /// The simulator's own process.
     pub(crate) simulator: Process,
+    /// The console's process, unless it is not wanted.
+    pub(crate) console: Option<Process>,
     /// The robots' processes, in the order of the file.
     pub(crate) processes: Vec<Process>,
 }
@@ -73,6 +79,8 @@ struct RawFile {
     speed: Option<Spanned<RawSpeed>>,
     #[serde(default)]
     simulator: RawSimulator,
+    #[serde(default)]
+    console: RawConsole,
     #[serde(default, rename = "process")]
     processes: Vec<RawProcess>,
 }
@@ -91,6 +99,22 @@ struct RawSimulator {
     command: Option<Spanned<Vec<String>>>,
     #[serde(default)]
     env: BTreeMap<String, String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawConsole {
+    #[serde(default = "yes")]
+    enabled: bool,
+    bind: Option<String>,
+    #[serde(default)]
+    env: BTreeMap<String, String>,
+}
+
+impl Default for RawConsole {
+    fn default() -> Self {
+        Self { enabled: true, bind: None, env: BTreeMap::new() }
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -126,7 +150,8 @@ impl LaunchFile {
         let raw: RawFile = source.parse()?;
         let speed = raw.speed.map(|speed| check_speed(&source, &speed)).transpose()?;
         let simulator = check_simulator(&source, raw.simulator)?;
-        let mut names = BTreeSet::from([SIMULATOR.to_owned()]);
+        let console = raw.console.enabled.then(|| console(raw.console));
+        let mut names = BTreeSet::from([SIMULATOR, CONSOLE].map(str::to_owned));
         let mut processes = Vec::new();
         for process in raw.processes {
             let (span, process) = (process.name.span(), check_process(&source, process)?);
@@ -137,7 +162,8 @@ impl LaunchFile {
         }
         let scenario_span = Some(raw.scenario.span());
         let scenario = tidy(&folder.join(raw.scenario.into_inner()));
-        Ok(Self { source, folder: folder.to_owned(), scenario, scenario_span, speed, simulator, processes })
+        let folder = folder.to_owned();
+        Ok(Self { source, folder, scenario, scenario_span, speed, simulator, console, processes })
     }
 
     /// What a plain roster means: one process for each robot, its program called after its class.
@@ -153,6 +179,7 @@ impl LaunchFile {
             scenario_span: None,
             speed: None,
             simulator: Process::new(SIMULATOR, vec![SIMULATOR_PROGRAM.to_owned()]),
+            console: Some(console(RawConsole::default())),
             processes: scenario.robots.iter().map(process).collect(),
         }
     }
@@ -220,6 +247,10 @@ fn second_process(source: &Source, span: Range<usize>, name: &str) -> FileError 
         return FileError::at(source, Some(span), "this name is the simulator's own")
             .with_help("to change how the simulator starts, write a table [simulator]");
     }
+    if name == CONSOLE {
+        return FileError::at(source, Some(span), "this name is the console's own")
+            .with_help("to change how the console starts, write a table [console]");
+    }
     FileError::at(source, Some(span), &format!("a second process called {name}"))
         .with_help("each process has a name of its own: its log is called after it")
 }
@@ -231,6 +262,12 @@ fn check_simulator(source: &Source, raw: RawSimulator) -> Result<Process, FileEr
         None => vec![SIMULATOR_PROGRAM.to_owned()],
     };
     Ok(Process { span, env: raw.env, ..Process::new(SIMULATOR, command) })
+}
+
+fn console(raw: RawConsole) -> Process {
+    let mut command = vec![CONSOLE_PROGRAM.to_owned()];
+    command.extend(raw.bind.map(|bind| format!("--bind={bind}")));
+    Process { env: raw.env, is_required: false, ..Process::new(CONSOLE, command) }
 }
 
 fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError> {

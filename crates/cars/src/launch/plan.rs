@@ -34,8 +34,19 @@ pub(super) struct Planned {
     pub(super) is_required: bool,
     /// Whether somebody else starts it.
     pub(super) is_extern: bool,
-    /// Whether the run is over when it is.
-    pub(super) is_simulator: bool,
+    /// What it is for.
+    pub(super) part: Part,
+}
+
+/// What a process is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    /// The run is over when it is.
+    Simulator,
+    /// It runs robots, and leaves when it hears that the run is over.
+    Robots,
+    /// It watches, and is told to end when the run is over.
+    Observer,
 }
 
 /// What a run is called and where it happens.
@@ -47,6 +58,10 @@ pub(super) struct Execution<'a> {
     pub(super) out: &'a Path,
     pub(super) speed: Speed,
     pub(super) is_paused: bool,
+    /// Whether the console is wanted.
+    pub(super) has_console: bool,
+    /// Whether it is to open a browser.
+    pub(super) opens_browser: bool,
 }
 
 /// All processes of a launch file, the simulator first.
@@ -54,14 +69,31 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
     let places = Places::new(&file.folder);
     let mut planned = vec![simulator(file, execution, &places)?];
     for process in &file.processes {
-        let mut env = process.env.clone();
-        env.insert("CARS_RUN".to_owned(), execution.run.to_string());
-        env.insert("CARS_CONNECT".to_owned(), execution.endpoint.to_owned());
-        let program = program(file, process, &places)?;
-        let args = process.command.iter().skip(1).cloned().chain(name_args(&process.robots)).collect();
-        planned.push(prepare(process, CommandLine { program, args, env }));
+        let command = guest(file, process, name_args(&process.robots), execution, &places)?;
+        planned.push(prepare(process, command));
+    }
+    if let Some(process) = file.console.as_ref().filter(|_| execution.has_console) {
+        let args = execution.opens_browser.then(|| "--open".to_owned()).into_iter().collect();
+        let command = guest(file, process, args, execution, &places)?;
+        planned.push(Planned { part: Part::Observer, ..prepare(process, command) });
     }
     Ok(planned)
+}
+
+/// The command line of a process that connects to the simulator.
+fn guest(
+    file: &LaunchFile,
+    process: &Process,
+    args: Vec<String>,
+    execution: &Execution,
+    places: &Places,
+) -> Result<CommandLine, FileError> {
+    let mut env = process.env.clone();
+    env.insert("CARS_RUN".to_owned(), execution.run.to_string());
+    env.insert("CARS_CONNECT".to_owned(), execution.endpoint.to_owned());
+    let program = program(file, process, places)?;
+    let args = process.command.iter().skip(1).cloned().chain(args).collect();
+    Ok(CommandLine { program, args, env })
 }
 
 /// How a program is told which robots it runs.
@@ -88,7 +120,7 @@ fn simulator(file: &LaunchFile, execution: &Execution, places: &Places) -> Resul
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
     let program = program(file, process, places)?;
     let command = CommandLine { program, args, env: process.env.clone() };
-    Ok(Planned { is_simulator: true, ..prepare(process, command) })
+    Ok(Planned { part: Part::Simulator, ..prepare(process, command) })
 }
 
 fn prepare(process: &Process, mut command: CommandLine) -> Planned {
@@ -106,7 +138,7 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
         backoff: process.backoff,
         is_required: process.is_required,
         is_extern: process.is_extern,
-        is_simulator: false,
+        part: Part::Robots,
     }
 }
 

@@ -8,7 +8,7 @@ use nix::sys::signal::Signal;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
 use super::ending::{Ended, Failure};
-use super::plan::Planned;
+use super::plan::{Part, Planned};
 use super::process::{self, Group, Output, Tail};
 use super::restart::{BUDGET, Budget};
 use super::screen::Tell;
@@ -161,10 +161,10 @@ impl Supervisor {
 
     fn on_ended(&mut self, index: usize, ended: &Ended) {
         self.kept[index].group = None;
-        if self.kept[index].planned.is_simulator {
+        if self.kept[index].planned.part == Part::Simulator {
             self.on_simulator_ended(index, ended);
         } else if self.stage == Stage::Running {
-            self.on_robot_ended(index, ended);
+            self.on_other_ended(index, ended);
         } else if ended.has_failed() && self.stage <= Stage::Leaving {
             self.tell.notice(format!("{} {ended} at the end of the run", self.kept[index].planned.name));
         }
@@ -182,12 +182,17 @@ impl Supervisor {
                 self.terminate();
             }
             // A failure after the signal that asked for the end is the end that was asked for.
-            _ => self.enter(Stage::Leaving),
+            _ => {
+                self.enter(Stage::Leaving);
+                // Robots hear that the run is over; who watches would go on watching.
+                let observers = self.kept.iter().filter(|kept| kept.planned.part == Part::Observer);
+                observers.filter_map(|kept| kept.group).for_each(|group| group.signal(Signal::SIGTERM));
+            }
         }
     }
 
-    /// A robot's process is over before the run is.
-    fn on_robot_ended(&mut self, index: usize, ended: &Ended) {
+    /// A process other than the simulator is over before the run is.
+    fn on_other_ended(&mut self, index: usize, ended: &Ended) {
         let kept = &mut self.kept[index];
         let (name, has_failed) = (kept.planned.name.clone(), ended.has_failed());
         if kept.planned.restart.applies(has_failed) {
@@ -271,7 +276,7 @@ impl Supervisor {
 
     /// Lets the simulator end the run in good order: it writes its record, and the robots leave.
     fn stop(&mut self) {
-        match self.kept.iter().find(|kept| kept.planned.is_simulator).and_then(|kept| kept.group) {
+        match self.kept.iter().find(|kept| kept.planned.part == Part::Simulator).and_then(|kept| kept.group) {
             Some(simulator) => {
                 simulator.signal(Signal::SIGTERM);
                 self.enter(Stage::Stopping);

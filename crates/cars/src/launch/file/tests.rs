@@ -77,6 +77,15 @@ fn a_file_means_what_it_says() {
 }
 
 #[test]
+fn the_console_runs_unless_it_is_not_wanted() {
+    let console = load(BOTH).unwrap().console.unwrap();
+    assert_eq!((console.command, console.is_required), (vec!["cars-console".to_owned()], false));
+    let bound = load(&format!("[console]\nbind = \"127.0.0.1:8080\"\n{BOTH}")).unwrap().console.unwrap();
+    assert_eq!(bound.command, ["cars-console", "--bind=127.0.0.1:8080"]);
+    assert!(load(&format!("[console]\nenabled = false\n{BOTH}")).unwrap().console.is_none());
+}
+
+#[test]
 fn one_process_may_run_several_robots() {
     let file =
         load("[[process]]\nname = \"all\"\ncommand = [\"x\"]\nrobots = [\"Leguin\", \"Butler\"]").unwrap();
@@ -117,6 +126,7 @@ fn every_robot_is_run_by_exactly_one_process() {
 fn names_are_unique_and_fit_for_files() {
     check(&format!("{BOTH}{BOTH}"), &["a second process called Butler"]);
     check("[[process]]\nname = \"simulator\"\ncommand = [\"x\"]", &["simulator's own", "[simulator]"]);
+    check("[[process]]\nname = \"console\"\ncommand = [\"x\"]", &["console's own", "[console]"]);
     check("[[process]]\nname = \"../x\"\ncommand = [\"x\"]", &["not a usable name", "launch/x.toml:3:8"]);
 }
 

@@ -29,7 +29,7 @@ impl Hall {
             planned: Vec::new(),
             grace: Duration::from_secs(20),
         };
-        hall.with(Planned { is_simulator: true, ..shell("simulator", simulator) })
+        hall.with(Planned { part: Part::Simulator, ..shell("simulator", simulator) })
     }
 
     fn with(mut self, mut planned: Planned) -> Self {
@@ -95,7 +95,7 @@ fn shell(name: &str, script: &str) -> Planned {
         backoff: Duration::from_millis(1),
         is_required: true,
         is_extern: false,
-        is_simulator: false,
+        part: Part::Robots,
     }
 }
 
@@ -120,6 +120,18 @@ fn a_run_that_ends_well_is_no_failure() {
     let hall = Hall::new("sleep 0.2").with(shell("Butler", "sleep 0.1")).with(shell("Leguin", "sleep 0.3"));
     let outcome = hall.run(&[], &[]);
     assert_eq!((outcome.failure, outcome.asked), (None, None));
+}
+
+#[test]
+fn who_watches_is_told_when_the_run_is_over_and_does_not_end_it() {
+    let watching = "trap 'touch $DIR/told; exit 0' TERM; touch $DIR/watching; sleep 600 & wait";
+    let observer = Planned { part: Part::Observer, is_required: false, ..shell("console", watching) };
+    let broken = Planned { part: Part::Observer, is_required: false, ..shell("broken", "exit 1") };
+    let hall = Hall::new("until [ -e $DIR/watching ]; do sleep 0.01; done").with(observer).with(broken);
+    let told = hall.path("told");
+    let outcome = hall.run(&[], &[]);
+    assert_eq!((outcome.failure, outcome.asked), (None, None));
+    assert!(told.exists());
 }
 
 #[test]
