@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod common;
 mod control;
+mod emotionml;
 mod experiment;
 mod launch;
 mod run;
@@ -42,6 +43,8 @@ enum Subcommands {
     Command(control::CommandArgs),
     /// Show the log of a run; `-f` follows one in progress.
     Log(control::LogArgs),
+    /// Export what the robots of a run felt as EmotionML 1.0.
+    Emotionml(emotionml::EmotionmlArgs),
     /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
     Bench(bench::BenchArgs),
     /// Print shell completions.
@@ -72,6 +75,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Query(args) => control::query(&args),
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
+        Subcommands::Emotionml(args) => emotionml::emotionml(&args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),
         Subcommands::BenchEcho { address } => bench::echo(&address),
