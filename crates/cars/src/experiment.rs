@@ -343,7 +343,7 @@ impl Plan<'_> {
     fn compared(&self) -> String {
         let Common { scenario, seeds, duration, .. } = self.common;
         let mut text = format!(
-            "{}: {seeds} runs of {} s for each line, seeds 1 to {seeds}. Runs with the same seed begin alike\n             and have the same chance, whatever the arm. {}\nMean and 95 % confidence interval over the seeds.\n\n",
+            "{}: {seeds} runs of {} s for each line, seeds 1 to {seeds}. Runs with the same seed begin alike\nand have the same chance, whatever the arm. {}\nMean and 95 % confidence interval over the seeds.\n\n",
             scenario.display(),
             duration.0,
             self.explained,
