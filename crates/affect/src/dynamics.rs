@@ -1,6 +1,6 @@
 //! How an emotion changes with time: the intensity filter and the state machine over a [`Ladder`].
 //!
-//! This is the rule table of affect.md 5.3. Documented are its shape [D: S]: positive progress keeps a
+//! Documented is the shape of the rule [D: S]: positive progress keeps a
 //! robot HAPPY, negative progress worries it increasingly until it is FRUSTRATED, and from there a positive
 //! input leads back as far as it is important. The numbers are parameters \[I\].
 //!

@@ -31,8 +31,8 @@
 //!
 //! # A robot with emotions of its own
 //!
-//! A guide that waits for visitors and becomes bored. It brings its own set of emotions, a schema for one of
-//! them, and composes the rest.
+//! This is a guide that waits for visitors and becomes bored. It brings its own set of emotions, a schema for one
+//! of them, and composes the rest. A whole robot, as a process of a simulation, is in `docs/new-robot.md`.
 //!
 //! ```
 //! use affect::akr::Valence;

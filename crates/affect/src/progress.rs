@@ -1,7 +1,7 @@
 //! Progress measures: how fast a stock empties, when help arrives, and how the two compare.
 //!
 //! An emotion generator needs a measure of progress, and the published one is not readable. These are the
-//! pieces of the measure proposed in affect.md 5.2 [I throughout]: pure, in SI units, and of use to any
+//! pieces of a measure chosen for this project [I throughout]: pure, in SI units, and of use to any
 //! robot that consumes something and waits for somebody.
 
 use crate::parameters::{ParameterError, not_negative, positive};

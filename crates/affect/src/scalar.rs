@@ -106,7 +106,7 @@ impl Default for Intensity {
 }
 
 impl Default for Caution {
-    /// The middle of the interval [I: affect.md 5.1].
+    /// The middle of the interval \[I\].
     fn default() -> Self {
         Self(0.5)
     }

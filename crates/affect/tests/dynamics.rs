@@ -91,7 +91,7 @@ fn without_a_measure_intensity_stays() {
 }
 
 #[test]
-fn test_18_a_positive_input_leads_back_as_far_as_it_is_important() {
+fn t18_a_positive_input_leads_back_as_far_as_it_is_important() {
     for (value, expected) in [(0.1, Frustrated), (0.4, Concerned), (0.7, Confident), (0.9, Happy)] {
         let mut robot = Robot::new(StateSet::Murphy4);
         robot.entered(Stimulus::need(9.0), 60.0);
@@ -147,7 +147,7 @@ fn anger_begins_anew_after_another_emotion() {
 }
 
 #[test]
-fn test_19_cannot_keeps_discouraged_and_can_gives_hope() {
+fn t19_cannot_keeps_discouraged_and_can_gives_hope() {
     for state_set in [StateSet::Murphy4, StateSet::Akr4] {
         let mut robot = Robot::new(state_set);
         robot.entered(Stimulus::need(9.0), 60.0);
@@ -290,7 +290,7 @@ proptest! {
 
     /// For one and the same course of need, a more cautious robot never feels less while need grows.
     #[test]
-    fn test_04_caution_never_slows_the_rise(low in 0.0..1.0, high in 0.0..1.0, slope in 0.01..1.0) {
+    fn t04_caution_never_slows_the_rise(low in 0.0..1.0, high in 0.0..1.0, slope in 0.01..1.0) {
         let (low, high) = if low <= high { (low, high) } else { (high, low) };
         let parameters = DynamicsParameters::default();
         let make = |caution| Dynamics::standard(&parameters, Caution::saturating(caution)).unwrap();
@@ -307,7 +307,7 @@ proptest! {
 
     /// Whatever the moment, what was written down and read again continues identically.
     #[test]
-    fn test_23_a_saved_state_continues(course in any_course(), cut in 0.0..1.0, state_set in any_set()) {
+    fn t23_a_saved_state_continues(course in any_course(), cut in 0.0..1.0, state_set in any_set()) {
         let dynamics = dynamics(state_set);
         let cut = (course.len() as f64 * cut) as usize;
         let mut state = dynamics.start();

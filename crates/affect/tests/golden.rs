@@ -30,7 +30,7 @@ fn run(caution: f64, closing_ft_s: f64, limit_s: f64) -> Waiter {
 }
 
 #[test]
-fn test_03_the_refiller_never_moves() {
+fn t03_the_refiller_never_moves() {
     let table = [
         (0.00, [(24.0, 6), (26.0, 4), (28.5, 2)]),
         (0.25, [(19.0, 11), (21.0, 9), (23.0, 7)]),
@@ -52,7 +52,7 @@ fn test_03_the_refiller_never_moves() {
 }
 
 #[test]
-fn test_03_the_refiller_comes_as_soon_as_it_is_called() {
+fn t03_the_refiller_comes_as_soon_as_it_is_called() {
     let waiter = run(0.5, 3.0, 60.0);
     assert_within_a_tick(&waiter.changes, &[(14.5, Confident, 16), (22.0, Happy, 8)], "caution 0.5");
     assert_eq!((waiter.time_s(), waiter.treats(), waiter.has_met()), (23.5, 7, true));
@@ -63,7 +63,7 @@ fn test_03_the_refiller_comes_as_soon_as_it_is_called() {
 }
 
 #[test]
-fn test_02_emotions_come_in_order_and_each_message_once() {
+fn t02_emotions_come_in_order_and_each_message_once() {
     for caution in [0.0, 0.3, 0.7, 1.0] {
         let waiter = run(caution, 0.0, 120.0);
         let emotions: Vec<_> = waiter.changes.iter().map(|change| change.1).collect();
@@ -73,7 +73,7 @@ fn test_02_emotions_come_in_order_and_each_message_once() {
 }
 
 #[test]
-fn test_04_more_caution_is_never_later() {
+fn t04_more_caution_is_never_later() {
     let time_s =
         |waiter: &Waiter, emotion| waiter.changes.iter().find(|change| change.1 == emotion).unwrap().0;
     let runs: Vec<Waiter> = (0..=50).map(|step| run(f64::from(step) / 50.0, 0.0, 120.0)).collect();
@@ -85,7 +85,7 @@ fn test_04_more_caution_is_never_later() {
 }
 
 #[test]
-fn test_23_saved_at_any_tick_it_continues_identically() {
+fn t23_saved_at_any_tick_it_continues_identically() {
     for closing_ft_s in [0.0, 3.0] {
         let straight = run(0.5, closing_ft_s, 40.0);
         for save_tick in 0..80 {

@@ -4,7 +4,7 @@
 
 use affect::akr::{
     Affect, Agency, Components, Duration, Emotion, FacialExpression, Focality, Mood, Personality, Preference,
-    Refusal, Strategy, TABLE_2, Trait, Valence,
+    Refusal, Signal, Strategy, TABLE_2, Trait, Valence,
 };
 use affect::{
     Caution, Circumstances, EmotionLabel, Intensity, IntensityLabel, SchemaError, Schemata, StandardEmotion,
@@ -28,7 +28,7 @@ fn refused(name: &str, change: impl Fn(&mut Components)) -> String {
 }
 
 #[test]
-fn test_22_every_standard_emotion_has_legal_components() {
+fn t22_every_standard_emotion_has_legal_components() {
     assert_eq!(Schemata::standard().names().count(), StandardEmotion::ALL.len());
     for label in StandardEmotion::ALL {
         let emotion = emotion(label.name());
@@ -43,7 +43,7 @@ fn test_22_every_standard_emotion_has_legal_components() {
 }
 
 #[test]
-fn test_22_frustrated_points_to_the_other_and_happy_to_the_self() {
+fn t22_frustrated_points_to_the_other_and_happy_to_the_self() {
     assert_eq!(emotion("FRUSTRATED").components().agency, Agency::Other("Leguin".to_owned()));
     assert_eq!(emotion("HAPPY").components().agency, Agency::Oneself);
     let nobody = Circumstances::default();
@@ -57,6 +57,16 @@ fn schemata_have_the_tendencies_of_table_2() {
     for row in TABLE_2 {
         assert_eq!(emotion(row.emotion.name()).components().action_tendency, row.tendency);
     }
+}
+
+#[test]
+fn an_emotion_signals_what_its_tendency_inclines_to() {
+    let signal = |name| emotion(name).components().causal_chain.goal.signal();
+    for name in ["HAPPY", "CONFIDENT", "CONCERNED", "HOPEFUL"] {
+        assert_eq!(signal(name), Signal::Continue, "{name}");
+    }
+    assert_eq!((signal("FRUSTRATED"), signal("ANGRY")), (Signal::ChangeCourse, Signal::ChangeCourse));
+    assert_eq!(signal("DISCOURAGED"), Signal::Disengage);
 }
 
 #[test]

@@ -5,6 +5,9 @@
 //! is how they move ([`drive`]), what they know of one another ([`peer`]) and their own chance ([`chance`]). They see
 //! nothing of the world but what the SDK gives them.
 //!
+//! What they feel acts at two of the three levels of `affect::levels`: sensory-motor (Leguin's speed) and schematic (what
+//! either of them does). Each has a switch, and so have all emotions of a robot, for experiments without.
+//!
 //! Much of the original robots was never published in a readable form. As in `affect`, a number or a rule is
 //! **\[D\]** documented in a readable source (the seed, unless another is named), or **\[I\]** inferred or chosen here;
 //! every chosen number is a parameter.

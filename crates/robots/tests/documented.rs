@@ -1,5 +1,6 @@
-//! What is documented of the two robots (affect.md 5.10), each test named after its number there. Statistics of whole
-//! halls are the system tests' matter.
+//! What is documented of the two robots, as far as a robot or two on an open field can show it. The tests are numbered:
+//! `t03`, `t04`, `t19` and `t22` are the affect library's, what takes whole halls (`t12`, `t13`, `t15`, `t20`, `t21`) is in
+//! the system tests, `t24` is the EmotionML export's.
 
 mod stage;
 
@@ -339,6 +340,44 @@ fn t18_a_completed_exchange_makes_butler_happy_at_once() {
 }
 
 #[test]
+fn t18_butler_calms_down_when_leguin_gets_on_again() {
+    // He stays where he is, so that all progress is hers.
+    let butler = "v_serve_mps = 0.0\nv_intercept_mps = 0.0";
+    for seed in 0..16 {
+        let emotions = |is_unblocked: bool| {
+            let cast = vec![
+                Role::new("Butler", "Butler", feet(25.0, 25.0), butler),
+                Role::new("Leguin", "Leguin", feet(4.0, 4.0), ""),
+            ];
+            let mut stage = Stage::new(seed, cast);
+            // Bodies all around her: nobody gets through.
+            stage.obstacles =
+                (0..8).flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))]).collect();
+            stage.begin();
+            assert!(stage.step_until(120.0, |stage| stage.emotion("Butler") == "FRUSTRATED"), "seed {seed}");
+            if is_unblocked {
+                stage.obstacles.clear();
+            }
+            let mut emotions = Vec::new();
+            stage.step_until(30.0, |stage| {
+                let is_met = stage.behavior("Butler") == "EXCHANGE";
+                if !is_met {
+                    emotions.push(stage.emotion("Butler").to_owned());
+                }
+                is_met
+            });
+            emotions.dedup();
+            emotions
+        };
+        assert_eq!(emotions(false), ["FRUSTRATED"], "seed {seed}: nothing changes for the better");
+        let calmed = emotions(true);
+        let is_lower = |emotion: &String| ["CONCERNED", "CONFIDENT", "HAPPY"].contains(&emotion.as_str());
+        assert!(calmed[0] == "FRUSTRATED" && calmed.len() > 1, "seed {seed}: {calmed:?}");
+        assert!(calmed[1..].iter().all(is_lower), "seed {seed}: {calmed:?}");
+    }
+}
+
+#[test]
 fn t23_saved_and_restored_in_mid_run_both_continue_identically() {
     let run = |reborn_at: u64| {
         let mut stage = Stage::new(
@@ -368,5 +407,28 @@ fn t23_saved_and_restored_in_mid_run_both_continue_identically() {
     assert_eq!(behaviors.len(), leguin::Behavior::ALL.len(), "the run goes through every behavior");
     for reborn_at in (1..240).step_by(7) {
         assert!(run(reborn_at) == straight, "saved at tick {reborn_at}");
+    }
+}
+
+#[test]
+fn t25_the_order_in_which_robots_act_changes_nothing() {
+    let play = |order: [usize; 3]| {
+        let mut cast: Vec<Option<Role>> = vec![
+            Some(Role::new("Butler", "Butler", feet(25.0, 25.0), "")),
+            Some(Role::new("Leguin", "Leguin", feet(4.0, 4.0), "")),
+            Some(Role::new("Vonda", "Vonda", feet(46.0, 4.0), "")),
+        ];
+        let mut stage = Stage::new(11, order.into_iter().filter_map(|index| cast[index].take()).collect());
+        stage.begin();
+        (0..600)
+            .map(|_| {
+                stage.step();
+                (stage.places.clone(), stage.reports.clone())
+            })
+            .collect::<Vec<_>>()
+    };
+    let straight = play([0, 1, 2]);
+    for order in [[0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        assert!(play(order) == straight, "{order:?}");
     }
 }

@@ -111,6 +111,10 @@ fn senseless_parameters_are_refused_with_their_name() {
         ("consume_in = [\"DANCE\"]", "DANCE"),
         ("cuation = 0.5", "cuation"),
         ("affect = \"maybe\"", "maybe"),
+        ("schematic = \"of\"", "`of`"),
+        ("schematics = \"off\"", "schematics"),
+        // He has no motor output that his emotion could modify.
+        ("sensory_motor = \"off\"", "sensory_motor"),
         ("exchange_s = nan", "exchange_s"),
         ("[dynamics]\nth_confident = 0.9", "0.9"),
         ("[rate]\nwindow_s = 0.0", "window_s"),
@@ -118,8 +122,15 @@ fn senseless_parameters_are_refused_with_their_name() {
         let reason = refusal(text).unwrap_err();
         assert!(reason.contains(named), "{text}: {reason}");
     }
-    let leguin = |text: &str| Leguin::new(toml::from_str(text).unwrap()).map(|_| ());
+    let leguin = |text: &str| {
+        let parameters = toml::from_str(text).map_err(|error| error.to_string())?;
+        Leguin::new(parameters).map(|_| ())
+    };
     assert!(leguin("hurry_mult = -1.0").is_err());
+    assert_eq!(leguin("sensory_motor = \"off\"\nschematic = \"off\""), Ok(()));
+    assert!(leguin("sensory_motor = \"no\"").unwrap_err().contains("`no`"));
+    assert!(leguin("schematic = true").unwrap_err().contains("schematic"));
+    assert!(leguin("sensorymotor = \"off\"").unwrap_err().contains("sensorymotor"));
     assert!(leguin("await_patience_s = 0.0").unwrap_err().contains("await_patience_s"));
 }
 

@@ -53,7 +53,8 @@ pub enum Focality {
 
 /// A coarse affective state: two dimensions and no more [D: S].
 ///
-/// Moods and emotions contain one. It is all that the sensory-motor level may see.
+/// The figure of the taxonomy lists duration and focality here, too [D: F2]; they have values only where a state is a
+/// mood or an emotion, and stand there. Moods and emotions contain one. It is all that the sensory-motor level may see.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Affect {

@@ -38,6 +38,31 @@ pub enum GoalStatus {
     Lost,
 }
 
+/// What an emotion signals about the course of action: to oneself, and to others, who can see it [D: S].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Signal {
+    /// Go on in this direction.
+    Continue,
+    /// Reach the goal in another way.
+    ChangeCourse,
+    /// Leave the goal.
+    Disengage,
+}
+
+impl GoalStatus {
+    /// That an achieved goal signals to continue, and a lost one to change course or to disengage, is documented
+    /// [D: S]; which of the two a blocked goal signals, and that one at risk still signals to continue, is chosen
+    /// here \[I\].
+    pub fn signal(self) -> Signal {
+        match self {
+            Self::Achieved | Self::Expected | Self::AtRisk => Signal::Continue,
+            Self::Blocked => Signal::ChangeCourse,
+            Self::Lost => Signal::Disengage,
+        }
+    }
+}
+
 /// One step of a causal chain, in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

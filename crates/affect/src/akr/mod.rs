@@ -24,7 +24,7 @@ mod tendency;
 
 pub use affect::{Affect, Duration, Focality, Valence};
 pub use appraisal::{Agency, Certainty, Compatibility, Degree, FacialExpression, Novelty};
-pub use emotion::{Account, Clause, ClauseKind, Components, Emotion, GoalStatus};
+pub use emotion::{Account, Clause, ClauseKind, Components, Emotion, GoalStatus, Signal};
 pub use mood::Mood;
 pub use personality::{Personality, Preference, Strategy, Trait};
 pub use tendency::{ActionTendency, PrimaryTendency, TABLE_1, TABLE_2, TaskTendency};

@@ -9,7 +9,7 @@ use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::progress::{need_ratio, time_to_arrive_by_depot_s, time_to_arrive_s, time_to_empty_s};
 use affect::{
     Circumstances, DynamicGenerator, Dynamics, EmotionGenerator, EmotionLabel, EmotionState, Feeling,
-    Intensity, StandardEmotion, SteadyGenerator,
+    Intensity, StandardEmotion,
 };
 use robot::{BadParameters, Cars, Panel, Point, Robot, RobotName, StateVariables, Widget};
 use serde::{Deserialize, Serialize};
@@ -29,16 +29,11 @@ const JOKES: &[&str] = &[
     "I used to serve soup. It was a short walk and a long cleaning.",
 ];
 
-/// His emotion state generator, or none.
-enum Esg {
-    Feels(Box<DynamicGenerator<Measures, Behavior, StandardEmotion>>),
-    Affectless(SteadyGenerator<Measures, Behavior, StandardEmotion>),
-}
-
 /// The waiter.
 pub struct Butler {
     parameters: Parameters,
-    esg: Esg,
+    /// Without emotions it never runs, and stays as it starts.
+    esg: DynamicGenerator<Measures, Behavior, StandardEmotion>,
     bsg: BehaviorGenerator<Behavior, Context, Act>,
     state: State,
 }
@@ -48,7 +43,7 @@ pub struct Butler {
 #[serde(deny_unknown_fields)]
 pub struct Saved {
     state: State,
-    emotion: Option<EmotionState<StandardEmotion>>,
+    emotion: EmotionState<StandardEmotion>,
     behavior: BehaviorState<Behavior>,
 }
 
@@ -72,21 +67,14 @@ impl Butler {
         let state = State::new(&parameters).map_err(|error| error.to_string())?;
         let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution);
         let dynamics = dynamics.map_err(|error| error.to_string())?;
-        let esg = if parameters.affect.is_on() {
-            Esg::Feels(Box::new(DynamicGenerator::new(dynamics, appraise)))
-        } else {
-            Esg::Affectless(SteadyGenerator::new(StandardEmotion::Happy))
-        };
+        let esg = DynamicGenerator::new(dynamics, appraise);
         Ok(Self { parameters, esg, bsg: BehaviorGenerator::new(TABLE, Behavior::Serve), state })
     }
 
     /// What he feels; without emotions a steady state without intensity.
     #[must_use]
     pub fn feeling(&self) -> Feeling<StandardEmotion> {
-        match &self.esg {
-            Esg::Feels(esg) => esg.feeling(),
-            Esg::Affectless(esg) => esg.feeling(),
-        }
+        self.esg.feeling()
     }
 
     /// What he does.
@@ -98,23 +86,27 @@ impl Butler {
     /// All that changes in him.
     #[must_use]
     pub fn save(&self) -> Saved {
-        let emotion = match &self.esg {
-            Esg::Feels(esg) => Some(esg.state().clone()),
-            Esg::Affectless(_) => None,
-        };
-        Saved { state: self.state.clone(), emotion, behavior: self.bsg.state().clone() }
+        Saved {
+            state: self.state.clone(),
+            emotion: self.esg.state().clone(),
+            behavior: self.bsg.state().clone(),
+        }
     }
 
     /// Continues from a saved state; the parameters must be those it was saved with.
     ///
     /// # Errors
-    /// The saved state is of a Butler with emotions and he has none, or the other way round, or it is not legal.
+    /// The saved emotion is none that a Butler of these parameters can have.
     pub fn restore(&mut self, saved: Saved) -> Result<(), String> {
-        match (&mut self.esg, saved.emotion) {
-            (Esg::Feels(esg), Some(emotion)) if esg.dynamics().accepts(&emotion) => esg.restore(emotion),
-            (Esg::Affectless(_), None) => {}
-            _ => return Err("the saved emotion does not fit these parameters".to_owned()),
+        let is_possible = if self.parameters.affect.is_on() {
+            self.esg.dynamics().accepts(&saved.emotion)
+        } else {
+            saved.emotion == *self.esg.state()
+        };
+        if !is_possible {
+            return Err("the saved emotion does not fit these parameters".to_owned());
         }
+        self.esg.restore(saved.emotion);
         self.bsg.restore(saved.behavior);
         self.state = saved.state;
         Ok(())
@@ -200,7 +192,7 @@ impl Butler {
 
     fn context(&self, cars: &Cars<'_>) -> Context {
         let (state, parameters) = (&self.state, &self.parameters);
-        let has_emotions = parameters.affect.is_on();
+        let acts_by_emotion = parameters.acts_by_emotion();
         let stale_s = parameters.query_stale_s;
         let refiller = state.refiller.behavior(stale_s);
         // She may see the two of them meet a tick before he does, and then already exchanges.
@@ -210,8 +202,8 @@ impl Butler {
         let is_here = state.refiller.is_within(radius_m, state.at, cars.welcome().sensing_range_m);
         let is_due = |since_s: f64| parameters.resend.is_on() && since_s >= parameters.resend_s;
         Context {
-            emotion: has_emotions.then(|| self.feeling().emotion),
-            is_pressed: !has_emotions && self.pressure() >= parameters.dynamics.th_confident,
+            emotion: acts_by_emotion.then(|| self.feeling().emotion),
+            is_pressed: !acts_by_emotion && self.pressure() >= parameters.dynamics.th_confident,
             need: state.need,
             called: state.called,
             hurried: state.hurried,
@@ -352,12 +344,10 @@ impl Robot for Butler {
     }
 
     fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
-        let (measures, behavior, tick_s) = (&self.state.measures, self.bsg.current(), cars.tick_s());
-        let feeling = match &mut self.esg {
-            Esg::Feels(esg) => esg.update(measures, behavior, tick_s),
-            Esg::Affectless(esg) => esg.update(measures, behavior, tick_s),
-        };
-        self.state.remember(feeling);
+        if self.parameters.affect.is_on() {
+            self.esg.update(&self.state.measures, self.bsg.current(), cars.tick_s());
+        }
+        self.state.remember(self.esg.feeling());
     }
 
     fn emotion_state(&self) -> &str {

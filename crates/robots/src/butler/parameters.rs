@@ -22,6 +22,9 @@ pub struct Parameters {
     /// Whether he has emotions. `off` is a baseline that calls by the same measure of progress, and neither asks to
     /// hurry nor intercepts. Default on \[I\].
     pub affect: Switch,
+    /// Whether what he feels has a say in what he does: the schematic level \[D: Murphy et al. 2002, abstract\]. `off`
+    /// has him feel and show his emotions, and act as the one without. Default on \[I\].
+    pub schematic: Switch,
     /// Whether he repeats a message that shows no effect, by a timer. Default off \[I\].
     pub resend: Switch,
     /// After how long he repeats it, s. Default 5 \[I\].
@@ -116,6 +119,7 @@ impl Default for Parameters {
             goods: "treats".to_owned(),
             goal: "to serve the guests".to_owned(),
             affect: Switch::On,
+            schematic: Switch::On,
             resend: Switch::Off,
             resend_s: 5.0,
             caution: Caution::default(),
@@ -172,6 +176,11 @@ impl Parameters {
             return Err("treat_capacity must be at least 1".to_owned());
         }
         Ok(())
+    }
+
+    /// Whether the guards of his behaviors see what he feels.
+    pub(super) fn acts_by_emotion(&self) -> bool {
+        self.affect.is_on() && self.schematic.is_on()
     }
 
     pub(super) fn rate(&self) -> RateParameters {

@@ -64,9 +64,9 @@ pub enum Act {
 /// What a row's guard can see.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Context {
-    /// What he feels; `None` without emotions.
+    /// What he feels; `None` if that has no say.
     pub emotion: Option<StandardEmotion>,
-    /// Without emotions: whether the need presses as much as what would make him CONFIDENT.
+    /// Where emotion has no say: whether the need presses as much as what would make him CONFIDENT.
     pub is_pressed: bool,
     /// Whether he needs the refiller.
     pub need: bool,
@@ -97,7 +97,7 @@ impl Context {
         self.emotion.is_some_and(|emotion| emotion.reaches(least))
     }
 
-    /// CONFIDENT or worse; without emotions, the same measure of progress \[I\].
+    /// CONFIDENT or worse; where emotion has no say, the same measure of progress \[I\].
     fn wants_refill(&self) -> bool {
         self.feels(Confident) || self.is_pressed
     }

@@ -7,9 +7,7 @@ mod tables;
 
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
-use affect::{
-    Circumstances, EmotionGenerator, EmotionLabel, Feeling, RuleGenerator, StandardEmotion, SteadyGenerator,
-};
+use affect::{Circumstances, EmotionGenerator, EmotionLabel, Feeling, RuleGenerator, StandardEmotion};
 use robot::{BadParameters, Cars, Panel, Point, Robot, RobotName, StateVariables, Widget};
 use serde::{Deserialize, Serialize};
 
@@ -28,16 +26,11 @@ const JOKES: &[&str] = &[
     "They say a watched pot never boils. Nobody has tried it with a watched robot.",
 ];
 
-/// Her emotion state generator, or none.
-enum Esg {
-    Feels(RuleGenerator<Measures, Behavior, StandardEmotion>),
-    Affectless(SteadyGenerator<Measures, Behavior, StandardEmotion>),
-}
-
 /// The refiller.
 pub struct Leguin {
     parameters: Parameters,
-    esg: Esg,
+    /// Without emotions it never runs, and stays as it starts.
+    esg: RuleGenerator<Measures, Behavior, StandardEmotion>,
     bsg: BehaviorGenerator<Behavior, Context, Act>,
     haste: SensoryMotor,
     state: State,
@@ -48,7 +41,7 @@ pub struct Leguin {
 #[serde(deny_unknown_fields)]
 pub struct Saved {
     state: State,
-    feeling: Option<Feeling<StandardEmotion>>,
+    feeling: Feeling<StandardEmotion>,
     behavior: BehaviorState<Behavior>,
 }
 
@@ -69,11 +62,7 @@ impl Leguin {
     /// What is wrong with the parameters.
     pub fn new(parameters: Parameters) -> Result<Self, String> {
         parameters.check()?;
-        let esg = if parameters.affect.is_on() {
-            Esg::Feels(RuleGenerator::new(EMOTIONS, intensity, StandardEmotion::Happy))
-        } else {
-            Esg::Affectless(SteadyGenerator::new(StandardEmotion::Happy))
-        };
+        let esg = RuleGenerator::new(EMOTIONS, intensity, StandardEmotion::Happy);
         // The sensory-motor level: concern speeds her up at once, nothing else changes her speed.
         let onset = parameters.dynamics.th_concerned;
         let haste = SensoryMotorParameters {
@@ -90,10 +79,7 @@ impl Leguin {
     /// What she feels; without emotions a steady state without intensity.
     #[must_use]
     pub fn feeling(&self) -> Feeling<StandardEmotion> {
-        match &self.esg {
-            Esg::Feels(esg) => esg.feeling(),
-            Esg::Affectless(esg) => esg.feeling(),
-        }
+        self.esg.feeling()
     }
 
     /// What she does.
@@ -105,20 +91,18 @@ impl Leguin {
     /// All that changes in her.
     #[must_use]
     pub fn save(&self) -> Saved {
-        let feeling = self.parameters.affect.is_on().then(|| self.feeling());
-        Saved { state: self.state.clone(), feeling, behavior: self.bsg.state().clone() }
+        Saved { state: self.state.clone(), feeling: self.feeling(), behavior: self.bsg.state().clone() }
     }
 
     /// Continues from a saved state; the parameters must be those it was saved with.
     ///
     /// # Errors
-    /// The saved state is of a Leguin with emotions and she has none, or the other way round.
+    /// The saved emotion is none that a Leguin of these parameters can have.
     pub fn restore(&mut self, saved: Saved) -> Result<(), String> {
-        match (&mut self.esg, saved.feeling) {
-            (Esg::Feels(esg), Some(feeling)) => esg.restore(feeling),
-            (Esg::Affectless(_), None) => {}
-            _ => return Err("the saved emotion does not fit these parameters".to_owned()),
+        if !self.parameters.affect.is_on() && saved.feeling != self.feeling() {
+            return Err("the saved emotion does not fit these parameters".to_owned());
         }
+        self.esg.restore(saved.feeling);
         self.bsg.restore(saved.behavior);
         self.state = saved.state;
         Ok(())
@@ -153,7 +137,7 @@ impl Leguin {
         let (state, parameters) = (&self.state, &self.parameters);
         let (radius_m, range_m) = (parameters.exchange_radius_m, cars.welcome().sensing_range_m);
         Context {
-            emotion: parameters.affect.is_on().then(|| self.feeling().emotion),
+            emotion: parameters.acts_by_emotion().then(|| self.feeling().emotion),
             pending: state.pending,
             waiter_is_needy_here: self.is_needed(cars) && state.waiter.is_within(radius_m, state.at, range_m),
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
@@ -193,7 +177,9 @@ impl Leguin {
     /// On the way to the waiter; if he is not where he was last known to be, in search of him.
     fn refill(&mut self, cars: &mut Cars<'_>) -> Point {
         let (parameters, goal) = (&self.parameters, self.goal());
-        let speed_mps = parameters.v_refill_mps * self.haste.gain(self.feeling().affect());
+        let haste =
+            if parameters.sensory_motor.is_on() { self.haste.gain(self.feeling().affect()) } else { 1.0 };
+        let speed_mps = parameters.v_refill_mps * haste;
         let State { legs, turns, at, aim, .. } = &mut self.state;
         if !self.bsg.has_lasted(parameters.prep_s) {
             return legs.stay(*at);
@@ -287,11 +273,9 @@ impl Robot for Leguin {
     }
 
     fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
-        let (measures, behavior, tick_s) = (&self.state.measures, self.bsg.current(), cars.tick_s());
-        match &mut self.esg {
-            Esg::Feels(esg) => esg.update(measures, behavior, tick_s),
-            Esg::Affectless(esg) => esg.update(measures, behavior, tick_s),
-        };
+        if self.parameters.affect.is_on() {
+            self.esg.update(&self.state.measures, self.bsg.current(), cars.tick_s());
+        }
     }
 
     fn emotion_state(&self) -> &str {

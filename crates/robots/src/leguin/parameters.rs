@@ -17,6 +17,12 @@ pub struct Parameters {
     pub goods: String,
     /// Whether she has emotions. `off` is a baseline that never hurries and never gives up. Default on \[I\].
     pub affect: Switch,
+    /// Whether what she feels changes how fast she is: the sensory-motor level \[D: Murphy et al. 2002, abstract\]. `off`
+    /// has her obey "hurry" in feeling alone. Default on \[I\].
+    pub sensory_motor: Switch,
+    /// Whether what she feels has a say in what she does: the schematic level \[D: the same\]. `off` has her feel and show
+    /// her emotions, and never give up or joke. Default on \[I\].
+    pub schematic: Switch,
     /// How cautious she is, 0 to 1. Default 0.5 \[I\]; that there is this trait \[D\].
     pub caution: Caution,
     /// Distance within which an exchange is possible, m. Default 4 ft \[D\].
@@ -89,6 +95,8 @@ impl Default for Parameters {
             waiter: "Butler".to_owned(),
             goods: "treats".to_owned(),
             affect: Switch::On,
+            sensory_motor: Switch::On,
+            schematic: Switch::On,
             caution: Caution::default(),
             exchange_radius_m: 4.0 * FT_M,
             exchange_s: 2.0,
@@ -112,6 +120,11 @@ impl Default for Parameters {
 }
 
 impl Parameters {
+    /// Whether the guards of her behaviors see what she feels.
+    pub(super) fn acts_by_emotion(&self) -> bool {
+        self.affect.is_on() && self.schematic.is_on()
+    }
+
     /// How strongly she reacts: 1 with the defaults.
     pub(super) fn gain(&self) -> f64 {
         self.dynamics.caution_gain_base + self.dynamics.caution_gain_slope * self.caution.value()

@@ -109,7 +109,7 @@ pub enum Act {
 /// What a row's guard can see.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Context {
-    /// What she feels; `None` without emotions.
+    /// What she feels; `None` if that has no say.
     pub emotion: Option<StandardEmotion>,
     /// What she was told to do and has not begun.
     pub pending: Option<Errand>,

@@ -1,4 +1,4 @@
-//! An open field in memory, for robots alone: no guests, no simulator. Bodies that would overlap stay; commands arrive at
+//! An open field in memory, for robots alone: no simulator, and no guests but those that a test places. Bodies that would overlap stay; commands arrive at
 //! the next tick, unless the test drops them; questions are answered, unless the test cuts them.
 
 #![allow(dead_code, reason = "each test file uses its own part of the stage")]
@@ -46,7 +46,11 @@ pub(crate) struct Role {
 
 impl Role {
     pub(crate) fn new(name: &'static str, class: &str, at: Point, text: &str) -> Self {
-        Self { name, at, robot: robots::make(class).unwrap(), parameters: parameters(text) }
+        Self::played_by(robots::make(class).unwrap(), name, at, text)
+    }
+
+    pub(crate) fn played_by(robot: Box<dyn Robot>, name: &'static str, at: Point, text: &str) -> Self {
+        Self { name, at, robot, parameters: parameters(text) }
     }
 }
 
@@ -68,6 +72,8 @@ pub(crate) struct Stage {
     pub(crate) tick: u64,
     pub(crate) places: BTreeMap<RobotName, Point>,
     pub(crate) obstacles: Vec<Point>,
+    /// Guests, who stand still.
+    pub(crate) guests: Vec<Point>,
     pub(crate) reports: BTreeMap<RobotName, Report>,
     /// Every command, also a lost one.
     pub(crate) sent: Vec<Sent>,
@@ -93,6 +99,7 @@ impl Stage {
             tick: 0,
             places,
             obstacles: Vec::new(),
+            guests: Vec::new(),
             reports: BTreeMap::new(),
             sent: Vec::new(),
             drops: Box::new(|_| false),
@@ -199,7 +206,8 @@ impl Stage {
     fn bodies_but(&self, robot: &RobotName) -> Vec<(SensedKind, Point)> {
         let others = self.places.iter().filter(|(other, _)| *other != robot);
         let robots = others.map(|(_, at)| (SensedKind::Robot, *at));
-        robots.chain(self.obstacles.iter().map(|at| (SensedKind::Obstacle, *at))).collect()
+        let obstacles = self.obstacles.iter().map(|at| (SensedKind::Obstacle, *at));
+        robots.chain(obstacles).chain(self.guests.iter().map(|at| (SensedKind::Guest, *at))).collect()
     }
 
     fn exchange(&mut self, blocked: &BTreeMap<RobotName, bool>) {
@@ -258,7 +266,13 @@ impl Stage {
     }
 }
 
-fn welcome(robot: &str, at: Point, seed: u64, roster: &[RobotName], parameters: Parameters) -> Welcome {
+pub(crate) fn welcome(
+    robot: &str,
+    at: Point,
+    seed: u64,
+    roster: &[RobotName],
+    parameters: Parameters,
+) -> Welcome {
     Welcome {
         protocol: 1,
         run: RunName::new("stage").unwrap(),

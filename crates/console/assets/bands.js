@@ -1,0 +1,86 @@
+// @ts-check
+// Emotion and behavior of each robot over simulated time, a color for a state.
+
+import { GUTTER_PX, MARGIN_PX } from "./charts.js";
+import { colorOf } from "./palette.js";
+import { seconds } from "./units.js";
+import { html, nothing, render, svg } from "./vendor/lit-html.js";
+
+/** @typedef {import("./store.js").Store} Store */
+/** @typedef {import("./history.js").Span} Span */
+
+const BAND_PX = 16;
+const GAP_PX = 3;
+const ROBOT_GAP_PX = 9;
+/** Width of a letter, about. */
+const LETTER_PX = 6.2;
+
+export class Bands {
+  /**
+   * @param {HTMLElement} place
+   * @param {Store} store
+   */
+  constructor(place, store) {
+    this.place = place;
+    this.store = store;
+  }
+
+  render() {
+    const width = this.place.clientWidth;
+    const { states } = this.store.history;
+    const [first_s, last_s] = this.store.history.range_s();
+    const inner = width - GUTTER_PX - MARGIN_PX;
+    if (inner <= 0) return;
+    const x = (/** @type {number} */ time_s) => GUTTER_PX + (inner * (Math.max(first_s, time_s) - first_s)) / (last_s - first_s);
+    const rows = [...states].flatMap(([robot, { emotion, behavior }], i) => {
+      const y = i * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
+      return [
+        svg`<text class="who" x="8" y=${y + BAND_PX + 5}>${robot.slice(0, 10)}</text>`,
+        ...emotion.map((span) => block(span, x, y, "emotion", robot)),
+        ...behavior.map((span) => block(span, x, y + BAND_PX + GAP_PX, "behavior", robot)),
+      ];
+    });
+    const height = states.size * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
+    render(
+      states.size
+        ? html`<svg width=${width} height=${height} role="img" aria-label=${this.words()}>${rows}${this.now(x, height)}</svg>`
+        : nothing,
+      this.place,
+    );
+  }
+
+  /**
+   * In a recording: where in time the plan is.
+   * @param {(time_s: number) => number} x
+   * @param {number} height
+   */
+  now(x, height) {
+    const { frame, mode } = this.store;
+    if (mode !== "recording" || !frame) return nothing;
+    const at = x(frame.time_s);
+    return svg`<line class="cursor" x1=${at} x2=${at} y1="0" y2=${height}></line>`;
+  }
+
+  words() {
+    const now = [...this.store.history.states].map(([robot, { emotion, behavior }]) =>
+      [robot, emotion.at(-1)?.state, behavior.at(-1)?.state].join(" "),
+    );
+    return `Emotion and behavior over time; last: ${now.join("; ")}`;
+  }
+}
+
+/**
+ * @param {Span} span
+ * @param {(time_s: number) => number} x
+ * @param {number} y
+ * @param {"emotion" | "behavior"} kind
+ * @param {string} robot
+ */
+function block({ state, from_s, to_s }, x, y, kind, robot) {
+  const [left, width] = [x(from_s), Math.max(1, x(to_s) - x(from_s) - 0.5)];
+  const isRoomy = width > LETTER_PX * state.length + 8;
+  return svg`
+    <g class="band" data-state=${state}><title>${robot}, ${kind} ${state}, ${seconds(from_s)} to ${seconds(to_s)}</title>
+      <rect x=${left} y=${y} width=${width} height=${BAND_PX} rx="2" fill=${colorOf(kind, state)}></rect>
+      ${isRoomy ? svg`<text x=${left + 5} y=${y + 12}>${state}</text>` : nothing}</g>`;
+}

@@ -1,0 +1,177 @@
+// @ts-check
+// A state variable of the robots over simulated time.
+
+import { colorOf } from "./palette.js";
+import { onThemeChange, readTheme } from "./theme.js";
+import { short } from "./units.js";
+import { html, render } from "./vendor/lit-html.js";
+import uPlot from "./vendor/uPlot.esm.js";
+
+/** @typedef {import("./store.js").Store} Store */
+
+/** Room for the numbers on the left; the bands below leave the same. */
+export const GUTTER_PX = 76;
+/** And on the right. */
+export const MARGIN_PX = 24;
+
+export class Charts {
+  /**
+   * @param {{select: HTMLElement, chart: HTMLElement}} places
+   * @param {Store} store
+   */
+  constructor({ select, chart }, store) {
+    this.select = select;
+    this.chart = chart;
+    this.store = store;
+    this.variable = "";
+    /** @type {uPlot | null} */
+    this.plot = null;
+    /** What the plot was made for. */
+    this.made = "";
+    /** Index of the moment under the pointer. @type {number | null} */
+    this.pointed = null;
+    chart.addEventListener("pointermove", () => this.point(this.plot?.cursor.idx ?? null));
+    chart.addEventListener("pointerleave", () => this.point(null));
+    new ResizeObserver(() => this.resize()).observe(chart);
+    onThemeChange(() => this.forget());
+  }
+
+  /** @param {number | null} index */
+  point(index) {
+    this.pointed = index;
+    this.renderSelect([...this.store.history.variables.keys()].sort());
+  }
+
+  forget() {
+    this.plot?.destroy();
+    this.plot = null;
+    this.made = "";
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.chart;
+    if (width > 0 && height > 0) this.plot?.setSize({ width, height });
+  }
+
+  render() {
+    const { history } = this.store;
+    const names = [...history.variables.keys()].sort();
+    if (!history.variables.has(this.variable)) this.variable = liveliest(history) ?? "";
+    this.renderSelect(names);
+    const robots = history.variables.get(this.variable);
+    const { clientWidth: width, clientHeight: height } = this.chart;
+    if (!robots || width === 0 || height === 0) {
+      if (!robots) this.forget();
+      return;
+    }
+    const made = [this.variable, ...robots.keys()].join("\n");
+    if (made !== this.made) {
+      this.forget();
+      this.made = made;
+      this.plot = new uPlot(options(this.variable, [...robots.keys()], width, height), [[0, 1]], this.chart);
+      this.chart.setAttribute("role", "img");
+    }
+    const [first_s, last_s] = history.range_s();
+    this.plot?.setData([history.times_s, ...robots.values()], false);
+    this.plot?.batch(() => {
+      this.plot?.setScale("x", { min: first_s, max: last_s });
+      this.cursor();
+    });
+    const now = [...robots].map(([robot, values]) => `${robot} ${short(values.at(-1) ?? NaN)}`);
+    this.chart.setAttribute("aria-label", `${this.variable} over time; last: ${now.join(", ")}`);
+  }
+
+  /** In a recording: where in time the plan is. */
+  cursor() {
+    const { frame, mode } = this.store;
+    if (mode !== "recording" || !frame || !this.plot) return;
+    this.plot.setCursor({ left: this.plot.valToPos(frame.time_s, "x"), top: 10 }, false);
+  }
+
+  /** Who has which color, and the value where the reader points, or else the last one. */
+  key() {
+    const { history, frame, mode } = this.store;
+    const shown = mode === "recording" && frame ? history.indexAt(frame.time_s) : history.times_s.length - 1;
+    const index = this.pointed ?? shown;
+    return [...(history.variables.get(this.variable) ?? [])].map(
+      ([robot, values]) => html`<li>${dot(colorOf("robot", robot))}${robot} <b>${short(values[index] ?? NaN, 3)}</b></li>`,
+    );
+  }
+
+  /** @param {string[]} names */
+  renderSelect(names) {
+    const choose = (/** @type {Event} */ event) => {
+      this.variable = /** @type {HTMLSelectElement} */ (event.target).value;
+      this.render();
+    };
+    const robots = (/** @type {string} */ name) => [...(this.store.history.variables.get(name)?.keys() ?? [])].join(", ");
+    render(
+      html`
+        <label class="field inline"><span>Variable</span>
+          <select data-testid="chart-variable" @change=${choose}>
+            ${names.map((name) => html`<option value=${name} ?selected=${name === this.variable}>${name} (${robots(name)})</option>`)}
+          </select></label>
+        <span class="muted" ?hidden=${names.length > 0}>No robot has published a number yet.</span>
+        <ul class="key">${this.key()}</ul>`,
+      this.select,
+    );
+  }
+}
+
+/**
+ * A small circle in a color that is only known to scripts.
+ * @param {string} color
+ */
+function dot(color) {
+  return html`<svg width="10" height="10" aria-hidden="true"><circle cx="5" cy="5" r="4.5" fill=${color}></circle></svg>`;
+}
+
+/**
+ * What to begin with: the variable that changes most often tells most.
+ * @param {import("./history.js").History} history
+ */
+function liveliest(history) {
+  let most = -1;
+  let found;
+  for (const [name, robots] of history.variables) {
+    for (const values of robots.values()) {
+      const changes = values.reduce((/** @type {number} */ sum, value, i) => sum + (i > 0 && value !== values[i - 1] ? 1 : 0), 0);
+      const rank = changes + robots.size / 10;
+      if (rank > most) [most, found] = [rank, name];
+    }
+  }
+  return found;
+}
+
+/**
+ * @param {string} variable
+ * @param {string[]} robots
+ * @param {number} width
+ * @param {number} height
+ * @returns {uPlot.Options}
+ */
+function options(variable, robots, width, height) {
+  const theme = readTheme();
+  const axis = { stroke: theme.muted, grid: { stroke: theme.grid, width: 1 }, ticks: { show: false }, font: `11px ${theme.font}` };
+  return {
+    width,
+    height,
+    padding: [10, MARGIN_PX, 0, 0],
+    legend: { show: false },
+    cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
+    scales: { x: { time: false, auto: false } },
+    axes: [
+      { ...axis, size: 26, values: (_, ticks) => ticks.map((tick) => `${short(tick)} s`) },
+      { ...axis, size: GUTTER_PX, values: (_, ticks) => ticks.map((tick) => short(tick, 4)) },
+    ],
+    series: [
+      {},
+      ...robots.map((robot) => ({
+        label: `${robot} ${variable}`,
+        stroke: colorOf("robot", robot),
+        width: 1.75,
+        points: { show: false },
+      })),
+    ],
+  };
+}

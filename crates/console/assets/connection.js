@@ -1,0 +1,113 @@
+// @ts-check
+// The WebSocket to the console server: comes back by itself, and gives every control its answer.
+
+/** @typedef {import("./types/messages.js").Control} Control */
+/** @typedef {import("./types/messages.js").ControlAnswer} ControlAnswer */
+/** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
+/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./types/messages.js").LogRecord} LogRecord */
+
+/**
+ * What the server sends.
+ * @typedef {{type: "hello", mode: "live" | "recording", run: string, version: string}
+ *   | {type: "simulator", present: boolean}
+ *   | {type: "frame", frame: WorldFrame}
+ *   | {type: "panel", robot: string, panel: Panel}
+ *   | {type: "log", lines: LogRecord[], dropped: number}
+ *   | {type: "answer", id: number, answer?: ControlAnswer, error?: string}} ServerMessage
+ */
+
+/** What is for everybody. @typedef {Exclude<ServerMessage, {type: "answer"}>} Broadcast */
+/** @typedef {{resolve: (answer: ControlAnswer) => void, timer: number}} Pending */
+
+const FIRST_PAUSE_MS = 500;
+const LONGEST_PAUSE_MS = 8000;
+const ANSWER_TIMEOUT_MS = 15000;
+
+export class Connection {
+  /**
+   * @param {(message: Broadcast) => void} onMessage
+   * @param {(isOpen: boolean) => void} onLink
+   */
+  constructor(onMessage, onLink) {
+    this.onMessage = onMessage;
+    this.onLink = onLink;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    /** @type {Map<number, Pending>} */
+    this.pending = new Map();
+    this.lastId = 0;
+    this.pause_ms = FIRST_PAUSE_MS;
+  }
+
+  /** Opens the connection, and again whenever it is lost. */
+  open() {
+    const url = new URL(`ws${location.search}`, location.href);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    const socket = new WebSocket(url);
+    this.socket = socket;
+    socket.addEventListener("open", () => {
+      this.pause_ms = FIRST_PAUSE_MS;
+      this.onLink(true);
+    });
+    socket.addEventListener("message", (event) => this.receive(String(event.data)));
+    socket.addEventListener("close", () => this.closed());
+  }
+
+  /**
+   * Asks the simulator for something. What cannot be asked is refused like what the simulator refuses, so that there is
+   * one way to show it.
+   * @param {Control} control
+   * @returns {Promise<ControlAnswer>}
+   */
+  control(control) {
+    const socket = this.socket;
+    if (!socket || socket.readyState !== WebSocket.OPEN) {
+      return Promise.resolve(refused("The console server is not reachable; the page tries again by itself."));
+    }
+    const id = ++this.lastId;
+    return new Promise((resolve) => {
+      const late = () => this.settle(id, refused("No answer from the simulator in 15 seconds."));
+      this.pending.set(id, { resolve, timer: window.setTimeout(late, ANSWER_TIMEOUT_MS) });
+      socket.send(JSON.stringify({ type: "control", id, control }));
+    });
+  }
+
+  /** @param {string} text */
+  receive(text) {
+    /** @type {ServerMessage} */
+    const message = JSON.parse(text);
+    if (message.type === "answer") {
+      this.settle(message.id, message.answer ?? refused(message.error ?? "The server gave no reason."));
+    } else {
+      this.onMessage(message);
+    }
+  }
+
+  /**
+   * @param {number} id
+   * @param {ControlAnswer} answer
+   */
+  settle(id, answer) {
+    const pending = this.pending.get(id);
+    if (!pending) return;
+    this.pending.delete(id);
+    clearTimeout(pending.timer);
+    pending.resolve(answer);
+  }
+
+  closed() {
+    this.onLink(false);
+    for (const id of [...this.pending.keys()]) this.settle(id, refused("The connection was lost before an answer came."));
+    window.setTimeout(() => this.open(), this.pause_ms);
+    this.pause_ms = Math.min(this.pause_ms * 2, LONGEST_PAUSE_MS);
+  }
+}
+
+/**
+ * @param {string} explanation
+ * @returns {ControlAnswer}
+ */
+function refused(explanation) {
+  return { answer: "refused", explanation };
+}

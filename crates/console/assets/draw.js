@@ -1,0 +1,246 @@
+// @ts-check
+// How things look on the plan. Every function draws one kind of thing and keeps nothing.
+
+import { barrier, cross, envelope, line, nose, ring, text } from "./shapes.js";
+
+/** @typedef {import("./camera.js").Camera} Camera */
+/** @typedef {import("./theme.js").Theme} Theme */
+/** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
+/** @typedef {import("./history.js").Track} Track */
+/** @typedef {{x: number, y: number}} Place */
+/** @typedef {{context: CanvasRenderingContext2D, camera: Camera, theme: Theme}} Pen */
+
+const FULL_TURN = 2 * Math.PI;
+/** Smallest radius at which the letters in a robot can be read. */
+const SMALLEST_ROBOT_PX = 9;
+/** Below this radius a guest is a dot, and a square dot is as good as a round one and cheaper. */
+const SMALLEST_ROUND_PX = 1.7;
+/** With more guests than this, two crossed bars stand for a circle: twice as fast, and at this size no eye can tell. */
+const MANY_GUESTS = 2000;
+const LARGEST_CROSS_PX = 5;
+/** Circles in one path: one path for all is slow, and so is one for each. */
+const CIRCLES_IN_PATH = 60;
+
+/**
+ * The field with lines at whole steps.
+ * @param {Pen} pen
+ * @param {number} step_m
+ */
+export function field({ context, camera, theme }, step_m) {
+  const [width_m, height_m] = camera.field_m;
+  const [left, top] = [camera.x(0), camera.y(height_m)];
+  const [width, height] = [width_m * camera.scale, height_m * camera.scale];
+  context.fillStyle = theme.field;
+  context.fillRect(left, top, width, height);
+  if (step_m * camera.scale >= 6) {
+    context.beginPath();
+    for (let x = step_m; x < width_m - 1e-9; x += step_m) line(context, camera.x(x), top, camera.x(x), top + height);
+    for (let y = step_m; y < height_m - 1e-9; y += step_m) line(context, left, camera.y(y), left + width, camera.y(y));
+    context.strokeStyle = theme.grid;
+    context.lineWidth = 1;
+    context.stroke();
+  }
+  context.strokeStyle = theme.edge;
+  context.lineWidth = 1.5;
+  context.strokeRect(left, top, width, height);
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Iterable<[number, number]>} centers
+ * @param {number} body_m
+ */
+export function obstacles({ context, camera, theme }, centers, body_m) {
+  const side = body_m * camera.scale;
+  context.fillStyle = theme.obstacle;
+  context.strokeStyle = theme.obstacleEdge;
+  context.lineWidth = 1;
+  for (const [x_m, y_m] of centers) {
+    const [x, y] = [camera.x(x_m) - side / 2, camera.y(y_m) - side / 2];
+    if (isOutside(camera, x + side / 2, y + side / 2, side)) continue;
+    context.fillRect(x, y, side, side);
+    if (side > 4) context.strokeRect(x + 0.5, y + 0.5, side - 1, side - 1);
+  }
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Float64Array} places_m x and y in turn
+ * @param {number} body_m
+ */
+export function guests({ context, camera, theme }, places_m, body_m) {
+  const radius = (body_m * camera.scale) / 2;
+  const { scale, width_px, height_px } = camera;
+  const [left, bottom] = [camera.x(0), camera.y(0)];
+  const seen = [];
+  for (let i = 0; i < places_m.length; i += 2) {
+    const x = left + places_m[i] * scale;
+    const y = bottom - places_m[i + 1] * scale;
+    if (x > -radius && y > -radius && x < width_px + radius && y < height_px + radius) seen.push(x, y);
+  }
+  context.fillStyle = theme.guest;
+  if (radius < SMALLEST_ROUND_PX) squares(context, seen, Math.max(0.75, radius));
+  else if (seen.length / 2 > MANY_GUESTS && radius < LARGEST_CROSS_PX) crosses(context, seen, radius);
+  else circles(context, seen, radius);
+}
+
+/** @type {(context: CanvasRenderingContext2D, at: number[], radius: number) => void} */
+function squares(context, at, radius) {
+  for (let i = 0; i < at.length; i += 2) context.fillRect(at[i] - radius, at[i + 1] - radius, 2 * radius, 2 * radius);
+}
+
+/** @type {(context: CanvasRenderingContext2D, at: number[], radius: number) => void} */
+function crosses(context, at, radius) {
+  const narrow = 0.55 * radius;
+  for (let i = 0; i < at.length; i += 2) {
+    context.fillRect(at[i] - radius, at[i + 1] - narrow, 2 * radius, 2 * narrow);
+    context.fillRect(at[i] - narrow, at[i + 1] - radius, 2 * narrow, 2 * radius);
+  }
+}
+
+/** @type {(context: CanvasRenderingContext2D, at: number[], radius: number) => void} */
+function circles(context, at, radius) {
+  for (let first = 0; first < at.length; first += 2 * CIRCLES_IN_PATH) {
+    context.beginPath();
+    for (let i = first; i < Math.min(at.length, first + 2 * CIRCLES_IN_PATH); i += 2) {
+      context.moveTo(at[i] + radius, at[i + 1]);
+      context.arc(at[i], at[i + 1], radius, 0, FULL_TURN);
+    }
+    context.fill();
+  }
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Track} track
+ * @param {number} from index
+ * @param {number} to index, not included
+ * @param {Place} end where the robot is seen now
+ */
+export function trail({ context, camera, theme }, track, from, to, end) {
+  context.strokeStyle = theme.robot;
+  context.lineWidth = 2;
+  context.lineJoin = context.lineCap = "round";
+  const pieces = 8;
+  for (let piece = 0; piece < pieces; piece += 1) {
+    const first = from + Math.floor(((to - from) * piece) / pieces);
+    const last = from + Math.floor(((to - from) * (piece + 1)) / pieces);
+    context.globalAlpha = 0.08 + (0.5 * (piece + 1)) / pieces;
+    context.beginPath();
+    for (let i = first; i <= last && i < to; i += 1) {
+      const [x, y] = [track.x_m[i], track.y_m[i]];
+      if (x !== null && y !== null) context.lineTo(camera.x(x), camera.y(y));
+    }
+    if (piece === pieces - 1) context.lineTo(camera.x(end.x), camera.y(end.y));
+    context.stroke();
+  }
+  context.globalAlpha = 1;
+}
+
+/**
+ * A red circle with the first two letters of the name; what is out of the ordinary is drawn around it.
+ * @param {Pen} pen
+ * @param {Pick<RobotFrame, "name" | "blocked" | "presence" | "direction_rad" | "speed_mps">} robot
+ * @param {Place} place
+ * @param {number} body_m
+ * @param {{isLate: boolean, isChosen: boolean}} marks
+ */
+export function robot({ context, camera, theme }, robot, place, body_m, { isLate, isChosen }) {
+  const [x, y] = [camera.x(place.x), camera.y(place.y)];
+  const radius = Math.max(SMALLEST_ROBOT_PX, (body_m * camera.scale) / 2);
+  if (isOutside(camera, x, y, 3 * radius)) return;
+  const isHere = robot.presence === "here";
+  if (isChosen) ring(context, x, y, radius + 6, theme.accent, 2);
+  if (isLate && isHere) ring(context, x, y, radius + 4, theme.warning, 2.5, [4, 4]);
+  context.beginPath();
+  context.arc(x, y, radius, 0, FULL_TURN);
+  context.fillStyle = isHere ? theme.robot : theme.absentFill;
+  context.fill();
+  if (!isHere) ring(context, x, y, radius - 1, robot.presence === "lost" ? theme.absent : theme.robot, 2.25, [3, 3]);
+  if (isHere && robot.speed_mps > 0) nose(context, x, y, radius, robot.direction_rad, theme.robot);
+  if (isHere && robot.blocked) barrier(context, x, y, radius, robot.direction_rad, theme.warning);
+  context.fillStyle = isHere ? theme.robotText : theme.absent;
+  context.font = `650 ${Math.max(10, Math.min(22, radius * 0.95))}px ${theme.font}`;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillText([...robot.name].slice(0, 2).join(""), x, y + 0.5);
+  if (robot.presence === "lost") cross(context, x, y, radius * 1.15, theme.absent);
+}
+
+/**
+ * A link that is cut: dashed and struck through.
+ * @param {Pen} pen
+ * @param {Place} from
+ * @param {Place} to
+ * @param {string} label
+ */
+export function cut({ context, camera, theme }, from, to, label) {
+  const [x1, y1, x2, y2] = [camera.x(from.x), camera.y(from.y), camera.x(to.x), camera.y(to.y)];
+  context.strokeStyle = theme.bad;
+  context.lineWidth = 1.75;
+  context.setLineDash([7, 6]);
+  context.beginPath();
+  line(context, x1, y1, x2, y2);
+  context.stroke();
+  context.setLineDash([]);
+  const [x, y] = [(x1 + x2) / 2, (y1 + y2) / 2];
+  context.fillStyle = theme.field;
+  context.beginPath();
+  context.arc(x, y, 9, 0, FULL_TURN);
+  context.fill();
+  ring(context, x, y, 9, theme.bad, 1.75);
+  cross(context, x, y, 4.5, theme.bad);
+  if (label) text(context, theme, label, x, y + 20, theme.bad);
+}
+
+/**
+ * A command in the air.
+ * @param {Pen} pen
+ * @param {import("./flights.js").Airborne} flight
+ * @param {Place} from
+ * @param {Place} to
+ */
+export function flight({ context, camera, theme }, flight, from, to) {
+  const [x1, y1, x2, y2] = [camera.x(from.x), camera.y(from.y), camera.x(to.x), camera.y(to.y)];
+  const isLost = flight.fate === "dropped" || flight.fate === "missing";
+  const eased = flight.progress * flight.progress * (3 - 2 * flight.progress);
+  const [x, y] = [x1 + (x2 - x1) * eased, y1 + (y2 - y1) * eased + 60 * flight.fallen * flight.fallen];
+  const color = isLost && flight.fallen > 0 ? theme.bad : theme.accent;
+  context.globalAlpha = Math.max(0, 1 - Math.max(flight.fallen, flight.landed));
+  context.strokeStyle = color;
+  context.lineWidth = 1.5;
+  context.setLineDash([1, 5]);
+  context.lineCap = "round";
+  context.beginPath();
+  line(context, x1, y1, x2, y2);
+  context.stroke();
+  context.setLineDash([]);
+  if (flight.landed > 0) ring(context, x2, y2, 14 + 18 * flight.landed, color, 2);
+  else envelope(context, x, y, color, theme.field);
+  if (isLost && flight.fallen > 0) cross(context, x, y, 9, color);
+  if (flight.text) text(context, theme, flight.text, x, y - 16, color);
+  context.globalAlpha = 1;
+}
+
+/**
+ * How long a stretch of the field is.
+ * @param {Pen} pen
+ * @param {number} length_m
+ * @param {string} label
+ */
+export function scaleBar({ context, camera, theme }, length_m, label) {
+  const [x, y, width] = [14, camera.height_px - 14, length_m * camera.scale];
+  context.strokeStyle = theme.muted;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  line(context, x, y, x + width, y);
+  line(context, x, y - 4, x, y);
+  line(context, x + width, y - 4, x + width, y);
+  context.stroke();
+  text(context, theme, label, x + width + 26, y - 1, theme.muted);
+}
+
+/** @type {(camera: Camera, x: number, y: number, margin: number) => boolean} */
+function isOutside(camera, x, y, margin) {
+  return x < -margin || y < -margin || x > camera.width_px + margin || y > camera.height_px + margin;
+}

@@ -1,0 +1,84 @@
+// @ts-check
+// Commands in the air. A frame tells at once that one was sent and what became of it; the eye needs a moment longer.
+
+/** @typedef {import("./types/messages.js").Flight} Flight */
+/** @typedef {import("./types/messages.js").Fate} Fate */
+
+/**
+ * A command as it is seen.
+ * @typedef {object} Airborne
+ * @property {string} from
+ * @property {string} to
+ * @property {string} text what it says, empty if its sending was not seen
+ * @property {Fate} fate what is known of it
+ * @property {number} progress 0 at the sender, 1 at the target
+ * @property {number} fallen 0 while it flies, 1 when a lost one is out of sight
+ * @property {number} landed 0 while it flies, 1 when the mark at the target is out of sight
+ */
+
+const FLIGHT_MS = 900;
+const FALL_MS = 900;
+const LANDING_MS = 500;
+/** Where a lost one falls. */
+const HALF_WAY = 0.5;
+/** Where one stays whose fate is not decided yet. */
+const BEFORE_TARGET = 0.85;
+const MOST_AIRBORNE = 64;
+/** One that the frames never speak of again. */
+const FORGOTTEN_MS = 60000;
+
+export class Flights {
+  constructor() {
+    /** @type {Map<string, Airborne & {age_ms: number}>} */
+    this.airborne = new Map();
+  }
+
+  clear() {
+    this.airborne.clear();
+  }
+
+  /** @param {Flight[]} flights in the order in which things happened */
+  push(flights) {
+    for (const { from, to, seq, command, fate } of flights) {
+      const key = JSON.stringify([from, to, seq]);
+      const known = this.airborne.get(key);
+      if (known) {
+        known.fate = fate;
+        known.text ||= command ?? "";
+        continue;
+      }
+      const text = command ?? "";
+      this.airborne.set(key, { from, to, text, fate, progress: 0, fallen: 0, landed: 0, age_ms: 0 });
+    }
+    for (const key of this.airborne.keys()) {
+      if (this.airborne.size <= MOST_AIRBORNE) break;
+      this.airborne.delete(key);
+    }
+  }
+
+  /** @param {number} passed_ms wall clock since the last call */
+  advance(passed_ms) {
+    for (const [key, flight] of this.airborne) {
+      flight.age_ms += passed_ms;
+      step(flight, passed_ms);
+      if (flight.fallen >= 1 || flight.landed >= 1 || flight.age_ms > FORGOTTEN_MS) this.airborne.delete(key);
+    }
+  }
+
+  /** Whether something in the air changes with time. */
+  get isMoving() {
+    return [...this.airborne.values()].some((flight) => flight.fate !== "sent" || flight.progress < BEFORE_TARGET);
+  }
+}
+
+/**
+ * @param {Airborne} flight
+ * @param {number} passed_ms
+ */
+function step(flight, passed_ms) {
+  const isLost = flight.fate === "dropped" || flight.fate === "missing";
+  const end = isLost ? Math.max(HALF_WAY, flight.progress) : flight.fate === "delivered" ? 1 : BEFORE_TARGET;
+  if (flight.progress < end) flight.progress = Math.min(end, flight.progress + passed_ms / FLIGHT_MS);
+  else if (isLost) flight.fallen += passed_ms / FALL_MS;
+  else if (flight.fate === "delivered") flight.landed += passed_ms / LANDING_MS;
+}

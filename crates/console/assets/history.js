@@ -1,0 +1,148 @@
+// @ts-check
+// What charts, bands and trails are drawn from: the robots over simulated time, in bounded memory.
+
+/** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
+/** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
+
+/** A stretch of time in one state. @typedef {{state: string, from_s: number, to_s: number}} Span */
+/** Places at the times of the history. @typedef {{x_m: (number | null)[], y_m: (number | null)[]}} Track */
+
+/** Samples kept; with more, every second one goes, so that the whole run stays in view. */
+const MOST_SAMPLES = 6000;
+const MOST_SPANS = 1000;
+/** Variables kept, over all robots: a robot that invents names must not eat the browser's memory. */
+const MOST_VARIABLES = 256;
+
+export class History {
+  constructor() {
+    this.clear();
+  }
+
+  clear() {
+    /** @type {number[]} */
+    this.times_s = [];
+    /** Values by variable and robot. @type {Map<string, Map<string, (number | null)[]>>} */
+    this.variables = new Map();
+    /** @type {Map<string, Track>} */
+    this.tracks = new Map();
+    /** @type {Map<string, {emotion: Span[], behavior: Span[]}>} */
+    this.states = new Map();
+    /** @type {number} */
+    this.variableCount = 0;
+  }
+
+  /**
+   * Adds a moment; one that is not later than the last is known already.
+   * @param {number} time_s
+   * @param {Pick<RobotFrame, "name" | "location" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
+   */
+  add(time_s, robots) {
+    const last_s = this.times_s.at(-1) ?? -Infinity;
+    if (time_s <= last_s) return;
+    this.times_s.push(time_s);
+    for (const robot of robots) {
+      this.place(robot);
+      this.note(robot, time_s);
+      for (const [variable, value] of Object.entries(robot.state_variables)) {
+        if (typeof value === "number") this.series(variable, robot.name)?.push(value);
+      }
+    }
+    this.align();
+    if (this.times_s.length > MOST_SAMPLES) this.thin();
+  }
+
+  /** @param {Pick<RobotFrame, "name" | "location">} robot */
+  place({ name, location }) {
+    const track = this.tracks.get(name) ?? { x_m: this.unknown(), y_m: this.unknown() };
+    this.tracks.set(name, track);
+    track.x_m.push(location.x);
+    track.y_m.push(location.y);
+  }
+
+  /**
+   * @param {string} variable
+   * @param {string} robot
+   * @returns {(number | null)[] | undefined} none if there are too many
+   */
+  series(variable, robot) {
+    const robots = this.variables.get(variable) ?? new Map();
+    let values = robots.get(robot);
+    if (!values && this.variableCount < MOST_VARIABLES) {
+      this.variableCount += 1;
+      values = this.unknown();
+      this.variables.set(variable, robots.set(robot, values));
+    }
+    return values;
+  }
+
+  /** Nothing was known so far. @returns {(number | null)[]} */
+  unknown() {
+    return new Array(this.times_s.length - 1).fill(null);
+  }
+
+  /**
+   * @param {Pick<RobotFrame, "name" | "emotion_state" | "behavior_state">} robot
+   * @param {number} time_s
+   */
+  note({ name, emotion_state, behavior_state }, time_s) {
+    const states = this.states.get(name) ?? { emotion: [], behavior: [] };
+    this.states.set(name, states);
+    extend(states.emotion, emotion_state, time_s);
+    extend(states.behavior, behavior_state, time_s);
+  }
+
+  /** Who said nothing at the last moment has a gap there. */
+  align() {
+    const length = this.times_s.length;
+    for (const values of this.all()) if (values.length < length) values.push(null);
+  }
+
+  thin() {
+    for (const values of [this.times_s, ...this.all()]) {
+      let kept = 0;
+      for (let i = 0; i < values.length; i += 2) values[kept++] = values[i];
+      values.length = kept;
+    }
+  }
+
+  /** Every list that goes along with the times. @returns {(number | null)[][]} */
+  all() {
+    const series = [...this.variables.values()].flatMap((robots) => [...robots.values()]);
+    const tracks = [...this.tracks.values()].flatMap((track) => [track.x_m, track.y_m]);
+    return [...series, ...tracks];
+  }
+
+  /** The time that is known, at least a second. @returns {[number, number]} */
+  range_s() {
+    const first_s = this.times_s[0] ?? 0;
+    return [first_s, Math.max(first_s + 1, this.times_s.at(-1) ?? 0)];
+  }
+
+  /**
+   * Index of the last moment that is not later.
+   * @param {number} time_s
+   */
+  indexAt(time_s) {
+    let low = 0;
+    let high = this.times_s.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.times_s[middle] <= time_s) low = middle + 1;
+      else high = middle;
+    }
+    return low - 1;
+  }
+}
+
+/**
+ * @param {Span[]} spans
+ * @param {string} state
+ * @param {number} time_s
+ */
+function extend(spans, state, time_s) {
+  const last = spans.at(-1);
+  if (last) last.to_s = time_s;
+  if (last?.state === state) return;
+  spans.push({ state, from_s: time_s, to_s: time_s });
+  if (spans.length > MOST_SPANS) spans.shift();
+}

@@ -1,0 +1,176 @@
+// @ts-check
+// The scrolling log: the lines of the log file, filtered, following the newest unless the reader looks back.
+
+import { html, render } from "./vendor/lit-html.js";
+
+/** @typedef {import("./store.js").Store} Store */
+/** @typedef {import("./types/messages.js").LogRecord} LogRecord */
+
+/** Rows in the page. */
+const MOST_ROWS = 2000;
+/** Rows that a reader who looks back is left with before the log stops growing under their eyes. */
+const MOST_ROWS_READING = 4000;
+const NEAR_END_PX = 12;
+/** Every kind there is, which the type check holds. @type {Record<import("./types/messages.js").LogKind, true>} */
+const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, late: true };
+const KINDS = Object.keys(ALL_KINDS);
+
+export class LogView {
+  /**
+   * @param {HTMLElement} place
+   * @param {Store} store
+   */
+  constructor(place, store) {
+    this.store = store;
+    this.robot = "";
+    this.kind = "";
+    /** How many of the lines that ever came are in the page or were passed over. */
+    this.seen = 0;
+    /** In a recording nothing is shown that has not happened yet. */
+    this.until = Infinity;
+    this.isFollowing = true;
+    this.waiting = 0;
+    /** Where the reader was last. */
+    this.top_px = 0;
+    this.bar = document.createElement("div");
+    this.bar.className = "log-bar";
+    this.rows = document.createElement("div");
+    this.rows.className = "log-rows";
+    this.rows.dataset.testid = "log";
+    this.rows.tabIndex = 0;
+    this.rows.setAttribute("role", "log");
+    this.rows.setAttribute("aria-label", "Log");
+    this.rows.addEventListener("scroll", () => this.scrolled(), { passive: true });
+    place.append(this.bar, this.rows);
+  }
+
+  /** Only who scrolls up stops following: rows may also grow by themselves, when they are laid out. */
+  scrolled() {
+    const { scrollTop, clientHeight, scrollHeight } = this.rows;
+    const isAtEnd = scrollHeight - scrollTop - clientHeight < NEAR_END_PX;
+    const isUp = scrollTop < this.top_px - 1;
+    this.top_px = scrollTop;
+    if (isAtEnd && !this.isFollowing && this.waiting > 0) return this.rebuild();
+    if (isAtEnd) this.isFollowing = true;
+    else if (isUp) this.isFollowing = false;
+    this.renderBar();
+  }
+
+  /** Twice, because rows that come into view get their true height then. */
+  toEnd() {
+    const go = () => {
+      if (!this.isFollowing) return;
+      this.rows.scrollTop = this.rows.scrollHeight;
+      this.top_px = this.rows.scrollTop;
+    };
+    go();
+    requestAnimationFrame(go);
+  }
+
+  /** Everything anew: another filter, another time. */
+  rebuild() {
+    this.rows.replaceChildren();
+    this.seen = this.store.logCount - this.store.log.length;
+    this.waiting = 0;
+    this.isFollowing = true;
+    this.render();
+  }
+
+  render() {
+    const { store } = this;
+    if (store.logCount < this.seen) return this.rebuild();
+    const first = store.logCount - store.log.length;
+    const fresh = store.log.slice(Math.max(0, this.seen - first)).filter((line) => this.isShown(line));
+    this.seen = store.logCount;
+    if (fresh.length) this.append(fresh);
+    this.renderBar();
+  }
+
+  /**
+   * In a recording: shows the lines up to this tick.
+   * @param {number} tick
+   */
+  showUntil(tick) {
+    const isForward = tick >= this.until && this.until !== Infinity;
+    const from = this.until;
+    this.until = tick;
+    if (!isForward) return this.rebuild();
+    this.append(this.store.log.filter((line) => line.tick > from && this.isShown(line)));
+    this.renderBar();
+  }
+
+  /** @param {LogRecord} line */
+  isShown(line) {
+    return (
+      line.tick <= this.until && (this.robot === "" || line.source === this.robot) && (this.kind === "" || line.kind === this.kind)
+    );
+  }
+
+  /** @param {LogRecord[]} lines */
+  append(lines) {
+    const { rows } = this;
+    const room = this.isFollowing ? Infinity : MOST_ROWS_READING - rows.childElementCount;
+    const kept = lines.slice(0, Math.max(0, room)).slice(-MOST_ROWS);
+    this.waiting += this.isFollowing ? 0 : lines.length;
+    rows.append(...kept.map(row));
+    if (!this.isFollowing) return;
+    const tooMany = rows.childElementCount - MOST_ROWS;
+    for (let i = 0; i < tooMany; i += 1) rows.firstElementChild?.remove();
+    this.toEnd();
+  }
+
+  /** The tab is shown again: a hidden element does not scroll. */
+  shown() {
+    this.toEnd();
+  }
+
+  renderBar() {
+    const robots = (this.store.frame?.robots ?? []).map((robot) => robot.name);
+    const choose = (/** @type {"robot" | "kind"} */ key) => (/** @type {Event} */ event) => {
+      this[key] = /** @type {HTMLSelectElement} */ (event.target).value;
+      this.rebuild();
+    };
+    const missed = this.store.logMissed;
+    render(
+      html`
+        <label class="field inline"><span>From</span>
+          <select data-testid="log-filter-robot" @change=${choose("robot")}>
+            <option value="">everybody</option>
+            ${["simulator", ...robots].map((name) => html`<option value=${name}>${name}</option>`)}
+          </select></label>
+        <label class="field inline"><span>Kind</span>
+          <select data-testid="log-filter-kind" @change=${choose("kind")}>
+            <option value="">everything</option>
+            ${KINDS.map((kind) => html`<option value=${kind}>${kind}</option>`)}
+          </select></label>
+        <span class="spacer"></span>
+        <span class="muted" ?hidden=${missed === 0} title="this browser was too slow for them; the log file has them">
+          ${missed} lines not shown</span>
+        <button type="button" class="jump" ?hidden=${this.isFollowing} data-testid="log-follow" @click=${() => this.rebuild()}>
+          ↓ ${this.waiting > 0 ? `${this.waiting} new` : "newest"}</button>`,
+      this.bar,
+    );
+  }
+}
+
+/**
+ * A line as it is in the log file.
+ * @param {LogRecord} line
+ */
+function row(line) {
+  const element = document.createElement("div");
+  element.className = `line kind-${KINDS.includes(line.kind) ? line.kind : "run"}`;
+  element.dataset.kind = line.kind;
+  const part = (/** @type {string} */ name, /** @type {string} */ text) => {
+    const span = document.createElement("span");
+    span.className = name;
+    span.textContent = text;
+    return span;
+  };
+  element.append(
+    part("time", `${line.time_s.toFixed(1).padStart(9)} s  `),
+    part("source", `${line.source.padEnd(12)} `),
+    part("text", line.text),
+  );
+  return element;
+}

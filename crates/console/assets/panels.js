@@ -1,0 +1,93 @@
+// @ts-check
+// A panel for each robot, side by side. The page knows no robot: it draws the widgets that it is given.
+
+import { presence } from "./presence.js";
+import { html, nothing, render } from "./vendor/lit-html.js";
+import { drawWidget } from "./widgets.js";
+
+/** @typedef {import("./store.js").Store} Store */
+/** @typedef {import("./units.js").Units} Units */
+/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
+
+const MOST_WIDGETS = 64;
+
+export class Panels {
+  /**
+   * @param {HTMLElement} place
+   * @param {Store} store
+   * @param {Units} units
+   * @param {{send: (robot: string, command: string) => void, choose: (robot: string) => void}} actions
+   */
+  constructor(place, store, units, actions) {
+    this.place = place;
+    this.store = store;
+    this.units = units;
+    this.actions = actions;
+    /** @type {string | null} */
+    this.chosen = null;
+  }
+
+  render() {
+    const robots = this.store.frame?.robots ?? [];
+    const awaiting = this.store.awaiting();
+    this.place.classList.toggle("many", robots.length > 3);
+    const nobody = html`<p class="panels-empty">Each robot shows here what it feels, does and knows.</p>`;
+    render(robots.length ? robots.map((robot) => this.panel(robot, awaiting)) : nobody, this.place);
+  }
+
+  /**
+   * @param {RobotFrame} robot
+   * @param {import("./types/messages.js").Awaited[]} awaiting
+   */
+  panel(robot, awaiting) {
+    const { word, since, detail, tone } = presence(robot, awaiting);
+    const { name } = robot;
+    const all = (this.store.panels.get(name) ?? generic(robot)).widgets;
+    const widgets = Array.isArray(all) ? all.slice(0, MOST_WIDGETS) : [];
+    const [buttons, others] = split(widgets);
+    const send = (/** @type {string} */ command) => this.actions.send(name, command);
+    return html`
+      <section class="panel ${word} ${name === this.chosen ? "chosen" : ""}" data-testid="panel-${name}" aria-label=${name}>
+        <header>
+          <button type="button" class="name" title="show on the plan" @click=${() => this.actions.choose(name)}>
+            <span class="initials" aria-hidden="true">${[...name].slice(0, 2).join("")}</span><h2>${name}</h2></button>
+          <span class="presence ${tone}" title=${detail}><span class="dot ${tone}"></span><span
+            data-testid="presence">${word}</span>${since ? html` <span class="since">${since}</span>` : nothing}</span>
+        </header>
+        <p class="where">${this.units.length(robot.location.x)}, ${this.units.length(robot.location.y)}
+          <span>${this.units.speed(robot.speed_mps)}</span>
+          ${robot.blocked ? html`<span class="blocked">blocked</span>` : nothing}</p>
+        <div class="widgets">${others.map((widget) => drawWidget(widget, send))}</div>
+        ${buttons.length && this.store.mode === "live"
+          ? html`<div class="buttons" role="group" aria-label="Commands">${buttons.map((button) => drawWidget(button, send))}</div>`
+          : nothing}
+      </section>`;
+  }
+}
+
+/**
+ * Buttons stand in one row below the rest.
+ * @param {Panel["widgets"]} widgets
+ */
+function split(widgets) {
+  const isButton = (/** @type {Panel["widgets"][0]} */ widget) => widget?.widget === "button";
+  return [widgets.filter(isButton), widgets.filter((widget) => !isButton(widget))];
+}
+
+/**
+ * Of a robot that shows nothing of its own, and in recordings, which hold no panels: what it publishes.
+ * @param {RobotFrame} robot
+ * @returns {Panel}
+ */
+function generic(robot) {
+  const show = (/** @type {unknown} */ value) =>
+    typeof value === "number" ? String(Number(value.toPrecision(5))) : value === true ? "yes" : value === false ? "no" : String(value);
+  return {
+    widgets: [
+      { widget: "badge", label: "emotion", text: robot.emotion_state, tone: "neutral" },
+      { widget: "badge", label: "behavior", text: robot.behavior_state, tone: "neutral" },
+      { widget: "table", rows: Object.entries(robot.state_variables).map(([name, value]) => [name, show(value)]) },
+    ],
+  };
+}

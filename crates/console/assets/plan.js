@@ -1,0 +1,234 @@
+// @ts-check
+// The plan view: the field from above, at the display's own rate.
+
+import { Camera } from "./camera.js";
+import * as draw from "./draw.js";
+import { Flights } from "./flights.js";
+import { Gestures } from "./gestures.js";
+import { Motion } from "./motion.js";
+import { onThemeChange, readTheme } from "./theme.js";
+
+/** @typedef {import("./store.js").Store} Store */
+/** @typedef {import("./units.js").Units} Units */
+/** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
+/** @typedef {{x: number, y: number}} Place */
+/** What is being set up, shown instead of the run.
+ * @typedef {import("./gestures.js").Editor & {draft: import("./types/messages.js").Setup | null,
+ *   isAsApplied: boolean, faulty: (robot: string) => boolean}} PlanEditor */
+
+/** Moments of a trail. */
+const TRAIL_SAMPLES = 240;
+/** Over these the rate of drawing is taken. */
+const RATE_WINDOW_MS = 1000;
+
+export class Plan {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {Store} store
+   * @param {Units} units
+   * @param {PlanEditor} editor
+   * @param {(robot: string | null) => void} onChoose
+   */
+  constructor(canvas, store, units, editor, onChoose) {
+    const context = canvas.getContext("2d", { alpha: false });
+    if (!context) throw new Error("this browser draws no canvas");
+    this.canvas = canvas;
+    this.store = store;
+    this.units = units;
+    this.editor = editor;
+    this.camera = new Camera();
+    this.motion = new Motion();
+    this.flights = new Flights();
+    /** @type {draw.Pen} */
+    this.pen = { context, camera: this.camera, theme: readTheme() };
+    this.hasTrails = false;
+    /** @type {string | null} */
+    this.chosen = null;
+    this.isStale = true;
+    /** @type {number[]} */
+    this.drawnAt_ms = [];
+    this.lastDraw_ms = performance.now();
+    const clicked = (/** @type {Place} */ place) => onChoose(this.robotAt(place));
+    this.gestures = new Gestures(canvas, this.camera, { changed: () => this.touch(), clicked, editor });
+    store.on("frame", () => this.push());
+    store.on("epoch", () => this.flights.clear());
+    onThemeChange(() => {
+      this.pen.theme = readTheme();
+      this.touch();
+    });
+    units.listeners.push(() => this.touch());
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+    requestAnimationFrame((now_ms) => this.loop(now_ms));
+  }
+
+  /** Something changed that the next picture must show. */
+  touch() {
+    this.isStale = true;
+  }
+
+  push() {
+    const { frame } = this.store;
+    if (!frame) return;
+    this.motion.push(frame, performance.now());
+    this.flights.push(frame.flights ?? []);
+    this.touch();
+  }
+
+  resize() {
+    const { clientWidth, clientHeight } = this.canvas;
+    const ratio = Math.min(2, devicePixelRatio || 1);
+    this.canvas.width = Math.max(1, Math.round(clientWidth * ratio));
+    this.canvas.height = Math.max(1, Math.round(clientHeight * ratio));
+    this.pen.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.aim();
+    this.paint(performance.now());
+  }
+
+  /** The camera looks at the field that is shown. */
+  aim() {
+    const field_m = this.editor.draft?.field_m ?? this.motion.to?.field_m;
+    const isField = field_m && field_m[0] > 0 && field_m[1] > 0;
+    this.camera.fit(isField ? field_m : this.camera.field_m, this.canvas.clientWidth, this.canvas.clientHeight);
+  }
+
+  /** @param {number} now_ms */
+  loop(now_ms) {
+    requestAnimationFrame((next_ms) => this.loop(next_ms));
+    this.drawnAt_ms.push(now_ms);
+    while (this.drawnAt_ms[0] < now_ms - RATE_WINDOW_MS) this.drawnAt_ms.shift();
+    if (this.isStale || this.motion.isMoving || this.flights.isMoving) this.paint(performance.now());
+    this.lastDraw_ms = performance.now();
+  }
+
+  /** Pictures in the last second; a picture that needs no drawing counts as drawn. */
+  fps() {
+    return this.drawnAt_ms.length;
+  }
+
+  /** @param {number} now_ms */
+  paint(now_ms) {
+    this.isStale = false;
+    this.aim();
+    this.gestures.touch();
+    const { context, theme } = this.pen;
+    context.fillStyle = theme.outside;
+    context.fillRect(0, 0, this.camera.width_px, this.camera.height_px);
+    if (this.editor.draft) this.paintDraft(this.editor.draft);
+    else if (this.motion.to) this.paintRun(this.motion.to, now_ms);
+  }
+
+  /**
+   * @param {WorldFrame} frame
+   * @param {number} now_ms
+   */
+  paintRun(frame, now_ms) {
+    const { pen, motion } = this;
+    motion.advance(now_ms);
+    this.flights.advance(Math.min(100, now_ms - this.lastDraw_ms));
+    this.lastDraw_ms = now_ms;
+    draw.field(pen, this.step_m());
+    draw.guests(pen, motion.now_m, frame.body_m);
+    draw.obstacles(pen, frame.obstacles, frame.body_m);
+    if (this.hasTrails) this.paintTrails(frame);
+    for (const { from, to, label } of links(frame.cuts ?? [])) {
+      const [a, b] = [motion.robotsNow.get(from), motion.robotsNow.get(to)];
+      if (a && b) draw.cut(pen, a, b, label);
+    }
+    const late = new Set(this.store.awaiting().map((awaited) => awaited.name));
+    for (const robot of frame.robots) {
+      const marks = { isLate: late.has(robot.name), isChosen: robot.name === this.chosen };
+      draw.robot(pen, robot, motion.robotsNow.get(robot.name) ?? robot.location, frame.body_m, marks);
+    }
+    for (const flight of this.flights.airborne.values()) {
+      // Who sends and is not on the field (a person at a console) stands above it.
+      const outside = { x: frame.field_m[0] / 2, y: frame.field_m[1] };
+      const to = motion.robotsNow.get(flight.to);
+      if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to);
+    }
+    this.paintScale();
+  }
+
+  /** @param {WorldFrame} frame */
+  paintTrails(frame) {
+    const { history } = this.store;
+    const end = history.indexAt(frame.time_s);
+    for (const robot of frame.robots) {
+      const track = history.tracks.get(robot.name);
+      const place = this.motion.robotsNow.get(robot.name);
+      if (track && place) draw.trail(this.pen, track, Math.max(0, end - TRAIL_SAMPLES), end, place);
+    }
+  }
+
+  /** @param {import("./types/messages.js").Setup} draft */
+  paintDraft(draft) {
+    const body_m = this.motion.to?.body_m ?? 0.6096;
+    draw.field(this.pen, this.step_m());
+    // Guests are placed by the simulator: nobody knows yet where those of a changed set-up will be.
+    if (this.editor.isAsApplied && this.motion.to?.tick === 0) draw.guests(this.pen, this.motion.now_m, body_m);
+    draw.obstacles(this.pen, draft.obstacles.map(({ x, y }) => [x, y]), body_m);
+    for (const [name, place] of Object.entries(draft.robots)) {
+      const robot = { name, blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
+      draw.robot(this.pen, robot, place, body_m, { isLate: this.editor.faulty(name), isChosen: name === this.chosen });
+    }
+    this.paintScale();
+  }
+
+  paintScale() {
+    const { unit, unit_m } = this.units;
+    const wanted = 90 / this.camera.scale / unit_m;
+    const power = 10 ** Math.floor(Math.log10(wanted));
+    const length = [5, 2, 1].map((n) => n * power).find((n) => n <= wanted) ?? power;
+    draw.scaleBar(this.pen, length * unit_m, `${Number(length.toPrecision(1))} ${unit}`);
+  }
+
+  /** Distance of the grid's lines. */
+  step_m() {
+    const { unit, unit_m } = this.units;
+    const steps = unit === "ft" ? [5, 10, 50, 100, 500] : [1, 5, 10, 50, 100];
+    return (steps.find((step) => step * unit_m * this.camera.scale >= 24) ?? 1000) * unit_m;
+  }
+
+  /**
+   * @param {Place} place
+   * @returns {string | null}
+   */
+  robotAt(place) {
+    const reach_m = Math.max((this.motion.to?.body_m ?? 0) / 2, 12 / this.camera.scale);
+    const isHit = (/** @type {Place} */ at) => Math.hypot(at.x - place.x, at.y - place.y) <= reach_m;
+    return [...this.motion.robotsNow].find(([, at]) => isHit(at))?.[0] ?? null;
+  }
+
+  /**
+   * Where a place of the field is in the window.
+   * @param {number} x_m
+   * @param {number} y_m
+   */
+  toClient(x_m, y_m) {
+    this.aim();
+    const box = this.canvas.getBoundingClientRect();
+    return { x: box.left + this.camera.x(x_m), y: box.top + this.camera.y(y_m) };
+  }
+}
+
+/**
+ * Links that are cut, each once; a label where not everything is cut both ways.
+ * @param {import("./types/messages.js").Cut[]} cuts
+ */
+function links(cuts) {
+  /** @type {Map<string, {from: string, to: string, ways: number, kinds: Set<string>}>} */
+  const found = new Map();
+  for (const { from, to, commands, queries } of cuts) {
+    const key = JSON.stringify([from, to].sort());
+    const link = found.get(key) ?? { from, to, ways: 0, kinds: new Set() };
+    link.ways += 1;
+    if (commands) link.kinds.add("commands");
+    if (queries) link.kinds.add("queries");
+    found.set(key, link);
+  }
+  return [...found.values()].map(({ from, to, ways, kinds }) => {
+    const what = kinds.size === 1 ? [...kinds][0] : "";
+    const way = ways === 1 ? `${from} → ${to}` : "";
+    return { from, to, label: [way, what].filter(Boolean).join(", ") };
+  });
+}

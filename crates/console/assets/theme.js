@@ -1,0 +1,38 @@
+// @ts-check
+// The colors of the style sheet, for what is drawn on canvases; they follow the reader's light or dark mode.
+
+/** @typedef {Record<"field" | "outside" | "grid" | "edge" | "obstacle" | "obstacleEdge" | "guest" | "robot" | "robotText"
+ *   | "absent" | "absentFill" | "accent" | "warning" | "bad" | "muted" | "text" | "font", string>} Theme */
+
+/** Names in the style sheet. @type {[keyof Theme, string][]} */
+const NAMES = [
+  ["field", "--field"],
+  ["outside", "--outside"],
+  ["grid", "--grid"],
+  ["edge", "--edge"],
+  ["obstacle", "--obstacle"],
+  ["obstacleEdge", "--obstacle-edge"],
+  ["guest", "--guest"],
+  ["robot", "--robot"],
+  ["robotText", "--robot-text"],
+  ["absent", "--absent"],
+  ["absentFill", "--absent-fill"],
+  ["accent", "--accent"],
+  ["warning", "--warning"],
+  ["bad", "--bad"],
+  ["muted", "--muted"],
+  ["text", "--text"],
+  ["font", "--font"],
+];
+
+/** @returns {Theme} */
+export function readTheme() {
+  const style = getComputedStyle(document.documentElement);
+  const entries = NAMES.map(([key, name]) => [key, style.getPropertyValue(name).trim()]);
+  return Object.fromEntries(entries);
+}
+
+/** @param {() => void} listener */
+export function onThemeChange(listener) {
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", listener);
+}

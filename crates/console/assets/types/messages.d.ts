@@ -1,0 +1,668 @@
+// Generated from crates/protocol/schemas by `npm run generate` in crates/console/check. Do not edit.
+
+/**
+ * A request to the simulator. It never goes through the barrier: it is answered at once, also while the clock is held.
+ */
+export type Control =
+  | {
+      do: "init";
+      /**
+       * Another seed; without it the same.
+       */
+      seed?: number | null;
+      /**
+       * Another set-up; without it the same. A refusal names the fields that are wrong, and changes nothing.
+       */
+      setup?: Setup | null;
+    }
+  | {
+      do: "load";
+      /**
+       * The text of a scenario file that says everything itself (no `params_from`).
+       */
+      scenario: string;
+    }
+  | {
+      do: "setup";
+    }
+  | {
+      do: "start";
+    }
+  | {
+      do: "pause";
+    }
+  | {
+      do: "step";
+      /**
+       * How many.
+       */
+      n: number;
+    }
+  | {
+      do: "stop";
+    }
+  | {
+      do: "speed";
+      /**
+       * The real-time factor.
+       */
+      factor?: number | null;
+    }
+  | {
+      do: "status";
+    }
+  | {
+      /**
+       * What it says.
+       */
+      command: string;
+      do: "command";
+      to: RobotName;
+    };
+/**
+ * Name of a robot of the roster; robots are addressed by it (seed, "Inter-Robot Communication").
+ */
+export type RobotName = string;
+/**
+ * The answer to a [`Control`].
+ */
+export type ControlAnswer =
+  | (Status & {
+      answer: "done";
+    })
+  | (SetupAnswer & {
+      answer: "setup";
+    })
+  | {
+      answer: "refused";
+      /**
+       * Why, and what to do about it.
+       */
+      explanation: string;
+      /**
+       * Of a set-up: what is wrong with which of its fields.
+       */
+      fields?: FieldError[];
+    };
+/**
+ * What is known of a robot that is awaited.
+ */
+export type Reason =
+  | "not_joined"
+  | "gone"
+  | "silent"
+  | {
+      waits_for: RobotName;
+    };
+/**
+ * What the simulator is doing.
+ */
+export type Phase = "gathering" | "ready" | "running" | "paused" | "ended";
+/**
+ * Whether a robot is there.
+ */
+export type Presence = "here" | "gone" | "lost";
+/**
+ * Name of a run; several runs can share a network.
+ */
+export type RunName = string;
+/**
+ * Kinds of log lines, to filter by.
+ */
+export type LogKind = "run" | "membership" | "emotion" | "behavior" | "command" | "network" | "say" | "late";
+/**
+ * One element of a panel.
+ */
+export type Widget =
+  | {
+      /**
+       * What it is.
+       */
+      label: string;
+      /**
+       * What it says.
+       */
+      text: string;
+      widget: "text";
+    }
+  | {
+      /**
+       * What it is.
+       */
+      label: string;
+      /**
+       * The state.
+       */
+      text: string;
+      tone: Tone;
+      widget: "badge";
+    }
+  | {
+      /**
+       * What it is.
+       */
+      label: string;
+      /**
+       * Upper bound.
+       */
+      max: number;
+      /**
+       * Lower bound.
+       */
+      min: number;
+      /**
+       * The quantity.
+       */
+      value: number;
+      widget: "bar";
+    }
+  | {
+      face: Face;
+      /**
+       * How strong, 0 to 1.
+       */
+      intensity: number;
+      widget: "face";
+    }
+  | {
+      /**
+       * What it is.
+       */
+      label: string;
+      /**
+       * The values, oldest first.
+       */
+      values: number[];
+      widget: "sparkline";
+    }
+  | {
+      /**
+       * The rows.
+       */
+      rows: string[][];
+      widget: "table";
+    }
+  | {
+      /**
+       * What it shows, for those who do not see it.
+       */
+      label: string;
+      /**
+       * The document.
+       */
+      svg: string;
+      widget: "svg";
+    }
+  | {
+      /**
+       * The command.
+       */
+      command: string;
+      /**
+       * What it says.
+       */
+      label: string;
+      widget: "button";
+    };
+/**
+ * How a badge is meant.
+ */
+export type Tone = "good" | "neutral" | "warning" | "bad";
+/**
+ * The facial expressions of the seed ("Emotion Components").
+ */
+export type Face = "happy" | "sad" | "surprised" | "disgusted" | "angry" | "fearful" | "neutral";
+/**
+ * A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
+ * languages that do not tell them apart give the same run.
+ */
+export type Variable = boolean | number | string;
+/**
+ * What became of a command.
+ */
+export type Fate = "sent" | "delivered" | "dropped" | "missing";
+
+/**
+ * What a person can change between two epochs: the set-up screen of the paper ("Overall Architecture"). Everything else
+ * of the scenario stays.
+ */
+export interface Setup {
+  /**
+   * Simulated time, seconds.
+   */
+  duration_s: number;
+  /**
+   * Width and height of the field, meters.
+   *
+   * @minItems 2
+   * @maxItems 2
+   */
+  field_m: [number, number];
+  guest_duration_s: Range;
+  guest_speed_mps: Range;
+  /**
+   * Number of guests.
+   */
+  guests: number;
+  log_file: LogFile;
+  /**
+   * Centers of the fixed obstacles, meters.
+   */
+  obstacles: Point[];
+  /**
+   * Where each robot starts, meters.
+   */
+  robots: {
+    [k: string]: Point;
+  };
+  /**
+   * Where all chance of the epoch comes from.
+   */
+  seed: number;
+}
+/**
+ * A triangular distribution.
+ */
+export interface Range {
+  /**
+   * Largest value.
+   */
+  max: number;
+  /**
+   * Least value.
+   */
+  min: number;
+  /**
+   * Most likely value.
+   */
+  mode: number;
+}
+/**
+ * The readable log of a run, in the run's folder.
+ */
+export interface LogFile {
+  /**
+   * Whether it is written.
+   */
+  enabled: boolean;
+  /**
+   * Its name, without a folder.
+   */
+  name: string;
+}
+/**
+ * A place on the field: meters from its lower left corner.
+ */
+export interface Point {
+  /**
+   * Meters to the right.
+   */
+  x: number;
+  /**
+   * Meters up.
+   */
+  y: number;
+}
+/**
+ * How things stand.
+ */
+export interface Status {
+  /**
+   * For whom the clock waits now; empty when it does not.
+   */
+  awaiting: Awaited[];
+  /**
+   * Simulated time at which the run ends, seconds.
+   */
+  duration_s: number;
+  /**
+   * The epoch.
+   */
+  epoch: number;
+  /**
+   * Messages that were ignored so far, by reason.
+   */
+  ignored: {
+    [k: string]: number;
+  };
+  /**
+   * Ticks that were requested by `step` and are not done yet.
+   */
+  pending_steps: number;
+  phase: Phase;
+  /**
+   * The robots of the roster, by name.
+   */
+  robots: RobotStatus[];
+  run: RunName;
+  /**
+   * Seed of the epoch.
+   */
+  seed: number;
+  /**
+   * Real-time factor; `null` is as fast as the barrier goes.
+   */
+  speed?: number | null;
+  /**
+   * Last tick that is complete.
+   */
+  tick: number;
+  /**
+   * Simulated time at `tick`, seconds.
+   */
+  time_s: number;
+}
+/**
+ * A robot that the clock waits for.
+ */
+export interface Awaited {
+  because: Reason;
+  name: RobotName;
+  /**
+   * For how long, seconds of wall clock.
+   */
+  since_s: number;
+}
+/**
+ * One robot of the roster.
+ */
+export interface RobotStatus {
+  /**
+   * Incarnation; 0 before the first.
+   */
+  generation: number;
+  name: RobotName;
+  presence: Presence;
+}
+/**
+ * The set-up of a run.
+ */
+export interface SetupAnswer {
+  /**
+   * The whole scenario as a file, to keep.
+   */
+  scenario: string;
+  setup: Setup;
+}
+/**
+ * What is wrong with one field of a set-up.
+ */
+export interface FieldError {
+  /**
+   * The field, as a path in the [`Setup`]: `guests`, `guest_speed_mps`, `robots.Butler`, `obstacles`.
+   */
+  field: string;
+  /**
+   * What is wrong with it and what would be right.
+   */
+  reason: string;
+}
+/**
+ * One line of the log.
+ */
+export interface LogRecord {
+  /**
+   * The epoch.
+   */
+  epoch: number;
+  kind: LogKind;
+  /**
+   * A robot's name, or `simulator`.
+   */
+  source: string;
+  /**
+   * The line.
+   */
+  text: string;
+  /**
+   * The tick.
+   */
+  tick: number;
+  /**
+   * Simulated time, seconds.
+   */
+  time_s: number;
+}
+/**
+ * What a robot chooses to display: data, not code.
+ */
+export interface Panel {
+  /**
+   * The widgets, from top to bottom.
+   */
+  widgets: Widget[];
+}
+/**
+ * Every further line of a recording: the field after a tick.
+ */
+export interface RecordedTick {
+  /**
+   * Centers of the guests in whole millimeters, x and y in turn: small, and more than an eye can tell.
+   */
+  guests_mm: number[];
+  /**
+   * The robots, by name.
+   */
+  robots: RecordedRobot[];
+  /**
+   * The tick.
+   */
+  tick: number;
+}
+/**
+ * A robot in a [`RecordedTick`].
+ */
+export interface RecordedRobot {
+  /**
+   * Its behavior state.
+   */
+  behavior_state: string;
+  /**
+   * Whether its last move was refused.
+   */
+  blocked?: boolean;
+  /**
+   * Direction of motion, radians counter-clockwise from +x.
+   */
+  direction_rad: number;
+  /**
+   * Its emotion state.
+   */
+  emotion_state: string;
+  location: Point;
+  /**
+   * Whether its report of this tick is missing, so that what follows is older.
+   */
+  missed?: boolean;
+  name: RobotName;
+  /**
+   * Magnitude of its velocity, m/s.
+   */
+  speed_mps: number;
+  /**
+   * What it publishes about itself.
+   */
+  state_variables: {
+    [k: string]: Variable;
+  };
+}
+/**
+ * The recording of an epoch begins with this line: what does not change during it.
+ */
+export interface RecordingHeader {
+  /**
+   * Side of every body, meters.
+   */
+  body_m: number;
+  /**
+   * Simulated time at which the run was to end, seconds.
+   */
+  duration_s: number;
+  /**
+   * The epoch.
+   */
+  epoch: number;
+  /**
+   * Width and height of the field, meters.
+   *
+   * @minItems 2
+   * @maxItems 2
+   */
+  field_m: [number, number];
+  /**
+   * Centers of the fixed obstacles, meters.
+   */
+  obstacles: [number, number][];
+  run: RunName;
+  /**
+   * Its seed.
+   */
+  seed: number;
+  /**
+   * Length of a tick, simulated seconds.
+   */
+  tick_s: number;
+}
+/**
+ * The field at a moment, published at a display rate while somebody watches.
+ */
+export interface WorldFrame {
+  /**
+   * For whom the clock waits; empty when it does not.
+   */
+  awaiting: Awaited[];
+  /**
+   * Side of every body, meters.
+   */
+  body_m: number;
+  /**
+   * Pairs of robots between which the medium lets nothing through now.
+   */
+  cuts?: Cut[];
+  /**
+   * Simulated time at which the run ends, seconds.
+   */
+  duration_s: number;
+  /**
+   * The epoch.
+   */
+  epoch: number;
+  /**
+   * Width and height of the field, meters.
+   *
+   * @minItems 2
+   * @maxItems 2
+   */
+  field_m: [number, number];
+  /**
+   * Commands that were sent, or whose fate was decided, since the frame before; the newest [`MAX_FLIGHTS`] of them.
+   */
+  flights?: Flight[];
+  /**
+   * Centers of the guests, meters.
+   */
+  guests: [number, number][];
+  /**
+   * Centers of the fixed obstacles, meters.
+   */
+  obstacles: [number, number][];
+  phase: Phase;
+  /**
+   * The robots, by name.
+   */
+  robots: RobotFrame[];
+  run: RunName;
+  /**
+   * Seed of the epoch.
+   */
+  seed: number;
+  /**
+   * Real-time factor; `null` is as fast as the barrier goes.
+   */
+  speed?: number | null;
+  /**
+   * The tick.
+   */
+  tick: number;
+  /**
+   * Length of a tick, simulated seconds.
+   */
+  tick_s: number;
+  /**
+   * Simulated time, seconds.
+   */
+  time_s: number;
+}
+/**
+ * A link that the medium has cut, one way.
+ */
+export interface Cut {
+  /**
+   * Whether commands are cut.
+   */
+  commands: boolean;
+  from: RobotName;
+  /**
+   * Whether queries are cut.
+   */
+  queries: boolean;
+  to: RobotName;
+}
+/**
+ * A command on its way, as observers see it.
+ */
+export interface Flight {
+  /**
+   * What it says; only where it was sent just now.
+   */
+  command?: string;
+  fate: Fate;
+  from: RobotName;
+  /**
+   * Its number among the sender's.
+   */
+  seq: number;
+  /**
+   * Tick of what is told here.
+   */
+  tick: number;
+  to: RobotName;
+}
+/**
+ * A robot in a [`WorldFrame`].
+ */
+export interface RobotFrame {
+  /**
+   * Its behavior state.
+   */
+  behavior_state: string;
+  /**
+   * Whether its last move was refused.
+   */
+  blocked: boolean;
+  /**
+   * Direction of motion, radians counter-clockwise from +x.
+   */
+  direction_rad: number;
+  /**
+   * Its emotion state.
+   */
+  emotion_state: string;
+  /**
+   * Incarnation; above 1 it has returned.
+   */
+  generation: number;
+  location: Point;
+  name: RobotName;
+  presence: Presence;
+  /**
+   * Magnitude of its velocity, m/s.
+   */
+  speed_mps: number;
+  /**
+   * What it publishes about itself.
+   */
+  state_variables: {
+    [k: string]: Variable;
+  };
+}

@@ -1,0 +1,2 @@
+// The types of the package of the same version; `check/package.json` pins it.
+export * from "lit-html";

@@ -1,0 +1,115 @@
+// @ts-check
+// The widgets of a robot's panel. What a robot sends is data: text stays text, and a picture is an image.
+
+import { drawFace } from "./face.js";
+import { short } from "./units.js";
+import { html, nothing, svg } from "./vendor/lit-html.js";
+
+/** @typedef {import("./types/messages.js").Widget} Widget */
+/** @typedef {import("./types/messages.js").Tone} Tone */
+/** @typedef {(command: string) => void} Send */
+
+const TONES = ["good", "neutral", "warning", "bad"];
+/** Of a table; more would not be read anyway. */
+const MOST_ROWS = 60;
+const MOST_CELLS = 12;
+const MOST_POINTS = 1000;
+/** Characters of a picture. */
+const LARGEST_SVG = 500_000;
+
+/**
+ * @param {Widget} widget
+ * @param {Send} send
+ */
+export function drawWidget(widget, send) {
+  switch (widget?.widget) {
+    case "text":
+      return html`<div class="widget text"><span class="label">${widget.label}</span><p>${widget.text}</p></div>`;
+    case "badge":
+      return html`
+        <div class="widget pair"><span class="label">${widget.label}</span>
+          <span class="badge ${tone(widget.tone)}">${widget.text}</span></div>`;
+    case "bar":
+      return bar(widget);
+    case "face":
+      return html`
+        <div class="widget face-box">
+          <svg class="face" viewBox="0 0 100 100" role="img" data-testid="face" data-face=${widget.face}
+            aria-label="${widget.face} face">${drawFace(widget.face, widget.intensity)}</svg>
+        </div>`;
+    case "sparkline":
+      return sparkline(widget);
+    case "table":
+      return table(Array.isArray(widget.rows) ? widget.rows : []);
+    case "svg":
+      return html`<div class="widget"><img class="picture" alt=${widget.label} src=${imageOf(widget.svg)} /></div>`;
+    case "button":
+      return html`
+        <button type="button" class="widget" data-testid="button-${String(widget.command).replaceAll(" ", "-")}"
+          title="send: ${widget.command}" @click=${() => send(widget.command)}>${widget.label}</button>`;
+    default:
+      return nothing;
+  }
+}
+
+/** @param {Tone} word */
+function tone(word) {
+  return TONES.includes(word) ? word : "neutral";
+}
+
+/** @param {Extract<Widget, {widget: "bar"}>} widget */
+function bar({ label, value, min, max }) {
+  const part = max > min ? (value / 2 - min / 2) / (max / 2 - min / 2) : 0;
+  const width = Number.isFinite(part) ? 100 * Math.min(1, Math.max(0, part)) : 0;
+  const of = min === 0 && max !== 1 ? html`<span class="of"> / ${short(max)}</span>` : nothing;
+  return html`
+    <div class="widget gauge">
+      <div class="row"><span class="label">${label}</span><span class="number">${short(value)}${of}</span></div>
+      <svg viewBox="0 0 100 1" preserveAspectRatio="none" role="meter" aria-label=${label} aria-valuemin=${min}
+        aria-valuemax=${max} aria-valuenow=${value}><rect class="rail" width="100" height="1"></rect>
+        <rect class="level" width=${width} height="1"></rect></svg>
+    </div>`;
+}
+
+/** @param {Extract<Widget, {widget: "sparkline"}>} widget */
+function sparkline({ label, values }) {
+  const points = (Array.isArray(values) ? values : []).filter(Number.isFinite).slice(-MOST_POINTS);
+  const [low, high] = [Math.min(...points), Math.max(...points)];
+  // Halves, because the distance of two large numbers may be larger than any number.
+  const range = high / 2 - low / 2 || 1;
+  const at = (/** @type {number} */ value, /** @type {number} */ i) =>
+    `${((100 * i) / Math.max(1, points.length - 1)).toFixed(2)},${(22 - 20 * ((value / 2 - low / 2) / range)).toFixed(2)}`;
+  const last = points.at(-1);
+  return html`
+    <div class="widget spark">
+      <div class="row"><span class="label">${label}</span><span class="number">${last === undefined ? "–" : short(last)}</span></div>
+      <svg viewBox="0 0 100 24" preserveAspectRatio="none" role="img" aria-label="${label}, recent values">
+        ${svg`<polyline vector-effect="non-scaling-stroke" points=${points.map(at).join(" ")}></polyline>`}
+      </svg>
+    </div>`;
+}
+
+/** @param {string[][]} rows */
+function table(rows) {
+  const cells = (/** @type {string[]} */ row) => (Array.isArray(row) ? row : []).slice(0, MOST_CELLS);
+  const isPairs = rows.every((row) => row?.length === 2);
+  return html`
+    <div class="widget table"><table class=${isPairs ? "pairs" : ""}><tbody>
+      ${rows.slice(0, MOST_ROWS).map((row) => html`<tr>${cells(row).map((cell) => html`<td>${cell}</td>`)}</tr>`)}
+    </tbody></table>
+    ${rows.length > MOST_ROWS ? html`<p class="muted">and ${rows.length - MOST_ROWS} rows more</p>` : nothing}</div>`;
+}
+
+/**
+ * An image runs no script and loads nothing.
+ * @param {string} document
+ */
+function imageOf(document) {
+  if (typeof document !== "string" || document.length > LARGEST_SVG) return "data:,";
+  try {
+    return `data:image/svg+xml;charset=utf-8,${encodeURIComponent(document)}`;
+  } catch {
+    // Half a surrogate pair: no picture.
+    return "data:,";
+  }
+}

@@ -1,0 +1,6 @@
+//! The real program, over real sockets.
+
+mod client;
+mod guards;
+mod playback;
+mod sockets;

@@ -1,0 +1,120 @@
+"""A real launch to test the console with: a simulator, robots and a console, each a process of its own."""
+
+import json
+import os
+import pathlib
+import re
+import select
+import signal
+import socket
+import subprocess
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BIN = pathlib.Path(os.environ["CARS_BIN"])
+PATIENCE_S = 20.0
+
+
+def eventually(what, ready, patience_s=PATIENCE_S):
+    """Waits until `ready()` gives something, returns it, and fails if it never does."""
+    end = time.monotonic() + patience_s
+    while True:
+        found = ready()
+        if found:
+            return found
+        assert time.monotonic() < end, f"waited in vain for {what}"
+        time.sleep(0.02)
+
+
+def until(page, expression):
+    """Waits until an expression holds in the page, whose policy lets nobody wait inside it."""
+    return eventually(expression, lambda: page.evaluate(expression))
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Processes:
+    """Processes that end with the test."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.all = []
+
+    def start(self, name, *arguments, environment=None, **options):
+        log = open(self.folder / f"{name}-{len(self.all)}.log", "wb")
+        environment = {**os.environ, **(environment or {})}
+        command = [str(BIN / name), *map(str, arguments)]
+        process = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stderr=log, **options)
+        log.close()
+        self.all.append(process)
+        return process
+
+    def end(self):
+        for process in self.all:
+            process.kill()
+        for process in self.all:
+            process.wait()
+
+    def logs(self):
+        return "\n".join(f"== {file.name}\n{file.read_text()}" for file in sorted(self.folder.glob("*.log")))
+
+
+def start_console(processes, *arguments, environment=None):
+    """Starts a console and returns its address."""
+    arguments = ("--bind", "127.0.0.1:0", *arguments)
+    process = processes.start("cars-console", *arguments, environment=environment, stdout=subprocess.PIPE)
+    assert select.select([process.stdout], [], [], PATIENCE_S)[0], "the console does not say where it is"
+    line = process.stdout.readline().decode()
+    found = re.fullmatch(r"console: (http://\S+)\n", line)
+    assert found, f"{line!r}\n{processes.logs()}"
+    return found[1]
+
+
+class Launch:
+    """A run in progress, with a console."""
+
+    RUN = "console-test"
+
+    def __init__(self, folder, scenario="configs/hors_doeuvres.toml", robots=("Butler", "Leguin"), options=()):
+        self.folder = folder
+        self.run_folder = folder / "runs" / self.RUN
+        self.processes = Processes(folder)
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.environment = {"CARS_RUN": self.RUN, "CARS_CONNECT": self.endpoint, "CARS_LISTEN": self.endpoint}
+        self.simulator = self.start("cars-sim", scenario, "--out", folder / "runs", "--paused", *options)
+        self.robots = {name: self.start(f"cars-{name.lower()}", "--name", name) for name in robots}
+        self.address = start_console(self.processes, environment=self.environment)
+        eventually("the robots", lambda: (self.status() or {}).get("phase") == "ready")
+
+    def start(self, name, *arguments):
+        return self.processes.start(name, *arguments, environment=self.environment)
+
+    def kill(self, robot):
+        self.robots[robot].send_signal(signal.SIGKILL)
+        self.robots[robot].wait()
+
+    def restart(self, robot):
+        self.robots[robot] = self.start(f"cars-{robot.lower()}", "--name", robot)
+
+    def status(self):
+        """What the simulator itself says; none if it does not answer."""
+        command = [BIN / "cars", "ctl", "status", "--json", "--run", self.RUN, "--connect", self.endpoint]
+        answer = subprocess.run(command, capture_output=True, timeout=PATIENCE_S, cwd=self.folder)
+        return json.loads(answer.stdout) if answer.returncode == 0 else None
+
+    def events(self):
+        lines = (self.run_folder / "events.jsonl").read_text().splitlines()
+        return [json.loads(line) for line in lines if line.endswith("}")]
+
+    def put(self, key, message):
+        """Puts a message on a key below the run's, as anybody on the bus can."""
+        helper = BIN / "examples" / "put"
+        command = [helper, self.endpoint, f"cars/{self.RUN}/{key}"]
+        subprocess.run(command, input=json.dumps(message).encode(), check=True, timeout=PATIENCE_S)
+
+    def end(self):
+        self.processes.end()
