@@ -143,3 +143,68 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
         nobody_is_left(&run);
     }
 }
+
+#[test]
+fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
+    let lab = Lab::new();
+    let set = ["--set", "robot.Leguin.on_late=continue", "--set", "deadline=0.2 s", "--set", "lose_after=3"];
+    let mut args = vec!["launch", FILE, "--speed", "20", "--duration", "200 s"];
+    args.extend(set);
+    let mut launch = lab.start("late-own", &args);
+    launch.prints("behavior");
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    launch.prints("is lost");
+    send(leguin, Signal::SIGCONT);
+    launch.finish();
+    let events = lab.events("late-own");
+    let of = |kind: &str| -> Vec<u64> {
+        let own = events.iter().filter(|event| event["event"] == kind && event["robot"] == "Leguin");
+        own.map(|event| event["tick"].as_u64().unwrap()).collect()
+    };
+    let (missed, lost, joined) = (of("missed"), of("lost"), of("joined"));
+    assert_eq!(lost.len(), 1, "{lost:?}");
+    assert!(missed.len() >= 3 && missed[2] == lost[0], "lost after three in a row: {missed:?} {lost:?}");
+    assert!(joined.len() == 2 && joined[1] > lost[0], "it returned: {joined:?}");
+    // It missed every tick in between, and none after.
+    assert_eq!(*missed.last().unwrap() + 1, joined[1]);
+    assert_eq!(missed.len() as u64, joined[1] - missed[0]);
+}
+
+#[test]
+fn a_robot_that_is_stuck_does_not_freeze_the_others() {
+    let lab = Lab::new();
+    let set = ["--set", "on_late=continue", "--set", "deadline=0.1 s", "--set", "lose_after=2"];
+    let mut args = vec!["launch", FILE, "--speed", "10", "--duration", "20000 s"];
+    args.extend(set);
+    let mut launch = lab.start("late-stuck", &args);
+    launch.prints("behavior");
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    launch.prints("is lost");
+    // From here on it is sent a clock a tick, which it never reads.
+    lab.ok(&["ctl", "speed", "max", "--run", "late-stuck"]);
+    launch.finish();
+    let events = lab.events("late-stuck");
+    assert_eq!(events.last().unwrap()["reason"], "finished");
+    assert_eq!(lab.summary("late-stuck")["ticks"], 40_000);
+    nobody_is_left("late-stuck");
+}
+
+#[test]
+fn what_the_clock_does_about_late_robots_changes_while_it_is_held() {
+    let lab = Lab::new();
+    let mut launch = lab.start("late-change", &["launch", FILE, "--speed", "20", "--duration", "60 s"]);
+    launch.prints("behavior");
+    send(launch.process("cars-leguin"), Signal::SIGSTOP);
+    launch.prints("waiting for");
+    let status = lab.ok(&["ctl", "status", "--run", "late-change"]);
+    assert!(status.contains("Leguin"), "{status}");
+    let (code, text) = lab.fails(&["ctl", "late", "continue", "--robot", "Nobody", "--run", "late-change"]);
+    assert!(code == 1 && text.contains("no robot of this run is called Nobody"), "{text}");
+    lab.ok(&["ctl", "late", "continue", "--deadline", "0.1 s", "--run", "late-change"]);
+    launch.prints("is lost");
+    launch.finish();
+    assert_eq!(lab.events("late-change").last().unwrap()["reason"], "finished");
+    nobody_is_left("late-change");
+}

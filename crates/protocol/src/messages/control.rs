@@ -44,6 +44,18 @@ pub enum Control {
         /// The real-time factor.
         factor: Option<f64>,
     },
+    /// What the clock does about robots that are late, from now on.
+    Late {
+        /// For which robot; without it for all that have no rule of their own.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        robot: Option<RobotName>,
+        /// What it does; without it as before.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        on_late: Option<OnLate>,
+        /// After how long without a report a robot is late, seconds of wall clock; for all robots; without it as before.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        deadline_s: Option<f64>,
+    },
     /// Nothing but the status.
     Status,
     /// A command from outside the roster; it takes effect at a tick boundary.
@@ -59,6 +71,7 @@ impl Message for Control {
     fn check(&self) -> Result<(), (String, String)> {
         match self {
             Self::Speed { factor: Some(factor) } => finite(*factor, "factor"),
+            Self::Late { deadline_s: Some(deadline_s), .. } => finite(*deadline_s, "deadline_s"),
             Self::Command { command, .. } => short(command, "command"),
             Self::Init { setup: Some(setup), .. } => setup.check(),
             _ => Ok(()),
@@ -193,6 +206,18 @@ impl std::fmt::Display for Phase {
     }
 }
 
+/// What the clock does about a robot that is late.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OnLate {
+    /// Hold, and say for whom; never act. The mode for science.
+    Wait,
+    /// Go on without it: the missed tick is recorded and its body stays.
+    Continue,
+    /// End the run.
+    Abort,
+}
+
 /// How things stand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Status {
@@ -214,6 +239,10 @@ pub struct Status {
     pub phase: Phase,
     /// Real-time factor; `null` is as fast as the barrier goes.
     pub speed: Option<f64>,
+    /// What the clock does about robots that are late and have no rule of their own.
+    pub on_late: OnLate,
+    /// After how long without a report a robot is late, seconds of wall clock.
+    pub deadline_s: f64,
     /// For whom the clock waits now; empty when it does not.
     pub awaiting: Vec<Awaited>,
     /// The robots of the roster, by name.
@@ -265,6 +294,8 @@ pub struct RobotStatus {
     pub name: RobotName,
     /// Incarnation; 0 before the first.
     pub generation: Generation,
+    /// What the clock does when it is late.
+    pub on_late: OnLate,
     /// Whether its process is there.
     pub presence: Presence,
 }

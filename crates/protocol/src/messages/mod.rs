@@ -8,7 +8,7 @@ mod step;
 use std::collections::BTreeMap;
 
 pub use control::{
-    Awaited, Control, ControlAnswer, FieldError, LogFile, Phase, Range, Reason, RobotStatus, Setup,
+    Awaited, Control, ControlAnswer, FieldError, LogFile, OnLate, Phase, Range, Reason, RobotStatus, Setup,
     SetupAnswer, Status,
 };
 pub use observe::{
