@@ -1,6 +1,7 @@
 //! What is simulated. A file is read as it is written (module `raw`), then checked and turned into what it means
 //! ([`Scenario`]): SI units, defaults filled in, every name and number legal.
 
+pub mod fault;
 pub mod network;
 mod overrides;
 mod raw;
@@ -16,6 +17,7 @@ use protocol::random::MAX_SEED;
 use protocol::{RobotName, Tick};
 use world::{Field, Guests, Hall, Triangular};
 
+pub use fault::{Fault, FaultEnd};
 pub use network::Network;
 pub use overrides::Override;
 
@@ -51,6 +53,8 @@ pub struct Scenario {
     pub lateness: Lateness,
     /// The network between the robots.
     pub network: Network,
+    /// What befalls the robots' processes, in the order in which it begins.
+    pub faults: Vec<Fault>,
     /// What is kept of the run.
     pub record: Record,
 }

@@ -4,6 +4,7 @@
 //! due. Control is answered by the same loop, also while the clock is held, because the loop never waits for a robot.
 
 mod control;
+mod faults;
 mod member;
 mod observers;
 
@@ -23,6 +24,7 @@ use crate::simulation::{Barrier, Exchange, Membership, Simulation};
 use crate::summary::Summary;
 
 use control::Pace;
+use faults::Orders;
 use member::Member;
 use observers::Observers;
 
@@ -108,6 +110,7 @@ pub struct Server {
     declared: Vec<Declared>,
     clock: Publisher,
     observers: Observers,
+    orders: Orders,
     pace: Pace,
     members: BTreeMap<RobotName, Member>,
     /// What each robot senses, for those who follow it instead of asking every tick.
@@ -151,6 +154,7 @@ impl Server {
         let mut server = Self {
             clock: bus.publisher(&keys.clock())?,
             observers: Observers::new(&bus, &keys)?,
+            orders: Orders::new(bus.publisher(&keys.faults())?),
             pace: Pace::new(options.speed, options.is_paused),
             percepts: scenario
                 .robots
@@ -265,6 +269,7 @@ impl Server {
         let last = simulation.scenario().ticks;
         while simulation.tick() < last {
             self.wait_for_grant(simulation)?;
+            self.carry_out_faults(simulation)?;
             self.forward_operator(simulation);
             let record = simulation.step(self)?;
             self.observers.note(&record);

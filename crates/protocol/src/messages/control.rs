@@ -56,6 +56,13 @@ pub enum Control {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         deadline_s: Option<f64>,
     },
+    /// The launcher has carried out the faults that it was ordered before this tick.
+    FaultsDone {
+        /// Epoch of the order.
+        epoch: Epoch,
+        /// Tick of the order.
+        tick: Tick,
+    },
     /// Nothing but the status.
     Status,
     /// A command from outside the roster; it takes effect at a tick boundary.
@@ -216,6 +223,50 @@ pub enum OnLate {
     Continue,
     /// End the run.
     Abort,
+}
+
+/// What the scenario has the launcher do to processes before a tick; the clock is held until it answers with
+/// [`Control::FaultsDone`]. The same order may come twice; what was done is not done again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FaultOrder {
+    /// Epoch.
+    pub epoch: Epoch,
+    /// Tick before whose clock it is done.
+    pub tick: Tick,
+    /// What to do, in this order.
+    pub orders: Vec<ProcessOrder>,
+}
+
+impl Message for FaultOrder {
+    fn check(&self) -> Result<(), (String, String)> {
+        super::few(self.orders.len(), "orders")
+    }
+}
+
+/// What to do to one robot's process.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProcessOrder {
+    /// Whose process.
+    pub robot: RobotName,
+    /// Which fault.
+    pub kind: FaultKind,
+    /// Whether the fault begins; else it is over.
+    pub begins: bool,
+    /// A fault that begins ends by itself after this time of wall clock, seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub for_s: Option<f64>,
+}
+
+/// A fault of a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FaultKind {
+    /// The process is killed; at the end of the fault it is started again.
+    Crash,
+    /// The process is stopped; at the end of the fault it goes on.
+    Hang,
+    /// The process is stopped for most of the time, and goes on in between.
+    Slow,
 }
 
 /// How things stand.

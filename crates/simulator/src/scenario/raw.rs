@@ -1,5 +1,6 @@
 //! A scenario file as it is written. Unknown keys are refused; what is wrong is shown where it stands.
 
+mod fault;
 mod network;
 
 use std::collections::BTreeMap;
@@ -10,6 +11,7 @@ use protocol::messages::{Parameters, Point};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use fault::FaultTable;
 use network::NetworkTable;
 
 use super::{DEFAULT_SEED, Lateness, OnLate, Record, RobotSpec, check_seed};
@@ -34,6 +36,8 @@ pub(super) struct Scenario {
     guests: Option<Spanned<GuestsTable>>,
     network: Option<Spanned<NetworkTable>>,
     record: Option<RecordTable>,
+    #[serde(default, rename = "fault", skip_serializing_if = "Vec::is_empty")]
+    faults: Vec<Spanned<FaultTable>>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
@@ -184,10 +188,12 @@ impl Scenario {
             lateness,
             robots: robots(self.robots, source, folder)?,
             network: super::Network::default(),
+            faults: Vec::new(),
             record: record(self.record, source)?,
         };
         let network = network::check(self.network, &scenario.robots, tick_s, source)?;
-        let scenario = super::Scenario { network, ..scenario };
+        let faults = fault::check(self.faults, &scenario.robots, &scenario.lateness, tick_s, source)?;
+        let scenario = super::Scenario { network, faults, ..scenario };
         scenario.check_hall(source, self.guests.as_ref().map(Spanned::span))?;
         Ok(scenario)
     }
@@ -343,6 +349,11 @@ impl From<&super::Scenario> for Scenario {
                 },
             )),
             network: NetworkTable::of(&scenario.network, scenario.tick_s),
+            faults: scenario
+                .faults
+                .iter()
+                .map(|entry| Spanned::new(0..0, FaultTable::of(entry, scenario.tick_s)))
+                .collect(),
             record: Some(RecordTable {
                 log: Some(scenario.record.log),
                 log_name: Some(Spanned::new(0..0, scenario.record.log_name.clone())),

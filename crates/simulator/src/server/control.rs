@@ -197,6 +197,7 @@ impl Server {
                 }
                 self.operator.push((to.clone(), command.clone()));
             }
+            Control::FaultsDone { epoch, tick } => self.orders.done(*epoch, *tick),
             Control::Late { robot, on_late, deadline_s } => {
                 self.change_lateness(robot.as_ref(), *on_late, *deadline_s)?;
             }

@@ -51,6 +51,11 @@ impl Member {
         }
     }
 
+    /// Whether the next clock finds it able to take part, or takes it in.
+    pub(super) fn is_back(&self) -> bool {
+        self.is_present && (!self.is_lost || self.has_returned || self.is_pending)
+    }
+
     /// Everybody takes part in an epoch from its beginning.
     pub(super) fn begin_epoch(&mut self) {
         (self.is_seated, self.is_pending, self.is_lost, self.missed) = (true, false, false, 0);
