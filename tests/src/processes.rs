@@ -152,6 +152,17 @@ pub fn find(run: &str) -> Vec<(u32, String)> {
     pids.filter(|pid| *pid != own && is_of_run(*pid) && alive(pid)).map(|pid| (pid, program(pid))).collect()
 }
 
+/// The process of a run that runs the robot called `robot`, if it is there.
+#[must_use]
+pub fn named(run: &str, robot: &str) -> Option<u32> {
+    let argument = format!("--name\0{robot}\0");
+    let is_robot = |pid: u32| {
+        let arguments = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        arguments.windows(argument.len()).any(|part| part == argument.as_bytes())
+    };
+    find(run).into_iter().find(|(pid, _)| is_robot(*pid)).map(|(pid, _)| pid)
+}
+
 fn program(pid: u32) -> String {
     let target = std::fs::read_link(format!("/proc/{pid}/exe")).unwrap_or_default();
     target.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()

@@ -4,16 +4,17 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, miette};
 use protocol::bus::{AnswerOf, Bus, Role};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Control, ControlAnswer, LogRecord, Presence, Status};
+use protocol::messages::{Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
 use protocol::{RobotName, RunName, decode, encode};
 use simulator::RunFolder;
 use simulator::recorder::ENDPOINT;
 use simulator::scenario::{Changes, Scenario};
+use simulator::units::Time;
 
 use crate::common::{LATEST, Speed};
 
@@ -114,6 +115,18 @@ enum Button {
         #[arg(value_parser = |text: &str| simulator::scenario::parse_speed(text).map(Speed))]
         factor: Speed,
     },
+    /// Change what the clock does about robots that are late.
+    Late {
+        /// What it does.
+        #[arg(value_enum)]
+        on_late: Option<LateMode>,
+        /// For this robot only; without it for all that have no rule of their own.
+        #[arg(long)]
+        robot: Option<RobotName>,
+        /// After how long without a report a robot is late, wall clock, for example "2 s".
+        #[arg(long, value_name = "TIME")]
+        deadline: Option<Time>,
+    },
     /// Say how things stand.
     Status,
     /// Back to tick 0 with another scenario for the same robots.
@@ -125,6 +138,17 @@ enum Button {
     Scenario,
 }
 
+/// What the clock does about a robot that is late.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum LateMode {
+    /// Hold, and say for whom.
+    Wait,
+    /// Go on without it.
+    Continue,
+    /// End the run.
+    Abort,
+}
+
 impl Button {
     fn control(&self) -> miette::Result<Control> {
         Ok(match self {
@@ -134,6 +158,15 @@ impl Button {
             Self::Step { n } => Control::Step { n: *n },
             Self::Stop => Control::Stop,
             Self::Speed { factor } => Control::Speed { factor: factor.0 },
+            Self::Late { on_late, robot, deadline } => Control::Late {
+                robot: robot.clone(),
+                on_late: on_late.map(|mode| match mode {
+                    LateMode::Wait => OnLate::Wait,
+                    LateMode::Continue => OnLate::Continue,
+                    LateMode::Abort => OnLate::Abort,
+                }),
+                deadline_s: deadline.map(|deadline| deadline.0),
+            },
             Self::Status => Control::Status,
             // Resolved here, where the files are that it names.
             Self::Load { file } => {

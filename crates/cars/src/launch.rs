@@ -228,10 +228,12 @@ impl Launch {
         let wants_world = look.has_bar;
         let screen = Screen::open(look);
         let (run, tell) = (self.run.clone(), screen.tell());
-        let watch = || Watch { run, endpoint: endpoint.to_owned(), wants_world, tell };
-        let observer = (!self.args.quiet).then(|| Observer::start(watch()));
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
         let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.tell());
+        let faults = (!self.scenario.faults.is_empty()).then(|| supervisor.queue());
+        let is_needed = !self.args.quiet || faults.is_some();
+        let watch = || Watch { run, endpoint: endpoint.to_owned(), wants_world, tell, faults };
+        let observer = is_needed.then(|| Observer::start(watch()));
         let running = async {
             signals::listen(&supervisor.queue())?;
             std::io::Result::Ok(supervisor.run().await)

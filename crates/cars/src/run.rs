@@ -32,6 +32,10 @@ pub(crate) struct RunArgs {
 pub(crate) fn run(args: &RunArgs) -> miette::Result<ExitCode> {
     let file = launch::scenario_file(&args.file)?;
     let scenario = Scenario::load(&file, &args.execution.changes())?;
+    if !scenario.faults.is_empty() {
+        let help = "play it with `cars launch`, or leave them out with --set 'fault=[]'";
+        return Err(miette!(help = help, "the scenario has faults of processes, and here are none"));
+    }
     let run = args.execution.run_name(&args.file)?;
     let (folder, _lock) = args.execution.folder(&run, &scenario)?;
     let speed = args.execution.speed.and_then(|speed| speed.0);

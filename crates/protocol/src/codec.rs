@@ -38,16 +38,26 @@ pub fn encode<M: Message>(message: &M) -> Vec<u8> {
     serde_json::to_vec(message).unwrap_or_else(|error| unreachable!("a message is always JSON: {error}"))
 }
 
+fn shortened(mut text: String) -> String {
+    const MAX_BYTES: usize = 500;
+    if text.len() > MAX_BYTES {
+        text.truncate((0..=MAX_BYTES).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0));
+        text += "...";
+    }
+    text
+}
+
 /// Reads a message that came on `key`. Unknown fields are ignored.
 ///
 /// # Errors
 /// [`Malformed`] names key, sender, field and reason.
 pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Malformed> {
+    // What is wrong may repeat what was sent, and that may be long.
     let malformed = |field: String, reason: String| Malformed {
         key: key.to_owned(),
         sender: sender.to_owned(),
-        field,
-        reason,
+        field: shortened(field),
+        reason: shortened(reason),
     };
     if bytes.len() > MAX_MESSAGE_BYTES {
         let reason = format!("{} bytes, more than the {MAX_MESSAGE_BYTES} allowed", bytes.len());

@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::messages::{End, LogKind, LogRecord, Performative, Point};
+use crate::messages::{End, FaultKind, LogKind, LogRecord, Performative, Point};
 use crate::name::RobotName;
 use crate::{Generation, Seq, Tick};
 
@@ -169,6 +169,15 @@ pub enum Event {
         /// Its number among the sender's.
         seq: Seq,
     },
+    /// What the scenario has the launcher do to a robot's process begins, or is over.
+    Fault {
+        /// Whose process.
+        robot: RobotName,
+        /// Which fault.
+        kind: FaultKind,
+        /// Whether it begins; else it is over.
+        begins: bool,
+    },
     /// A robot wrote a line to the log.
     Say {
         /// Who.
@@ -236,6 +245,16 @@ impl Event {
             }
             Self::Lost { robot } => says(robot, LogKind::Membership, "is lost".to_owned()),
             Self::Missed { robot } => says(robot, LogKind::Membership, "missed the tick".to_owned()),
+            Self::Fault { robot, kind, begins } => {
+                let what = match kind {
+                    FaultKind::Crash => "the process is killed",
+                    FaultKind::Hang => "the process is stopped",
+                    FaultKind::Slow => "the process is slowed down",
+                };
+                let text =
+                    if *begins { format!("fault: {what}") } else { format!("fault over: {what} no more") };
+                says(robot, LogKind::Membership, text)
+            }
             Self::Emotion { robot, from, to } => {
                 says(robot, LogKind::Emotion, change("emotion", from.as_ref(), to))
             }

@@ -122,6 +122,12 @@ impl Keys {
         format!("{}/log", self.root)
     }
 
+    /// Simulator to launcher: what to do to processes before a tick.
+    #[must_use]
+    pub fn faults(&self) -> String {
+        format!("{}/faults", self.root)
+    }
+
     /// Liveliness token of the simulator.
     #[must_use]
     pub fn alive_sim(&self) -> String {

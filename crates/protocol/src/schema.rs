@@ -23,6 +23,7 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("control", one::<Control>()),
         ("control_answer", one::<ControlAnswer>()),
         ("event", one::<crate::event::Line>()),
+        ("fault_order", one::<crate::messages::FaultOrder>()),
         ("join_answer", one::<JoinAnswer>()),
         ("join_request", one::<JoinRequest>()),
         ("log_record", one::<LogRecord>()),

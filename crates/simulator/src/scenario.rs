@@ -1,6 +1,7 @@
 //! What is simulated. A file is read as it is written (module `raw`), then checked and turned into what it means
 //! ([`Scenario`]): SI units, defaults filled in, every name and number legal.
 
+pub mod fault;
 pub mod network;
 mod overrides;
 mod raw;
@@ -10,10 +11,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use protocol::messages::{Parameters, Point};
+
+pub use protocol::messages::OnLate;
 use protocol::random::MAX_SEED;
 use protocol::{RobotName, Tick};
 use world::{Field, Guests, Hall, Triangular};
 
+pub use fault::{Fault, FaultEnd};
 pub use network::Network;
 pub use overrides::Override;
 
@@ -45,12 +49,12 @@ pub struct Scenario {
     pub obstacles: Vec<Point>,
     /// The roster, by name.
     pub robots: BTreeMap<RobotName, RobotSpec>,
-    /// What the clock does about a robot that is late.
-    pub on_late: OnLate,
-    /// After how long without a report a robot is late, seconds of wall clock.
-    pub deadline_s: f64,
+    /// What the clock does about robots that are late.
+    pub lateness: Lateness,
     /// The network between the robots.
     pub network: Network,
+    /// What befalls the robots' processes, in the order in which it begins.
+    pub faults: Vec<Fault>,
     /// What is kept of the run.
     pub record: Record,
 }
@@ -83,16 +87,25 @@ pub struct RobotSpec {
     pub parameters: Parameters,
 }
 
-/// What the clock does about a robot that is late.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OnLate {
-    /// Hold, and say for whom; never act. The mode for science.
-    Wait,
-    /// Go on without it: the missed tick is recorded and its body stays.
-    Continue,
-    /// End the run.
-    Abort,
+/// What the clock does about robots that are late.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lateness {
+    /// For robots that have no rule of their own.
+    pub on_late: OnLate,
+    /// For single robots.
+    pub own: BTreeMap<RobotName, OnLate>,
+    /// After how long without a report a robot is late, seconds of wall clock.
+    pub deadline_s: f64,
+    /// After this many missed ticks in a row a robot is lost, where the clock goes on without it.
+    pub lose_after: u32,
+}
+
+impl Lateness {
+    /// What the clock does when this robot is late.
+    #[must_use]
+    pub fn of(&self, robot: &RobotName) -> OnLate {
+        self.own.get(robot).copied().unwrap_or(self.on_late)
+    }
 }
 
 /// What the command line changes of a scenario file.

@@ -4,10 +4,11 @@
 //! due. Control is answered by the same loop, also while the clock is held, because the loop never waits for a robot.
 
 mod control;
+mod faults;
 mod member;
 mod observers;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
@@ -18,11 +19,12 @@ use protocol::{Epoch, Malformed, RobotName, RunName, Tick, decode, encode};
 
 use crate::diagnostic::FileError;
 use crate::recorder::{Recorder, RunFolder};
-use crate::scenario::{OnLate, Scenario};
+use crate::scenario::{Lateness, OnLate, Scenario};
 use crate::simulation::{Barrier, Exchange, Membership, Simulation};
 use crate::summary::Summary;
 
 use control::Pace;
+use faults::Orders;
 use member::Member;
 use observers::Observers;
 
@@ -42,8 +44,6 @@ pub struct Options {
     pub speed: Option<f64>,
     /// Whether the clock waits for `start` once everybody is there.
     pub is_paused: bool,
-    /// After this many ticks in a row without a report a robot is lost (`on_late = "continue"`).
-    pub lose_after: u32,
 }
 
 /// Why a simulator process ended before its time.
@@ -110,12 +110,12 @@ pub struct Server {
     declared: Vec<Declared>,
     clock: Publisher,
     observers: Observers,
+    orders: Orders,
     pace: Pace,
     members: BTreeMap<RobotName, Member>,
     /// What each robot senses, for those who follow it instead of asking every tick.
     percepts: BTreeMap<RobotName, Publisher>,
-    on_late: OnLate,
-    deadline: Duration,
+    lateness: Lateness,
     open: Open,
     summary_wall: crate::summary::Wall,
     /// Commands from outside the roster that take effect at the next tick boundary.
@@ -135,6 +135,8 @@ struct Open {
     reports: BTreeMap<RobotName, Report>,
     membership: Vec<Membership>,
     waits: BTreeMap<RobotName, RobotName>,
+    /// Robots without which the clock goes on in this tick: it is recorded that they missed it.
+    given_up: BTreeSet<RobotName>,
     /// Whether people have been told that the clock is held.
     is_announced: bool,
     repeated: Instant,
@@ -152,6 +154,7 @@ impl Server {
         let mut server = Self {
             clock: bus.publisher(&keys.clock())?,
             observers: Observers::new(&bus, &keys)?,
+            orders: Orders::new(bus.publisher(&keys.faults())?),
             pace: Pace::new(options.speed, options.is_paused),
             percepts: scenario
                 .robots
@@ -159,8 +162,7 @@ impl Server {
                 .map(|name| Ok((name.clone(), bus.publisher(&keys.percept(name))?)))
                 .collect::<Result<_, BusError>>()?,
             members: scenario.robots.keys().map(|name| (name.clone(), Member::default())).collect(),
-            on_late: scenario.on_late,
-            deadline: Duration::from_secs_f64(scenario.deadline_s),
+            lateness: scenario.lateness.clone(),
             open: Open {
                 clock: Clock::default(),
                 is_open: false,
@@ -169,6 +171,7 @@ impl Server {
                 reports: BTreeMap::new(),
                 membership: Vec::new(),
                 waits: BTreeMap::new(),
+                given_up: BTreeSet::new(),
                 is_announced: false,
                 repeated: now,
             },
@@ -258,8 +261,7 @@ impl Server {
         for member in self.members.values_mut() {
             member.begin_epoch();
         }
-        self.on_late = simulation.scenario().on_late;
-        self.deadline = Duration::from_secs_f64(simulation.scenario().deadline_s);
+        self.lateness = simulation.scenario().lateness.clone();
         let record = simulation.init(self)?;
         self.observers.note(&record);
         self.observers.log(&recorder.write(simulation, &record)?);
@@ -267,6 +269,7 @@ impl Server {
         let last = simulation.scenario().ticks;
         while simulation.tick() < last {
             self.wait_for_grant(simulation)?;
+            self.carry_out_faults(simulation)?;
             self.forward_operator(simulation);
             let record = simulation.step(self)?;
             self.observers.note(&record);
@@ -402,8 +405,8 @@ impl Server {
         if report.generation < member.generation {
             member.hears_predecessor();
         }
-        if (report.epoch, report.tick) != open || !self.open.is_open || report.generation != member.generation
-        {
+        let is_due = self.open.is_open && !self.open.given_up.contains(&name);
+        if (report.epoch, report.tick) != open || !is_due || report.generation != member.generation {
             return self.ignore("stale", robot);
         }
         self.open.waits.remove(&name);
@@ -433,7 +436,8 @@ impl Server {
     /// Robots of the open tick whose report is still to come.
     fn awaited(&self) -> impl Iterator<Item = &RobotName> {
         let is_awaited = |(name, member): &(&RobotName, &Member)| {
-            self.open.is_open && !member.is_lost && !self.open.reports.contains_key(*name)
+            let is_settled = self.open.reports.contains_key(*name) || self.open.given_up.contains(*name);
+            self.open.is_open && !member.is_lost && !is_settled
         };
         self.members.iter().filter(is_awaited).map(|(name, _)| name)
     }
@@ -479,6 +483,7 @@ impl Server {
             reports: BTreeMap::new(),
             membership,
             waits: BTreeMap::new(),
+            given_up: BTreeSet::new(),
             is_announced: false,
             repeated: now,
         };
@@ -512,11 +517,16 @@ impl Server {
 
     /// How long to sleep unless something happens: until people must be told, the clock repeated, a deadline met.
     fn next_look(&self) -> Duration {
-        let announce = (!self.open.is_announced).then(|| SAY_AFTER.saturating_sub(self.open.since.elapsed()));
+        let elapsed = self.open.since.elapsed();
+        let announce = (!self.open.is_announced).then(|| SAY_AFTER.saturating_sub(elapsed));
         let repeat = REPEAT_AFTER.saturating_sub(self.open.repeated.elapsed());
-        let deadline =
-            (self.on_late != OnLate::Wait).then(|| self.deadline.saturating_sub(self.open.since.elapsed()));
+        let acts = self.awaited().any(|name| self.lateness.of(name) != OnLate::Wait);
+        let deadline = acts.then(|| self.deadline().saturating_sub(elapsed));
         announce.into_iter().chain(deadline).fold(repeat, Duration::min)
+    }
+
+    fn deadline(&self) -> Duration {
+        Duration::try_from_secs_f64(self.lateness.deadline_s).unwrap_or(Duration::MAX)
     }
 
     /// Nothing has happened for a while: say for whom the clock waits, ask everybody to repeat, act as the scenario
@@ -535,33 +545,39 @@ impl Server {
         if self.open.repeated.elapsed() >= REPEAT_AFTER {
             self.repeat_clock()?;
         }
-        if self.open.since.elapsed() >= self.deadline {
-            match self.on_late {
-                OnLate::Wait => {}
-                OnLate::Abort => return Err(Interrupt::End(End::Aborted)),
-                OnLate::Continue => self.go_on_without_late(),
+        if self.open.since.elapsed() >= self.deadline() {
+            self.judge_late()?;
+        }
+        Ok(())
+    }
+
+    /// The deadline is over: the scenario says, robot by robot, what then.
+    fn judge_late(&mut self) -> Result<(), Interrupt> {
+        let late: Vec<RobotName> = self.awaited().cloned().collect();
+        if late.iter().any(|name| self.lateness.of(name) == OnLate::Abort) {
+            return Err(Interrupt::End(End::Aborted));
+        }
+        for name in late {
+            if self.lateness.of(&name) == OnLate::Continue {
+                self.give_up(&name);
             }
         }
         Ok(())
+    }
+
+    /// The clock goes on without a robot in this tick, and from now on if it is lost.
+    fn give_up(&mut self, name: &RobotName) {
+        let Some(member) = self.members.get_mut(name) else { return };
+        if member.miss(self.lateness.lose_after) {
+            self.open.membership.push(Membership::Lost(name.clone()));
+        }
+        self.open.given_up.insert(name.clone());
     }
 
     fn repeat_clock(&mut self) -> Result<(), BusError> {
         self.open.repeated = Instant::now();
         self.operator_sent.iter().for_each(|(key, command)| self.put_operator(key, command));
         self.clock.put(encode(&self.open.clock))
-    }
-
-    fn go_on_without_late(&mut self) {
-        let late: Vec<RobotName> = self.awaited().cloned().collect();
-        for name in late {
-            if let Some(member) = self.members.get_mut(&name)
-                && member.miss(self.options.lose_after)
-            {
-                self.open.membership.push(Membership::Lost(name));
-            }
-        }
-        // Closes the barrier: `awaited` counts nobody of a tick that is not open.
-        self.open.is_open = false;
     }
 
     /// The tick as of which a newcomer would take part.

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{
-    Clock, CommandId, Correction, Cut, End, News, Percept, Performative, Point, PublicState, Report,
-    SensedBody, SensedKind, SensedRobot, StateVariables, Welcome,
+    Clock, CommandId, Correction, Cut, End, News, Percept, Performative, Point, ProcessOrder, PublicState,
+    Report, SensedBody, SensedKind, SensedRobot, StateVariables, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
@@ -12,7 +12,7 @@ use world::{Blocker, Body, HallError, Verdict, World};
 
 use crate::digest::Digest;
 use crate::medium::{Medium, Underway};
-use crate::scenario::{Scenario, to_wire};
+use crate::scenario::{Fault, FaultEnd, Scenario, to_wire};
 
 /// How a clock reaches the robots and their reports come back: over the bus, or by calling them.
 pub trait Barrier {
@@ -85,7 +85,8 @@ pub struct Simulation {
     silent: Vec<RobotName>,
     blocked: Vec<bool>,
     operator_seq: Seq,
-    operator_sent: Vec<Event>,
+    /// What happened between the last tick and the next.
+    between: Vec<Event>,
     digest: Digest,
 }
 
@@ -112,7 +113,7 @@ impl Simulation {
             last_seq: BTreeMap::new(),
             silent: Vec::new(),
             operator_seq: 0,
-            operator_sent: Vec::new(),
+            between: Vec::new(),
             digest: Digest::default(),
             scenario,
         })
@@ -144,7 +145,7 @@ impl Simulation {
     /// The barrier's interrupt; the tick is then incomplete and the epoch is over.
     pub fn step<B: Barrier>(&mut self, barrier: &mut B) -> Result<TickRecord, B::Interrupt> {
         let tick = self.tick + 1;
-        let mut events = std::mem::take(&mut self.operator_sent);
+        let mut events = std::mem::take(&mut self.between);
 
         self.now = tick;
         let verdicts = self.world.advance(&self.proposals());
@@ -310,12 +311,37 @@ impl Simulation {
         self.digest.close(&tick);
     }
 
+    /// What the launcher must do to processes before the next tick, in the order of the scenario.
+    #[must_use]
+    pub fn faults_due(&self) -> Vec<ProcessOrder> {
+        let tick = self.tick + 1;
+        let order = |fault: &Fault| {
+            let (robot, kind) = (fault.robot.clone(), fault.kind);
+            let for_s = if let FaultEnd::After(wall_s) = fault.end { Some(wall_s) } else { None };
+            let begins = ProcessOrder { robot: robot.clone(), kind, begins: true, for_s };
+            let ends = ProcessOrder { robot, kind, begins: false, for_s: None };
+            let is_over = fault.end == FaultEnd::At(tick);
+            [(fault.at == tick).then_some(begins), is_over.then_some(ends)].into_iter().flatten()
+        };
+        self.scenario.faults.iter().flat_map(order).collect()
+    }
+
+    /// What was ordered before the next tick has been done; it is told with that tick.
+    pub fn note_faults(&mut self, orders: &[ProcessOrder]) {
+        let event = |order: &ProcessOrder| Event::Fault {
+            robot: order.robot.clone(),
+            kind: order.kind,
+            begins: order.begins,
+        };
+        self.between.extend(orders.iter().map(event));
+    }
+
     /// A command from outside the roster; it arrives at the next tick. Returns its number.
     pub fn command(&mut self, to: &RobotName, command: &str) -> Seq {
         self.operator_seq += 1;
         let (from, seq) = (RobotName::operator(), self.operator_seq);
         self.medium.accept(Underway { to: to.clone(), from: from.clone(), seq });
-        self.operator_sent.push(Event::CommandSent {
+        self.between.push(Event::CommandSent {
             from,
             to: to.clone(),
             seq,

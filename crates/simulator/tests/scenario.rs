@@ -28,7 +28,7 @@ fn units_become_si_and_defaults_are_those_of_the_paper() {
     assert_eq!(scenario.field_m, [15.24, 15.24]);
     assert_eq!(scenario.body_m, 0.6096);
     assert_eq!((scenario.tick_s, scenario.ticks), (0.5, 1200));
-    assert_eq!(scenario.on_late, OnLate::Wait);
+    assert_eq!(scenario.lateness.on_late, OnLate::Wait);
     assert_eq!(scenario.robots.values().next().unwrap().class, "Butler");
 }
 

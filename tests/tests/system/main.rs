@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
 
 mod boundaries;
+mod chaos;
 mod control;
 mod determinism;
 mod experiment;

@@ -6,11 +6,13 @@ use std::time::Duration;
 
 use protocol::bus::{Bus, BusError, Declared, Role};
 use protocol::keys::Keys;
-use protocol::messages::{Control, ControlAnswer, LogRecord, Phase, WorldFrame};
+use protocol::messages::{Control, ControlAnswer, FaultOrder, LogRecord, Phase, WorldFrame};
 use protocol::{RunName, decode, encode};
+use tokio::sync::mpsc::UnboundedSender;
 
 use super::bar::Progress;
 use super::screen::Tell;
+use super::supervise::{self, Done};
 
 /// How long to try to reach the simulator: as long as a robot does.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -24,6 +26,8 @@ pub(super) struct Watch {
     /// Whether pictures of the field are wanted, for the progress bar.
     pub(super) wants_world: bool,
     pub(super) tell: Tell,
+    /// Where the faults that the scenario has in store for processes are handed over; `None` if it has none.
+    pub(super) faults: Option<UnboundedSender<supervise::Event>>,
 }
 
 /// An observer at work.
@@ -74,6 +78,8 @@ impl Watch {
                 }
             })?);
         }
+        declared
+            .extend(self.faults.as_ref().map(|queue| hear_faults(&bus, &keys, queue.clone())).transpose()?);
         // Dropping the sender is the message.
         let end = std::sync::Mutex::new(Some(end));
         declared.push(bus.watch(&keys.alive_sim(), move |_, is_there| {
@@ -108,4 +114,31 @@ impl Watch {
         self.tell.progress(Progress::from(*status));
         Ok(Some(phase))
     }
+}
+
+/// Hands over what the scenario has in store for processes, and answers when it has been done.
+fn hear_faults(
+    bus: &Bus,
+    keys: &Keys,
+    queue: UnboundedSender<supervise::Event>,
+) -> Result<Declared, BusError> {
+    let (asking, control) = (bus.clone(), keys.control());
+    bus.subscribe(&keys.faults(), move |key, bytes| {
+        let order = match decode::<FaultOrder>(key, "the simulator", bytes) {
+            Ok(order) => order,
+            Err(error) => return tracing::warn!("{error}"),
+        };
+        let (asking, control) = (asking.clone(), control.clone());
+        let done = move || {
+            let done = Control::FaultsDone { epoch: order.epoch, tick: order.tick };
+            // On a thread of its own: the answer takes as long as the simulator takes.
+            std::thread::spawn(move || {
+                if let Err(error) = asking.ask(&control, "", Some(encode(&done))) {
+                    tracing::warn!("{error}");
+                }
+            });
+        };
+        // The supervisor is gone only when the launch is over.
+        let _over = queue.send(supervise::Event::Faults(order.orders, Done(Box::new(done))));
+    })
 }

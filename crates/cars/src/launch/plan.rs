@@ -36,6 +36,8 @@ pub(super) struct Planned {
     pub(super) is_extern: bool,
     /// What it is for.
     pub(super) part: Part,
+    /// The robots that it runs.
+    pub(super) robots: Vec<RobotName>,
 }
 
 /// What a process is for.
@@ -139,6 +141,7 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
         is_required: process.is_required,
         is_extern: process.is_extern,
         part: Part::Robots,
+        robots: process.robots.clone(),
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
+use protocol::messages::{FaultKind, ProcessOrder};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
 use super::ending::{Ended, Failure};
@@ -20,10 +21,25 @@ pub(super) enum Event {
     Ended(usize, Ended),
     /// The wait before a restart is over.
     RestartDue(usize),
+    /// The scenario has something in store for processes.
+    Faults(Vec<ProcessOrder>, Done),
+    /// A fault is over by the wall clock.
+    FaultOver(usize, FaultKind),
+    /// A slowed process goes on for a moment, or is stopped again.
+    Pulse(usize, bool),
     /// A person, or the system, asks to end.
     Asked(Signal),
     /// The patience of a stage is over.
     GraceOver(Stage),
+}
+
+/// Tells whoever ordered faults that they have been carried out.
+pub(super) struct Done(pub(super) Box<dyn FnOnce() + Send>);
+
+impl std::fmt::Debug for Done {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Done")
+    }
 }
 
 /// How far the end of a run has come. Stages only ever go forward.
@@ -58,6 +74,10 @@ struct Kept {
     budget: Budget,
     group: Option<Group>,
     tail: Tail,
+    /// Whether the scenario has killed it: its end is no failure.
+    is_down: bool,
+    /// Whether the scenario slows it down.
+    is_slow: bool,
 }
 
 /// The launcher's loop.
@@ -79,7 +99,7 @@ impl Supervisor {
         let (queue, events) = tokio::sync::mpsc::unbounded_channel();
         let keep = |planned: Planned| {
             let budget = Budget::new(planned.backoff);
-            Kept { planned, budget, group: None, tail: Tail::default() }
+            Kept { planned, budget, group: None, tail: Tail::default(), is_down: false, is_slow: false }
         };
         Self {
             kept: planned.into_iter().map(keep).collect(),
@@ -121,6 +141,9 @@ impl Supervisor {
         match event {
             Event::Ended(index, ended) => self.on_ended(index, &ended),
             Event::RestartDue(index) => self.on_restart_due(index),
+            Event::Faults(orders, done) => self.on_faults(&orders, done),
+            Event::FaultOver(index, kind) => self.end_fault(index, kind),
+            Event::Pulse(index, stops) => self.pulse(index, stops),
             Event::Asked(signal) => self.on_asked(signal),
             Event::GraceOver(stage) => self.on_grace_over(stage),
         }
@@ -163,6 +186,8 @@ impl Supervisor {
         self.kept[index].group = None;
         if self.kept[index].planned.part == Part::Simulator {
             self.on_simulator_ended(index, ended);
+        } else if self.kept[index].is_down {
+            tracing::debug!("{} was killed by the scenario", self.kept[index].planned.name);
         } else if self.stage == Stage::Running {
             self.on_other_ended(index, ended);
         } else if ended.has_failed() && self.stage <= Stage::Leaving {
@@ -326,5 +351,6 @@ fn log_of(logs: &Path, name: &str) -> PathBuf {
     logs.join(format!("{name}.log"))
 }
 
+mod faults;
 #[cfg(test)]
 mod tests;

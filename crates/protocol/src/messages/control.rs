@@ -44,6 +44,25 @@ pub enum Control {
         /// The real-time factor.
         factor: Option<f64>,
     },
+    /// What the clock does about robots that are late, from now on.
+    Late {
+        /// For which robot; without it for all that have no rule of their own.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        robot: Option<RobotName>,
+        /// What it does; without it as before.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        on_late: Option<OnLate>,
+        /// After how long without a report a robot is late, seconds of wall clock; for all robots; without it as before.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        deadline_s: Option<f64>,
+    },
+    /// The launcher has carried out the faults that it was ordered before this tick.
+    FaultsDone {
+        /// Epoch of the order.
+        epoch: Epoch,
+        /// Tick of the order.
+        tick: Tick,
+    },
     /// Nothing but the status.
     Status,
     /// A command from outside the roster; it takes effect at a tick boundary.
@@ -59,6 +78,7 @@ impl Message for Control {
     fn check(&self) -> Result<(), (String, String)> {
         match self {
             Self::Speed { factor: Some(factor) } => finite(*factor, "factor"),
+            Self::Late { deadline_s: Some(deadline_s), .. } => finite(*deadline_s, "deadline_s"),
             Self::Command { command, .. } => short(command, "command"),
             Self::Init { setup: Some(setup), .. } => setup.check(),
             _ => Ok(()),
@@ -193,6 +213,62 @@ impl std::fmt::Display for Phase {
     }
 }
 
+/// What the clock does about a robot that is late.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OnLate {
+    /// Hold, and say for whom; never act. The mode for science.
+    Wait,
+    /// Go on without it: the missed tick is recorded and its body stays.
+    Continue,
+    /// End the run.
+    Abort,
+}
+
+/// What the scenario has the launcher do to processes before a tick; the clock is held until it answers with
+/// [`Control::FaultsDone`]. The same order may come twice; what was done is not done again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FaultOrder {
+    /// Epoch.
+    pub epoch: Epoch,
+    /// Tick before whose clock it is done.
+    pub tick: Tick,
+    /// What to do, in this order.
+    pub orders: Vec<ProcessOrder>,
+}
+
+impl Message for FaultOrder {
+    fn check(&self) -> Result<(), (String, String)> {
+        super::few(self.orders.len(), "orders")
+    }
+}
+
+/// What to do to one robot's process.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProcessOrder {
+    /// Whose process.
+    pub robot: RobotName,
+    /// Which fault.
+    pub kind: FaultKind,
+    /// Whether the fault begins; else it is over.
+    pub begins: bool,
+    /// A fault that begins ends by itself after this time of wall clock, seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub for_s: Option<f64>,
+}
+
+/// A fault of a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FaultKind {
+    /// The process is killed; at the end of the fault it is started again.
+    Crash,
+    /// The process is stopped; at the end of the fault it goes on.
+    Hang,
+    /// The process is stopped for most of the time, and goes on in between.
+    Slow,
+}
+
 /// How things stand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Status {
@@ -214,6 +290,10 @@ pub struct Status {
     pub phase: Phase,
     /// Real-time factor; `null` is as fast as the barrier goes.
     pub speed: Option<f64>,
+    /// What the clock does about robots that are late and have no rule of their own.
+    pub on_late: OnLate,
+    /// After how long without a report a robot is late, seconds of wall clock.
+    pub deadline_s: f64,
     /// For whom the clock waits now; empty when it does not.
     pub awaiting: Vec<Awaited>,
     /// The robots of the roster, by name.
@@ -265,6 +345,8 @@ pub struct RobotStatus {
     pub name: RobotName,
     /// Incarnation; 0 before the first.
     pub generation: Generation,
+    /// What the clock does when it is late.
+    pub on_late: OnLate,
     /// Whether its process is there.
     pub presence: Presence,
 }

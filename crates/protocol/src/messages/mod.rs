@@ -8,8 +8,8 @@ mod step;
 use std::collections::BTreeMap;
 
 pub use control::{
-    Awaited, Control, ControlAnswer, FieldError, LogFile, Phase, Range, Reason, RobotStatus, Setup,
-    SetupAnswer, Status,
+    Awaited, Control, ControlAnswer, FaultKind, FaultOrder, FieldError, LogFile, OnLate, Phase, ProcessOrder,
+    Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
 pub use observe::{
     Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, Presence, RecordedRobot,

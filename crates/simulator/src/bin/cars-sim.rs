@@ -44,9 +44,6 @@ struct Args {
     /// Wait for `start` once everybody is there.
     #[arg(long)]
     paused: bool,
-    /// After this many ticks in a row without a report a robot is lost, where the clock goes on without it.
-    #[arg(long, default_value_t = 10)]
-    lose_after: u32,
     /// A configuration file of the middleware instead of the built-in settings.
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
@@ -82,12 +79,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
     let _lock = folder.create(&scenario)?;
     let role = Role::Router { listen: args.listen.clone() };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
-    let options = Options {
-        run: args.run.clone(),
-        speed: args.speed.0,
-        is_paused: args.paused,
-        lose_after: args.lose_after,
-    };
+    let options = Options { run: args.run.clone(), speed: args.speed.0, is_paused: args.paused };
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;
     let queue = server.queue();
     // The queue is closed only when the run is over, and then there is nothing left to end.

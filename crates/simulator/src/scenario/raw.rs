@@ -1,5 +1,6 @@
 //! A scenario file as it is written. Unknown keys are refused; what is wrong is shown where it stands.
 
+mod fault;
 mod network;
 
 use std::collections::BTreeMap;
@@ -10,9 +11,10 @@ use protocol::messages::{Parameters, Point};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use fault::FaultTable;
 use network::NetworkTable;
 
-use super::{DEFAULT_SEED, OnLate, Record, RobotSpec, check_seed};
+use super::{DEFAULT_SEED, Lateness, OnLate, Record, RobotSpec, check_seed};
 use crate::diagnostic::{FileError, Source};
 use crate::units::{Length, Speed, Time, quantity};
 
@@ -28,11 +30,14 @@ pub(super) struct Scenario {
     duration: Option<Spanned<Time>>,
     on_late: Option<OnLate>,
     deadline: Option<Spanned<Time>>,
+    lose_after: Option<Spanned<u32>>,
     field: Option<Spanned<FieldTable>>,
     sensing: Option<SensingTable>,
     guests: Option<Spanned<GuestsTable>>,
     network: Option<Spanned<NetworkTable>>,
     record: Option<RecordTable>,
+    #[serde(default, rename = "fault", skip_serializing_if = "Vec::is_empty")]
+    faults: Vec<Spanned<FaultTable>>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
@@ -96,6 +101,7 @@ struct Robot {
     name: RobotName,
     class: Option<String>,
     at: [Length; 2],
+    on_late: Option<OnLate>,
     params_from: Option<PathBuf>,
     #[serde(default)]
     params: toml::Table,
@@ -110,6 +116,10 @@ const BODY: Length = Length(0.6096);
 const FIELD: [Length; 2] = [Length(15.24), Length(15.24)];
 /// 10 ft/s [I]: a brisk run; the fastest shipped robot drives at 4.5 ft/s.
 const MAX_SPEED: Speed = Speed(3.048);
+/// Seconds of wall clock [I].
+const DEADLINE_S: f64 = 2.0;
+/// Ticks [I].
+const LOSE_AFTER: f64 = 10.0;
 /// 6 ft [I].
 const SENSING_RANGE: Length = Length(1.8288);
 
@@ -148,6 +158,19 @@ impl Scenario {
             |range| range.0,
             "the range",
         )?;
+        let own = self.robots.iter().map(Spanned::get_ref);
+        let lateness = Lateness {
+            on_late: self.on_late.unwrap_or(OnLate::Wait),
+            own: own.filter_map(|robot| Some((robot.name.clone(), robot.on_late?))).collect(),
+            deadline_s: positive(source, self.deadline.as_ref(), DEADLINE_S, |time| time.0, "the deadline")?,
+            lose_after: positive(
+                source,
+                self.lose_after.as_ref(),
+                LOSE_AFTER,
+                |n| f64::from(*n),
+                "lose_after",
+            )? as u32,
+        };
         let scenario = super::Scenario {
             seed,
             tick_s,
@@ -162,14 +185,15 @@ impl Scenario {
                 duration_s: duration,
             },
             obstacles: self.obstacles.iter().map(|obstacle| point(obstacle.at)).collect(),
-            on_late: self.on_late.unwrap_or(OnLate::Wait),
-            deadline_s: positive(source, self.deadline.as_ref(), 2.0, |time| time.0, "the deadline")?,
+            lateness,
             robots: robots(self.robots, source, folder)?,
             network: super::Network::default(),
+            faults: Vec::new(),
             record: record(self.record, source)?,
         };
         let network = network::check(self.network, &scenario.robots, tick_s, source)?;
-        let scenario = super::Scenario { network, ..scenario };
+        let faults = fault::check(self.faults, &scenario.robots, &scenario.lateness, tick_s, source)?;
+        let scenario = super::Scenario { network, faults, ..scenario };
         scenario.check_hall(source, self.guests.as_ref().map(Spanned::span))?;
         Ok(scenario)
     }
@@ -304,8 +328,9 @@ impl From<&super::Scenario> for Scenario {
             seed: Some(Spanned::new(0..0, scenario.seed)),
             tick: spanned(Time(scenario.tick_s)),
             duration: spanned(Time(scenario.duration_s())),
-            on_late: Some(scenario.on_late),
-            deadline: spanned(Time(scenario.deadline_s)),
+            on_late: Some(scenario.lateness.on_late),
+            deadline: spanned(Time(scenario.lateness.deadline_s)),
+            lose_after: Some(Spanned::new(0..0, scenario.lateness.lose_after)),
             field: Some(Spanned::new(
                 0..0,
                 FieldTable {
@@ -324,6 +349,11 @@ impl From<&super::Scenario> for Scenario {
                 },
             )),
             network: NetworkTable::of(&scenario.network, scenario.tick_s),
+            faults: scenario
+                .faults
+                .iter()
+                .map(|entry| Spanned::new(0..0, FaultTable::of(entry, scenario.tick_s)))
+                .collect(),
             record: Some(RecordTable {
                 log: Some(scenario.record.log),
                 log_name: Some(Spanned::new(0..0, scenario.record.log_name.clone())),
@@ -337,7 +367,10 @@ impl From<&super::Scenario> for Scenario {
             robots: scenario
                 .robots
                 .iter()
-                .map(|(name, spec)| Spanned::new(0..0, Robot::from((name, spec))))
+                .map(|(name, spec)| {
+                    let on_late = scenario.lateness.own.get(name).copied();
+                    Spanned::new(0..0, Robot { on_late, ..Robot::from((name, spec)) })
+                })
                 .collect(),
         }
     }
@@ -350,6 +383,7 @@ impl From<(&RobotName, &RobotSpec)> for Robot {
             name: name.clone(),
             class: Some(spec.class.clone()),
             at: [Length(spec.at.x), Length(spec.at.y)],
+            on_late: None,
             params_from: None,
             params: params.collect(),
         }

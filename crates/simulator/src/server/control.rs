@@ -7,11 +7,11 @@ use protocol::messages::{
     Awaited, Control, ControlAnswer, End, FieldError, Phase, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
 use protocol::random::MAX_SEED;
-use protocol::{Tick, decode, encode};
+use protocol::{RobotName, Tick, decode, encode};
 
 use super::{Interrupt, Server};
 use crate::diagnostic::Source;
-use crate::scenario::Scenario;
+use crate::scenario::{OnLate, Scenario};
 use crate::simulation::Simulation;
 
 /// Most ticks that one `step` may ask for.
@@ -197,6 +197,10 @@ impl Server {
                 }
                 self.operator.push((to.clone(), command.clone()));
             }
+            Control::FaultsDone { epoch, tick } => self.orders.done(*epoch, *tick),
+            Control::Late { robot, on_late, deadline_s } => {
+                self.change_lateness(robot.as_ref(), *on_late, *deadline_s)?;
+            }
             Control::Status => {}
             Control::Start | Control::Pause => return Err(format!("the run is {phase}")),
             Control::Init { .. }
@@ -207,6 +211,27 @@ impl Server {
                 unreachable!("handled by on_control")
             }
         }
+        Ok(())
+    }
+
+    fn change_lateness(
+        &mut self,
+        robot: Option<&RobotName>,
+        on_late: Option<OnLate>,
+        deadline_s: Option<f64>,
+    ) -> Result<(), String> {
+        if let Some(unknown) = robot.filter(|robot| !self.members.contains_key(*robot)) {
+            return Err(format!("no robot of this run is called {unknown}"));
+        }
+        if deadline_s.is_some_and(|deadline_s| deadline_s <= 0.0) {
+            return Err("a deadline is more than zero".to_owned());
+        }
+        match (robot, on_late) {
+            (Some(robot), Some(on_late)) => drop(self.lateness.own.insert(robot.clone(), on_late)),
+            (None, Some(on_late)) => self.lateness.on_late = on_late,
+            (_, None) => {}
+        }
+        self.lateness.deadline_s = deadline_s.unwrap_or(self.lateness.deadline_s);
         Ok(())
     }
 
@@ -280,6 +305,8 @@ impl Server {
             seed: scenario.seed,
             phase: self.pace.phase,
             speed: self.pace.speed,
+            on_late: self.lateness.on_late,
+            deadline_s: self.lateness.deadline_s,
             awaiting: self.awaiting(),
             robots: self
                 .members
@@ -287,6 +314,7 @@ impl Server {
                 .map(|(name, member)| RobotStatus {
                     name: name.clone(),
                     generation: member.generation,
+                    on_late: self.lateness.of(name),
                     presence: member.presence(),
                 })
                 .collect(),

@@ -7,6 +7,7 @@ use protocol::messages::{JoinAnswer, JoinRequest, Phase, Presence, Refusal};
 use protocol::{Generation, PROTOCOL_VERSION, decode, encode};
 
 use super::{Interrupt, Server, introduce};
+use crate::scenario::OnLate;
 use crate::simulation::{Membership, Simulation, public_state};
 
 /// A robot that has joined shows its token within this time, or its place is free again.
@@ -48,6 +49,11 @@ impl Member {
             (false, true) => Presence::Here,
             (false, false) => Presence::Gone,
         }
+    }
+
+    /// Whether the next clock finds it able to take part, or takes it in.
+    pub(super) fn is_back(&self) -> bool {
+        self.is_present && (!self.is_lost || self.has_returned || self.is_pending)
     }
 
     /// Everybody takes part in an epoch from its beginning.
@@ -185,6 +191,11 @@ impl Server {
                 introduce(&mut self.open.clock, &name, generation, simulation);
             }
             self.repeat_clock()?;
+        }
+        let is_awaited = self.awaited().any(|awaited| *awaited == name);
+        if !is_there && is_awaited && self.lateness.of(&name) == OnLate::Continue {
+            // Who is gone will not be in time.
+            self.give_up(&name);
         }
         if self.open.is_announced {
             self.observers.held(simulation, &self.status(simulation));

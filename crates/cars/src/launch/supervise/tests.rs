@@ -96,6 +96,7 @@ fn shell(name: &str, script: &str) -> Planned {
         is_required: true,
         is_extern: false,
         part: Part::Robots,
+        robots: Vec::new(),
     }
 }
 

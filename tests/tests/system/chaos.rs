@@ -1,0 +1,133 @@
+//! Processes are killed and stopped at random, drawn from a seed: nothing hangs, nobody is left behind, the record is whole
+//! and names whom it happened to. A short version runs always; `CARS_CHAOS=200` plays as many events as it says.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use nix::sys::signal::Signal;
+use protocol::random::{Stream, stream, unit};
+use system_tests::processes::{find, named, send};
+use system_tests::{Lab, eventually};
+
+/// Events of the short version.
+const EVENTS: usize = 24;
+/// Robots of the launches, in turn.
+const ROBOTS: [usize; 4] = [2, 5, 9, 16];
+/// Kills of one robot in one launch: below what the launcher takes for a broken program.
+const MAX_KILLS: usize = 4;
+
+/// What happens to a process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Blow {
+    Kill,
+    Stop(Duration),
+}
+
+fn below(chance: &mut Stream, n: usize) -> usize {
+    (unit(chance) * n as f64) as usize
+}
+
+/// A launch of `n` robots that are restarted, and without which the clock goes on.
+fn launch_file(lab: &Lab, n: usize) -> String {
+    let mut scenario =
+        "seed = 7\nduration = \"100000 s\"\non_late = \"continue\"\ndeadline = \"0.2 s\"\nlose_after = 2\n\
+                        record = { frames = false }\n[guests]\ncount = 10\n"
+            .to_owned();
+    let mut launch = "scenario = \"chaos.toml\"\nspeed = 100\n[console]\nenabled = false\n".to_owned();
+    for i in 0..n {
+        let (x, y) = (2 + 3 * (i % 4), 2 + 3 * (i / 4));
+        scenario += &format!("[[robot]]\nname = \"R{i}\"\nclass = \"Vonda\"\nat = [\"{x} m\", \"{y} m\"]\n");
+        launch += &format!(
+            "[[process]]\nname = \"R{i}\"\ncommand = [\"cars-vonda\"]\nrestart = \"on-failure\"\nbackoff = \"0.05 s\"\n"
+        );
+    }
+    lab.write("chaos.toml", &scenario);
+    lab.write("chaos-launch.toml", &launch).to_str().unwrap().to_owned()
+}
+
+/// Strikes robots of a launch `count` times; returns whom.
+fn strike(run: &str, n: usize, count: usize, chance: &mut Stream) -> BTreeSet<String> {
+    let mut kills = vec![0; n];
+    let mut struck = BTreeSet::new();
+    for _ in 0..count {
+        let robot = below(chance, n);
+        let can_be_killed = kills[robot] < MAX_KILLS;
+        let blow = if unit(chance) < 0.5 && can_be_killed {
+            Blow::Kill
+        } else {
+            Blow::Stop(Duration::from_millis(250 + below(chance, 500) as u64))
+        };
+        let name = format!("R{robot}");
+        // One that was killed just now is being started again.
+        let pid = eventually(&name, || named(run, &name));
+        println!("{run}: {name} {blow:?}");
+        match blow {
+            Blow::Kill => {
+                kills[robot] += 1;
+                send(pid, Signal::SIGKILL);
+            }
+            Blow::Stop(lasting) => {
+                send(pid, Signal::SIGSTOP);
+                std::thread::sleep(lasting);
+                send(pid, Signal::SIGCONT);
+            }
+        }
+        struck.insert(name);
+    }
+    struck
+}
+
+#[test]
+fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
+    let events = std::env::var("CARS_CHAOS").ok().and_then(|n| n.parse().ok()).unwrap_or(EVENTS);
+    let seed = std::env::var("CARS_CHAOS_SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(1);
+    let launches = ROBOTS.len().min(events);
+    let lab = Lab::new();
+    for (index, n) in ROBOTS.iter().take(launches).enumerate() {
+        let run = format!("chaos-{index}");
+        let file = launch_file(&lab, *n);
+        let mut launch = lab.start(&run, &["launch", &file]);
+        launch.prints("takes part");
+        let mut chance = stream(seed, &run);
+        let struck = strike(&run, *n, events / launches, &mut chance);
+        // The clock still goes, whoever is missing.
+        let status = || -> u64 {
+            let text = lab.ok(&["ctl", "status", "--json", "--run", &run]);
+            serde_json::from_str::<serde_json::Value>(&text).unwrap()["tick"].as_u64().unwrap()
+        };
+        let reached = status();
+        eventually("further ticks", || (status() > reached + 10).then_some(()));
+        lab.ok(&["ctl", "stop", "--run", &run]);
+        launch.finish();
+        eventually("the last process to be gone", || find(&run).is_empty().then_some(()));
+        check_record(&lab, &run, &struck);
+    }
+}
+
+/// Every line is whole, every tick is there once and in order, and everybody who was struck is named.
+fn check_record(lab: &Lab, run: &str, struck: &BTreeSet<String>) {
+    let bytes = lab.bytes(run);
+    assert!(bytes.ends_with(b"\n"));
+    let events = lab.events(run);
+    assert_eq!(events.last().unwrap()["reason"], "stopped");
+    let ticks =
+        events.iter().filter(|event| event["event"] == "tick").map(|event| event["tick"].as_u64().unwrap());
+    assert!(ticks.enumerate().all(|(index, tick)| index as u64 == tick), "a tick is missing or out of order");
+    let named: BTreeSet<String> = events
+        .iter()
+        .filter(|event| {
+            event["event"] == "missed" || event["event"] == "lost" || event["generation"].is_u64()
+        })
+        .map(|event| event["robot"].as_str().unwrap().to_owned())
+        .collect();
+    assert!(struck.is_subset(&named), "struck {struck:?}, named {named:?}");
+    // A robot is lost before a further incarnation of it joins, and every incarnation has a higher number.
+    for robot in struck {
+        let own = events.iter().filter(|event| event["robot"] == robot.as_str());
+        let generations: Vec<u64> = own
+            .filter(|event| event["event"] == "joined")
+            .filter_map(|event| event["generation"].as_u64())
+            .collect();
+        assert!(generations.windows(2).all(|pair| pair[0] <= pair[1]), "{robot}: {generations:?}");
+    }
+}
