@@ -53,6 +53,9 @@ struct Args {
     /// Show the recording in this run's folder, or this recording, instead of a run in progress.
     #[arg(long, value_name = "RUN-FOLDER")]
     recording: Option<PathBuf>,
+    /// Open the page in a browser.
+    #[arg(long)]
+    open: bool,
 }
 
 fn main() -> ExitCode {
@@ -85,14 +88,14 @@ fn run(args: Args) -> Result<(), String> {
         .enable_all()
         .build()
         .map_err(|error| format!("cannot start: {error}"))?;
-    let outcome = runtime.block_on(serve(args.bind, mode));
+    let outcome = runtime.block_on(serve(args.bind, mode, args.open));
     // Whoever still waits for an answer of the simulator waits in vain.
     runtime.shutdown_timeout(Duration::from_millis(200));
     outcome
 }
 
 /// Serves until it is told to end.
-async fn serve(bind: Option<SocketAddr>, mode: Mode) -> Result<(), String> {
+async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), String> {
     let listener = listen(bind).await?;
     let address = listener.local_addr().map_err(|error| format!("cannot serve: {error}"))?;
     let guard = Guard::new(address).map_err(|error| format!("cannot draw a token: {error}"))?;
@@ -103,6 +106,9 @@ async fn serve(bind: Option<SocketAddr>, mode: Mode) -> Result<(), String> {
         eprintln!("the console is open to the network at {address}; whoever has the token controls the run");
     }
     println!("console: {url}");
+    if opens {
+        open_browser(&url);
+    }
     let serving = tokio::spawn(server::serve(listener, app.clone()));
     tokio::select! {
         _ = ended.0.recv() => {}
@@ -114,6 +120,18 @@ async fn serve(bind: Option<SocketAddr>, mode: Mode) -> Result<(), String> {
     }
     app.close();
     Ok(())
+}
+
+/// Opens the page with what the system, or the variable `BROWSER`, opens pages with. Without one the address is printed all
+/// the same.
+fn open_browser(url: &str) {
+    let system = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    let program = std::env::var("BROWSER").unwrap_or_else(|_| system.to_owned());
+    let quiet = std::process::Stdio::null;
+    let started = std::process::Command::new(&program).arg(url).stdout(quiet()).stderr(quiet()).spawn();
+    if let Err(error) = started {
+        eprintln!("{program} cannot be started ({error}): open the address above yourself");
+    }
 }
 
 fn termination(kind: SignalKind) -> Result<tokio::signal::unix::Signal, String> {
