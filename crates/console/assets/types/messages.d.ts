@@ -49,6 +49,32 @@ export type Control =
       factor?: number | null;
     }
   | {
+      /**
+       * After how long without a report a robot is late, seconds of wall clock; for all robots; without it as before.
+       */
+      deadline_s?: number | null;
+      do: "late";
+      /**
+       * What it does; without it as before.
+       */
+      on_late?: OnLate | null;
+      /**
+       * For which robot; without it for all that have no rule of their own.
+       */
+      robot?: RobotName | null;
+    }
+  | {
+      do: "faults_done";
+      /**
+       * Epoch of the order.
+       */
+      epoch: number;
+      /**
+       * Tick of the order.
+       */
+      tick: number;
+    }
+  | {
       do: "status";
     }
   | {
@@ -59,6 +85,10 @@ export type Control =
       do: "command";
       to: RobotName;
     };
+/**
+ * What the clock does about a robot that is late.
+ */
+export type OnLate = "wait" | "continue" | "abort";
 /**
  * Name of a robot of the roster; robots are addressed by it (seed, "Inter-Robot Communication").
  */
@@ -312,6 +342,10 @@ export interface Status {
    */
   awaiting: Awaited[];
   /**
+   * After how long without a report a robot is late, seconds of wall clock.
+   */
+  deadline_s: number;
+  /**
    * Simulated time at which the run ends, seconds.
    */
   duration_s: number;
@@ -325,6 +359,7 @@ export interface Status {
   ignored: {
     [k: string]: number;
   };
+  on_late: OnLate;
   /**
    * Ticks that were requested by `step` and are not done yet.
    */
@@ -372,6 +407,7 @@ export interface RobotStatus {
    */
   generation: number;
   name: RobotName;
+  on_late: OnLate;
   presence: Presence;
 }
 /**
