@@ -7,7 +7,7 @@ use protocol::messages::{FaultKind, ProcessOrder};
 
 use super::{Done, Event, Stage, Supervisor};
 
-/// A slowed process stands still for this long, and goes on for as long as the second says [I].
+/// A slowed process stands still for this long, and goes on for as long as the second says \[I\].
 const SLOW_STOP: Duration = Duration::from_millis(40);
 const SLOW_GO: Duration = Duration::from_millis(10);
 
