@@ -55,7 +55,7 @@ fn strike(run: &str, n: usize, count: usize, chance: &mut Stream) -> BTreeSet<St
         let blow = if unit(chance) < 0.5 && can_be_killed {
             Blow::Kill
         } else {
-            Blow::Stop(Duration::from_millis(250 + below(chance, 500) as u64))
+            Blow::Stop(Duration::from_millis(500 + below(chance, 500) as u64))
         };
         let name = format!("R{robot}");
         // One that was killed just now is being started again.
