@@ -87,7 +87,11 @@ fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
         let run = format!("chaos-{index}");
         let file = launch_file(&lab, *n);
         let mut launch = lab.start(&run, &["launch", &file]);
-        launch.prints("takes part");
+        // Its first lines may have been said before the launcher listened: whether it runs is asked.
+        eventually("the clock to run", || {
+            let output = lab.cars(&["ctl", "status", "--json", "--run", &run]).output().ok()?;
+            String::from_utf8_lossy(&output.stdout).contains("\"phase\":\"running\"").then_some(())
+        });
         let mut chance = stream(seed, &run);
         let struck = strike(&run, *n, events / launches, &mut chance);
         // The clock still goes, whoever is missing.
