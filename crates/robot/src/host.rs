@@ -105,6 +105,18 @@ impl Host {
     ) -> Result<Self, HostError> {
         let role = Role::Client { connect: options.connect.clone(), patience: options.patience };
         let bus = Bus::open(&role, options.zenoh_config.as_ref())?;
+        Self::join_over(bus, robots, options)
+    }
+
+    /// The same over a bus that is open already.
+    ///
+    /// # Errors
+    /// [`HostError`], as for [`Host::connect`].
+    pub fn join_over(
+        bus: Bus,
+        robots: Vec<(RobotName, Box<dyn Robot>)>,
+        options: HostOptions,
+    ) -> Result<Self, HostError> {
         let keys = Keys::new(&options.run);
         let link = Link::new(bus.clone(), keys.clone(), options.patience);
         let mut host = Self { options, bus, keys, link, members: BTreeMap::new(), declared: Vec::new() };

@@ -31,7 +31,7 @@ const QUEUE: usize = 65_536;
 /// After this long without a report people are told for whom the clock waits.
 const SAY_AFTER: Duration = Duration::from_millis(500);
 /// While the clock is held it is repeated this often: whatever got lost on the wire is then sent again.
-const REPEAT_AFTER: Duration = Duration::from_secs(2);
+pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
 
 /// How a simulator process runs.
 #[derive(Debug, Clone)]
@@ -44,6 +44,8 @@ pub struct Options {
     pub is_paused: bool,
     /// After this many ticks in a row without a report a robot is lost (`on_late = "continue"`).
     pub lose_after: u32,
+    /// While the clock is held it is repeated this often; [`REPEAT_AFTER`] unless a test is in a hurry.
+    pub repeat_after: Duration,
 }
 
 /// Why a simulator process ended before its time.
@@ -513,7 +515,7 @@ impl Server {
     /// How long to sleep unless something happens: until people must be told, the clock repeated, a deadline met.
     fn next_look(&self) -> Duration {
         let announce = (!self.open.is_announced).then(|| SAY_AFTER.saturating_sub(self.open.since.elapsed()));
-        let repeat = REPEAT_AFTER.saturating_sub(self.open.repeated.elapsed());
+        let repeat = self.options.repeat_after.saturating_sub(self.open.repeated.elapsed());
         let deadline =
             (self.on_late != OnLate::Wait).then(|| self.deadline.saturating_sub(self.open.since.elapsed()));
         announce.into_iter().chain(deadline).fold(repeat, Duration::min)
@@ -532,7 +534,7 @@ impl Server {
                 self.answer_status(&question, simulation);
             }
         }
-        if self.open.repeated.elapsed() >= REPEAT_AFTER {
+        if self.open.repeated.elapsed() >= self.options.repeat_after {
             self.repeat_clock()?;
         }
         if self.open.since.elapsed() >= self.deadline {

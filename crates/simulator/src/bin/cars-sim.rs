@@ -10,7 +10,7 @@ use protocol::bus::{Bus, DEFAULT_ENDPOINT, Role};
 use protocol::messages::End;
 use simulator::recorder::ENDPOINT;
 use simulator::scenario::{Changes, Override, Scenario};
-use simulator::server::{Event, Options, Server};
+use simulator::server::{Event, Options, REPEAT_AFTER, Server};
 use simulator::units::Time;
 use simulator::{RunFolder, Summary};
 
@@ -87,6 +87,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
         speed: args.speed.0,
         is_paused: args.paused,
         lose_after: args.lose_after,
+        repeat_after: REPEAT_AFTER,
     };
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;
     let queue = server.queue();
