@@ -125,7 +125,7 @@ impl Host {
         for (name, robot) in robots {
             let welcome = host.join(&name)?;
             // Others may still ask for what the previous incarnation reported last.
-            if let Some(last) = &welcome.last_state {
+            for last in welcome.state_before.iter().chain(&welcome.last_state) {
                 host.link.board.show(&name, Arc::new(last.clone()));
             }
             let member = Member {
@@ -213,7 +213,8 @@ impl Host {
     /// [`HostError`] if it cannot go on.
     pub fn run(mut self) -> Result<End, HostError> {
         let outcome = loop {
-            match self.link.next_clock(self.options.patience) {
+            let gone = self.link.simulator_gone.map_or(Duration::ZERO, |since| since.elapsed());
+            match self.link.next_clock(self.options.patience.saturating_sub(gone)) {
                 Some(Clock { end: Some(end), .. }) => break Ok(end),
                 Some(clock) => {
                     if let Err(error) = self.on_clock(&clock) {
@@ -223,7 +224,7 @@ impl Host {
                 None => {}
             }
             if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())
-                && gone > self.options.patience
+                && gone >= self.options.patience
             {
                 break Err(HostError::SimulatorGone(gone));
             }

@@ -345,19 +345,32 @@ impl Server {
         let clock =
             Clock { epoch: simulation.epoch(), tick: simulation.tick(), end: Some(end), ..Clock::default() };
         self.clock.put(encode(&clock))?;
-        self.say_goodbye(simulation);
+        self.say_goodbye(&clock, simulation);
         self.declared.clear();
         self.bus.close();
         Ok(summary)
     }
 
-    /// Waits for the robots to go, but not for ever: whoever leaves late finds nobody.
-    fn say_goodbye(&mut self, simulation: &Simulation) {
+    /// Waits for the robots to go, but not for ever: whoever leaves late finds nobody. One whose link has just lost the
+    /// end of the run hears it again.
+    fn say_goodbye(&mut self, clock: &Clock, simulation: &Simulation) {
         let deadline = Instant::now() + Duration::from_secs(1);
-        while self.members.values().any(|member| member.is_present) && Instant::now() < deadline {
-            if let Some(event) = self.receive(deadline.saturating_duration_since(Instant::now())) {
+        let took_part =
+            |name: &RobotName| simulation.report(name).is_some_and(|report| report.tick == simulation.tick());
+        let is_awaited = |(name, member): &(&RobotName, &Member)| member.is_present || took_part(name);
+        let mut awaited: Vec<_> =
+            self.members.iter().filter(is_awaited).map(|(name, _)| name.clone()).collect();
+        while !awaited.is_empty() && Instant::now() < deadline {
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.receive(self.options.repeat_after.min(left)) {
+                Some(Event::Token(robot, false)) => awaited.retain(|name| name.as_str() != robot),
+                Some(Event::Token(_, true)) | None => {
+                    if let Err(error) = self.clock.put(encode(clock)) {
+                        tracing::debug!("{error}");
+                    }
+                }
                 // The run is over: whatever else is asked for changes nothing any more.
-                let _ = self.handle(event, simulation);
+                Some(event) => drop(self.handle(event, simulation)),
             }
         }
     }

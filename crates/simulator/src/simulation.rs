@@ -343,6 +343,7 @@ impl Simulation {
             last_state: last
                 .zip(self.index(name))
                 .and_then(|(report, index)| Some(public_state(report, *self.stood_at.get(index)?))),
+            state_before: None,
             last_seq: self.last_seq.get(name).copied().unwrap_or(0),
         })
     }

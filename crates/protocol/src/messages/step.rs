@@ -108,6 +108,10 @@ pub struct Welcome {
     /// must answer with it until it has reported itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_state: Option<PublicState>,
+    /// What it reported for the tick before that, where it had reported for the tick under way before it was gone: the
+    /// others still ask for this one in this tick.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_before: Option<PublicState>,
     /// Number of the last command that its previous incarnation sent in this epoch.
     #[serde(default)]
     pub last_seq: Seq,

@@ -276,6 +276,7 @@ fn welcome(robot: &str, at: Point, seed: u64, roster: &[RobotName], parameters: 
         roster: roster.to_vec(),
         parameters,
         last_state: None,
+        state_before: None,
         last_seq: 0,
     }
 }

@@ -17,6 +17,7 @@ const TOKEN_PATIENCE: Duration = Duration::from_secs(2);
 pub(super) struct Member {
     /// The process that joined last.
     instance: Option<String>,
+    /// Since when its token is awaited.
     joined_at: Option<Instant>,
     /// Its number; 0 before the first.
     pub(super) generation: Generation,
@@ -155,9 +156,9 @@ impl Server {
         member.take_place(request.instance.clone());
         let generation = member.generation;
         let mut welcome = simulation.welcome(run, name, generation);
-        // Its predecessor had done the tick that is under way.
+        // Its predecessor had done the tick that is under way, in which others may still ask for the one before.
         if let (Some(welcome), Some(report)) = (&mut welcome, self.open.reports.get(name)) {
-            welcome.last_state = Some(public_state(report, welcome.location));
+            welcome.state_before = welcome.last_state.replace(public_state(report, welcome.location));
             welcome.last_seq = report.sent.iter().map(|sent| sent.seq).fold(welcome.last_seq, u64::max);
         }
         let unknown = || (Refusal::UnknownName, format!("no robot of this run is called {name}"));
@@ -178,6 +179,8 @@ impl Server {
         let is_open = self.open_tick().is_some() && !self.open.reports.contains_key(&name);
         let Some(member) = self.members.get_mut(&name) else { return Ok(()) };
         member.is_present = is_there;
+        // It has been here: when its token goes, its place is free at once.
+        member.joined_at = None;
         if is_there && is_open {
             // It takes the place of one that was lost in this very tick, or it is back and may have missed the clock.
             if let Some(generation) = member.take_pending() {

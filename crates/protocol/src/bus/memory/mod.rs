@@ -124,9 +124,10 @@ impl MemoryNetwork {
     /// Kills the process behind a session: of what it has sent last, some is lost, and it says no more.
     pub fn kill(&self, bus: &Bus) {
         if let super::Session::Memory(session) = &bus.session {
-            let ended = self.shared.lock().kill(session.open.peer);
+            let mut calls = Calls::new();
+            self.shared.lock().kill(session.open.peer, &mut calls);
             self.shared.changed.notify_one();
-            drop(ended);
+            calls.into_iter().for_each(|call| call());
         }
     }
 

@@ -92,6 +92,8 @@ pub(super) struct Star {
     peers: BTreeMap<PeerId, Peer>,
     questions: BTreeMap<u64, Routed>,
     next_id: u64,
+    /// Sessions so far: a number is never given twice.
+    joined: PeerId,
     /// Questions answer through what the sessions share.
     shared: Weak<Shared>,
     /// What is to be dropped without the lock: a callback may own questions, and a question that is dropped sends.
@@ -120,6 +122,16 @@ impl Peer {
         }
     }
 
+    /// Its watchers see all tokens go.
+    fn lose_sight(&mut self, calls: &mut Calls) {
+        for (watcher, key) in std::mem::take(&mut self.seen) {
+            if let Some(Declaration::Watch(_, handle)) = self.declared.get(&watcher) {
+                let handle = handle.clone();
+                calls.push(Box::new(move || handle(&key, false)));
+            }
+        }
+    }
+
     fn subscribes_to(&self, key: &str) -> bool {
         let covers = |d: &Declaration| matches!(d, Declaration::Subscribe(keys, _) if covers(keys, key));
         self.known.values().any(covers)
@@ -143,6 +155,7 @@ impl Star {
             peers: BTreeMap::new(),
             questions: BTreeMap::new(),
             next_id: 0,
+            joined: 0,
             shared,
             rubbish: Vec::new(),
             traffic: Traffic::default(),
@@ -163,7 +176,8 @@ impl Star {
     // What sessions do.
 
     pub(super) fn join(&mut self, can_break: bool) -> PeerId {
-        let number = self.peers.keys().next_back().map_or(0, |last| last + 1);
+        let number = self.joined;
+        self.joined += 1;
         let link = |way: &str| Link {
             queue: VecDeque::new(),
             random: stream(self.seed, &format!("link/{number}/{way}")),
@@ -239,15 +253,17 @@ impl Star {
         std::mem::take(&mut peer.asks).into_values().map(|(_, then)| then).collect()
     }
 
-    /// The same for a process that is killed: some of what it said last never left it.
-    pub(super) fn kill(&mut self, from: PeerId) -> Vec<Pending> {
-        if let Some(peer) = self.peers.get_mut(&from).filter(|peer| !peer.is_closed) {
-            let draw = unit(&mut peer.up.random);
-            let kept = (draw * (peer.up.queue.len() + 1) as f64) as usize;
-            self.traffic.lost += (peer.up.queue.len() - kept) as u64;
-            peer.up.queue.truncate(kept);
-        }
-        self.close(from)
+    /// The process is killed: some of what it said last never left it. Whatever of it lives on in this process finds its
+    /// link broken for good.
+    pub(super) fn kill(&mut self, from: PeerId, calls: &mut Calls) {
+        let Some(peer) = self.peers.get_mut(&from).filter(|peer| !peer.is_closed) else { return };
+        let draw = unit(&mut peer.up.random);
+        let kept = (draw * (peer.up.queue.len() + 1) as f64) as usize;
+        self.traffic.lost += (peer.up.queue.len() - kept) as u64;
+        peer.up.queue.truncate(kept);
+        peer.lose_sight(calls);
+        let ended = self.close(from);
+        calls.push(Box::new(move || drop(ended)));
     }
 
     // What the scheduler does.
@@ -341,7 +357,9 @@ impl Star {
             }
             if peer.cut_until.is_some_and(|until| until <= now) {
                 peer.cut_until = None;
+                // One that was closed meanwhile comes back only to be forgotten.
                 let anew = peer.declared.iter().map(|(id, d)| Message::Declare(*id, d.clone()));
+                let anew = anew.filter(|_| !peer.is_closed).chain(peer.is_closed.then_some(Message::Close));
                 peer.up.queue.extend(anew);
             }
         }
@@ -358,12 +376,7 @@ impl Star {
         for (_, then) in std::mem::take(&mut peer.asks).into_values() {
             calls.push(Box::new(move || drop(then)));
         }
-        for (watcher, key) in std::mem::take(&mut peer.seen) {
-            if let Some(Declaration::Watch(_, handle)) = peer.declared.get(&watcher) {
-                let handle = handle.clone();
-                calls.push(Box::new(move || handle(&key, false)));
-            }
-        }
+        peer.lose_sight(calls);
         for declaration in peer.declared.values() {
             if let Declaration::Publish(_, watched) = declaration {
                 watched.store(false, Ordering::Relaxed);
