@@ -240,35 +240,35 @@ impl Schedule {
             patience: Duration::from_secs(4),
             zenoh_config: None,
         };
-        let make = move || robots::make(&class).expect("a shipped class");
+        let make = |class: &str| robots::make(class).expect("a shipped class");
         let bus = network.client();
         std::thread::spawn(move || {
-            let live = |bus: Bus, robot: Box<dyn Robot>| {
-                Host::join_over(bus, vec![(name.clone(), robot)], options.clone())
+            let own = name.clone();
+            let live = move |bus: Bus, robot: Box<dyn Robot>| {
+                Host::join_over(bus, vec![(own.clone(), robot)], options.clone())
                     .and_then(Host::run)
-                    .map_err(|error| format!("{name}: {error}"))
+                    .map_err(|error| format!("{own}: {error}"))
             };
             match harm {
                 Harm::KilledIn(victim, tick, phase) if victim == name => {
                     let (network, dies) = (network.clone(), (tick, phase));
-                    let mortal = Mortal { robot: make(), network: network.clone(), bus: bus.clone(), dies };
+                    let mortal =
+                        Mortal { robot: make(&class), network: network.clone(), bus: bus.clone(), dies };
                     let mortal: Box<dyn Robot> = Box::new(mortal);
                     let life = std::panic::AssertUnwindSafe(|| live(bus, mortal));
                     std::panic::catch_unwind(life).expect_err("it is killed");
-                    live(network.client(), make())
+                    live(network.client(), make(&class))
                 }
                 Harm::KilledAfter(victim, after_us) if victim == name => {
-                    let (killer, victim) = (network.clone(), bus.clone());
-                    let killer = std::thread::spawn(move || {
-                        std::thread::sleep(Duration::from_micros(after_us));
-                        killer.kill(&victim);
-                    });
-                    // It may have been killed before it could join, or after the end.
-                    let first = live(bus, make());
-                    killer.join().expect("it only kills");
-                    first.or_else(|_| live(network.client(), make())).or_else(after_the_end)
+                    let process = bus.clone();
+                    // How it ends interests nobody: it is killed, or the run is over before that.
+                    let (first, robot_class) = (live.clone(), class.clone());
+                    std::thread::spawn(move || drop(first(bus, make(&robot_class))));
+                    std::thread::sleep(Duration::from_micros(after_us));
+                    network.kill(&process);
+                    live(network.client(), make(&class)).or_else(after_the_end)
                 }
-                _ => live(bus, make()),
+                _ => live(bus, make(&class)),
             }
         })
     }
@@ -276,7 +276,7 @@ impl Schedule {
 
 /// Who comes when all is over has missed nothing.
 fn after_the_end(error: String) -> Ended {
-    if error.contains("is over") { Ok(End::Finished) } else { Err(error) }
+    if error.contains("is over") || error.contains("no simulator") { Ok(End::Finished) } else { Err(error) }
 }
 
 /// How many schedules, or the only one that is wanted.
@@ -432,7 +432,7 @@ fn a_robot_that_is_killed_at_any_moment_comes_back() {
             let scenario = halls[of(seed)].clone();
             let mut draws = stream(seed, "moment");
             let victim = scenario.roster()[(unit(&mut draws) * 2.0) as usize].clone();
-            let after_us = (unit(&mut draws) * 40_000.0) as u64;
+            let after_us = (unit(&mut draws) * 25_000.0) as u64;
             Schedule::new(seed, faults(seed), scenario, Harm::KilledAfter(victim, after_us))
         },
         |_, summary| same(&summary.digest, &summary),
