@@ -287,7 +287,8 @@ impl Member {
             }
             return Ok(());
         }
-        let Some((report, state)) = self.tick(clock, joined.is_some(), link)? else { return Ok(()) };
+        let is_named = joined == Some(welcome.generation);
+        let Some((report, state)) = self.tick(clock, is_named, link)? else { return Ok(()) };
         // First what others may ask for, then the report: after it the clock may go on and they will ask.
         // Who follows has the state before the next clock, because both come the same way.
         if self.state.is_watched() {

@@ -112,7 +112,8 @@ pub struct Welcome {
     /// others still ask for this one in this tick.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_before: Option<PublicState>,
-    /// Number of the last command that its previous incarnation sent in this epoch.
+    /// Its commands of this epoch are numbered from the next one on: no incarnation uses a number that a former one may
+    /// have used.
     #[serde(default)]
     pub last_seq: Seq,
 }
@@ -197,7 +198,7 @@ pub struct Correction {
 pub struct CommandId {
     /// Who sent it.
     pub from: RobotName,
-    /// Its number among the sender's commands of this epoch, from 1.
+    /// Its number among the sender's commands of this epoch: from 1, or from where its welcome says.
     pub seq: Seq,
 }
 

@@ -7,7 +7,7 @@ use protocol::messages::{JoinAnswer, JoinRequest, Phase, Presence, Refusal};
 use protocol::{Generation, PROTOCOL_VERSION, decode, encode};
 
 use super::{Interrupt, Server, introduce};
-use crate::simulation::{Membership, Simulation, public_state};
+use crate::simulation::{Membership, Simulation, public_state, set_apart};
 
 /// A robot that has joined shows its token within this time, or its place is free again.
 const TOKEN_PATIENCE: Duration = Duration::from_secs(2);
@@ -159,7 +159,7 @@ impl Server {
         // Its predecessor had done the tick that is under way, in which others may still ask for the one before.
         if let (Some(welcome), Some(report)) = (&mut welcome, self.open.reports.get(name)) {
             welcome.state_before = welcome.last_state.replace(public_state(report, welcome.location));
-            welcome.last_seq = report.sent.iter().map(|sent| sent.seq).fold(welcome.last_seq, u64::max);
+            set_apart(welcome);
         }
         let unknown = || (Refusal::UnknownName, format!("no robot of this run is called {name}"));
         welcome.map(|welcome| JoinAnswer::Welcome(Box::new(welcome))).ok_or_else(unknown)
@@ -179,8 +179,10 @@ impl Server {
         let is_open = self.open_tick().is_some() && !self.open.reports.contains_key(&name);
         let Some(member) = self.members.get_mut(&name) else { return Ok(()) };
         member.is_present = is_there;
-        // It has been here: when its token goes, its place is free at once.
-        member.joined_at = None;
+        if is_there {
+            // It has been here: when its token goes, its place is free at once.
+            member.joined_at = None;
+        }
         if is_there && is_open {
             // It takes the place of one that was lost in this very tick, or it is back and may have missed the clock.
             if let Some(generation) = member.take_pending() {
