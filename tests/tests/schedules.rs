@@ -55,7 +55,7 @@ fn faults(seed: u64) -> Faults {
     let mut draws = stream(seed, "faults");
     let mut up_to = |most: f64| most * unit(&mut draws);
     Faults {
-        pause: Duration::from_micros(if seed % 2 == 0 { 0 } else { up_to(60.0) as u64 }),
+        pause: Duration::from_micros(if seed.is_multiple_of(2) { 0 } else { up_to(60.0) as u64 }),
         nap: up_to(0.02),
         cut: up_to(0.004),
         loss: up_to(0.01),
