@@ -24,8 +24,8 @@ use system_tests::hall::{Hall, scenario};
 
 /// Ticks of every run.
 const TICKS: u64 = 40;
-/// A schedule that takes longer than this hangs.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// A schedule that takes longer than this hangs. A command that was lost together with its sender is given up after 10 s.
+const PATIENCE: Duration = Duration::from_secs(40);
 /// The simulator asks everybody to repeat after this long.
 const REPEAT_AFTER: Duration = Duration::from_millis(5);
 /// Seeds of the hall: each is another run.
