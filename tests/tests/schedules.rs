@@ -313,7 +313,7 @@ fn explore<T: Send>(
                     match outcome.and_then(|summary| judge(seed, summary)) {
                         Ok(one) => found.lock().unwrap().push(one),
                         Err(reason) => {
-                            failed.lock().unwrap().push((seed, format!("{harm:?}: {reason}"), traffic))
+                            failed.lock().unwrap().push((seed, format!("{harm:?}: {reason}"), traffic));
                         }
                     }
                 }
