@@ -1,7 +1,7 @@
 //! The contract between the simulator, the robots and the observers of a run.
 //!
 //! Three things live here and nowhere else: what is said ([`messages`]), where it is said ([`keys`]) and how it
-//! is written ([`codec`]). The [`bus`] carries it; it is the only module of the whole project that names the
+//! is written ([`codec`]). The [`bus`] carries it; one file of it, and no other of the whole project, names the
 //! middleware, so that everything above it can be tested without a network.
 //!
 //! SI units and REP 103 throughout: meters, seconds, radians counter-clockwise from +x.

@@ -105,6 +105,18 @@ impl Host {
     ) -> Result<Self, HostError> {
         let role = Role::Client { connect: options.connect.clone(), patience: options.patience };
         let bus = Bus::open(&role, options.zenoh_config.as_ref())?;
+        Self::join_over(bus, robots, options)
+    }
+
+    /// The same over a bus that is open already.
+    ///
+    /// # Errors
+    /// [`HostError`], as for [`Host::connect`].
+    pub fn join_over(
+        bus: Bus,
+        robots: Vec<(RobotName, Box<dyn Robot>)>,
+        options: HostOptions,
+    ) -> Result<Self, HostError> {
         let keys = Keys::new(&options.run);
         let link = Link::new(bus.clone(), keys.clone(), options.patience);
         let mut host = Self { options, bus, keys, link, members: BTreeMap::new(), declared: Vec::new() };
@@ -113,7 +125,7 @@ impl Host {
         for (name, robot) in robots {
             let welcome = host.join(&name)?;
             // Others may still ask for what the previous incarnation reported last.
-            if let Some(last) = &welcome.last_state {
+            for last in welcome.state_before.iter().chain(&welcome.last_state) {
                 host.link.board.show(&name, Arc::new(last.clone()));
             }
             let member = Member {
@@ -204,7 +216,8 @@ impl Host {
     /// [`HostError`] if it cannot go on.
     pub fn run(mut self) -> Result<End, HostError> {
         let outcome = loop {
-            match self.link.next_clock(self.options.patience) {
+            let gone = self.link.simulator_gone.map_or(Duration::ZERO, |since| since.elapsed());
+            match self.link.next_clock(self.options.patience.saturating_sub(gone)) {
                 Some(Clock { end: Some(end), .. }) => break Ok(end),
                 Some(clock) => {
                     if let Err(error) = self.on_clock(&clock) {
@@ -214,7 +227,7 @@ impl Host {
                 None => {}
             }
             if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())
-                && gone > self.options.patience
+                && gone >= self.options.patience
             {
                 break Err(HostError::SimulatorGone(gone));
             }
@@ -277,7 +290,8 @@ impl Member {
             }
             return Ok(());
         }
-        let Some((report, state)) = self.tick(clock, joined.is_some(), link)? else { return Ok(()) };
+        let is_named = joined == Some(welcome.generation);
+        let Some((report, state)) = self.tick(clock, is_named, link)? else { return Ok(()) };
         // First what others may ask for, then the report: after it the clock may go on and they will ask.
         // Who follows has the state before the next clock, because both come the same way.
         if self.state.is_watched() {

@@ -33,7 +33,7 @@ const QUEUE: usize = 65_536;
 /// After this long without a report people are told for whom the clock waits.
 const SAY_AFTER: Duration = Duration::from_millis(500);
 /// While the clock is held it is repeated this often: whatever got lost on the wire is then sent again.
-const REPEAT_AFTER: Duration = Duration::from_secs(2);
+pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
 
 /// How a simulator process runs.
 #[derive(Debug, Clone)]
@@ -44,6 +44,8 @@ pub struct Options {
     pub speed: Option<f64>,
     /// Whether the clock waits for `start` once everybody is there.
     pub is_paused: bool,
+    /// While the clock is held it is repeated this often; [`REPEAT_AFTER`] unless a test is in a hurry.
+    pub repeat_after: Duration,
 }
 
 /// Why a simulator process ended before its time.
@@ -346,19 +348,32 @@ impl Server {
         let clock =
             Clock { epoch: simulation.epoch(), tick: simulation.tick(), end: Some(end), ..Clock::default() };
         self.clock.put(encode(&clock))?;
-        self.say_goodbye(simulation);
+        self.say_goodbye(&clock, simulation);
         self.declared.clear();
         self.bus.close();
         Ok(summary)
     }
 
-    /// Waits for the robots to go, but not for ever: whoever leaves late finds nobody.
-    fn say_goodbye(&mut self, simulation: &Simulation) {
+    /// Waits for the robots to go, but not for ever: whoever leaves late finds nobody. One whose link has just lost the
+    /// end of the run hears it again.
+    fn say_goodbye(&mut self, clock: &Clock, simulation: &Simulation) {
         let deadline = Instant::now() + Duration::from_secs(1);
-        while self.members.values().any(|member| member.is_present) && Instant::now() < deadline {
-            if let Some(event) = self.receive(deadline.saturating_duration_since(Instant::now())) {
+        let took_part =
+            |name: &RobotName| simulation.report(name).is_some_and(|report| report.tick == simulation.tick());
+        let is_awaited = |(name, member): &(&RobotName, &Member)| member.is_present || took_part(name);
+        let mut awaited: Vec<_> =
+            self.members.iter().filter(is_awaited).map(|(name, _)| name.clone()).collect();
+        while !awaited.is_empty() && Instant::now() < deadline {
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.receive(self.options.repeat_after.min(left)) {
+                Some(Event::Token(robot, false)) => awaited.retain(|name| name.as_str() != robot),
+                Some(Event::Token(_, true)) | None => {
+                    if let Err(error) = self.clock.put(encode(clock)) {
+                        tracing::debug!("{error}");
+                    }
+                }
                 // The run is over: whatever else is asked for changes nothing any more.
-                let _ = self.handle(event, simulation);
+                Some(event) => drop(self.handle(event, simulation)),
             }
         }
     }
@@ -519,7 +534,7 @@ impl Server {
     fn next_look(&self) -> Duration {
         let elapsed = self.open.since.elapsed();
         let announce = (!self.open.is_announced).then(|| SAY_AFTER.saturating_sub(elapsed));
-        let repeat = REPEAT_AFTER.saturating_sub(self.open.repeated.elapsed());
+        let repeat = self.options.repeat_after.saturating_sub(self.open.repeated.elapsed());
         let acts = self.awaited().any(|name| self.lateness.of(name) != OnLate::Wait);
         let deadline = acts.then(|| self.deadline().saturating_sub(elapsed));
         announce.into_iter().chain(deadline).fold(repeat, Duration::min)
@@ -542,7 +557,7 @@ impl Server {
                 self.answer_status(&question, simulation);
             }
         }
-        if self.open.repeated.elapsed() >= REPEAT_AFTER {
+        if self.open.repeated.elapsed() >= self.options.repeat_after {
             self.repeat_clock()?;
         }
         if self.open.since.elapsed() >= self.deadline() {

@@ -14,6 +14,9 @@ use crate::digest::Digest;
 use crate::medium::{Medium, Underway};
 use crate::scenario::{Fault, FaultEnd, Scenario, to_wire};
 
+/// More commands than one incarnation ever sends; as many incarnations as ever come fit below 2^53 with it.
+const SEQS_OF_A_GENERATION: Seq = 1_000_000_000;
+
 /// How a clock reaches the robots and their reports come back: over the bus, or by calling them.
 pub trait Barrier {
     /// Why a tick was given up before it was complete.
@@ -79,8 +82,6 @@ pub struct Simulation {
     reports: BTreeMap<RobotName, Report>,
     /// Where each robot stood at the last complete tick, in the order of names.
     stood_at: Vec<Point>,
-    /// Number of the last command of each robot.
-    last_seq: BTreeMap<RobotName, Seq>,
     /// Robots whose report of the last tick is missing: they propose nothing, and nobody can query them.
     silent: Vec<RobotName>,
     blocked: Vec<bool>,
@@ -110,7 +111,6 @@ impl Simulation {
             unreachable: BTreeMap::new(),
             reports: BTreeMap::new(),
             stood_at: Vec::new(),
-            last_seq: BTreeMap::new(),
             silent: Vec::new(),
             operator_seq: 0,
             between: Vec::new(),
@@ -290,8 +290,6 @@ impl Simulation {
         }
         for sent in &report.sent {
             let (from, to, seq) = (robot.clone(), sent.to.clone(), sent.seq);
-            let last_seq = self.last_seq.entry(robot.clone()).or_default();
-            *last_seq = seq.max(*last_seq);
             let (performative, command) = (sent.performative, sent.command.clone());
             events.push(Event::CommandSent { from, to, seq, performative, command });
             self.medium.accept(Underway { to: sent.to.clone(), from: robot.clone(), seq });
@@ -361,12 +359,8 @@ impl Simulation {
     #[must_use]
     pub fn welcome(&self, run: &RunName, name: &RobotName, generation: Generation) -> Option<Welcome> {
         let spec = self.scenario.robots.get(name)?;
-        // Who is there from the beginning draws from a stream of its name alone, whatever happened to it in an
-        // earlier epoch; a later incarnation must not draw the same again.
         let last = self.reports.get(name);
-        let stream =
-            if last.is_some() { format!("robot/{name}#{generation}") } else { format!("robot/{name}") };
-        Some(Welcome {
+        let mut welcome = Welcome {
             protocol: PROTOCOL_VERSION,
             run: run.clone(),
             name: name.clone(),
@@ -374,7 +368,7 @@ impl Simulation {
             epoch: self.epoch,
             tick: self.tick,
             seed: self.scenario.seed,
-            stream,
+            stream: format!("robot/{name}"),
             tick_s: self.scenario.tick_s,
             field_m: self.scenario.field_m,
             body_m: self.scenario.body_m,
@@ -385,9 +379,14 @@ impl Simulation {
             last_state: last
                 .zip(self.index(name))
                 .and_then(|(report, index)| Some(public_state(report, *self.stood_at.get(index)?))),
-            last_seq: self.last_seq.get(name).copied().unwrap_or(0),
+            state_before: None,
+            last_seq: 0,
             repeat_ticks: self.scenario.network.longest_delay(self.scenario.tick_s) + 2,
-        })
+        };
+        if last.is_some() {
+            set_apart(&mut welcome);
+        }
+        Some(welcome)
     }
 
     /// What a robot senses around itself now.
@@ -498,6 +497,15 @@ impl Simulation {
     pub fn digest(&self) -> String {
         self.digest.to_string()
     }
+}
+
+/// Tells a further incarnation apart from those that took part before it. Who is there from the beginning draws from a
+/// stream of its name alone, whatever happened to it in an earlier epoch; a later incarnation must not draw the same
+/// again. Nor may it use a number that a former one may have used: commands of that one which were never reported may
+/// lie at their targets, or still be under way.
+pub(crate) fn set_apart(welcome: &mut Welcome) {
+    welcome.stream = format!("robot/{}#{}", welcome.name, welcome.generation);
+    welcome.last_seq = SEQS_OF_A_GENERATION * Seq::from(welcome.generation.saturating_sub(1));
 }
 
 /// What the other robots may learn of one that reported this from there.

@@ -1,6 +1,7 @@
 //! The missing arrows between crates are invariants.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// For each crate of this project: which others of this project it may depend on, tests included.
@@ -47,6 +48,26 @@ fn only_protocol_names_the_middleware() {
     for (name, dependencies) in dependencies() {
         assert_eq!(dependencies.contains("zenoh"), name == "protocol", "{name}");
     }
+}
+
+/// All Rust files under a folder.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        match entry.path() {
+            path if path.is_dir() => sources(&path, found),
+            path if path.extension().is_some_and(|extension| extension == "rs") => found.push(path),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn one_file_names_the_middleware() {
+    let mut files = Vec::new();
+    sources(&system_tests::root().join("crates"), &mut files);
+    let names_it = |file: &PathBuf| std::fs::read_to_string(file).unwrap().contains("zenoh::");
+    let naming: Vec<_> = files.into_iter().filter(names_it).collect();
+    assert!(matches!(&naming[..], [one] if one.ends_with("protocol/src/bus/middleware.rs")), "{naming:?}");
 }
 
 #[test]

@@ -266,6 +266,24 @@ fn a_lost_report_is_asked_for_again_by_repeating_the_clock() {
 }
 
 #[test]
+fn a_newcomer_is_told_all_that_others_may_still_ask_for() {
+    let (wire, a, b) = ready("wire-return");
+    wire.control(&Control::Start).unwrap();
+    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    // A does tick 1 and is gone; B is still in it, and may ask for what A reported for tick 0.
+    a.put(&a.report(1));
+    drop(a);
+    let welcome = eventually("the place of A to be free", || match wire.join(&wire.request("A", "next")) {
+        JoinAnswer::Welcome(welcome) => Some(welcome),
+        JoinAnswer::Refused { .. } => None,
+    });
+    let tick = |state: &Option<PublicState>| state.as_ref().map(|state| state.tick);
+    assert_eq!((tick(&welcome.last_state), tick(&welcome.state_before)), (Some(1), Some(0)));
+    assert_eq!((welcome.generation, welcome.tick), (2, 0));
+    drop(b);
+}
+
+#[test]
 fn queries_answer_with_the_tick_before() {
     // A real robot asked by hand: Leguin, in a run that is stepped.
     let lab = Lab::new();

@@ -108,7 +108,12 @@ pub struct Welcome {
     /// must answer with it until it has reported itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_state: Option<PublicState>,
-    /// Number of the last command that its previous incarnation sent in this epoch.
+    /// What it reported for the tick before that, where it had reported for the tick under way before it was gone: the
+    /// others still ask for this one in this tick.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_before: Option<PublicState>,
+    /// Its commands of this epoch are numbered from the next one on: no incarnation uses a number that a former one may
+    /// have used.
     #[serde(default)]
     pub last_seq: Seq,
     /// Whoever sees a clock repeated repeats the commands of this many ticks back: a clock may name one so late, because
@@ -202,7 +207,7 @@ pub struct Correction {
 pub struct CommandId {
     /// Who sent it.
     pub from: RobotName,
-    /// Its number among the sender's commands of this epoch, from 1.
+    /// Its number among the sender's commands of this epoch: from 1, or from where its welcome says.
     pub seq: Seq,
 }
 

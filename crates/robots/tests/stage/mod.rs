@@ -290,6 +290,7 @@ pub(crate) fn welcome(
         roster: roster.to_vec(),
         parameters,
         last_state: None,
+        state_before: None,
         last_seq: 0,
         repeat_ticks: 2,
     }

@@ -10,7 +10,7 @@ use protocol::bus::{Bus, DEFAULT_ENDPOINT, Role};
 use protocol::messages::End;
 use simulator::recorder::ENDPOINT;
 use simulator::scenario::{Changes, Override, Scenario};
-use simulator::server::{Event, Options, Server};
+use simulator::server::{Event, Options, REPEAT_AFTER, Server};
 use simulator::units::Time;
 use simulator::{RunFolder, Summary};
 
@@ -79,7 +79,12 @@ fn run(args: &Args) -> miette::Result<Summary> {
     let _lock = folder.create(&scenario)?;
     let role = Role::Router { listen: args.listen.clone() };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
-    let options = Options { run: args.run.clone(), speed: args.speed.0, is_paused: args.paused };
+    let options = Options {
+        run: args.run.clone(),
+        speed: args.speed.0,
+        is_paused: args.paused,
+        repeat_after: REPEAT_AFTER,
+    };
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;
     let queue = server.queue();
     // The queue is closed only when the run is over, and then there is nothing left to end.

@@ -8,7 +8,7 @@ use protocol::{Generation, PROTOCOL_VERSION, decode, encode};
 
 use super::{Interrupt, Server, introduce};
 use crate::scenario::OnLate;
-use crate::simulation::{Membership, Simulation, public_state};
+use crate::simulation::{Membership, Simulation, public_state, set_apart};
 
 /// A robot that has joined shows its token within this time, or its place is free again.
 const TOKEN_PATIENCE: Duration = Duration::from_secs(2);
@@ -18,6 +18,7 @@ const TOKEN_PATIENCE: Duration = Duration::from_secs(2);
 pub(super) struct Member {
     /// The process that joined last.
     instance: Option<String>,
+    /// Since when its token is awaited.
     joined_at: Option<Instant>,
     /// Its number; 0 before the first.
     pub(super) generation: Generation,
@@ -161,10 +162,10 @@ impl Server {
         member.take_place(request.instance.clone());
         let generation = member.generation;
         let mut welcome = simulation.welcome(run, name, generation);
-        // Its predecessor had done the tick that is under way.
+        // Its predecessor had done the tick that is under way, in which others may still ask for the one before.
         if let (Some(welcome), Some(report)) = (&mut welcome, self.open.reports.get(name)) {
-            welcome.last_state = Some(public_state(report, welcome.location));
-            welcome.last_seq = report.sent.iter().map(|sent| sent.seq).fold(welcome.last_seq, u64::max);
+            welcome.state_before = welcome.last_state.replace(public_state(report, welcome.location));
+            set_apart(welcome);
         }
         let unknown = || (Refusal::UnknownName, format!("no robot of this run is called {name}"));
         welcome.map(|welcome| JoinAnswer::Welcome(Box::new(welcome))).ok_or_else(unknown)
@@ -184,6 +185,10 @@ impl Server {
         let is_open = self.open_tick().is_some() && !self.open.reports.contains_key(&name);
         let Some(member) = self.members.get_mut(&name) else { return Ok(()) };
         member.is_present = is_there;
+        if is_there {
+            // It has been here: when its token goes, its place is free at once.
+            member.joined_at = None;
+        }
         if is_there && is_open {
             // It takes the place of one that was lost in this very tick, or it is back and may have missed the clock.
             if let Some(generation) = member.take_pending() {

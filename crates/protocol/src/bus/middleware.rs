@@ -1,7 +1,4 @@
-//! The bus: the middleware behind seven verbs, with the settings that a lock-step system needs.
-//!
-//! A simulator embeds the router and everything else is a client of it: one path between any two, which is what keeps
-//! messages in order. No multicast, no gossip, loopback unless an address says otherwise.
+//! The middleware: the only file of the project that names it, with the settings that a lock-step system needs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,84 +11,22 @@ use zenoh::key_expr::KeyExpr;
 use zenoh::qos::CongestionControl;
 use zenoh::query::{ConsolidationMode, Query, QueryTarget, Reply};
 use zenoh::sample::{Sample, SampleKind};
-use zenoh::{Config, Session, Wait};
+use zenoh::{Config, Wait};
 
-/// Where a simulator listens and others connect unless told otherwise.
-pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
+use super::{AnswerOf, BusError, Declared, Pending, QUERY_TIMEOUT, Role};
 
-/// Longest wait for an answer before the asker looks again whether the other side is still there.
-pub const QUERY_TIMEOUT: Duration = Duration::from_secs(2);
-
-/// A failure of the bus itself.
-#[derive(Debug, thiserror::Error)]
-pub enum BusError {
-    /// No session could be opened.
-    #[error("cannot {doing} {endpoint}: {reason}")]
-    Open {
-        /// What was tried.
-        doing: &'static str,
-        /// The address tried.
-        endpoint: String,
-        /// What the middleware says.
-        reason: String,
-    },
-    /// A session that was open cannot do what was asked.
-    #[error("bus: cannot {doing} {key}: {reason}")]
-    Use {
-        /// What was tried.
-        doing: &'static str,
-        /// The key concerned.
-        key: String,
-        /// What the middleware says.
-        reason: String,
-    },
-}
-
-/// How to take part.
+/// A session of the middleware. Clones share it; the last one closes it.
 #[derive(Debug, Clone)]
-pub enum Role {
-    /// Listen at this endpoint and route for everybody: the simulator.
-    Router {
-        /// For example `tcp/127.0.0.1:7447`.
-        listen: String,
-    },
-    /// Connect to this endpoint: everybody else.
-    Client {
-        /// For example `tcp/127.0.0.1:7447`.
-        connect: String,
-        /// How long to go on trying to reach it.
-        patience: Duration,
-    },
-}
-
-/// A session. Clones share it; the last one closes it.
-#[derive(Debug, Clone)]
-pub struct Bus {
-    session: Session,
-}
-
-/// A declaration, alive until dropped.
-pub struct Declared {
-    _inner: Box<dyn Send + Sync>,
-}
-
-impl std::fmt::Debug for Declared {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Declared")
-    }
+pub(super) struct Session {
+    session: zenoh::Session,
 }
 
 fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T, BusError> {
     result.map_err(|error| BusError::Use { doing, key: key.to_owned(), reason: error.to_string() })
 }
 
-impl Bus {
-    /// Opens a session. `overrides` is a configuration file of the middleware that replaces the built-in settings,
-    /// for set-ups across machines.
-    ///
-    /// # Errors
-    /// [`BusError::Open`] names the address that was tried and what went wrong.
-    pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
+impl Session {
+    pub(super) fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
         let (doing, endpoint) = match role {
             Role::Router { listen } => ("listen at", listen),
             Role::Client { connect, .. } => ("reach the simulator at", connect),
@@ -102,27 +37,16 @@ impl Bus {
         Ok(Self { session })
     }
 
-    /// An identity that no other session has.
-    #[must_use]
-    pub fn id(&self) -> String {
+    pub(super) fn id(&self) -> String {
         self.session.zid().to_string()
     }
 
-    /// Declares that messages will be put on `key`.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
+    pub(super) fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
         // The middleware's default would drop under pressure, and a lock-step system cannot afford a lost message.
         self.declare_publisher(key, CongestionControl::Block)
     }
 
-    /// Declares that pictures and lines for observers will be put on `key`. Where an observer does not keep up, they
-    /// are dropped: nobody who watches may hold the clock.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn observer_publisher(&self, key: &str) -> Result<Publisher, BusError> {
+    pub(super) fn observer_publisher(&self, key: &str) -> Result<Publisher, BusError> {
         self.declare_publisher(key, CongestionControl::Drop)
     }
 
@@ -142,21 +66,12 @@ impl Bus {
         Ok(Publisher { inner, watched })
     }
 
-    /// Puts one message.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
+    pub(super) fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
         let put = self.session.put(key, message).congestion_control(CongestionControl::Block).wait();
         used("put on", key, put)
     }
 
-    /// Calls `handle(key, bytes)` for each message put on `keys`. It runs on the thread that reads the link: it must
-    /// hand over and return.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
-    pub fn subscribe(
+    pub(super) fn subscribe(
         &self,
         keys: &str,
         handle: impl Fn(&str, &[u8]) + Send + Sync + 'static,
@@ -169,41 +84,22 @@ impl Bus {
         Ok(Declared { _inner: Box::new(used("subscribe to", keys, declared)?) })
     }
 
-    /// Calls `handle` for each question asked on `keys`. It must hand over and return.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
-    pub fn serve(
+    pub(super) fn serve(
         &self,
         keys: &str,
-        handle: impl Fn(Question) + Send + Sync + 'static,
+        handle: impl Fn(super::Question) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
         let declared = self
             .session
             .declare_queryable(keys)
-            .callback(move |query: Query| handle(Question { query }))
+            .callback(move |query: Query| {
+                handle(super::Question { inner: super::Query::Middleware(Question { query }) });
+            })
             .wait();
         Ok(Declared { _inner: Box::new(used("serve", keys, declared)?) })
     }
 
-    /// Asks, and waits for the one answer: `None` if nobody answers within [`QUERY_TIMEOUT`].
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn ask(
-        &self,
-        key: &str,
-        parameters: &str,
-        body: Option<Vec<u8>>,
-    ) -> Result<Option<AnswerOf>, BusError> {
-        self.ask_within(key, parameters, body, QUERY_TIMEOUT)
-    }
-
-    /// The same with another limit, for answers that take their time.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn ask_within(
+    pub(super) fn ask_within(
         &self,
         key: &str,
         parameters: &str,
@@ -223,18 +119,13 @@ impl Bus {
         Ok(None)
     }
 
-    /// Asks, and hands the one answer to `then`, or `None` if nobody answers within [`QUERY_TIMEOUT`]. `then` runs on
-    /// the thread that reads the link: it must hand over and return.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn ask_then(
+    pub(super) fn ask_then(
         &self,
         key: &str,
         parameters: &str,
         then: impl FnOnce(Option<AnswerOf>) + Send + 'static,
     ) -> Result<(), BusError> {
-        let pending = std::sync::Mutex::new(Pending(Some(Box::new(then))));
+        let pending = std::sync::Mutex::new(Pending::new(then));
         let asked = self
             .get(key, parameters, None, QUERY_TIMEOUT)?
             .callback(move |reply: Reply| {
@@ -265,21 +156,12 @@ impl Bus {
             .timeout(timeout))
     }
 
-    /// Shows that something is there, until dropped or until this process or its link is gone. To be declared last:
-    /// who sees it knows that everything declared before is in effect.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn token(&self, key: &str) -> Result<Declared, BusError> {
+    pub(super) fn token(&self, key: &str) -> Result<Declared, BusError> {
         let declared = self.session.liveliness().declare_token(key.to_owned()).wait();
         Ok(Declared { _inner: Box::new(used("declare", key, declared)?) })
     }
 
-    /// Calls `handle(key, is_there)` for each token under `keys` that is there, comes or goes.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
-    pub fn watch(
+    pub(super) fn watch(
         &self,
         keys: &str,
         handle: impl Fn(&str, bool) + Send + Sync + 'static,
@@ -296,63 +178,27 @@ impl Bus {
         Ok(Declared { _inner: Box::new(used("watch", keys, declared)?) })
     }
 
-    /// Closes the session after everything that was put has left. A process that exits without it loses messages.
-    pub fn close(&self) {
+    pub(super) fn close(&self) {
         if let Err(error) = self.session.close().wait() {
             tracing::debug!(%error, "closing the session");
         }
     }
 }
 
-type Then = Box<dyn FnOnce(Option<AnswerOf>) + Send>;
-
-/// A continuation that is called exactly once: with the answer, or with `None` when the query ends without one.
-struct Pending(Option<Then>);
-
-impl Pending {
-    fn settle(&mut self, answer: Option<AnswerOf>) {
-        if let Some(then) = self.0.take() {
-            then(answer);
-        }
-    }
-}
-
-impl Drop for Pending {
-    fn drop(&mut self) {
-        self.settle(None);
-    }
-}
-
-/// A place to put messages of one kind.
 #[derive(Debug)]
-pub struct Publisher {
+pub(super) struct Publisher {
     inner: zenoh::pubsub::Publisher<'static>,
     watched: Arc<AtomicBool>,
 }
 
 impl Publisher {
-    /// Puts a message.
-    ///
-    /// # Errors
-    /// [`BusError::Use`] if the session is closed.
-    pub fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
+    pub(super) fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
         used("put on", self.inner.key_expr().as_str(), self.inner.put(message).wait())
     }
 
-    /// Whether anybody subscribes: pictures that nobody looks at need not be painted.
-    #[must_use]
-    pub fn is_watched(&self) -> bool {
+    pub(super) fn is_watched(&self) -> bool {
         self.watched.load(Ordering::Relaxed)
     }
-}
-
-/// An answer: bytes, or the reason why there are none.
-#[derive(Debug, Clone)]
-pub struct AnswerOf {
-    /// Key on which it came.
-    pub key: String,
-    /// The message, or the responder's refusal in words.
-    pub result: Result<Vec<u8>, String>,
 }
 
 impl AnswerOf {
@@ -371,40 +217,31 @@ impl AnswerOf {
     }
 }
 
-/// A question that waits for an answer. One that is dropped unanswered ends at once at the asker.
 #[derive(Debug)]
-pub struct Question {
+pub(super) struct Question {
     query: Query,
 }
 
 impl Question {
-    /// Key that was asked.
-    #[must_use]
-    pub fn key(&self) -> &str {
+    pub(super) fn key(&self) -> &str {
         self.query.key_expr().as_str()
     }
 
-    /// The parameter called `name`, as in `?tick=12;epoch=1`.
-    #[must_use]
-    pub fn parameter(&self, name: &str) -> Option<&str> {
+    pub(super) fn parameter(&self, name: &str) -> Option<&str> {
         self.query.parameters().get(name)
     }
 
-    /// What came with it.
-    #[must_use]
-    pub fn body(&self) -> Vec<u8> {
+    pub(super) fn body(&self) -> Vec<u8> {
         self.query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default()
     }
 
-    /// Answers on `key`.
-    pub fn answer(&self, key: &str, message: Vec<u8>) {
+    pub(super) fn answer(&self, key: &str, message: Vec<u8>) {
         if let Err(error) = self.query.reply(key.to_owned(), message).wait() {
             tracing::debug!(%error, key, "an answer could not be sent");
         }
     }
 
-    /// Refuses, in words.
-    pub fn refuse(&self, reason: &str) {
+    pub(super) fn refuse(&self, reason: &str) {
         if let Err(error) = self.query.reply_err(reason.to_owned()).wait() {
             tracing::debug!(%error, "a refusal could not be sent");
         }
