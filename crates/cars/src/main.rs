@@ -6,6 +6,8 @@ mod common;
 mod control;
 mod experiment;
 mod launch;
+mod net;
+mod router;
 mod run;
 mod statistics;
 mod table;
@@ -42,6 +44,11 @@ enum Subcommands {
     Command(control::CommandArgs),
     /// Show the log of a run; `-f` follows one in progress.
     Log(control::LogArgs),
+    /// Real links with real faults: cut, slow, narrow. Nothing of it is reproducible but the record.
+    #[command(subcommand)]
+    Net(net::NetCommand),
+    /// Forward between a simulator and robots on different machines, and do nothing else.
+    Router(router::RouterArgs),
     /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
     Bench(bench::BenchArgs),
     /// Print shell completions.
@@ -72,6 +79,8 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Query(args) => control::query(&args),
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
+        Subcommands::Net(command) => net::net(command),
+        Subcommands::Router(args) => router::router(&args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),
         Subcommands::BenchEcho { address } => bench::echo(&address),

@@ -62,6 +62,14 @@ pub enum Role {
         /// How long to go on trying to reach it.
         patience: Duration,
     },
+    /// Only forward, between a simulator and robots on different machines. What is empty is left to the
+    /// configuration file.
+    Relay {
+        /// Where others reach it, for example `tcp/192.0.2.1:7447`.
+        listen: Vec<String>,
+        /// Other relays that it reaches.
+        connect: Vec<String>,
+    },
 }
 
 /// A session. Clones share it; the last one closes it.
@@ -87,14 +95,16 @@ fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T
 
 impl Bus {
     /// Opens a session. `overrides` is a configuration file of the middleware that replaces the built-in settings,
-    /// for set-ups across machines.
+    /// for set-ups across machines; `configs/zenoh/` has files that say the same as the built-in ones. What the role
+    /// says (mode, where to listen or connect) holds in either case.
     ///
     /// # Errors
     /// [`BusError::Open`] names the address that was tried and what went wrong.
     pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
         let (doing, endpoint) = match role {
-            Role::Router { listen } => ("listen at", listen),
-            Role::Client { connect, .. } => ("reach the simulator at", connect),
+            Role::Router { listen } => ("listen at", listen.clone()),
+            Role::Client { connect, .. } => ("reach the simulator at", connect.clone()),
+            Role::Relay { listen, .. } => ("listen at", listen.join(", ")),
         };
         let failed = |reason: String| BusError::Open { doing, endpoint: endpoint.clone(), reason };
         let config = configuration(role, overrides).map_err(&failed)?;
@@ -429,31 +439,44 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
             set("mode", "\"client\"")?;
             set("connect/endpoints", &format!("[{connect:?}]"))?;
             set("connect/timeout_ms", &patience.as_millis().to_string())?;
-            set("connect/retry", "{period_init_ms: 100, period_max_ms: 500, period_increase_factor: 2}")?;
-            // A connection attempt into a cut link must not outlive the cut by ten seconds.
-            set("transport/unicast/open_timeout", "1000")?;
+        }
+        Role::Relay { listen, connect } => {
+            set("mode", "\"router\"")?;
+            for (key, endpoints) in [("listen/endpoints", listen), ("connect/endpoints", connect)] {
+                if !endpoints.is_empty() {
+                    set(key, &format!("{endpoints:?}"))?;
+                }
+            }
         }
     }
     if overrides.is_some() {
         return Ok(config);
     }
-    for (key, value) in [
-        // A router waits half a second for scouting that is switched off below.
-        ("scouting/delay", "0"),
-        ("scouting/multicast/enabled", "false"),
-        ("scouting/gossip/enabled", "false"),
-        // A process that hangs or a link that is cut is noticed within this time, milliseconds.
-        ("transport/link/tx/lease", "2000"),
-        ("transport/link/tx/keep_alive", "4"),
-        // A receiver that does not read holds the sender for at most this long, microseconds.
-        ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
-        ("transport/link/rx/max_message_size", "4194304"),
-        // Hundreds of robots may connect at the same moment.
-        ("transport/unicast/accept_pending", "1000"),
-        ("transport/unicast/max_sessions", "2000"),
-        ("transport/unicast/accept_timeout", "2000"),
-    ] {
+    for (key, value) in SETTINGS {
         set(key, value)?;
     }
     Ok(config)
 }
+
+/// What every session is set to, unless a configuration file says otherwise.
+const SETTINGS: [(&str, &str); 12] = [
+    // A router waits half a second for scouting that is switched off below.
+    ("scouting/delay", "0"),
+    ("scouting/multicast/enabled", "false"),
+    ("scouting/gossip/enabled", "false"),
+    // A process that hangs or a link that is cut is noticed within this time, milliseconds.
+    ("transport/link/tx/lease", "2000"),
+    ("transport/link/tx/keep_alive", "4"),
+    // A receiver that does not read holds the sender for at most this long, microseconds.
+    ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
+    ("transport/link/rx/max_message_size", "4194304"),
+    // Hundreds of robots may connect at the same moment.
+    ("transport/unicast/accept_pending", "1000"),
+    ("transport/unicast/max_sessions", "2000"),
+    ("transport/unicast/accept_timeout", "2000"),
+    // An attempt to connect into a cut link must not outlive the cut for long, milliseconds. It takes three round
+    // trips to succeed: where one takes more than 0.3 s, a configuration file says more.
+    ("transport/unicast/open_timeout", "1000"),
+    // So a link that is whole again is found within about a second: the rest of an attempt and the longest wait.
+    ("connect/retry", "{period_init_ms: 100, period_max_ms: 200, period_increase_factor: 2}"),
+];
