@@ -30,6 +30,8 @@ const MAX_PROCESSES: usize = 250;
 /// the time that a healed link takes to be used again.
 const ASK_FOR_ADDRESS_AGAIN_MS: &str = "100";
 
+const NO_CONSOLE: &str = "--no-console";
+
 /// Namespaces of a launch: the simulator's, one for each process, and the switch.
 #[derive(Debug)]
 pub(super) struct Namespaces {
@@ -108,8 +110,11 @@ impl Links for Namespaces {
         let own = std::env::current_exe().into_diagnostic().wrap_err("where this program is")?;
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.host(0)]).arg(own).args(start.args(&links));
-        // A browser would not reach the console there.
-        command.arg(format!("--listen={endpoint}")).arg("--no-console").args(ARGS_TO_LISTEN_WIDELY);
+        command.arg(format!("--listen={endpoint}")).args(ARGS_TO_LISTEN_WIDELY);
+        if !start.more.iter().any(|arg| arg == NO_CONSOLE) {
+            // A browser would not reach it there.
+            command.arg(NO_CONSOLE);
+        }
         Ok(command)
     }
 
