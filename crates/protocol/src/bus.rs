@@ -480,3 +480,31 @@ const SETTINGS: [(&str, &str); 12] = [
     // So a link that is whole again is found within about a second: the rest of an attempt and the longest wait.
     ("connect/retry", "{period_init_ms: 100, period_max_ms: 200, period_increase_factor: 2}"),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `configs/zenoh/` says what is built in, so that who changes one thing there changes nothing else.
+    #[test]
+    fn the_configuration_files_say_what_is_built_in() {
+        let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/zenoh"));
+        let here = || "tcp/127.0.0.1:7447".to_owned();
+        for (file, role) in [
+            ("simulator.json5", Role::Router { listen: here() }),
+            ("robot.json5", Role::Client { connect: here(), patience: QUERY_TIMEOUT }),
+            ("router.json5", Role::Relay { listen: Vec::new(), connect: Vec::new() }),
+        ] {
+            let built_in = configuration(&role, None).unwrap();
+            let from_file = configuration(&role, Some(&folder.join(file))).unwrap();
+            for (key, _) in SETTINGS.iter().chain(&[("mode", "")]) {
+                assert_eq!(
+                    from_file.get_json(key).ok(),
+                    built_in.get_json(key).ok(),
+                    "{key} in {file} and as it is built in"
+                );
+                assert!(built_in.get_json(key).is_ok_and(|value| value != "null"), "{key} is set");
+            }
+        }
+    }
+}

@@ -219,6 +219,13 @@ mod tests {
     }
 
     #[test]
+    fn the_shipped_plan_can_be_played() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/links/cut_leguin.toml");
+        let plan = Plan::load(&file, &BTreeSet::from([RobotName::new("Leguin").unwrap()])).unwrap();
+        assert_eq!(plan.changes().len(), 4);
+    }
+
+    #[test]
     fn what_is_wrong_is_shown_where_it_stands() {
         for (text, reason) in [
             (fault("Vonda", "5 s", "5 s", "\"cut\""), "no link of a robot Vonda"),
