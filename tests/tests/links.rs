@@ -145,6 +145,35 @@ fn namespaces_cut_for_30_s_lose_a_robot_that_returns() {
     }
 }
 
+/// Closing a connection that is cut must not keep the simulator from hearing all others (`.cargo/config.toml`).
+#[test]
+fn several_links_cut_at_once_hold_up_nobody_else() {
+    if !has_namespaces("several") {
+        return;
+    }
+    let (lab, run) = (Lab::new(), "several");
+    let fault =
+        |robot| format!("[[link_fault]]\nrobot = \"{robot}\"\nat = \"1 s\"\nfor = \"6 s\"\ndo = \"cut\"\n");
+    let plan = lab.write("plan.toml", &(fault("Leguin") + &fault("Vonda")));
+    let args = ["net", "play", "launch/three_robots.toml", "--via", "namespaces", "--speed", "10", "--plan"];
+    let set = ["--set", "on_late=continue", "--set", "deadline=0.5 s", "--duration", "120 s"];
+    let mut player = lab.start(run, &[&args, [plan.to_str().unwrap()].as_slice(), &set].concat());
+    let healed = player.prints("the link of Vonda is whole");
+    for robot in ["Leguin       is back", "Vonda        is back"] {
+        let back = player.prints_after(robot, Some(healed - ROOM)).saturating_duration_since(healed);
+        println!("{robot} {back:?} after healing");
+        assert!(back < HEALED + ROOM, "{robot} {back:?} after healing");
+    }
+    player.finish();
+    let events = lab.events(run);
+    let missed = |robot: &str| {
+        events.iter().filter(|event| event["event"] == "missed" && event["robot"] == robot).count()
+    };
+    assert!(missed("Leguin") > 0 && missed("Vonda") > 0);
+    assert_eq!(missed("Butler"), 0, "his link was whole");
+    nothing_is_left(run, &player);
+}
+
 #[test]
 fn a_slow_a_narrow_and_a_closed_link_change_nothing() {
     let lab = Lab::new();
