@@ -8,6 +8,7 @@
 )]
 
 pub mod hall;
+pub mod network;
 pub mod processes;
 
 use std::path::{Path, PathBuf};

@@ -3,9 +3,10 @@
 mod bar;
 mod compose;
 mod ending;
-mod endpoint;
+pub(crate) mod endpoint;
 pub(crate) mod file;
 mod lines;
+pub(crate) mod link;
 mod observe;
 mod plan;
 mod process;
@@ -32,6 +33,7 @@ use crate::common::{ExecutionArgs, Speed};
 use crate::table;
 
 use file::LaunchFile;
+use link::Link;
 use observe::{Observer, Watch};
 use plan::{Execution, Planned};
 use screen::{Look, Screen};
@@ -75,6 +77,10 @@ pub(crate) struct LaunchArgs {
     /// Where the simulator listens. Everything but loopback opens the run to the network.
     #[arg(long, value_name = "ENDPOINT")]
     listen: Option<String>,
+    /// How a process of the file reaches the simulator, if not directly: by another endpoint, and from within a network
+    /// namespace. `cars net play` says it.
+    #[arg(long = "link", value_name = "PROCESS=ENDPOINT[@NAMESPACE]")]
+    links: Vec<Link>,
     /// How long a process has to end by itself before it is killed.
     #[arg(long, value_name = "TIME", default_value = "3 s")]
     grace: Time,
@@ -164,7 +170,9 @@ impl Launch {
             has_console: !self.args.no_console,
             opens_browser: self.args.open,
         };
-        plan::plan(&self.file, &execution)
+        let mut planned = plan::plan(&self.file, &execution)?;
+        self.args.links.iter().try_for_each(|link| link.lay(&mut planned))?;
+        Ok(planned)
     }
 
     fn speed(&self) -> Speed {

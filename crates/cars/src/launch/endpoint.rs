@@ -3,7 +3,7 @@
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 
 /// A loopback port that is free at this moment.
-pub(super) fn free() -> std::io::Result<String> {
+pub(crate) fn free() -> std::io::Result<String> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
     Ok(format!("tcp/{}", listener.local_addr()?))
 }

@@ -28,8 +28,9 @@ fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T
 impl Session {
     pub(super) fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
         let (doing, endpoint) = match role {
-            Role::Router { listen } => ("listen at", listen),
-            Role::Client { connect, .. } => ("reach the simulator at", connect),
+            Role::Router { listen } => ("listen at", listen.clone()),
+            Role::Client { connect, .. } => ("reach the simulator at", connect.clone()),
+            Role::Relay { listen, .. } => ("listen at", listen.join(", ")),
         };
         let failed = |reason: String| BusError::Open { doing, endpoint: endpoint.clone(), reason };
         let config = configuration(role, overrides).map_err(&failed)?;
@@ -266,31 +267,72 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
             set("mode", "\"client\"")?;
             set("connect/endpoints", &format!("[{connect:?}]"))?;
             set("connect/timeout_ms", &patience.as_millis().to_string())?;
-            set("connect/retry", "{period_init_ms: 100, period_max_ms: 500, period_increase_factor: 2}")?;
-            // A connection attempt into a cut link must not outlive the cut by ten seconds.
-            set("transport/unicast/open_timeout", "1000")?;
+        }
+        Role::Relay { listen, connect } => {
+            set("mode", "\"router\"")?;
+            for (key, endpoints) in [("listen/endpoints", listen), ("connect/endpoints", connect)] {
+                if !endpoints.is_empty() {
+                    set(key, &format!("{endpoints:?}"))?;
+                }
+            }
         }
     }
     if overrides.is_some() {
         return Ok(config);
     }
-    for (key, value) in [
-        // A router waits half a second for scouting that is switched off below.
-        ("scouting/delay", "0"),
-        ("scouting/multicast/enabled", "false"),
-        ("scouting/gossip/enabled", "false"),
-        // A process that hangs or a link that is cut is noticed within this time, milliseconds.
-        ("transport/link/tx/lease", "2000"),
-        ("transport/link/tx/keep_alive", "4"),
-        // A receiver that does not read holds the sender for at most this long, microseconds.
-        ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
-        ("transport/link/rx/max_message_size", "4194304"),
-        // Hundreds of robots may connect at the same moment.
-        ("transport/unicast/accept_pending", "1000"),
-        ("transport/unicast/max_sessions", "2000"),
-        ("transport/unicast/accept_timeout", "2000"),
-    ] {
+    for (key, value) in SETTINGS {
         set(key, value)?;
     }
     Ok(config)
+}
+
+/// What every session is set to, unless a configuration file says otherwise.
+const SETTINGS: [(&str, &str); 12] = [
+    // A router waits half a second for scouting that is switched off below.
+    ("scouting/delay", "0"),
+    ("scouting/multicast/enabled", "false"),
+    ("scouting/gossip/enabled", "false"),
+    // A process that hangs or a link that is cut is noticed within this time, milliseconds.
+    ("transport/link/tx/lease", "2000"),
+    ("transport/link/tx/keep_alive", "4"),
+    // A receiver that does not read holds the sender for at most this long, microseconds.
+    ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
+    ("transport/link/rx/max_message_size", "4194304"),
+    // Hundreds of robots may connect at the same moment.
+    ("transport/unicast/accept_pending", "1000"),
+    ("transport/unicast/max_sessions", "2000"),
+    ("transport/unicast/accept_timeout", "2000"),
+    // An attempt to connect into a cut link must not outlive the cut for long, milliseconds. It takes three round
+    // trips to succeed: where one takes more than 0.3 s, a configuration file says more.
+    ("transport/unicast/open_timeout", "1000"),
+    // So a link that is whole again is found within about a second: the rest of an attempt and the longest wait.
+    ("connect/retry", "{period_init_ms: 100, period_max_ms: 200, period_increase_factor: 2}"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `configs/zenoh/` says what is built in, so that who changes one thing there changes nothing else.
+    #[test]
+    fn the_configuration_files_say_what_is_built_in() {
+        let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/zenoh"));
+        let here = || "tcp/127.0.0.1:7447".to_owned();
+        for (file, role) in [
+            ("simulator.json5", Role::Router { listen: here() }),
+            ("robot.json5", Role::Client { connect: here(), patience: QUERY_TIMEOUT }),
+            ("router.json5", Role::Relay { listen: Vec::new(), connect: Vec::new() }),
+        ] {
+            let built_in = configuration(&role, None).unwrap();
+            let from_file = configuration(&role, Some(&folder.join(file))).unwrap();
+            for (key, _) in SETTINGS.iter().chain(&[("mode", "")]) {
+                assert_eq!(
+                    from_file.get_json(key).ok(),
+                    built_in.get_json(key).ok(),
+                    "{key} in {file} and as it is built in"
+                );
+                assert!(built_in.get_json(key).is_ok_and(|value| value != "null"), "{key} is set");
+            }
+        }
+    }
 }

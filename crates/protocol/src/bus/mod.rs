@@ -60,6 +60,14 @@ pub enum Role {
         /// How long to go on trying to reach it.
         patience: Duration,
     },
+    /// Only forward, between a simulator and robots on different machines. What is empty is left to the
+    /// configuration file.
+    Relay {
+        /// Where others reach it, for example `tcp/192.0.2.1:7447`.
+        listen: Vec<String>,
+        /// Other relays that it reaches.
+        connect: Vec<String>,
+    },
 }
 
 /// A session. Clones share it; the last one closes it.
@@ -97,7 +105,8 @@ macro_rules! on {
 
 impl Bus {
     /// Opens a session. `overrides` is a configuration file of the middleware that replaces the built-in settings,
-    /// for set-ups across machines.
+    /// for set-ups across machines; `configs/zenoh/` has files that say the same as the built-in ones. What the role
+    /// says (mode, where to listen or connect) holds in either case.
     ///
     /// # Errors
     /// [`BusError::Open`] names the address that was tried and what went wrong.
