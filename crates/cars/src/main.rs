@@ -7,6 +7,7 @@ mod control;
 mod experiment;
 mod launch;
 mod run;
+mod secure;
 mod statistics;
 mod table;
 
@@ -42,6 +43,8 @@ enum Subcommands {
     Command(control::CommandArgs),
     /// Show the log of a run; `-f` follows one in progress.
     Log(control::LogArgs),
+    /// Make certificates and access control for a roster, for runs that strangers could reach.
+    Secure(secure::SecureArgs),
     /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
     Bench(bench::BenchArgs),
     /// Print shell completions.
@@ -72,6 +75,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Query(args) => control::query(&args),
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
+        Subcommands::Secure(args) => secure::secure(&args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),
         Subcommands::BenchEcho { address } => bench::echo(&address),

@@ -3,7 +3,7 @@
 //! A simulator embeds the router and everything else is a client of it: one path between any two, which is what keeps
 //! messages in order. No multicast, no gossip, loopback unless an address says otherwise.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -15,6 +15,8 @@ use zenoh::qos::CongestionControl;
 use zenoh::query::{ConsolidationMode, Query, QueryTarget, Reply};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Session, Wait};
+
+use crate::endpoint::{is_local, is_tls};
 
 /// Where a simulator listens and others connect unless told otherwise.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
@@ -35,6 +37,16 @@ pub enum BusError {
         /// What the middleware says.
         reason: String,
     },
+    /// A simulator would be open to a network.
+    #[error(
+        "{0} can be reached from other machines, and whoever reaches it may control the run and pose as any robot; \
+         either secure the run (`cars secure init` says how) and listen at tls/…, or say --insecure if you trust \
+         everybody who can reach it"
+    )]
+    Exposed(String),
+    /// A configuration with access control does not fit a listener without certificates.
+    #[error("{0} is not encrypted, so nobody could show a certificate there: a secured run listens at tls/…")]
+    Unencrypted(String),
     /// A session that was open cannot do what was asked.
     #[error("bus: cannot {doing} {key}: {reason}")]
     Use {
@@ -54,6 +66,8 @@ pub enum Role {
     Router {
         /// For example `tcp/127.0.0.1:7447`.
         listen: String,
+        /// Whether other machines may reach it without certificates and access control.
+        trusts_network: bool,
     },
     /// Connect to this endpoint: everybody else.
     Client {
@@ -93,7 +107,10 @@ impl Bus {
     /// [`BusError::Open`] names the address that was tried and what went wrong.
     pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
         let (doing, endpoint) = match role {
-            Role::Router { listen } => ("listen at", listen),
+            Role::Router { listen, trusts_network } => {
+                check_exposure(listen, overrides, *trusts_network)?;
+                ("listen at", listen)
+            }
             Role::Client { connect, .. } => ("reach the simulator at", connect),
         };
         let failed = |reason: String| BusError::Open { doing, endpoint: endpoint.clone(), reason };
@@ -411,49 +428,207 @@ impl Question {
     }
 }
 
-/// The settings that were measured to suit a lock-step system, on top of the middleware's defaults.
+/// One of the middleware's settings.
+pub(crate) struct Setting {
+    /// Its path.
+    pub(crate) key: &'static str,
+    /// Its value, as JSON5.
+    pub(crate) value: &'static str,
+    /// Why it is what it is.
+    pub(crate) why: &'static str,
+}
+
+const fn setting(key: &'static str, value: &'static str, why: &'static str) -> Setting {
+    Setting { key, value, why }
+}
+
+/// What was measured to suit a lock-step system, for everybody.
+pub(crate) const SETTINGS: [Setting; 10] = [
+    setting("scouting/delay", "0", "A router waits half a second for scouting that is switched off below."),
+    setting("scouting/multicast/enabled", "false", "Nobody is looked for: the endpoint says where to go."),
+    setting("scouting/gossip/enabled", "false", "One path between any two keeps messages in order."),
+    setting(
+        "transport/link/tx/lease",
+        "2000",
+        "A process that hangs or a link that is cut is noticed within this time, milliseconds.",
+    ),
+    setting("transport/link/tx/keep_alive", "4", "Signs of life within that time."),
+    setting(
+        "transport/link/tx/queue/congestion_control/block/wait_before_close",
+        "500000",
+        "A receiver that does not read holds the sender for at most this long, microseconds.",
+    ),
+    setting("transport/link/rx/max_message_size", "4194304", "Bytes; nothing here is nearly as long."),
+    setting("transport/unicast/accept_pending", "1000", "Hundreds of robots may connect at the same moment."),
+    setting("transport/unicast/max_sessions", "2000", "No more sessions than this."),
+    setting("transport/unicast/accept_timeout", "2000", "Who connects and says nothing is in nobody's way for long."),
+];
+
+/// What holds for those who connect, in addition.
+pub(crate) const CLIENT_SETTINGS: [Setting; 3] = [
+    setting("mode", "\"client\"", "Everything goes by the simulator, which checks it."),
+    setting(
+        "connect/retry",
+        "{ period_init_ms: 100, period_max_ms: 500, period_increase_factor: 2 }",
+        "Milliseconds between two attempts to connect.",
+    ),
+    setting(
+        "transport/unicast/open_timeout",
+        "1000",
+        "A connection attempt into a cut link must not outlive the cut by ten seconds.",
+    ),
+];
+
+/// What holds for the simulator, in addition.
+pub(crate) const ROUTER_SETTINGS: [Setting; 1] =
+    [setting("mode", "\"router\"", "Everybody connects here, and nobody to anybody else.")];
+
+/// Setting of an encrypted listener: who connects must have shown a certificate within this time, milliseconds.
+const HANDSHAKE_TIMEOUT: &str = "tls_handshake_timeout_ms=2000";
+
+/// The built-in settings, or those of a file, and the endpoint, which is never the file's affair.
 fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, String> {
     let mut config = match overrides {
-        Some(file) => Config::from_file(file).map_err(|error| error.to_string())?,
+        Some(file) => Config::from_file(file).map_err(|error| format!("{}: {error}", file.display()))?,
         None => Config::default(),
     };
     let mut set = |key: &str, value: &str| {
         config.insert_json5(key, value).map_err(|error| format!("setting {key} = {value}: {error}"))
     };
-    match role {
-        Role::Router { listen } => {
-            set("mode", "\"router\"")?;
+    let own = match role {
+        Role::Router { listen, .. } => {
+            let separator = if listen.contains('#') { ';' } else { '#' };
+            let listen = if is_tls(listen) {
+                format!("{listen}{separator}{HANDSHAKE_TIMEOUT}")
+            } else {
+                listen.clone()
+            };
             set("listen/endpoints", &format!("[{listen:?}]"))?;
+            &ROUTER_SETTINGS[..]
         }
         Role::Client { connect, patience } => {
-            set("mode", "\"client\"")?;
             set("connect/endpoints", &format!("[{connect:?}]"))?;
             set("connect/timeout_ms", &patience.as_millis().to_string())?;
-            set("connect/retry", "{period_init_ms: 100, period_max_ms: 500, period_increase_factor: 2}")?;
-            // A connection attempt into a cut link must not outlive the cut by ten seconds.
-            set("transport/unicast/open_timeout", "1000")?;
+            &CLIENT_SETTINGS[..]
         }
-    }
-    if overrides.is_some() {
-        return Ok(config);
-    }
-    for (key, value) in [
-        // A router waits half a second for scouting that is switched off below.
-        ("scouting/delay", "0"),
-        ("scouting/multicast/enabled", "false"),
-        ("scouting/gossip/enabled", "false"),
-        // A process that hangs or a link that is cut is noticed within this time, milliseconds.
-        ("transport/link/tx/lease", "2000"),
-        ("transport/link/tx/keep_alive", "4"),
-        // A receiver that does not read holds the sender for at most this long, microseconds.
-        ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
-        ("transport/link/rx/max_message_size", "4194304"),
-        // Hundreds of robots may connect at the same moment.
-        ("transport/unicast/accept_pending", "1000"),
-        ("transport/unicast/max_sessions", "2000"),
-        ("transport/unicast/accept_timeout", "2000"),
-    ] {
+    };
+    let common = SETTINGS.iter().filter(|_| overrides.is_none());
+    for Setting { key, value, .. } in own.iter().chain(common) {
         set(key, value)?;
     }
     Ok(config)
+}
+
+/// Refuses to listen where strangers could connect, unless they need certificates, or `trusts_network`.
+///
+/// # Errors
+/// [`BusError::Exposed`] says what it would mean, and what to do. [`BusError::Unencrypted`] if the configuration has
+/// access control and the endpoint no certificates: it would refuse everybody.
+pub fn check_exposure(
+    listen: &str,
+    overrides: Option<&PathBuf>,
+    trusts_network: bool,
+) -> Result<(), BusError> {
+    let guards = match overrides {
+        Some(file) => guards(file)
+            .map_err(|reason| BusError::Open { doing: "listen at", endpoint: listen.to_owned(), reason })?,
+        None => Guards::default(),
+    };
+    if guards.has_access_control && !is_tls(listen) {
+        return Err(BusError::Unencrypted(listen.to_owned()));
+    }
+    let is_guarded = guards.has_access_control && guards.wants_certificates;
+    if is_local(listen) || is_guarded || trusts_network {
+        return Ok(());
+    }
+    Err(BusError::Exposed(listen.to_owned()))
+}
+
+/// What a configuration file asks of those who connect.
+#[derive(Default)]
+struct Guards {
+    wants_certificates: bool,
+    has_access_control: bool,
+}
+
+fn guards(file: &Path) -> Result<Guards, String> {
+    let config = Config::from_file(file).map_err(|error| format!("{}: {error}", file.display()))?;
+    // A setting that is not there guards nothing.
+    let is = |key: &str, value: &str| config.get_json(key).is_ok_and(|found| found == value);
+    Ok(Guards {
+        wants_certificates: is("transport/link/tls/enable_mtls", "true"),
+        has_access_control: is("access_control/enabled", "true")
+            && is("access_control/default_permission", "\"deny\""),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::secure::{Credentials, client_config, simulator_config};
+    use crate::{RobotName, keys::Keys};
+
+    fn credentials() -> Credentials<'static> {
+        Credentials { ca: "a CA", certificate: "a certificate", key: "a key", validity: "some time" }
+    }
+
+    fn robots() -> Vec<RobotName> {
+        ["Butler", "r-2_d.2"].map(|name| RobotName::new(name).unwrap()).to_vec()
+    }
+
+    fn assert_settings(config: &Config, settings: &[Setting]) {
+        for Setting { key, value, .. } in settings.iter().filter(|setting| !setting.key.ends_with("retry")) {
+            assert_eq!(config.get_json(key).unwrap(), *value, "{key}");
+        }
+        assert_eq!(config.get_json("transport/link/tls/enable_mtls").unwrap(), "true");
+    }
+
+    #[test]
+    fn generated_configurations_are_complete() {
+        let client = client_config("Butler", &credentials());
+        let config = Config::from_json5(&client).unwrap();
+        assert_settings(&config, &SETTINGS);
+        assert_settings(&config, &CLIENT_SETTINGS);
+        assert!(config.get_json("connect/retry").unwrap().contains("\"period_init_ms\":100"));
+        let simulator = simulator_config(&Keys::of_any_run(), &robots(), &credentials());
+        let config = Config::from_json5(&simulator).unwrap();
+        assert_settings(&config, &SETTINGS);
+        assert_settings(&config, &ROUTER_SETTINGS);
+        assert_eq!(config.get_json("access_control/default_permission").unwrap(), "\"deny\"");
+        let subjects = config.get_json("access_control/subjects").unwrap();
+        for name in ["Butler", "r-2_d.2", "operator", "console"] {
+            assert!(subjects.contains(&format!("\"cert_common_names\":[\"{name}\"]")), "{subjects}");
+        }
+    }
+
+    #[test]
+    fn a_listener_for_strangers_needs_certificates_and_access_control_or_a_word() {
+        let folder = std::env::temp_dir().join(format!("cars-exposure-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let write = |name: &str, text: &str| {
+            let file = folder.join(name);
+            std::fs::write(&file, text).unwrap();
+            file
+        };
+        let guarded =
+            write("guarded.json5", &simulator_config(&Keys::of_any_run(), &robots(), &credentials()));
+        let encrypted = write("encrypted.json5", "{transport: {link: {tls: {enable_mtls: true}}}}");
+        let refused = |listen: &str, file: Option<&PathBuf>, trusts: bool| match check_exposure(listen, file, trusts)
+        {
+            Ok(()) => "",
+            Err(BusError::Exposed(_)) => "exposed",
+            Err(BusError::Unencrypted(_)) => "unencrypted",
+            Err(error) => panic!("{error}"),
+        };
+        let all = "tcp/0.0.0.0:7447";
+        assert_eq!(refused(DEFAULT_ENDPOINT, None, false), "");
+        assert_eq!(refused(all, None, false), "exposed");
+        assert_eq!(refused(all, None, true), "");
+        assert_eq!(refused("tls/0.0.0.0:7447", None, false), "exposed");
+        assert_eq!(refused("tls/0.0.0.0:7447", Some(&encrypted), false), "exposed");
+        assert_eq!(refused("tls/0.0.0.0:7447", Some(&guarded), false), "");
+        assert_eq!(refused(all, Some(&guarded), true), "unencrypted");
+        assert_eq!(refused(DEFAULT_ENDPOINT, Some(&guarded), false), "unencrypted");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }
