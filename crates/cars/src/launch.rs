@@ -196,7 +196,8 @@ impl Launch {
             check_exposure(endpoint, config.as_ref(), self.args.insecure).into_diagnostic()?;
             return Ok(endpoint.clone());
         }
-        let free = || endpoint::free_port().into_diagnostic().wrap_err("no free port of the loopback interface");
+        let free =
+            || endpoint::free_port().into_diagnostic().wrap_err("no free port of the loopback interface");
         let port = self.args.connect_port.map_or_else(free, Ok)?;
         Ok(endpoint::loopback(port, self.secured.is_some()))
     }
@@ -204,7 +205,9 @@ impl Launch {
     /// The configuration file that the simulator gets: that of a secured run, or what the environment says.
     fn simulator_config(&self) -> Option<PathBuf> {
         let secured = self.secured.as_ref().map(|secured| secured.config_of(file::SIMULATOR));
-        secured.or_else(|| self.file.simulator.env.get(plan::ZENOH_CONFIG).map(PathBuf::from)).or_else(inherited)
+        secured
+            .or_else(|| self.file.simulator.env.get(plan::ZENOH_CONFIG).map(PathBuf::from))
+            .or_else(inherited)
     }
 
     /// The configuration file that the launcher itself uses to watch.
@@ -258,7 +261,13 @@ impl Launch {
         let wants_world = look.has_bar;
         let screen = Screen::open(look);
         let (run, tell) = (self.run.clone(), screen.tell());
-        let watch = || Watch { run, endpoint: connectable(endpoint), config: self.observer_config(), wants_world, tell };
+        let watch = || Watch {
+            run,
+            endpoint: connectable(endpoint),
+            config: self.observer_config(),
+            wants_world,
+            tell,
+        };
         let observer = (!self.args.quiet).then(|| Observer::start(watch()));
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
         let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.tell());

@@ -118,7 +118,8 @@ impl InitArgs {
             simulator_config(&keys, &self.robots, credentials)
         })?;
         for name in self.clients() {
-            authority.equip(&self.folder, name, Vec::new(), |credentials| client_config(name, credentials))?;
+            authority
+                .equip(&self.folder, name, Vec::new(), |credentials| client_config(name, credentials))?;
         }
         // Last: a folder with it is complete.
         write_file(&self.folder.join(CA), &authority.issuer.pem(), 0o644)?;
@@ -229,7 +230,9 @@ fn forget_participants(folder: &Path) -> miette::Result<()> {
         if !entry.join(CONFIG).exists() {
             continue;
         }
-        for file in [CERTIFICATE, KEY, CONFIG].map(|name| entry.join(name)).iter().filter(|file| file.exists()) {
+        for file in
+            [CERTIFICATE, KEY, CONFIG].map(|name| entry.join(name)).iter().filter(|file| file.exists())
+        {
             remove(file)?;
         }
         // Somebody may keep something of their own in it.
@@ -240,7 +243,9 @@ fn forget_participants(folder: &Path) -> miette::Result<()> {
 }
 
 fn remove(file: &Path) -> miette::Result<()> {
-    std::fs::remove_file(file).into_diagnostic().wrap_err_with(|| format!("cannot replace {}", file.display()))
+    std::fs::remove_file(file)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot replace {}", file.display()))
 }
 
 /// A folder that `cars secure init` made, to be used.

@@ -98,7 +98,9 @@ mod tests {
                 "cars/*/robot/*/command/Butler"
             ]
         );
-        for (message, others) in [("reply", 0), ("declare_queryable", 0), ("liveliness_token", 0), ("query", 7)] {
+        for (message, others) in
+            [("reply", 0), ("declare_queryable", 0), ("liveliness_token", 0), ("query", 7)]
+        {
             let foreign = keys_of(&grants, message).iter().filter(|key| !key.contains("/Butler")).count();
             assert_eq!(foreign, others, "{message}");
         }

@@ -461,7 +461,11 @@ pub(crate) const SETTINGS: [Setting; 10] = [
     setting("transport/link/rx/max_message_size", "4194304", "Bytes; nothing here is nearly as long."),
     setting("transport/unicast/accept_pending", "1000", "Hundreds of robots may connect at the same moment."),
     setting("transport/unicast/max_sessions", "2000", "No more sessions than this."),
-    setting("transport/unicast/accept_timeout", "2000", "Who connects and says nothing is in nobody's way for long."),
+    setting(
+        "transport/unicast/accept_timeout",
+        "2000",
+        "Who connects and says nothing is in nobody's way for long.",
+    ),
 ];
 
 /// What holds for those who connect, in addition.
@@ -530,8 +534,11 @@ pub fn check_exposure(
     trusts_network: bool,
 ) -> Result<(), BusError> {
     let guards = match overrides {
-        Some(file) => guards(file)
-            .map_err(|reason| BusError::Open { doing: "listen at", endpoint: listen.to_owned(), reason })?,
+        Some(file) => guards(file).map_err(|reason| BusError::Open {
+            doing: "listen at",
+            endpoint: listen.to_owned(),
+            reason,
+        })?,
         None => Guards::default(),
     };
     if guards.has_access_control && !is_tls(listen) {
@@ -613,13 +620,13 @@ mod tests {
         let guarded =
             write("guarded.json5", &simulator_config(&Keys::of_any_run(), &robots(), &credentials()));
         let encrypted = write("encrypted.json5", "{transport: {link: {tls: {enable_mtls: true}}}}");
-        let refused = |listen: &str, file: Option<&PathBuf>, trusts: bool| match check_exposure(listen, file, trusts)
-        {
-            Ok(()) => "",
-            Err(BusError::Exposed(_)) => "exposed",
-            Err(BusError::Unencrypted(_)) => "unencrypted",
-            Err(error) => panic!("{error}"),
-        };
+        let refused =
+            |listen: &str, file: Option<&PathBuf>, trusts: bool| match check_exposure(listen, file, trusts) {
+                Ok(()) => "",
+                Err(BusError::Exposed(_)) => "exposed",
+                Err(BusError::Unencrypted(_)) => "unencrypted",
+                Err(error) => panic!("{error}"),
+            };
         let all = "tcp/0.0.0.0:7447";
         assert_eq!(refused(DEFAULT_ENDPOINT, None, false), "");
         assert_eq!(refused(all, None, false), "exposed");

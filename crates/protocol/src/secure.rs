@@ -69,7 +69,8 @@ pub fn simulator_config(keys: &Keys, robots: &[RobotName], credentials: &Credent
     tree.add("access_control/enabled", "", "true");
     tree.add("access_control/default_permission", "What no rule allows is refused.", "\"deny\"");
     tree.add("access_control/rules", "What may be said, and on which keys.", &rules(keys, &grants));
-    let subjects = grants.iter().map(|(name, _)| format!("{{ id: {name:?}, cert_common_names: [{name:?}] }}"));
+    let subjects =
+        grants.iter().map(|(name, _)| format!("{{ id: {name:?}, cert_common_names: [{name:?}] }}"));
     tree.add("access_control/subjects", "Who somebody is, is what the certificate says.", &list(subjects));
     let policies = grants.iter().map(|(name, grants)| policy(name, grants));
     tree.add("access_control/policies", "Who may do what.", &list(policies));

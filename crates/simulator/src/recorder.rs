@@ -80,7 +80,8 @@ impl RunFolder {
         }
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
         let lock = self.lock()?;
-        let (log, own) = (self.log(), [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name)));
+        let (log, own) =
+            (self.log(), [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name)));
         for file in self.superseded().into_iter().chain(own).chain([log]) {
             if file.exists() {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;

@@ -9,7 +9,8 @@ use simulator::Scenario;
 use simulator::diagnostic::{FileError, Source};
 use simulator::medium::{Medium, Underway};
 
-const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n";
+const ROBOTS: &str =
+    "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n";
 
 fn parse(network: &str) -> Result<Scenario, FileError> {
     let text = format!("seed = 5\n{network}\n{ROBOTS}");

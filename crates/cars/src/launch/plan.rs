@@ -102,7 +102,8 @@ fn guest(
     env.insert("CARS_RUN".to_owned(), execution.run.to_string());
     env.insert("CARS_CONNECT".to_owned(), connectable(execution.endpoint));
     // A process is let in as its robot; only the console is none.
-    let name = if process.name == CONSOLE { Some(CONSOLE) } else { process.robots.first().map(RobotName::as_str) };
+    let name =
+        if process.name == CONSOLE { Some(CONSOLE) } else { process.robots.first().map(RobotName::as_str) };
     if let (Some(secured), Some(name)) = (execution.secured, name) {
         env.entry(ZENOH_CONFIG.to_owned()).or_insert_with(|| secured.config_of(name).display().to_string());
     }

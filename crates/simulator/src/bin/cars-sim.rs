@@ -107,7 +107,8 @@ fn run(args: &Args) -> miette::Result<Summary> {
     }
     write_line(&folder.file(ENDPOINT), &connectable(&args.listen))?;
     let outcome = server.run(scenario, &folder).into_diagnostic();
-    for name in [ENDPOINT, OPERATOR_CONFIG].map(|name| folder.file(name)).iter().filter(|file| file.exists()) {
+    for name in [ENDPOINT, OPERATOR_CONFIG].map(|name| folder.file(name)).iter().filter(|file| file.exists())
+    {
         if let Err(error) = std::fs::remove_file(name) {
             tracing::debug!(%error, "{} is gone already", name.display());
         }
@@ -115,6 +116,10 @@ fn run(args: &Args) -> miette::Result<Summary> {
     outcome
 }
 
+/// Writes a file that others wait for: they see it whole or not at all.
 fn write_line(file: &Path, line: &dyn std::fmt::Display) -> miette::Result<()> {
-    std::fs::write(file, format!("{line}\n")).into_diagnostic().wrap_err_with(|| file.display().to_string())
+    let unfinished = file.with_extension("new");
+    let written = std::fs::write(&unfinished, format!("{line}\n"));
+    let written = written.and_then(|()| std::fs::rename(&unfinished, file));
+    written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", file.display()))
 }
