@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, miette};
-use protocol::RunName;
+use protocol::{Event, RunName};
 use serde::Serialize;
 use simulator::Summary;
 use simulator::scenario::{Changes, Override, Scenario};
@@ -33,18 +33,17 @@ enum Experiment {
     /// The problem of Murphy, Lisetti et al. 2002: two robots that depend on each other deadlock when one message is
     /// lost, unless something makes them act.
     Deadlock(DeadlockArgs),
+    /// Cut the two robots off from each other for a while, commands and queries, and see which team works on and recovers.
+    Partition(PartitionArgs),
 }
 
-/// `cars experiment deadlock`.
+/// What all experiments have in common.
 #[derive(Debug, Args)]
-pub(crate) struct DeadlockArgs {
+struct Common {
     /// Scenario with a Butler and a Leguin.
     #[arg(long, default_value = "configs/hors_doeuvres.toml", value_name = "FILE")]
     scenario: PathBuf,
-    /// Probabilities with which a command is lost.
-    #[arg(long, value_delimiter = ',', default_value = "0,0.1,0.25,0.5,1", value_parser = probability)]
-    loss: Vec<f64>,
-    /// Runs of each arm and probability, with the seeds 1, 2, 3 and so on.
+    /// Runs of each arm and condition, with the seeds 1, 2, 3 and so on.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u64).range(MIN_SAMPLE..=100_000))]
     seeds: u64,
     /// Simulated time of each run.
@@ -59,6 +58,92 @@ pub(crate) struct DeadlockArgs {
     /// Print JSON: every run and every estimate.
     #[arg(long)]
     json: bool,
+}
+
+/// `cars experiment deadlock`.
+#[derive(Debug, Args)]
+pub(crate) struct DeadlockArgs {
+    /// Probabilities with which a command is lost.
+    #[arg(long, value_delimiter = ',', default_value = "0,0.1,0.25,0.5,1", value_parser = probability)]
+    loss: Vec<f64>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// `cars experiment partition`.
+#[derive(Debug, Args)]
+pub(crate) struct PartitionArgs {
+    /// When the link is cut.
+    #[arg(long, default_value = "120 s", value_name = "TIME")]
+    from: Time,
+    /// For how long.
+    #[arg(long, value_delimiter = ',', default_value = "0 s,60 s,120 s,240 s", value_name = "TIMES")]
+    lasting: Vec<Time>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// One row of an experiment: what is done to every team alike.
+struct Condition {
+    /// As the table names it.
+    name: String,
+    change: String,
+    /// Simulated time of what is done, from and until, seconds; the whole run if it has no time.
+    time_s: (f64, f64),
+}
+
+/// An experiment, ready to be played.
+struct Plan<'a> {
+    common: &'a Common,
+    /// Head of the column with the conditions.
+    varied: &'static str,
+    /// What is done and what is not, in a sentence.
+    explained: String,
+    conditions: Vec<Condition>,
+    /// Whether exchanges are told for the time of what is done and for the time after it.
+    tells_times: bool,
+}
+
+impl DeadlockArgs {
+    fn plan(&self) -> Plan<'_> {
+        let mut losses = self.loss.clone();
+        losses.sort_by(f64::total_cmp);
+        let condition = |loss: f64| Condition {
+            name: loss.to_string(),
+            change: format!("network.commands={{ loss = {loss:?} }}"),
+            time_s: (0.0, self.common.duration.0),
+        };
+        Plan {
+            common: &self.common,
+            varied: "loss",
+            explained: "Every command between robots is lost with the probability given,\nindependently; queries and sensing always work.".to_owned(),
+            conditions: losses.into_iter().map(condition).collect(),
+            tells_times: false,
+        }
+    }
+}
+
+impl PartitionArgs {
+    fn plan(&self) -> Plan<'_> {
+        let from_s = self.from.0;
+        let condition = |lasting: &Time| {
+            let until_s = from_s + lasting.0;
+            let cut = format!(
+                "network.partition=[{{ groups = [[\"Butler\"], [\"Leguin\"]], from = \"{from_s} s\", until = \"{until_s} s\" }}]"
+            );
+            let change = if lasting.0 > 0.0 { cut } else { "network.partition=[]".to_owned() };
+            Condition { name: format!("{} s", lasting.0), change, time_s: (from_s, until_s) }
+        };
+        Plan {
+            common: &self.common,
+            varied: "cut for",
+            explained: format!(
+                "From {from_s} s on, for the time given, no command and no query passes\nbetween Butler and Leguin; sensing is physical and goes on."
+            ),
+            conditions: self.lasting.iter().map(condition).collect(),
+            tells_times: true,
+        }
+    }
 }
 
 fn probability(text: &str) -> Result<f64, String> {
@@ -99,175 +184,199 @@ const ARMS: [Arm; 4] = [
 /// What came of one run.
 #[derive(Debug, Clone, Serialize)]
 struct Outcome {
-    loss: f64,
+    condition: String,
     arm: &'static str,
     seed: u64,
     exchanges: f64,
+    /// Exchanges that began while the condition lasted, and after it.
+    during: f64,
+    after: f64,
     empty_s: f64,
     messages: f64,
     digest: String,
 }
 
-/// What came of all runs of an arm at one loss.
+/// What came of all runs of an arm under one condition.
 #[derive(Debug, Serialize)]
 struct Cell {
-    loss: f64,
+    condition: String,
     arm: &'static str,
     exchanges: Estimate,
+    during: Estimate,
+    after: Estimate,
     empty_s: Estimate,
     messages: Estimate,
 }
 
 /// Plays an experiment.
 pub(crate) fn experiment(args: &ExperimentArgs) -> miette::Result<ExitCode> {
-    let Experiment::Deadlock(args) = &args.experiment;
-    let outcomes = measure(args)?;
-    let cells = estimate(args, &outcomes);
-    if args.json {
-        let all = serde_json::json!({ "compared": compared(args), "runs": outcomes, "estimates": cells });
+    let plan = match &args.experiment {
+        Experiment::Deadlock(args) => args.plan(),
+        Experiment::Partition(args) => args.plan(),
+    };
+    let outcomes = plan.measure()?;
+    let cells = plan.estimate(&outcomes);
+    if plan.common.json {
+        let all = serde_json::json!({ "compared": plan.compared(), "runs": outcomes, "estimates": cells });
         println!("{}", serde_json::to_string_pretty(&all).into_diagnostic()?);
     } else {
-        print!("{}", render(args, &cells));
+        print!("{}", plan.render(&cells));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Every run of the experiment, in a fixed order whatever the number of jobs.
-fn measure(args: &DeadlockArgs) -> miette::Result<Vec<Outcome>> {
-    let mut units = Vec::new();
-    for loss in &args.loss {
+/// One run to be played.
+type Unit<'a> = (&'a Condition, &'static Arm, u64);
+
+impl Plan<'_> {
+    /// Every run of the experiment, in a fixed order whatever the number of jobs.
+    fn measure(&self) -> miette::Result<Vec<Outcome>> {
+        let mut units: Vec<Unit<'_>> = Vec::new();
+        for condition in &self.conditions {
+            for arm in &ARMS {
+                units.extend((1..=self.common.seeds).map(|seed| (condition, arm, seed)));
+            }
+        }
+        // A mistake in the scenario is told once, before anything starts.
+        units.first().map(|unit| self.load(unit)).transpose()?;
+        let bar = ProgressBar::new(units.len() as u64);
+        bar.set_style(
+            ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?,
+        );
+        let available = || std::thread::available_parallelism().map_or(1, usize::from);
+        let jobs = self.common.jobs.map_or_else(available, |jobs| jobs as usize);
+        let next = AtomicUsize::new(0);
+        let work = || {
+            let mut done = Vec::new();
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(unit) = units.get(index) else { return done };
+                done.push((index, self.one(unit)));
+                bar.inc(1);
+            }
+        };
+        let mut done = std::thread::scope(|scope| {
+            let workers: Vec<_> = (0..jobs).map(|_| scope.spawn(work)).collect();
+            let joined = workers.into_iter().map(|worker| worker.join().map_err(|_| broken()));
+            joined.collect::<miette::Result<Vec<_>>>()
+        })?;
+        bar.finish_and_clear();
+        let mut outcomes: Vec<_> = done.drain(..).flatten().collect();
+        outcomes.sort_by_key(|(index, _)| *index);
+        outcomes.into_iter().map(|(_, outcome)| outcome).collect()
+    }
+
+    fn load(&self, (condition, arm, seed): &Unit<'_>) -> miette::Result<Scenario> {
+        let own = arm.changes.iter().copied().chain([condition.change.as_str(), "record.frames=false"]);
+        let mut set = self.common.set.clone();
+        for change in own {
+            set.push(change.parse().map_err(|reason| miette!("{change}: {reason}"))?);
+        }
+        let changes = Changes { seed: Some(*seed), duration_s: Some(self.common.duration.0), set };
+        Ok(Scenario::load(&self.common.scenario, &changes)?)
+    }
+
+    fn one(&self, unit: &Unit<'_>) -> miette::Result<Outcome> {
+        let (condition, arm, seed) = unit;
+        let run = RunName::new("experiment").into_diagnostic()?;
+        let (mut summary, mut begun_s) = (None, Vec::new());
+        let simulation = play(self.load(unit)?, &run, |simulation, record| {
+            let summary = summary.get_or_insert_with(|| Summary::begin(&run, simulation));
+            record.lines().for_each(|line| summary.count(simulation, &line));
+            let begins = |event: &&Event| matches!(event, Event::Behavior { robot, to, .. } if robot.as_str() == "Butler" && to == "EXCHANGE");
+            begun_s.extend(record.events.iter().filter(begins).map(|_| simulation.time_s(record.tick)));
+            Ok(())
+        })?;
+        let mut summary = summary.ok_or_else(|| miette!("the run has not begun"))?;
+        summary.finish(&simulation);
+        let (from_s, until_s) = condition.time_s;
+        let count = |is_meant: &dyn Fn(f64) -> bool| {
+            begun_s.iter().filter(|begun_s| is_meant(**begun_s)).count() as f64
+        };
+        Ok(Outcome {
+            condition: condition.name.clone(),
+            arm: arm.name,
+            seed: *seed,
+            exchanges: self.of_butler(&summary, "exchanges")?,
+            during: count(&|begun_s| (from_s..until_s).contains(&begun_s)),
+            after: count(&|begun_s| begun_s >= until_s),
+            empty_s: self.of_butler(&summary, "empty_s")?,
+            messages: summary.robots.values().flat_map(|robot| robot.sent.values()).sum::<u64>() as f64,
+            digest: summary.digest.clone(),
+        })
+    }
+
+    /// A number that Butler published last.
+    fn of_butler(&self, summary: &Summary, variable: &str) -> miette::Result<f64> {
+        let robot = summary.robots.iter().find(|(name, _)| name.as_str() == "Butler");
+        let value = robot.and_then(|(_, robot)| robot.state_variables.get(variable)?.as_f64());
+        value.ok_or_else(|| {
+            let file = self.common.scenario.display();
+            miette!("{file}: it needs a robot called Butler that publishes {variable:?} as a number")
+        })
+    }
+
+    fn estimate(&self, outcomes: &[Outcome]) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for condition in self.conditions.iter().map(|condition| &condition.name) {
+            for arm in ARMS.iter().map(|arm| arm.name) {
+                let runs: Vec<&Outcome> =
+                    outcomes.iter().filter(|run| run.condition == *condition && run.arm == arm).collect();
+                let of = |value: fn(&Outcome) -> f64| {
+                    Estimate::of(&runs.iter().map(|run| value(run)).collect::<Vec<_>>())
+                };
+                cells.push(Cell {
+                    condition: condition.clone(),
+                    arm,
+                    exchanges: of(|run| run.exchanges),
+                    during: of(|run| run.during),
+                    after: of(|run| run.after),
+                    empty_s: of(|run| run.empty_s),
+                    messages: of(|run| run.messages),
+                });
+            }
+        }
+        cells
+    }
+
+    /// What is compared with what, in words.
+    fn compared(&self) -> String {
+        let Common { scenario, seeds, duration, .. } = self.common;
+        let mut text = format!(
+            "{}: {seeds} runs of {} s for each line, seeds 1 to {seeds}. Runs with the same seed begin alike\nand have the same chance, whatever the arm. {}\nMean and 95 % confidence interval over the seeds.\n\n",
+            scenario.display(),
+            duration.0,
+            self.explained,
+        );
         for arm in &ARMS {
-            units.extend((1..=args.seeds).map(|seed| (*loss, arm, seed)));
+            text += &format!("  {:<13} {}\n", arm.name, arm.what);
         }
+        text
     }
-    // A mistake in the scenario is told once, before anything starts.
-    if let Some((loss, arm, seed)) = units.first() {
-        load(args, *loss, arm, *seed)?;
-    }
-    let bar = ProgressBar::new(units.len() as u64);
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?;
-    bar.set_style(style);
-    let available = || std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = args.jobs.map_or_else(available, |jobs| jobs as usize);
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        while let Some((loss, arm, seed)) = units.get(next.fetch_add(1, Ordering::Relaxed)) {
-            done.push(one(args, *loss, arm, *seed));
-            bar.inc(1);
+
+    fn render(&self, cells: &[Cell]) -> String {
+        let mut table = Builder::default();
+        let mut head = vec![self.varied, "arm", "exchanges", "tray empty, s", "messages"];
+        if self.tells_times {
+            head.splice(3..3, ["of them during", "after"]);
         }
-        done
-    };
-    let done: Vec<miette::Result<Outcome>> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..jobs).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_else(|_| vec![Err(broken())])).collect()
-    });
-    bar.finish_and_clear();
-    let mut outcomes = done.into_iter().collect::<miette::Result<Vec<_>>>()?;
-    let place = |arm: &str| ARMS.iter().position(|other| other.name == arm);
-    outcomes.sort_by(|a, b| {
-        a.loss.total_cmp(&b.loss).then(place(a.arm).cmp(&place(b.arm))).then(a.seed.cmp(&b.seed))
-    });
-    Ok(outcomes)
+        table.push_record(head);
+        let mut above = None;
+        for cell in cells {
+            let is_new = above.replace(&cell.condition) != Some(&cell.condition);
+            let mut row =
+                vec![if is_new { cell.condition.clone() } else { String::new() }, cell.arm.to_owned()];
+            let times = self.tells_times.then_some([cell.during, cell.after]);
+            let values = [cell.exchanges].into_iter().chain(times.into_iter().flatten());
+            row.extend(values.chain([cell.empty_s, cell.messages]).map(|estimate| estimate.to_string()));
+            table.push_record(row);
+        }
+        let mut table = table.build();
+        table.with(Style::rounded()).modify(Columns::new(2..), Alignment::right());
+        format!("{}\n{table}\n", self.compared())
+    }
 }
 
 fn broken() -> miette::Report {
     miette!("a run ended in a panic; its message stands above")
-}
-
-fn load(args: &DeadlockArgs, loss: f64, arm: &Arm, seed: u64) -> miette::Result<Scenario> {
-    let own = arm.changes.iter().map(|change| (*change).to_owned());
-    let own =
-        own.chain([format!("network.commands={{ loss = {loss:?} }}"), "record.frames=false".to_owned()]);
-    let mut set = args.set.clone();
-    for change in own {
-        set.push(change.parse().map_err(|reason| miette!("{change}: {reason}"))?);
-    }
-    let changes = Changes { seed: Some(seed), duration_s: Some(args.duration.0), set };
-    Ok(Scenario::load(&args.scenario, &changes)?)
-}
-
-fn one(args: &DeadlockArgs, loss: f64, arm: &Arm, seed: u64) -> miette::Result<Outcome> {
-    let scenario = load(args, loss, arm, seed)?;
-    let run = RunName::new("deadlock").into_diagnostic()?;
-    let mut summary = None;
-    let simulation = play(scenario, &run, |simulation, record| {
-        let summary = summary.get_or_insert_with(|| Summary::begin(&run, simulation));
-        record.lines().for_each(|line| summary.count(simulation, &line));
-        Ok(())
-    })?;
-    let mut summary = summary.ok_or_else(|| miette!("the run has not begun"))?;
-    summary.finish(&simulation);
-    let butler = |variable: &str| {
-        let robot = summary.robots.iter().find(|(name, _)| name.as_str() == "Butler");
-        let value = robot.and_then(|(_, robot)| robot.state_variables.get(variable)?.as_f64());
-        value.ok_or_else(|| {
-            let file = args.scenario.display();
-            miette!("{file}: it needs a robot called Butler that publishes {variable:?} as a number")
-        })
-    };
-    Ok(Outcome {
-        loss,
-        arm: arm.name,
-        seed,
-        exchanges: butler("exchanges")?,
-        empty_s: butler("empty_s")?,
-        messages: summary.robots.values().flat_map(|robot| robot.sent.values()).sum::<u64>() as f64,
-        digest: summary.digest.clone(),
-    })
-}
-
-fn estimate(args: &DeadlockArgs, outcomes: &[Outcome]) -> Vec<Cell> {
-    let mut losses = args.loss.clone();
-    losses.sort_by(f64::total_cmp);
-    let mut cells = Vec::new();
-    for loss in losses {
-        for arm in &ARMS {
-            let runs: Vec<&Outcome> =
-                outcomes.iter().filter(|run| run.loss == loss && run.arm == arm.name).collect();
-            let of = |value: fn(&Outcome) -> f64| {
-                Estimate::of(&runs.iter().map(|run| value(run)).collect::<Vec<_>>())
-            };
-            let (exchanges, empty_s, messages) =
-                (of(|run| run.exchanges), of(|run| run.empty_s), of(|run| run.messages));
-            cells.push(Cell { loss, arm: arm.name, exchanges, empty_s, messages });
-        }
-    }
-    cells
-}
-
-/// What is compared with what, in words.
-fn compared(args: &DeadlockArgs) -> String {
-    let mut text = format!(
-        "{}: {} runs of {} s for each line, seeds 1 to {}. Runs with the same seed have the same guests at the start and\n\
-         the same chance of their own, whatever the arm. Every command between robots is lost with the probability given,\n\
-         independently; queries and sensing always work. Mean and 95 % confidence interval over the seeds.\n\n",
-        args.scenario.display(),
-        args.seeds,
-        args.duration.0,
-        args.seeds,
-    );
-    for arm in &ARMS {
-        text += &format!("  {:<13} {}\n", arm.name, arm.what);
-    }
-    text
-}
-
-fn render(args: &DeadlockArgs, cells: &[Cell]) -> String {
-    let mut table = Builder::default();
-    table.push_record(["loss", "arm", "exchanges", "tray empty, s", "messages"]);
-    let mut above = None;
-    for cell in cells {
-        let is_new = above.replace(cell.loss) != Some(cell.loss);
-        table.push_record([
-            if is_new { format!("{}", cell.loss) } else { String::new() },
-            cell.arm.to_owned(),
-            cell.exchanges.to_string(),
-            cell.empty_s.to_string(),
-            cell.messages.to_string(),
-        ]);
-    }
-    let mut table = table.build();
-    table.with(Style::rounded()).modify(Columns::new(2..), Alignment::right());
-    format!("{}\n{table}\n", compared(args))
 }

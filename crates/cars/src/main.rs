@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod common;
 mod control;
+mod emotionml;
 mod experiment;
 mod launch;
 mod run;
@@ -43,6 +44,8 @@ enum Subcommands {
     Command(control::CommandArgs),
     /// Show the log of a run; `-f` follows one in progress.
     Log(control::LogArgs),
+    /// Export what the robots of a run felt as EmotionML 1.0.
+    Emotionml(emotionml::EmotionmlArgs),
     /// Make certificates and access control for a roster, for runs that strangers could reach.
     Secure(secure::SecureArgs),
     /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
@@ -75,6 +78,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Query(args) => control::query(&args),
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
+        Subcommands::Emotionml(args) => emotionml::emotionml(&args),
         Subcommands::Secure(args) => secure::secure(&args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),

@@ -110,6 +110,55 @@ pub enum Event {
         to: RobotName,
         /// Its number among the sender's.
         seq: Seq,
+        /// Why.
+        because: Cause,
+    },
+    /// The medium holds a command back.
+    CommandDelayed {
+        /// By whom.
+        from: RobotName,
+        /// To whom.
+        to: RobotName,
+        /// Its number among the sender's.
+        seq: Seq,
+        /// Tick at which it will arrive.
+        until: Tick,
+    },
+    /// The medium doubled a command: it arrives twice in the same tick.
+    CommandDuplicated {
+        /// By whom.
+        from: RobotName,
+        /// To whom.
+        to: RobotName,
+        /// Its number among the sender's.
+        seq: Seq,
+    },
+    /// The medium lost what a robot might ask another one in this tick, by chance; cuts are told when they change.
+    QueryLost {
+        /// Who would ask.
+        from: RobotName,
+        /// Who would be asked.
+        to: RobotName,
+        /// Why.
+        because: Cause,
+    },
+    /// From this tick on the medium lets these messages from one robot to another through no more.
+    LinkCut {
+        /// Who cannot reach the other.
+        from: RobotName,
+        /// The other.
+        to: RobotName,
+        /// Whether commands are cut.
+        commands: bool,
+        /// Whether queries are cut.
+        queries: bool,
+    },
+    /// From this tick on messages from one robot to another pass again.
+    LinkHealed {
+        /// Who reaches the other again.
+        from: RobotName,
+        /// The other.
+        to: RobotName,
     },
     /// A command should have arrived and was really lost on the wire.
     CommandMissing {
@@ -139,6 +188,28 @@ pub enum Event {
         /// Digest of the run: that of its last complete tick.
         digest: String,
     },
+}
+
+/// Why the medium lost a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// By chance.
+    Loss,
+    /// By chance, in a burst.
+    Burst,
+    /// The two are cut off from each other.
+    Partition,
+}
+
+impl std::fmt::Display for Cause {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Loss => "by chance",
+            Self::Burst => "in a burst",
+            Self::Partition => "in a partition",
+        })
+    }
 }
 
 impl Line {
@@ -177,8 +248,25 @@ impl Event {
             Self::CommandDelivered { from, to, seq } => {
                 says(to, LogKind::Command, format!("receives command {seq} of {from}"))
             }
-            Self::CommandDropped { from, to, seq } => {
-                says(to, LogKind::Command, format!("command {seq} of {from} was lost on the way"))
+            Self::CommandDropped { from, to, seq, because } => {
+                says(to, LogKind::Command, format!("command {seq} of {from} was lost on the way, {because}"))
+            }
+            Self::CommandDelayed { from, to, seq, until } => {
+                says(to, LogKind::Command, format!("command {seq} of {from} is held back until tick {until}"))
+            }
+            Self::CommandDuplicated { from, to, seq } => {
+                says(to, LogKind::Command, format!("command {seq} of {from} comes twice"))
+            }
+            Self::LinkCut { from, to, commands, queries } => {
+                let what = match (commands, queries) {
+                    (true, true) => "commands and queries",
+                    (true, false) => "commands",
+                    _ => "queries",
+                };
+                simulator(LogKind::Network, format!("{what} from {from} to {to} are cut"))
+            }
+            Self::LinkHealed { from, to } => {
+                simulator(LogKind::Network, format!("messages from {from} to {to} pass again"))
             }
             Self::CommandMissing { from, to, seq } => says(
                 to,
@@ -194,8 +282,8 @@ impl Event {
                 };
                 simulator(LogKind::Run, format!("{how}, digest {digest}"))
             }
-            // A blocked robot tries again every tick; the log would be nothing else.
-            Self::Blocked { .. } | Self::Tick { .. } => None,
+            // A blocked robot tries again every tick; the log would be nothing else. So with a lossy network.
+            Self::Blocked { .. } | Self::QueryLost { .. } | Self::Tick { .. } => None,
         }
     }
 }

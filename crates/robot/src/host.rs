@@ -162,7 +162,7 @@ impl Host {
         Ok(())
     }
 
-    fn join(&self, name: &RobotName) -> Result<Welcome, HostError> {
+    fn join(&mut self, name: &RobotName) -> Result<Welcome, HostError> {
         let request = JoinRequest {
             protocol: PROTOCOL_VERSION,
             run: self.options.run.clone(),
@@ -177,7 +177,10 @@ impl Host {
                 Some(answer) => {
                     let bytes = answer.result.unwrap_or_else(String::into_bytes);
                     match decode(&key, "simulator", &bytes)? {
-                        JoinAnswer::Welcome(welcome) => return Ok(*welcome),
+                        JoinAnswer::Welcome(welcome) => {
+                            self.link.keep_commands(welcome.repeat_ticks);
+                            return Ok(*welcome);
+                        }
                         // A predecessor that was killed is noticed within its lease.
                         JoinAnswer::Refused { reason: Refusal::NameTaken, .. } if !is_last_try => {}
                         JoinAnswer::Refused { reason, explanation } => {

@@ -42,6 +42,7 @@ mod board;
 mod cars;
 mod cri;
 mod entry;
+mod held;
 mod host;
 mod link;
 mod local;

@@ -12,6 +12,7 @@ use protocol::messages::{Clock, Command, CommandId, Percept, PublicState, Waitin
 use protocol::{Epoch, Malformed, Message, RobotName, Tick, decode, encode};
 
 use crate::board::Board;
+use crate::held::Held;
 use crate::seat::{Network, Undelivered};
 
 /// Messages that may queue up before the link is slowed down.
@@ -23,10 +24,10 @@ const COMMAND_PATIENCE: Duration = Duration::from_secs(10);
 const LOOK_AGAIN: Duration = Duration::from_millis(250);
 /// Between two attempts to ask a robot that does not answer.
 const ASK_AGAIN: Duration = Duration::from_millis(500);
+/// For how many ticks commands are kept at most, whatever the simulator says.
+const MAX_REPEAT_TICKS: Tick = 2000;
 /// What was not asked for in so many ticks is followed no more.
 const UNUSED_TICKS: Tick = 64;
-/// Commands that are kept for a robot before a clock names them; beyond that the first by sender and number makes room.
-const MAX_COMMANDS: usize = 4096;
 
 /// All that can happen to a process of robots.
 pub(crate) enum Event {
@@ -62,14 +63,16 @@ pub(crate) struct Link {
     /// The clock that is being answered: epoch and tick.
     current: Asked,
     /// Commands that arrived and were not named yet, by target.
-    commands: BTreeMap<RobotName, BTreeMap<CommandId, Command>>,
+    commands: BTreeMap<RobotName, Held>,
     /// States of other processes' robots.
     states: BTreeMap<(RobotName, Asked), Arc<PublicState>>,
     percepts: BTreeMap<(RobotName, Asked), Percept>,
     /// What is followed, by key.
     followed: BTreeMap<String, Followed>,
-    /// Commands of the last two ticks, for those who missed them.
+    /// Commands of the last ticks, for those who missed them.
     sent: VecDeque<(RobotName, RobotName, Command)>,
+    /// For how many ticks they are kept.
+    repeat_ticks: Tick,
     /// Since when the simulator is away.
     pub(crate) simulator_gone: Option<Instant>,
     /// How long to go on without a simulator.
@@ -92,6 +95,7 @@ impl Link {
             percepts: BTreeMap::new(),
             followed: BTreeMap::new(),
             sent: VecDeque::new(),
+            repeat_ticks: 2,
             simulator_gone: None,
             patience,
         }
@@ -130,14 +134,14 @@ impl Link {
     /// A tick begins: what was known for the one before is of no use any more.
     pub(crate) fn begin(&mut self, epoch: Epoch, tick: Tick) {
         if epoch != self.current.0 {
-            self.commands.values_mut().for_each(|held| held.retain(|_, command| command.epoch >= epoch));
+            self.commands.values_mut().for_each(|held| held.begin(epoch));
             self.sent.clear();
         }
         self.current = (epoch, tick);
         self.states.retain(|(_, asked), _| *asked >= (epoch, tick.saturating_sub(1)));
         self.percepts.retain(|(_, asked), _| *asked >= (epoch, tick));
         self.followed.retain(|_, followed| tick.saturating_sub(followed.last_used) < UNUSED_TICKS);
-        self.sent.retain(|(_, _, command)| command.tick.saturating_add(2) > tick);
+        self.sent.retain(|(_, _, command)| command.tick.saturating_add(self.repeat_ticks) > tick);
     }
 
     /// Sends again what others may have missed.
@@ -186,15 +190,9 @@ impl Link {
     }
 
     fn file_command(&mut self, to: RobotName, from: RobotName, command: Command) {
-        let held = self.commands.entry(to).or_default();
-        if command.epoch < self.current.0 {
-            return;
+        if command.epoch >= self.current.0 {
+            self.commands.entry(to).or_default().hold(from, command);
         }
-        if held.len() >= MAX_COMMANDS {
-            tracing::warn!(%from, "too many commands are waiting; the first by sender and number is dropped");
-            held.pop_first();
-        }
-        held.insert(CommandId { from, seq: command.seq }, command);
     }
 
     /// Whether a clock has arrived that ends the tick under way before it is done: the run is over, the next epoch
@@ -309,6 +307,11 @@ impl Link {
         }
     }
 
+    /// A robot of this process was told for how many ticks it must be able to repeat its commands.
+    pub(crate) fn keep_commands(&mut self, ticks: Tick) {
+        self.repeat_ticks = self.repeat_ticks.max(ticks.min(MAX_REPEAT_TICKS));
+    }
+
     /// Names the robots of this process, so that their commands have a place.
     pub(crate) fn host(&mut self, robot: &RobotName) {
         self.commands.entry(robot.clone()).or_default();
@@ -350,10 +353,8 @@ impl Network for Link {
     }
 
     fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command> {
-        let found = self.wait(&id.from, Some(COMMAND_PATIENCE), |link| {
-            let held = link.commands.get_mut(to)?;
-            if held.get(id)?.epoch == epoch { held.remove(id) } else { None }
-        });
+        let found =
+            self.wait(&id.from, Some(COMMAND_PATIENCE), |link| link.commands.get_mut(to)?.take(id, epoch));
         found.ok()
     }
 }

@@ -7,6 +7,7 @@ use protocol::messages::{Clock, Command, CommandId, Percept, PublicState, Report
 use protocol::{Epoch, RobotName, Tick};
 
 use crate::cri::{BadParameters, Robot};
+use crate::held::Held;
 use crate::seat::{Network, Seat, Undelivered};
 
 /// Senses for a robot: the environment is not this crate's to know.
@@ -23,8 +24,8 @@ pub struct LocalHost {
 struct Known {
     /// As reported for the last complete tick.
     states: BTreeMap<RobotName, Arc<PublicState>>,
-    /// Commands under way, by target and name.
-    commands: BTreeMap<(RobotName, CommandId), Command>,
+    /// Commands under way, by target.
+    commands: BTreeMap<RobotName, Held>,
 }
 
 struct LocalNetwork<'a, 'b> {
@@ -48,12 +49,11 @@ impl Network for LocalNetwork<'_, '_> {
     }
 
     fn send(&mut self, from: &RobotName, to: &RobotName, command: &Command) {
-        let id = CommandId { from: from.clone(), seq: command.seq };
-        self.known.commands.insert((to.clone(), id), command.clone());
+        self.known.commands.entry(to.clone()).or_default().hold(from.clone(), command.clone());
     }
 
-    fn receive(&mut self, to: &RobotName, _: Epoch, id: &CommandId) -> Option<Command> {
-        self.known.commands.remove(&(to.clone(), id.clone()))
+    fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command> {
+        self.known.commands.get_mut(to)?.take(id, epoch)
     }
 }
 
@@ -67,8 +67,7 @@ impl LocalHost {
 
     /// A command from outside the roster.
     pub fn inject(&mut self, to: &RobotName, from: &RobotName, command: Command) {
-        let id = CommandId { from: from.clone(), seq: command.seq };
-        self.known.commands.insert((to.clone(), id), command);
+        self.known.commands.entry(to.clone()).or_default().hold(from.clone(), command);
     }
 
     /// Runs one tick of every robot. Everybody sees the others as they reported themselves for the tick before.

@@ -265,6 +265,7 @@ fn superseded_prefix(file: &str) -> String {
     format!("{}-epoch", file.split('.').next().unwrap_or(file))
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
 fn unwritable(error: std::io::Error) -> FileError {
     FileError::new(format!("cannot write the record of the run: {error}"))
 }

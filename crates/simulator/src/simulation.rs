@@ -73,6 +73,8 @@ pub struct Simulation {
     medium: Medium,
     /// Commands that the clock under way names, by target.
     arriving: BTreeMap<RobotName, Vec<CommandId>>,
+    /// Whom each robot cannot ask during the tick under way.
+    unreachable: BTreeMap<RobotName, Vec<RobotName>>,
     /// What each robot reported last.
     reports: BTreeMap<RobotName, Report>,
     /// Where each robot stood at the last complete tick, in the order of names.
@@ -98,12 +100,13 @@ impl Simulation {
         Ok(Self {
             epoch,
             blocked: vec![false; names.len()],
-            names,
             tick: 0,
             now: 0,
             world,
-            medium: Medium::new(scenario.seed, scenario.network.clone()),
+            medium: Medium::new(scenario.seed, scenario.tick_s, scenario.network.clone(), names.clone()),
+            names,
             arriving: BTreeMap::new(),
+            unreachable: BTreeMap::new(),
             reports: BTreeMap::new(),
             stood_at: Vec::new(),
             last_seq: BTreeMap::new(),
@@ -148,10 +151,9 @@ impl Simulation {
         self.note_moves(&verdicts, &mut events);
 
         let decision = self.medium.decide(tick);
+        events.extend(decision.events);
         self.arriving = decision.delivered;
-        for Underway { to, from, seq } in decision.dropped {
-            events.push(Event::CommandDropped { from, to, seq });
-        }
+        self.unreachable = self.join_silent(decision.unreachable);
 
         let clock = self.clock(tick, &verdicts);
         let exchange = barrier.exchange(clock, self)?;
@@ -202,7 +204,7 @@ impl Simulation {
             let own = News {
                 correction,
                 commands: self.arriving.get(name).cloned().unwrap_or_default(),
-                unreachable: self.silent.iter().filter(|silent| *silent != name).cloned().collect(),
+                unreachable: self.unreachable.get(name).cloned().unwrap_or_default(),
                 sensed: self.sensed_robots(index),
                 joined: None,
             };
@@ -211,6 +213,20 @@ impl Simulation {
             }
         }
         Clock { epoch: self.epoch, tick, news, end: None }
+    }
+
+    /// Whom each robot cannot ask: those from whom the medium cuts it off, and those whose last report is missing.
+    fn join_silent(
+        &self,
+        mut cut: BTreeMap<RobotName, Vec<RobotName>>,
+    ) -> BTreeMap<RobotName, Vec<RobotName>> {
+        for name in self.names.iter().filter(|_| !self.silent.is_empty()) {
+            let others = cut.entry(name.clone()).or_default();
+            others.extend(self.silent.iter().filter(|silent| *silent != name).cloned());
+            others.sort();
+            others.dedup();
+        }
+        cut
     }
 
     /// The end of a tick: what the robots did, and the digest.
@@ -231,7 +247,7 @@ impl Simulation {
         let mut reports = exchange.reports;
         for name in self.names.clone() {
             match reports.remove(&name) {
-                Some(report) => self.note_report(tick, &name, report, &mut events),
+                Some(report) => self.note_report(&name, report, &mut events),
                 None => {
                     events.push(Event::Missed { robot: name.clone() });
                     self.silent.push(name);
@@ -260,7 +276,7 @@ impl Simulation {
         }
     }
 
-    fn note_report(&mut self, tick: Tick, robot: &RobotName, report: Report, events: &mut Vec<Event>) {
+    fn note_report(&mut self, robot: &RobotName, report: Report, events: &mut Vec<Event>) {
         let before = self.reports.get(robot);
         let change =
             |from: Option<&String>, to: &String| (from != Some(to)).then(|| (from.cloned(), to.clone()));
@@ -277,7 +293,7 @@ impl Simulation {
             *last_seq = seq.max(*last_seq);
             let (performative, command) = (sent.performative, sent.command.clone());
             events.push(Event::CommandSent { from, to, seq, performative, command });
-            self.medium.accept(tick, Underway { to: sent.to.clone(), from: robot.clone(), seq });
+            self.medium.accept(Underway { to: sent.to.clone(), from: robot.clone(), seq });
         }
         events.extend(report.log.iter().map(|text| Event::Say { robot: robot.clone(), text: text.clone() }));
         self.reports.insert(robot.clone(), report);
@@ -298,7 +314,7 @@ impl Simulation {
     pub fn command(&mut self, to: &RobotName, command: &str) -> Seq {
         self.operator_seq += 1;
         let (from, seq) = (RobotName::operator(), self.operator_seq);
-        self.medium.accept(self.tick, Underway { to: to.clone(), from: from.clone(), seq });
+        self.medium.accept(Underway { to: to.clone(), from: from.clone(), seq });
         self.operator_sent.push(Event::CommandSent {
             from,
             to: to.clone(),
@@ -344,6 +360,7 @@ impl Simulation {
                 .zip(self.index(name))
                 .and_then(|(report, index)| Some(public_state(report, *self.stood_at.get(index)?))),
             last_seq: self.last_seq.get(name).copied().unwrap_or(0),
+            repeat_ticks: self.scenario.network.longest_delay(self.scenario.tick_s) + 2,
         })
     }
 
@@ -442,6 +459,12 @@ impl Simulation {
     #[must_use]
     pub fn cuts(&self) -> Vec<Cut> {
         self.medium.cuts()
+    }
+
+    /// Whom each robot could not ask in this tick.
+    #[must_use]
+    pub fn unreachable(&self) -> &BTreeMap<RobotName, Vec<RobotName>> {
+        &self.unreachable
     }
 
     /// Digest of the run so far.

@@ -1,11 +1,15 @@
 //! What came of a run, as data: the table at the end of a run and every later report are made from it.
 
+mod network;
+
 use std::collections::BTreeMap;
 use std::time::Instant;
 
 use protocol::messages::{End, StateVariables};
 use protocol::{Event, Line, RobotName, RunName, Tick};
 use serde::{Deserialize, Serialize};
+
+pub use network::{CutSummary, LinkSummary, NetworkSummary};
 
 use crate::simulation::Simulation;
 
@@ -30,6 +34,9 @@ pub struct Summary {
     pub digest: String,
     /// The robots.
     pub robots: BTreeMap<RobotName, RobotSummary>,
+    /// What the network did.
+    #[serde(default)]
+    pub network: NetworkSummary,
     /// Wall-clock matters; they differ from run to run.
     pub wall: Wall,
     #[serde(skip)]
@@ -109,6 +116,7 @@ impl Summary {
             guests: simulation.scenario().guests.count,
             digest: String::new(),
             robots,
+            network: NetworkSummary::default(),
             wall: Wall::default(),
             begun: None,
             since: BTreeMap::new(),
@@ -118,6 +126,7 @@ impl Summary {
     /// Counts an event.
     pub fn count(&mut self, simulation: &Simulation, line: &Line) {
         let tick_s = simulation.scenario().tick_s;
+        self.network.count(simulation, line.tick, &line.event);
         match &line.event {
             Event::Emotion { robot, to, .. } => self.enter_emotion(robot, to, line.tick, tick_s),
             Event::Behavior { robot, to, .. } => self.enter_behavior(robot, to, line.tick, tick_s),
@@ -136,7 +145,7 @@ impl Summary {
             }
             // What came before, waiting for robots to join, is not part of the epoch.
             Event::Init { .. } => self.begun = Some(Instant::now()),
-            Event::Joined { .. } | Event::Lost { .. } | Event::Say { .. } | Event::Tick { .. } => {}
+            _ => {}
         }
     }
 

@@ -1,8 +1,7 @@
 //! The triangular distribution, from which guests take speeds and durations.
 
 use crate::error::TriangularError;
-use rand::Rng;
-use rand_distr::Distribution;
+use rand::{Rng, RngExt};
 
 /// A triangular distribution of a quantity that cannot be negative (seed, "Obstacles": speed and duration).
 ///
@@ -49,11 +48,20 @@ impl Triangular {
     /// One value; takes exactly one number from the stream, also for a constant, so that two halls which differ
     /// in a parameter only still draw alike.
     pub(crate) fn sample(&self, rng: &mut impl Rng) -> f64 {
-        match rand_distr::Triangular::new(self.min, self.max, self.mode) {
-            // Rounding may leave the interval by a bit; what was promised is the interval.
-            Ok(distribution) => distribution.sample(rng).clamp(self.min, self.max),
-            Err(error) => unreachable!("the constructor admits only what rand_distr admits: {error}"),
-        }
+        self.quantile(rng.random())
+    }
+
+    /// The value below which a share `p` of all draws lies; `p` from 0 to 1.
+    #[must_use]
+    pub fn quantile(&self, p: f64) -> f64 {
+        let (range, rise) = (self.max - self.min, self.mode - self.min);
+        let value = if p * range < rise {
+            self.min + (p * range * rise).sqrt()
+        } else {
+            self.max - ((range - p * range) * (self.max - self.mode)).sqrt()
+        };
+        // Rounding may leave the interval by a bit; what was promised is the interval.
+        value.clamp(self.min, self.max)
     }
 }
 

@@ -12,7 +12,7 @@ const ALLOWED: [(&str, &[&str]); 9] = [
     ("robots", &["robot", "affect"]),
     ("simulator", &["world", "protocol"]),
     ("console", &["protocol"]),
-    ("cars", &["simulator", "robot", "robots", "protocol"]),
+    ("cars", &["simulator", "robot", "robots", "affect", "protocol"]),
     ("system-tests", &["simulator", "robot", "robots", "protocol"]),
 ];
 

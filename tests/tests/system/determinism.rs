@@ -151,3 +151,56 @@ fn a_lossy_network_is_part_of_the_seed() {
     assert!(dropped > 0 && dropped < sent.len(), "{dropped} of {}", sent.len());
     assert!(sent.iter().all(|event| event["performative"] == "achieve"));
 }
+
+/// The experiment of the paper with a cut between the two robots, commands and queries.
+const CUT: &str =
+    "network.partition=[{ groups = [[\"Butler\"], [\"Leguin\"]], from = \"60 s\", until = \"180 s\" }]";
+
+#[test]
+fn a_partition_is_part_of_the_seed_and_told_in_the_summary() {
+    let lab = Lab::new();
+    let with = |first: [&'static str; 4]| {
+        first.into_iter().chain(["--duration", "300 s", "--set", CUT]).collect::<Vec<_>>()
+    };
+    lab.ok(&with(["run", "configs/hors_doeuvres.toml", "--run", "cut-run"]));
+    for run in ["cut-launch", "cut-again"] {
+        lab.start(run, &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"])).finish();
+        assert_same(("run", &lab.bytes("cut-run")), (run, &lab.bytes(run)));
+    }
+    let events = lab.events("cut-launch");
+    let at = |kind: &str| -> Vec<u64> {
+        events
+            .iter()
+            .filter(|event| event["event"] == kind)
+            .map(|event| event["tick"].as_u64().unwrap())
+            .collect()
+    };
+    assert_eq!((at("link_cut"), at("link_healed")), (vec![120, 120], vec![360, 360]));
+    let summary = lab.summary("cut-launch");
+    let network = &summary["network"];
+    assert_eq!(network, &lab.summary("cut-run")["network"]);
+    let (there, back) = (&network["links"]["Butler -> Leguin"], &network["links"]["Leguin -> Butler"]);
+    assert_eq!((&there["unreachable_ticks"], &back["longest_stale_s"]), (&240.into(), &120.0.into()));
+    assert_eq!(network["cuts"][0]["until_s"], 180.0);
+    let dropped = at("command_dropped");
+    assert!(!dropped.is_empty() && dropped.iter().all(|tick| (120..360).contains(tick)), "{dropped:?}");
+    assert_eq!(there["dropped"]["partition"], dropped.len());
+}
+
+#[test]
+fn delays_and_doubles_are_the_same_as_processes_and_in_one() {
+    let lab = Lab::new();
+    let network = "network.commands={ loss = 0.2, duplication = 0.3, delay = { min = \"0 s\", mode = \"1 s\", max = \"10 s\" }, burst = { enter = 0.05, leave = 0.2 } }";
+    let with = |first: [&'static str; 4]| {
+        let more = ["--duration", "300 s", "--set", network, "--set", "network.queries.loss=0.2"];
+        first.into_iter().chain(more).collect::<Vec<_>>()
+    };
+    lab.ok(&with(["run", "configs/hors_doeuvres.toml", "--run", "late-run"]));
+    lab.start("late-launch", &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"])).finish();
+    assert_same(("run", &lab.bytes("late-run")), ("launch", &lab.bytes("late-launch")));
+    let events = lab.events("late-run");
+    for kind in ["command_delayed", "command_duplicated", "command_dropped", "query_lost"] {
+        assert!(events.iter().any(|event| event["event"] == kind), "{kind}");
+    }
+    assert!(events.iter().all(|event| event["event"] != "command_missing"));
+}

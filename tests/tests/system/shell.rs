@@ -164,13 +164,36 @@ fn the_deadlock_experiment_gives_the_same_table_for_any_number_of_jobs() {
     assert_eq!(one, experiment("3"));
     let all: serde_json::Value = serde_json::from_str(&one).unwrap();
     assert_eq!(all["runs"].as_array().unwrap().len(), 2 * 4 * 8);
-    let exchanges = |loss: f64, arm: &str| {
+    let exchanges = |loss: &str, arm: &str| {
         let cells = all["estimates"].as_array().unwrap().iter();
-        let cell = cells.filter(|cell| cell["loss"] == loss && cell["arm"] == arm).collect::<Vec<_>>();
+        let cell = cells.filter(|cell| cell["condition"] == loss && cell["arm"] == arm).collect::<Vec<_>>();
         cell[0]["exchanges"]["mean"].as_f64().unwrap()
     };
     // Every command lost: who has no emotions never gets treats, timer or not.
-    assert!(exchanges(1.0, "affectless") < 1.0 && exchanges(1.0, "timer repeat") < 1.0);
-    assert!(exchanges(1.0, "affect only") > 1.5, "{}", exchanges(1.0, "affect only"));
-    assert!(exchanges(0.0, "affectless") > 1.5);
+    assert!(exchanges("1", "affectless") < 1.0 && exchanges("1", "timer repeat") < 1.0);
+    assert!(exchanges("1", "affect only") > 1.5, "{}", exchanges("1", "affect only"));
+    assert!(exchanges("0", "affectless") > 1.5);
+}
+
+#[test]
+fn with_emotions_the_team_works_on_while_it_is_cut_off_and_recovers() {
+    let lab = Lab::new();
+    let args = ["experiment", "partition", "--seeds", "8", "--lasting", "0 s,240 s", "--json"];
+    let (code, text) = lab.cars_without_out(&args);
+    assert_eq!(code, 0, "{text}");
+    let all: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let mean = |condition: &str, arm: &str, what: &str| {
+        let cells = all["estimates"].as_array().unwrap().iter();
+        let cell =
+            cells.filter(|cell| cell["condition"] == condition && cell["arm"] == arm).collect::<Vec<_>>();
+        cell[0][what]["mean"].as_f64().unwrap()
+    };
+    let uncut = mean("0 s", "affectless", "after");
+    let (without, with) = (mean("240 s", "affectless", "after"), mean("240 s", "affect only", "after"));
+    println!(
+        "exchanges after 120 s uncut, without emotions: {uncut}; after a cut of 240 s: {without} without, {with} with"
+    );
+    // One lost call is the end for those who call once; those who feel go on.
+    assert!(with > 2.0 * without && with > 4.0, "{with} {without}");
+    assert!(mean("240 s", "affect only", "during") > mean("240 s", "affectless", "during") + 1.0);
 }

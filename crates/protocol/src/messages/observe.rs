@@ -234,6 +234,8 @@ pub enum LogKind {
     Behavior,
     /// A command was sent, delivered, dropped or is missing.
     Command,
+    /// The medium cut a link, or healed it.
+    Network,
     /// A robot said something.
     Say,
     /// The clock waits; wall-clock matter, not part of the run's record.

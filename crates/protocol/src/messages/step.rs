@@ -111,13 +111,21 @@ pub struct Welcome {
     /// Number of the last command that its previous incarnation sent in this epoch.
     #[serde(default)]
     pub last_seq: Seq,
+    /// Whoever sees a clock repeated repeats the commands of this many ticks back: a clock may name one so late, because
+    /// the medium holds commands back.
+    #[serde(default = "two_ticks")]
+    pub repeat_ticks: Tick,
+}
+
+fn two_ticks() -> Tick {
+    2
 }
 
 /// The simulator grants a tick. It carries exceptions only: a robot that is not named moved as it proposed and has no
 /// command, and a quiet tick is a small message however many robots there are.
 ///
 /// The same clock may come twice. Then somebody's message of this tick was lost: every robot repeats its report and
-/// the commands of its last two ticks, and whoever already has them ignores the repetition.
+/// the commands of its last ticks ([`Welcome::repeat_ticks`]), and whoever already has them ignores the repetition.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
     /// Epoch; a higher one than before means `init`.
@@ -156,7 +164,8 @@ pub struct News {
     /// Where it stands, where that is not what it proposed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<Correction>,
-    /// Commands that arrive now, in this order (by sender, then number).
+    /// Commands that arrive now, in this order (by sender, then number). One that the medium has doubled is named twice in
+    /// a row and counts as two commands.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub commands: Vec<CommandId>,
     /// Robots that it cannot query in this tick: the medium has cut it off from them.

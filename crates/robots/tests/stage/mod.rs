@@ -277,6 +277,7 @@ fn welcome(robot: &str, at: Point, seed: u64, roster: &[RobotName], parameters: 
         parameters,
         last_state: None,
         last_seq: 0,
+        repeat_ticks: 2,
     }
 }
 

@@ -1,5 +1,7 @@
 //! A scenario file as it is written. Unknown keys are refused; what is wrong is shown where it stands.
 
+mod network;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -8,8 +10,9 @@ use protocol::messages::{Parameters, Point};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::network::{Channel, Link};
-use super::{DEFAULT_SEED, Network, OnLate, Record, RobotSpec, check_seed};
+use network::NetworkTable;
+
+use super::{DEFAULT_SEED, OnLate, Record, RobotSpec, check_seed};
 use crate::diagnostic::{FileError, Source};
 use crate::units::{Length, Speed, Time, quantity};
 
@@ -28,7 +31,7 @@ pub(super) struct Scenario {
     field: Option<Spanned<FieldTable>>,
     sensing: Option<SensingTable>,
     guests: Option<Spanned<GuestsTable>>,
-    network: Option<NetworkTable>,
+    network: Option<Spanned<NetworkTable>>,
     record: Option<RecordTable>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
@@ -64,22 +67,6 @@ struct Range<Q> {
     min: Q,
     mode: Q,
     max: Q,
-}
-
-#[derive(Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct NetworkTable {
-    commands: Option<Spanned<Channel>>,
-    #[serde(default, rename = "link", skip_serializing_if = "Vec::is_empty")]
-    links: Vec<LinkTable>,
-}
-
-#[derive(Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct LinkTable {
-    from: Spanned<RobotName>,
-    to: Spanned<RobotName>,
-    commands: Spanned<Channel>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -181,7 +168,7 @@ impl Scenario {
             network: super::Network::default(),
             record: record(self.record, source)?,
         };
-        let network = network(self.network, &scenario.robots, source)?;
+        let network = network::check(self.network, &scenario.robots, tick_s, source)?;
         let scenario = super::Scenario { network, ..scenario };
         scenario.check_hall(source, self.guests.as_ref().map(Spanned::span))?;
         Ok(scenario)
@@ -219,38 +206,6 @@ impl super::Scenario {
         }
         text
     }
-}
-
-/// The network, every link between two robots of the roster and every probability one.
-fn network(
-    raw: Option<NetworkTable>,
-    robots: &BTreeMap<RobotName, RobotSpec>,
-    source: &Source,
-) -> Result<Network, FileError> {
-    let Some(raw) = raw else { return Ok(Network::default()) };
-    let known = |name: Spanned<RobotName>| {
-        let span = name.span();
-        let name = name.into_inner();
-        if robots.contains_key(&name) || name.is_operator() {
-            return Ok(name);
-        }
-        Err(FileError::at(source, Some(span), &format!("no robot of this scenario is called {name}")))
-    };
-    let mut links = Vec::new();
-    for link in raw.links {
-        let commands = channel(link.commands, source)?;
-        links.push(Link { from: known(link.from)?, to: known(link.to)?, commands });
-    }
-    let commands = raw.commands.map(|commands| channel(commands, source)).transpose()?;
-    Ok(Network { commands: commands.unwrap_or_default(), links })
-}
-
-fn channel(raw: Spanned<Channel>, source: &Source) -> Result<Channel, FileError> {
-    let (span, channel) = (raw.span(), raw.into_inner());
-    if (0.0..=1.0).contains(&channel.loss) {
-        return Ok(channel);
-    }
-    Err(FileError::at(source, Some(span), "a loss is a probability, from 0 to 1"))
 }
 
 fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError> {
@@ -368,7 +323,7 @@ impl From<&super::Scenario> for Scenario {
                     duration: Some(Spanned::new(0..0, duration)),
                 },
             )),
-            network: NetworkTable::of(&scenario.network),
+            network: NetworkTable::of(&scenario.network, scenario.tick_s),
             record: Some(RecordTable {
                 log: Some(scenario.record.log),
                 log_name: Some(Spanned::new(0..0, scenario.record.log_name.clone())),
@@ -385,24 +340,6 @@ impl From<&super::Scenario> for Scenario {
                 .map(|(name, spec)| Spanned::new(0..0, Robot::from((name, spec))))
                 .collect(),
         }
-    }
-}
-
-impl NetworkTable {
-    /// The table of a network; a perfect one needs none.
-    fn of(network: &Network) -> Option<Self> {
-        if *network == Network::default() {
-            return None;
-        }
-        let link = |link: &Link| LinkTable {
-            from: Spanned::new(0..0, link.from.clone()),
-            to: Spanned::new(0..0, link.to.clone()),
-            commands: Spanned::new(0..0, link.commands),
-        };
-        Some(Self {
-            commands: Some(Spanned::new(0..0, network.commands)),
-            links: network.links.iter().map(link).collect(),
-        })
     }
 }
 

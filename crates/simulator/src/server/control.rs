@@ -144,7 +144,10 @@ impl Server {
             Control::Load { scenario } => {
                 self.on_init(load(&scenario, simulation.scenario()), &question, simulation)?;
             }
-            Control::Setup => return Ok(answer_setup(&question, simulation.scenario())),
+            Control::Setup => {
+                answer_setup(&question, simulation.scenario());
+                return Ok(());
+            }
             Control::Stop => {
                 self.answer_status(&question, simulation);
                 return Err(Interrupt::End(End::Stopped));

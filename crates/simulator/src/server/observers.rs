@@ -115,7 +115,7 @@ fn flight(tick: protocol::Tick, event: &Event) -> Option<Flight> {
     let (from, to, seq, command, fate) = match event {
         Event::CommandSent { from, to, seq, command, .. } => (from, to, *seq, command.as_str(), Fate::Sent),
         Event::CommandDelivered { from, to, seq } => (from, to, *seq, "", Fate::Delivered),
-        Event::CommandDropped { from, to, seq } => (from, to, *seq, "", Fate::Dropped),
+        Event::CommandDropped { from, to, seq, .. } => (from, to, *seq, "", Fate::Dropped),
         Event::CommandMissing { from, to, seq } => (from, to, *seq, "", Fate::Missing),
         _ => return None,
     };

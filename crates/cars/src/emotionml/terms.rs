@@ -1,0 +1,157 @@
+//! What this project's words are in EmotionML: nearest terms of W3C's vocabularies (Working Group Note, 1 April 2014),
+//! degrees as numbers, names and texts as XML allows them.
+//!
+//! Which term is nearest is chosen here \[I\], as are all numbers.
+
+use std::fmt::Write;
+
+use affect::akr::{ActionTendency, Certainty, Degree, Novelty};
+
+/// Where W3C's vocabularies are; the id of one follows.
+const W3C: &str = "http://www.w3.org/TR/emotion-voc/xml#";
+
+/// A term of one of W3C's vocabularies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Term {
+    /// Id of the vocabulary.
+    vocabulary: &'static str,
+    pub(super) name: &'static str,
+}
+
+impl Term {
+    /// The vocabulary, as a `*-set` attribute refers to it.
+    pub(super) fn set(self) -> String {
+        format!("{W3C}{}", self.vocabulary)
+    }
+
+    /// For people: `worried of everyday-categories`.
+    pub(super) fn in_words(self) -> String {
+        format!("{} of {}", self.name, self.vocabulary)
+    }
+}
+
+const fn term(vocabulary: &'static str, name: &'static str) -> Term {
+    Term { vocabulary, name }
+}
+
+pub(super) const VALENCE: Term = term("fsre-dimensions", "valence");
+pub(super) const UNPREDICTABILITY: Term = term("fsre-dimensions", "unpredictability");
+pub(super) const INTENSITY: Term = term("intensity-dimension", "intensity");
+pub(super) const AGENCY: Term = term("ema-appraisals", "agency");
+pub(super) const UNEXPECTEDNESS: Term = term("ema-appraisals", "unexpectedness");
+pub(super) const CONTROLLABILITY: Term = term("ema-appraisals", "controllability");
+pub(super) const CHANGEABILITY: Term = term("ema-appraisals", "changeability");
+pub(super) const URGENCY: Term = term("ema-appraisals", "urgency");
+pub(super) const DESIRABILITY: Term = term("ema-appraisals", "desirability");
+
+/// The category that is nearest to an emotion of the standard schemata.
+pub(super) fn nearest_category(emotion: &str) -> Option<Term> {
+    Some(match emotion {
+        "HAPPY" => term("everyday-categories", "happy"),
+        "CONFIDENT" => term("everyday-categories", "confident"),
+        "CONCERNED" => term("everyday-categories", "worried"),
+        "FRUSTRATED" => term("fsre-categories", "irritation"),
+        "ANGRY" => term("everyday-categories", "angry"),
+        "DISCOURAGED" => term("frijda-categories", "resignation"),
+        "HOPEFUL" => term("occ-categories", "hope"),
+        _ => return None,
+    })
+}
+
+/// The action tendency that is nearest.
+pub(super) fn nearest_tendency(tendency: ActionTendency) -> Option<Term> {
+    tendency.emotionml().map(|name| term("frijda-action-tendencies", name))
+}
+
+/// A degree on the scale of EmotionML: equal steps.
+pub(super) fn degree(degree: Degree) -> f64 {
+    match degree {
+        Degree::None => 0.0,
+        Degree::Low => 1.0 / 3.0,
+        Degree::Medium => 2.0 / 3.0,
+        Degree::High => 1.0,
+    }
+}
+
+/// Unpredictability: the opposite of certainty.
+pub(super) fn unpredictability(certainty: Certainty) -> f64 {
+    match certainty {
+        Certainty::Certain => 0.0,
+        Certainty::Uncertain => 1.0,
+    }
+}
+
+/// Unexpectedness.
+pub(super) fn unexpectedness(novelty: Novelty) -> f64 {
+    match novelty {
+        Novelty::Match => 0.0,
+        Novelty::Mismatch => 1.0,
+    }
+}
+
+/// A number between 0 and 1 as it is written: to the seven digits that the schema's single precision holds.
+pub(super) fn scale_value(value: f64) -> String {
+    // Adding zero turns -0 into 0.
+    ((value.clamp(0.0, 1.0) * 1e6).round() / 1e6 + 0.0).to_string()
+}
+
+/// A name as a vocabulary may hold it, an `NMTOKEN`: letters, digits, `.`, `-` and `_` stand for themselves, everything
+/// else is `_x` and its code point, with an underscore at the end. Different names stay different.
+pub(super) fn token(name: &str) -> String {
+    let mut token = String::new();
+    let mut rest = name.chars().peekable();
+    while let Some(char) = rest.next() {
+        let begins_code = char == '_' && rest.peek() == Some(&'x');
+        if (char.is_ascii_alphanumeric() || ".-_".contains(char)) && !begins_code {
+            token.push(char);
+        } else {
+            let _ = write!(token, "_x{:X}_", u32::from(char));
+        }
+    }
+    token
+}
+
+/// A text as a document may hold it: what is no character of XML 1.0 is shown as missing.
+pub(super) fn text(raw: &str) -> String {
+    let is_char =
+        |char: char| matches!(char, '\t' | '\n' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'..);
+    raw.chars().map(|char| if is_char(char) { char } else { char::REPLACEMENT_CHARACTER }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use affect::Schemata;
+
+    #[test]
+    fn every_emotion_with_a_schema_has_a_nearest_category() {
+        for name in Schemata::standard().names() {
+            assert!(nearest_category(name).is_some(), "{name}");
+        }
+        assert_eq!(nearest_category("BORED"), None);
+    }
+
+    #[test]
+    fn names_become_tokens_and_stay_different() {
+        assert_eq!(token("VERY_CONTENT-2.1"), "VERY_CONTENT-2.1");
+        assert_eq!(token("si content!"), "si_x20_content_x21_");
+        assert_eq!(token("ému"), "_xE9_mu");
+        let names =
+            ["a b", "a_x20_b", "a_x20_", "a ", "_x", "x", "_xx", "a_x5F_x20_b", "<&\">", "\u{1F600}", "\0"];
+        let tokens: std::collections::BTreeSet<String> = names.iter().map(|name| token(name)).collect();
+        assert_eq!(tokens.len(), names.len());
+        let is_plain = |token: &String| token.chars().all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c));
+        assert!(tokens.iter().all(is_plain), "{tokens:?}");
+    }
+
+    #[test]
+    fn a_document_holds_no_character_that_xml_forbids() {
+        assert_eq!(text("a\0\u{1b}\r\u{FFFE}\t\u{1F600}"), "a\u{FFFD}\u{FFFD}\u{FFFD}\u{FFFD}\t\u{1F600}");
+    }
+
+    #[test]
+    fn numbers_are_written_without_exponent_and_without_sign() {
+        let written = [0.0, -0.0, 1e-9, 0.25, 1.0 / 3.0, 1.0].map(scale_value);
+        assert_eq!(written, ["0", "0", "0", "0.25", "0.333333", "1"]);
+    }
+}
