@@ -7,7 +7,6 @@ use std::time::Duration;
 use clap::{Args, Subcommand};
 use miette::{IntoDiagnostic, miette};
 use protocol::bus::{AnswerOf, Bus, Role};
-use protocol::endpoint::is_tls;
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Control, ControlAnswer, LogRecord, Presence, Status};
@@ -85,10 +84,6 @@ impl RunRef {
 
     fn open(&self) -> miette::Result<(Bus, Keys)> {
         let (connect, config) = (self.endpoint()?, self.config()?);
-        if is_tls(&connect) && config.is_none() {
-            let help = "name the operator's file with --zenoh-config, as `cars secure init` made it";
-            return Err(miette!(help = help, "{connect} wants a certificate"));
-        }
         let role = Role::Client { connect, patience: PATIENCE };
         Ok((Bus::open(&role, config.as_ref()).into_diagnostic()?, Keys::new(&self.run()?)))
     }

@@ -96,7 +96,8 @@ impl InitArgs {
         let folder = &self.folder;
         let is_ours = [folder.join(CA), folder.join(SIMULATOR).join(CONFIG)].iter().any(|file| file.exists());
         let is_empty = !folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-        if !is_empty && !(self.force && is_ours) {
+        let is_free = is_empty || (self.force && is_ours);
+        if !is_free {
             let help = if is_ours {
                 "--force makes everything anew; what was made before is then of no use any more"
             } else {
@@ -138,7 +139,7 @@ impl InitArgs {
             "made {folder}, for {runs}, valid until {validity}:\n\
              \x20 ca.pem                 whose certificates are believed; its key is not kept, so there will be no more\n\
              \x20 simulator/zenoh.json5  for cars-sim: its certificate, and who may say what\n\
-             \x20 NAME/zenoh.json5       all that {} needs; it holds a private key\n\
+             \x20 NAME/zenoh.json5       all that NAME needs, one of {}; it holds a private key\n\
              \x20 NAME/cert.pem, key.pem the same, apart\n\
              use it by one line of a launch file, secure = \"{folder}\", or by `cars launch FILE --secure {folder}`;\n\
              by hand with --zenoh-config {folder}/NAME/zenoh.json5. On another machine a participant needs its own\n\

@@ -24,6 +24,10 @@ pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
 /// Longest wait for an answer before the asker looks again whether the other side is still there.
 pub const QUERY_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// What else may be the matter with an encrypted endpoint.
+const TLS_HINT: &str =
+    " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
+
 /// A failure of the bus itself.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
@@ -44,6 +48,12 @@ pub enum BusError {
          everybody who can reach it"
     )]
     Exposed(String),
+    /// Somebody would connect to a secured run and has nothing to show.
+    #[error(
+        "{0} wants a certificate: name a file zenoh.json5 that `cars secure init` made, by --zenoh-config or \
+         CARS_ZENOH_CONFIG"
+    )]
+    NoCertificate(String),
     /// A configuration with access control does not fit a listener without certificates.
     #[error("{0} is not encrypted, so nobody could show a certificate there: a secured run listens at tls/…")]
     Unencrypted(String),
@@ -111,11 +121,18 @@ impl Bus {
                 check_exposure(listen, overrides, *trusts_network)?;
                 ("listen at", listen)
             }
-            Role::Client { connect, .. } => ("reach the simulator at", connect),
+            Role::Client { connect, .. } => {
+                if is_tls(connect) && overrides.is_none() {
+                    return Err(BusError::NoCertificate(connect.clone()));
+                }
+                ("reach the simulator at", connect)
+            }
         };
         let failed = |reason: String| BusError::Open { doing, endpoint: endpoint.clone(), reason };
         let config = configuration(role, overrides).map_err(&failed)?;
-        let session = zenoh::open(config).wait().map_err(|error| failed(error.to_string()))?;
+        // The middleware tries again without a word when certificates do not fit.
+        let hint = if is_tls(endpoint) { TLS_HINT } else { "" };
+        let session = zenoh::open(config).wait().map_err(|error| failed(format!("{error}{hint}")))?;
         Ok(Self { session })
     }
 
