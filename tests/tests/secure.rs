@@ -234,6 +234,10 @@ fn a_participant_says_nothing_in_anothers_name() {
     ]
     .map(|key| heard.on(&castle.operator, &key));
 
+    // An answer on the same link comes after what was declared there: from here on they hear.
+    assert!(witness.ask(&keys.percept(&butler), "", None).unwrap().is_some());
+    castle.status();
+
     let rubbish = || b"rubbish".to_vec();
     let clock = Clock { epoch: 1, tick: 99_999, ..Clock::default() };
     for (key, message) in [
