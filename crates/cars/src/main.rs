@@ -10,6 +10,7 @@ mod launch;
 mod net;
 mod router;
 mod run;
+mod secure;
 mod statistics;
 mod table;
 
@@ -52,6 +53,8 @@ enum Subcommands {
     Net(net::NetCommand),
     /// Forward between a simulator and robots on different machines, and do nothing else.
     Router(router::RouterArgs),
+    /// Make certificates and access control for a roster, for runs that strangers could reach.
+    Secure(secure::SecureArgs),
     /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
     Bench(bench::BenchArgs),
     /// Print shell completions.
@@ -85,6 +88,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Emotionml(args) => emotionml::emotionml(&args),
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),
+        Subcommands::Secure(args) => secure::secure(&args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),
         Subcommands::BenchEcho { address } => bench::echo(&address),

@@ -20,6 +20,10 @@ pub(crate) struct RouterArgs {
     /// A configuration file of the middleware instead of the built-in settings.
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
+    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the runs
+    /// behind it and pose as any robot.
+    #[arg(long)]
+    insecure: bool,
 }
 
 /// Forwards until it is told to end.
@@ -31,7 +35,11 @@ pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
         let _asked_already = end.try_send(());
     })
     .into_diagnostic()?;
-    let role = Role::Relay { listen: args.listen.clone(), connect: args.connect.clone() };
+    let role = Role::Relay {
+        listen: args.listen.clone(),
+        connect: args.connect.clone(),
+        trusts_network: args.insecure,
+    };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
     println!(
         "forwarding at {}",

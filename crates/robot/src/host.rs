@@ -184,7 +184,7 @@ impl Host {
             instance: self.bus.id(),
             sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
         };
-        let (key, begun) = (self.keys.join(), Instant::now());
+        let (key, begun) = (self.keys.join_as(name), Instant::now());
         loop {
             let is_last_try = begun.elapsed() > self.options.patience;
             match self.bus.ask(&key, "", Some(encode(&request)))? {

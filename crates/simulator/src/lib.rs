@@ -20,7 +20,3 @@ pub use recorder::{Recorder, RunFolder};
 pub use scenario::{OnLate, Scenario};
 pub use simulation::{Barrier, Exchange, Simulation, TickRecord};
 pub use summary::Summary;
-
-/// What `cars-sim` and `cars launch` must be told on the command line, beside where to listen, to listen at more than
-/// loopback: for set-ups of the project's own, whose networks nobody else is in.
-pub const ARGS_TO_LISTEN_WIDELY: [&str; 0] = [];

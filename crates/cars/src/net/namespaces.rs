@@ -12,7 +12,6 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use miette::{IntoDiagnostic, WrapErr, miette};
-use simulator::ARGS_TO_LISTEN_WIDELY;
 
 use super::play::{Links, Start};
 use super::shape::{Flow, Shape};
@@ -110,7 +109,8 @@ impl Links for Namespaces {
         let own = std::env::current_exe().into_diagnostic().wrap_err("where this program is")?;
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.host(0)]).arg(own).args(start.args(&links));
-        command.arg(format!("--listen={endpoint}")).args(ARGS_TO_LISTEN_WIDELY);
+        // Nobody else is in this network.
+        command.arg(format!("--listen={endpoint}")).arg("--insecure");
         if !start.more.iter().any(|arg| arg == NO_CONSOLE) {
             // A browser would not reach it there.
             command.arg(NO_CONSOLE);

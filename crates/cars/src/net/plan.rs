@@ -1,16 +1,17 @@
 //! The plan of faults: which link, when, for how long, what. Times are of the wall clock, from the moment when the clock
 //! of the run first ran.
 //!
-//! A partition of a scenario that separates one robot from all others is a `cut` of its link; simulated times become
-//! times of a plan when they are divided by the speed of the run.
+//! A plan is a file, or what a scenario's own partitions come to on real links.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
-use protocol::RobotName;
+use protocol::{RobotName, Tick};
 use serde::Deserialize;
+use simulator::Scenario;
 use simulator::diagnostic::{FileError, Source};
+use simulator::scenario::network::Partition;
 use simulator::units::Time;
 use toml::Spanned;
 
@@ -79,6 +80,39 @@ impl Plan {
         Self::parse(&Source::read(path)?, robots)
     }
 
+    /// The partitions of a scenario as cuts of real links, at `speed` simulated seconds a second. Every link leads to the
+    /// simulator, so whoever is cut off from the others there is cut off from it, too: the largest group, the first of
+    /// equals, keeps its links, and all other groups lose theirs.
+    ///
+    /// # Errors
+    /// There is no partition, or one that real links cannot be: in one direction, or of one kind of message.
+    pub(super) fn of_partitions(scenario: &Scenario, speed: f64) -> Result<Self, FileError> {
+        let partitions = &scenario.network.partitions;
+        if partitions.is_empty() {
+            return Err(FileError::new("the scenario has no partition that could be played")
+                .with_help("name a plan of faults by --plan; docs/links.md says how one looks"));
+        }
+        let wall = |tick: Tick| Duration::try_from_secs_f64(tick as f64 * scenario.tick_s / speed);
+        let mut faults = Vec::new();
+        for partition in partitions {
+            if partition.one_way || !(partition.commands && partition.queries) {
+                return Err(FileError::new("a real link is cut in both directions and for all messages")
+                    .with_help(
+                        "a partition in one direction, or of one kind of message, is simulated only",
+                    ));
+            }
+            let begin = wall(partition.from);
+            let end = partition.until.map_or(Ok(NEVER), wall);
+            let (Ok(begin), Ok(end)) = (begin, end) else {
+                return Err(FileError::new("at this speed a partition never comes"));
+            };
+            let shape = Shape { flow: Flow::Cut, ..Shape::default() };
+            let cut = |robot: &RobotName| Fault { robot: robot.clone(), begin, end, shape };
+            faults.extend(cut_off(partition).map(cut));
+        }
+        Ok(Self { faults })
+    }
+
     fn parse(source: &Source, robots: &BTreeSet<RobotName>) -> Result<Self, FileError> {
         let raw: RawPlan = source.parse()?;
         let faults = raw.faults.into_iter().map(|fault| check(source, fault, robots));
@@ -140,6 +174,18 @@ impl Plan {
 
 /// While a plan waits for its next moment it looks this often whether the run is over.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
+
+/// The end of what lasts until the run is over.
+const NEVER: Duration = Duration::from_secs(u32::MAX as u64);
+
+/// Robots that a partition leaves without a link to the simulator.
+fn cut_off(partition: &Partition) -> impl Iterator<Item = &RobotName> {
+    // Of equals `max_by_key` gives the last, so they are looked at from the end.
+    let largest = partition.groups.iter().enumerate().rev().max_by_key(|(_, group)| group.len());
+    let kept = largest.map(|(index, _)| index);
+    let others = partition.groups.iter().enumerate().filter(move |(index, _)| Some(*index) != kept);
+    others.flat_map(|(_, group)| group)
+}
 
 fn check(source: &Source, raw: RawFault, robots: &BTreeSet<RobotName>) -> Result<Fault, FileError> {
     let refuse = |span, reason: &str| FileError::at(source, Some(span), reason);
@@ -223,6 +269,34 @@ mod tests {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/links/cut_leguin.toml");
         let plan = Plan::load(&file, &BTreeSet::from([RobotName::new("Leguin").unwrap()])).unwrap();
         assert_eq!(plan.changes().len(), 4);
+    }
+
+    fn scenario(network: &str) -> Scenario {
+        let robots: String = ["A", "B", "C"]
+            .iter()
+            .enumerate()
+            .map(|(i, name)| format!("[[robot]]\nname = \"{name}\"\nat = [\"{} m\", \"2 m\"]\n", 2 + 2 * i))
+            .collect();
+        let text = format!("seed = 5\ntick = \"0.5 s\"\n{network}\n{robots}");
+        Scenario::parse(&Source { name: "scenario.toml".to_owned(), text }, Path::new(".")).unwrap()
+    }
+
+    #[test]
+    fn a_simulated_partition_is_a_cut_of_links_at_the_same_simulated_time() {
+        let partition = |more: &str| {
+            let head = "[[network.partition]]\ngroups = [[\"A\"], [\"C\", \"B\"]]\nfrom = \"60 s\"\n";
+            scenario(&format!("{head}{more}\n"))
+        };
+        let plan = Plan::of_partitions(&partition("until = \"100 s\""), 20.0).unwrap();
+        let cut = |s: u64| plan.shape(&RobotName::new("A").unwrap(), Duration::from_secs(s)).to_string();
+        assert_eq!([cut(2), cut(3), cut(4), cut(5)], ["whole", "cut", "cut", "whole"]);
+        assert_eq!(plan.robots().len(), 1, "the larger group keeps its links");
+        let endless = Plan::of_partitions(&partition(""), 20.0).unwrap();
+        assert!(endless.changes().contains(&NEVER));
+        for refused in ["one_way = true", "cuts = [\"queries\"]"] {
+            assert!(Plan::of_partitions(&partition(refused), 20.0).is_err(), "{refused}");
+        }
+        assert!(Plan::of_partitions(&scenario(""), 20.0).is_err());
     }
 
     #[test]

@@ -14,10 +14,11 @@ use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use protocol::endpoint::is_tls;
 use protocol::{RobotName, RunName};
 use serde::Serialize;
-use simulator::RunFolder;
 use simulator::recorder::EVENTS;
+use simulator::{RunFolder, Scenario};
 
 use super::compose::Compose;
 use super::namespaces::Namespaces;
@@ -41,9 +42,10 @@ const LOOK_AGAIN: Duration = Duration::from_millis(5);
 pub(crate) struct PlayArgs {
     /// The launch file.
     file: PathBuf,
-    /// The plan of faults; its times are of the wall clock, from the moment when the clock of the run first ran.
+    /// The plan of faults; its times are of the wall clock, from the moment when the clock of the run first ran. Without
+    /// one, the partitions of the scenario itself are played, and not simulated in addition.
     #[arg(long, value_name = "FILE")]
-    plan: PathBuf,
+    plan: Option<PathBuf>,
     /// What the links are.
     #[arg(long)]
     via: Via,
@@ -55,7 +57,7 @@ pub(crate) struct PlayArgs {
 }
 
 /// What links are made of.
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum Via {
     /// A TCP proxy for each process: cut, close, delay, jitter, bandwidth. Needs nothing.
     Proxy,
@@ -99,19 +101,22 @@ struct Proxies {
 }
 
 impl Proxies {
-    fn new(processes: &[Process]) -> miette::Result<Self> {
-        let endpoint = endpoint::free().into_diagnostic()?;
+    /// What is encrypted passes a proxy as it is.
+    fn new(file: &LaunchFile) -> miette::Result<Self> {
+        let port = endpoint::free_port().into_diagnostic()?;
+        let endpoint = endpoint::loopback(port, file.secure.is_some());
         let proxy = |process: &Process| Ok((process.name.clone(), proxy::on_loopback(&endpoint)?));
-        let proxies = processes.iter().map(proxy).collect::<miette::Result<_>>()?;
+        let proxies = file.processes.iter().map(proxy).collect::<miette::Result<_>>()?;
         Ok(Self { endpoint, proxies })
     }
 }
 
 impl Links for Proxies {
     fn command(&self, start: &Start) -> miette::Result<Command> {
+        let is_secured = is_tls(&self.endpoint);
         let link = |(process, proxy): (&String, &Proxy)| Link {
             process: process.clone(),
-            endpoint: proxy.endpoint(),
+            endpoint: endpoint::loopback(proxy.address().port(), is_secured),
             namespace: None,
         };
         let links: Vec<Link> = self.proxies.iter().map(link).collect();
@@ -129,23 +134,36 @@ impl Links for Proxies {
 pub(crate) fn play(args: &PlayArgs) -> miette::Result<ExitCode> {
     let file = LaunchFile::load(&args.file)?;
     let run = args.execution.run_name(&args.file)?;
-    let start = Start { file: &args.file, run: &run, execution: &args.execution, more: &args.launch_args };
     // Robots of one process share its link.
     let process_of: BTreeMap<RobotName, String> = file
         .processes
         .iter()
         .flat_map(|process| process.robots.iter().map(|robot| (robot.clone(), process.name.clone())))
         .collect();
-    let plan = Plan::load(&args.plan, &process_of.keys().cloned().collect())?;
+    let mut execution = args.execution.clone();
+    let plan = match &args.plan {
+        Some(plan) => Plan::load(plan, &process_of.keys().cloned().collect())?,
+        None => {
+            let plan = partitions(&file, &execution)?;
+            // Containers read the scenario as it is.
+            if args.via != Via::Compose {
+                execution.set.push(WITHOUT_PARTITIONS.parse().map_err(|error| miette!("{error}"))?);
+            }
+            plan
+        }
+    };
+    let start = Start { file: &args.file, run: &run, execution: &execution, more: &args.launch_args };
     let signals = Signals::forward()?;
     let mut links: Box<dyn Links> = match args.via {
-        Via::Proxy => Box::new(Proxies::new(&file.processes)?),
+        Via::Proxy => Box::new(Proxies::new(&file)?),
         Via::Namespaces => {
             plan.check_cuts_only("the link of a namespace")?;
+            check_not_secured(&file)?;
             Box::new(Namespaces::new(&file.processes)?)
         }
         Via::Compose => {
             plan.check_cuts_only("the link of a container")?;
+            check_not_secured(&file)?;
             Box::new(Compose::new(&start)?)
         }
     };
@@ -160,6 +178,29 @@ pub(crate) fn play(args: &PlayArgs) -> miette::Result<ExitCode> {
     }
     let status = launch.wait().into_diagnostic()?;
     played.map(|()| exit_code(status))
+}
+
+/// Certificates name the hosts by which a simulator is reached, and those of these links are made anew each time.
+fn check_not_secured(file: &LaunchFile) -> miette::Result<()> {
+    let help = "play it --via proxy, or leave out `secure`: nobody else is in the network of these links";
+    if file.secure.is_some() {
+        Err(miette!(help = help, "a secured launch has no certificate there"))
+    } else {
+        Ok(())
+    }
+}
+
+/// A change of a scenario: no partition is simulated.
+const WITHOUT_PARTITIONS: &str = "network.partition=[]";
+
+/// The partitions of the scenario, as faults of real links.
+fn partitions(file: &LaunchFile, execution: &ExecutionArgs) -> miette::Result<Plan> {
+    let scenario = Scenario::load(&file.scenario, &execution.changes())?;
+    let Some(speed) = execution.speed.or(file.speed).and_then(|speed| speed.0) else {
+        let help = "say --speed 20, for example";
+        return Err(miette!(help = help, "as fast as it goes, nobody knows when a partition would come"));
+    };
+    Ok(Plan::of_partitions(&scenario, speed)?)
 }
 
 /// Waits until the first tick is in the record. Returns whether it came before the end of the launch.

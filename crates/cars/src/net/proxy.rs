@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::RobotName;
+use protocol::endpoint::TLS;
 use protocol::random::{stream, unit};
 
 use super::gate::{Gate, Pace};
@@ -52,7 +53,8 @@ pub(crate) struct ProxyArgs {
 
 fn address(endpoint: &str) -> Result<SocketAddr, String> {
     let bad = || format!("{endpoint:?} is no address such as tcp/127.0.0.1:7447");
-    endpoint.strip_prefix("tcp/").ok_or_else(bad)?.parse().map_err(|_| bad())
+    let address = endpoint.split_once('/').filter(|(protocol, _)| ["tcp", TLS].contains(protocol));
+    address.ok_or_else(bad)?.1.parse().map_err(|_| bad())
 }
 
 /// Forwards until the process is ended, and does what the plan and the standard input say.
@@ -62,7 +64,7 @@ pub(super) fn run(args: &ProxyArgs) -> miette::Result<ExitCode> {
     let proxy = Proxy::start(args.listen, args.to)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot listen at {}", args.listen))?;
-    println!("listening at {}, on to tcp/{}", proxy.endpoint(), args.to);
+    println!("listening at {}, on to {}", proxy.address(), args.to);
     let proxy = Arc::new(proxy);
     if let Some(plan) = plan {
         let (proxy, closes) = (proxy.clone(), args.close);
@@ -125,8 +127,8 @@ impl Proxy {
     }
 
     /// Where it listens.
-    pub(super) fn endpoint(&self) -> String {
-        format!("tcp/{}", self.local)
+    pub(super) fn address(&self) -> SocketAddr {
+        self.local
     }
 
     pub(super) fn shape(&self) -> Shape {
