@@ -12,7 +12,7 @@ mod middleware;
 use std::path::PathBuf;
 use std::time::Duration;
 
-pub use memory::{Faults, MemoryNetwork, Traffic};
+pub use memory::{Faults, MemoryNetwork, Overheard, Traffic};
 
 /// Where a simulator listens and others connect unless told otherwise.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
