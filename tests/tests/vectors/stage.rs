@@ -49,7 +49,6 @@ impl Stage {
         let loaded =
             Scenario::load(&root().join(Path::new(scenario)), &changes).unwrap_or_else(|error| panic!("{error}"));
         let network = MemoryNetwork::new(0, Faults::default());
-        assert!(network.overhear().is_empty());
         let (folder, router) = (tempfile::tempdir().unwrap(), network.router());
         let options = Options { run: run.clone(), speed: None, is_paused: true, repeat_after: NEVER };
         let server = Server::open(router, &loaded, options).unwrap();
@@ -64,6 +63,10 @@ impl Stage {
         let watch = |key: String| observer.subscribe(&key, |_, _| {}).unwrap();
         let watching = vec![watch(keys.query(&robot, STATE).replace(robot.as_str(), "*")), watch(keys.percepts())];
         let transcript = Transcript::new(keys.clone(), robot.clone(), scenario);
+        // Who is answered knows that the simulator is there, and that what it declared before it asked is in effect.
+        let status = encode(&Control::Status);
+        eventually("the simulator", || observer.ask(&keys.control(), "", Some(status.clone())).unwrap());
+        let _ = network.overhear(); // The story begins here.
         Self {
             network,
             observer,
