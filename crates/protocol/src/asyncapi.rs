@@ -51,8 +51,7 @@ fn placeholder(name: &'static str) -> RobotName {
 fn channels() -> Vec<Channel> {
     let run = RunName::new("RUN-").unwrap_or_else(|error| unreachable!("a legal name: {error}"));
     let (keys, robot, from) = (Keys::new(&run), placeholder("NAME-"), placeholder("FROM-"));
-    let channel =
-        |name, key, what, messages, operations| Channel { name, key, what, messages, operations };
+    let channel = |name, key, what, messages, operations| Channel { name, key, what, messages, operations };
     let mut channels = vec![
         channel("clock", keys.clock(), "A tick is granted.", &["clock"], &[Receive("clock")]),
         channel(
@@ -107,7 +106,13 @@ fn channels() -> Vec<Channel> {
         channel("world", keys.world(), "The picture, for observers.", &["world_frame"], &[]),
         channel("log", keys.log(), "What changes, as lines, for observers.", &["log_record"], &[]),
         channel("faults", keys.faults(), "What the launcher does to processes.", &["fault_order"], &[]),
-        channel("alive_robot", keys.alive_robot(&robot), "Liveliness token of a robot: it is ready.", &[], &[]),
+        channel(
+            "alive_robot",
+            keys.alive_robot(&robot),
+            "Liveliness token of a robot: it is ready.",
+            &[],
+            &[],
+        ),
         channel("alive_sim", keys.alive_sim(), "Liveliness token of the simulator.", &[], &[]),
     ];
     let query = |name| {
@@ -210,9 +215,9 @@ pub fn document() -> Value {
     let mut schemas = settings.into_generator();
     let messages = messages(&mut schemas);
     let channels = channels();
-    let operations = channels.iter().flat_map(|channel| {
-        channel.operations.iter().map(|operation| channel.operation(operation))
-    });
+    let operations = channels
+        .iter()
+        .flat_map(|channel| channel.operations.iter().map(|operation| channel.operation(operation)));
     json!({
         "asyncapi": "3.0.0",
         "info": {

@@ -103,6 +103,7 @@ impl Robot for Echo {
     }
 
     fn resume(&mut self, _: &mut Cars<'_>, last: &StateVariables) {
-        self.heard = last.get("heard").and_then(protocol::messages::Variable::as_f64).unwrap_or_default() as u32;
+        self.heard =
+            last.get("heard").and_then(protocol::messages::Variable::as_f64).unwrap_or_default() as u32;
     }
 }

@@ -69,7 +69,9 @@ fn echo_through_everything_that_a_network_does() {
     stage.seat("Echo", || Box::<echo::Echo>::default());
     stage.begin(1);
     stage.step_to(28);
-    for parameters in ["", "tick=29;epoch=1", "tick=28;epoch=1", "tick=27;epoch=1", "tick=99;epoch=1", "tick=x"] {
+    for parameters in
+        ["", "tick=29;epoch=1", "tick=28;epoch=1", "tick=27;epoch=1", "tick=99;epoch=1", "tick=x"]
+    {
         stage.ask("state", parameters);
     }
     for what in protocol::keys::QUERIES {

@@ -46,8 +46,8 @@ impl Stage {
         let keys = Keys::new(&run);
         let set = set.iter().map(|change| change.parse().expect("a legal change")).collect();
         let changes = Changes { set, ..Changes::default() };
-        let loaded =
-            Scenario::load(&root().join(Path::new(scenario)), &changes).unwrap_or_else(|error| panic!("{error}"));
+        let loaded = Scenario::load(&root().join(Path::new(scenario)), &changes)
+            .unwrap_or_else(|error| panic!("{error}"));
         let network = MemoryNetwork::new(0, Faults::default());
         let (folder, router) = (tempfile::tempdir().unwrap(), network.router());
         let options = Options { run: run.clone(), speed: None, is_paused: true, repeat_after: NEVER };
@@ -61,7 +61,8 @@ impl Stage {
         let observer = network.client();
         // Who follows everything from the beginning has everything that a robot could ever ask for.
         let watch = |key: String| observer.subscribe(&key, |_, _| {}).unwrap();
-        let watching = vec![watch(keys.query(&robot, STATE).replace(robot.as_str(), "*")), watch(keys.percepts())];
+        let watching =
+            vec![watch(keys.query(&robot, STATE).replace(robot.as_str(), "*")), watch(keys.percepts())];
         let transcript = Transcript::new(keys.clone(), robot.clone(), scenario);
         // Who is answered knows that the simulator is there, and that what it declared before it asked is in effect.
         let status = encode(&Control::Status);
@@ -119,7 +120,8 @@ impl Stage {
     /// Waits until the process of the robot is there, and as this incarnation.
     pub(super) fn wait_for(&self, generation: u32) {
         self.wait_until("it is there", |status| {
-            let robot = status.robots.iter().find(|robot| robot.name == self.robot).expect("it is of the roster");
+            let robot =
+                status.robots.iter().find(|robot| robot.name == self.robot).expect("it is of the roster");
             (robot.generation, robot.presence) == (generation, Presence::Here)
         });
     }

@@ -68,8 +68,10 @@ fn question(
 
 impl Transcript {
     pub(super) fn new(keys: Keys, robot: RobotName, scenario: &str) -> Self {
-        let start =
-            format!(r#"{{"way":"start","robot":"{robot}","scenario":{}}}"#, serde_json::Value::from(scenario));
+        let start = format!(
+            r#"{{"way":"start","robot":"{robot}","scenario":{}}}"#,
+            serde_json::Value::from(scenario)
+        );
         Self { keys, robot, states: Vec::new(), lines: vec![Line(start)] }
     }
 
@@ -181,9 +183,12 @@ impl Transcript {
     /// All that the robot may ask in this tick, and what it would be answered. Whether it asks or follows the keys, the
     /// answers are the same, so the lines do not depend on that.
     fn answers(&self, clock: Option<&Clock>) -> Vec<(Place, Line)> {
-        let Some(clock) = clock.filter(|clock| clock.tick > 0 && clock.end.is_none()) else { return Vec::new() };
+        let Some(clock) = clock.filter(|clock| clock.tick > 0 && clock.end.is_none()) else {
+            return Vec::new();
+        };
         let parameters = format!("tick={};epoch={}", clock.tick, clock.epoch);
-        let unreachable = clock.news.get(&self.robot).map(|news| news.unreachable.clone()).unwrap_or_default();
+        let unreachable =
+            clock.news.get(&self.robot).map(|news| news.unreachable.clone()).unwrap_or_default();
         let mut asks = Vec::new();
         for (key, state) in &self.states {
             let of = Keys::robot_of(key).unwrap_or_default();
