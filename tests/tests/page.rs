@@ -118,18 +118,13 @@ fn the_rules_are_there_once_each() {
     assert_eq!(sorted(found), sorted(RULES.to_vec()));
 }
 
-/// Key on which a robot asks to join, by name.
-fn join(keys: &Keys, robot: &RobotName) -> String {
-    format!("{}/{robot}", keys.join())
-}
-
 #[test]
 fn the_table_of_keys_is_that_of_the_code() {
     let (run, name) = (RunName::new("RUN").unwrap(), |name| RobotName::new(name).unwrap());
     let (keys, robot, from) = (Keys::new(&run), name("NAME"), name("FROM"));
     let mut expected = vec![
         keys.clock(),
-        join(&keys, &robot),
+        keys.join_as(&robot),
         keys.report(&robot),
         keys.waiting(&robot),
         keys.command(&robot, &from),
@@ -218,7 +213,7 @@ fn limits_times_and_version_are_those_of_the_code() {
             "1,000,000,001 for generation 2",
         ),
         ("protocol/src/bus/mod.rs", "QUERY_TIMEOUT: Duration = Duration::from_secs(2)", "timeout 2 s"),
-        ("protocol/src/bus/middleware.rs", r#"("transport/link/tx/lease", "2000")"#, "lease: 2000"),
+        ("protocol/src/bus/settings.rs", "\"transport/link/tx/lease\",\n        \"2000\"", "lease: 2000"),
     ] {
         let source = std::fs::read_to_string(root().join("crates").join(file)).unwrap();
         assert!(

@@ -38,11 +38,6 @@ enum Operation {
 }
 use Operation::{Answer as Replies, Ask, Receive, Send};
 
-/// Key on which a robot asks to join: its name is in it, so that access control can pin it.
-fn join(keys: &Keys, robot: &RobotName) -> String {
-    format!("{}/{robot}", keys.join())
-}
-
 fn placeholder(name: &'static str) -> RobotName {
     RobotName::new(name).unwrap_or_else(|error| unreachable!("a placeholder is a legal name: {error}"))
 }
@@ -56,7 +51,7 @@ fn channels() -> Vec<Channel> {
         channel("clock", keys.clock(), "A tick is granted.", &["clock"], &[Receive("clock")]),
         channel(
             "join",
-            join(&keys, &robot),
+            keys.join_as(&robot),
             "A robot asks the simulator to take part.",
             &["join_request", "join_answer"],
             &[Ask { with: "join_request", answer: "join_answer" }],

@@ -79,7 +79,11 @@ impl Caller {
             instance: self.bus.id(),
             sdk: String::new(),
         };
-        let answer = self.bus.ask(&self.keys.join(), "", Some(encode(&request))).unwrap().expect("an answer");
+        let answer = self
+            .bus
+            .ask(&self.keys.join_as(&self.name), "", Some(encode(&request)))
+            .unwrap()
+            .expect("an answer");
         match decode("join", "simulator", &answer.result.unwrap()).unwrap() {
             JoinAnswer::Welcome(welcome) => *welcome,
             JoinAnswer::Refused { explanation, .. } => panic!("{explanation}"),

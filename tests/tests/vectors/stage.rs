@@ -91,7 +91,8 @@ impl Stage {
         let options = HostOptions {
             run: self.run.clone(),
             connect: "this process".to_owned(),
-            patience: Duration::from_secs(1),
+            patience: Duration::from_secs(20),
+            gone_patience: Duration::from_secs(1),
             zenoh_config: None,
         };
         self.threads.push(std::thread::spawn(move || {
