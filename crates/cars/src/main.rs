@@ -8,6 +8,7 @@ mod emotionml;
 mod exec;
 mod experiment;
 mod launch;
+mod new;
 mod run;
 mod statistics;
 mod table;
@@ -30,6 +31,8 @@ struct Cli {
 enum Subcommands {
     /// Run any program as a robot, over its standard input and output: `cars exec --name Leguin -- ./leguin.sh`.
     Exec(exec::ExecArgs),
+    /// Make a skeleton of a robot of your own: `cars new robot Rosie --lang python`.
+    New(new::NewArgs),
     /// Start the processes of a launch file and run them to the end.
     Launch(launch::LaunchArgs),
     /// Run a scenario, or that of a launch file, in this process.
@@ -75,6 +78,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Launch(args) => launch::launch(args),
         Subcommands::Exec(args) => exec::exec(&args),
         Subcommands::ExecStart(args) => Ok(exec::start(&args)),
+        Subcommands::New(args) => new::new(&args),
         Subcommands::Run(args) => run::run(&args),
         Subcommands::Experiment(args) => experiment::experiment(&args),
         Subcommands::Check(args) => check::check(&args),

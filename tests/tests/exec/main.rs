@@ -5,4 +5,5 @@
 mod ending;
 mod program;
 mod rubbish;
+mod skeletons;
 mod stage;

@@ -43,7 +43,11 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
         "head -c 3000000 /dev/zero | tr '\\0' x",
         &["its line `xxxx", "xxx...` is longer than 1048576 bytes"],
     ),
-    ("chatter", r#"yes '{"type":"log","text":"again"}'"#, &["said too much for one tick: 0 commands and 917"]),
+    (
+        "chatter",
+        r#"yes '{"type":"log","text":"again"}'"#,
+        &["said too much for one tick: 0 commands and 917"],
+    ),
     (
         "endless",
         r#"yes '{"type":"panel","widgets":[]}'"#,
