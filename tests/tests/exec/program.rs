@@ -1,8 +1,8 @@
 //! A program takes part as any robot does.
 
-use system_tests::{assert_same, eventually};
+use system_tests::assert_same;
 
-use crate::stage::{Stage, nobody_is_left};
+use crate::stage::{Stage, nobody_is_left, ready};
 
 /// Walks to and fro by chance, asks, looks around, commands and says what it hears.
 const WALKER: &str = r#"
@@ -105,12 +105,12 @@ fn a_slow_program_is_late_and_named_and_changes_nothing() {
 #[test]
 fn init_starts_the_same_process_over() {
     let stage = Stage::each_tick(r#"if is init; then echo "init in $$: $json" >&2; fi"#, "");
-    let mut launch = stage.start("exec-again", &["--speed", "10"]);
-    let ctl = |command: &str| stage.lab.ok(&["ctl", command, "--run", "exec-again"]);
-    launch.prints("takes part");
-    eventually("a first tick", || (!stage.log("exec-again").is_empty()).then_some(()));
-    ctl("init");
-    ctl("start");
+    let mut launch = stage.start("exec-again", &["--paused"]);
+    let ctl = |args: &[&str]| stage.lab.ok(&[&["ctl"], args, &["--run", "exec-again"]].concat());
+    ready(&stage.lab, "exec-again");
+    ctl(&["step", "3"]);
+    ctl(&["init"]);
+    ctl(&["start"]);
     launch.finish();
     let log = stage.log("exec-again");
     let inits: Vec<(&str, &str)> =

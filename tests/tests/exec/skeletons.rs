@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use system_tests::processes::Running;
-use system_tests::{Lab, assert_same, eventually, programs, root};
+use system_tests::{Lab, assert_same, programs, root};
 
-use crate::stage::nobody_is_left;
+use crate::stage::{nobody_is_left, ready};
 
 /// A new robot in a folder of its own.
 struct Robot {
@@ -68,10 +68,7 @@ impl Robot {
         let run = format!("new-{language}-orders");
         let mut launch = self.start(&run, &["--paused"]);
         let cars = |args: &[&str]| self.lab.cars(&[args, &["--run", &run]].concat()).output().unwrap();
-        eventually("the launch to be ready", || {
-            let status = cars(&["ctl", "status", "--json"]);
-            String::from_utf8_lossy(&status.stdout).contains("\"ready\"").then_some(())
-        });
+        ready(&self.lab, &run);
         for order in ["rest", r#"say "boo" \ backwards"#] {
             assert!(cars(&["command", "Rosie", order]).status.success());
         }

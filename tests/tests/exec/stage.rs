@@ -73,6 +73,14 @@ pub(crate) fn nobody_is_left(run: &str) {
     eventually("the last process to be gone", || find(run).is_empty().then_some(()));
 }
 
+/// Waits until a launch that is paused has gathered its robots.
+pub(crate) fn ready(lab: &Lab, run: &str) {
+    eventually("the launch to be ready", || {
+        let status = lab.cars(&["ctl", "status", "--json", "--run", run]).output().unwrap();
+        String::from_utf8_lossy(&status.stdout).contains("\"ready\"").then_some(())
+    });
+}
+
 /// Waits until there is no process of this number any more.
 pub(crate) fn is_gone(pid: &str) {
     let stat = format!("/proc/{}/stat", pid.trim());

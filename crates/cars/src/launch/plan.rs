@@ -210,7 +210,34 @@ fn quote(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use simulator::diagnostic::Source;
+
     use super::*;
+
+    #[test]
+    fn what_stands_after_two_dashes_is_not_told_the_robots_name() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let with_name = |text| with_own_args(&words(text), words("--name Rosie")).join(" ");
+        assert_eq!(with_name("exec -- ./robot.sh -- -v"), "exec --name Rosie -- ./robot.sh -- -v");
+        assert_eq!(with_name("--loud"), "--loud --name Rosie");
+    }
+
+    #[test]
+    fn a_program_after_two_dashes_is_found_from_the_launch_file() {
+        let text = "scenario = \"x.toml\"\n[[process]]\nname = \"Rosie\"\n\
+                    command = [\"sh\", \"-c\", \"./sh\", \"--\", \"./sh\", \"./sh\"]";
+        let file = |text: &str| {
+            let source = Source { name: "launch.toml".to_owned(), text: text.to_owned() };
+            LaunchFile::parse(source, Path::new("/usr/../bin")).unwrap()
+        };
+        let located = |file: &LaunchFile| {
+            let (process, places) = (&file.processes[0], Places::new(&file.folder));
+            locate_inner(file, process, process.command[1..].to_vec(), &places)
+        };
+        assert_eq!(located(&file(text)).unwrap(), ["-c", "./sh", "--", "/usr/../bin/./sh", "./sh"]);
+        let wrong = located(&file(&text.replace("\"--\", \"./sh\"", "\"--\", \"./nobody\""))).unwrap_err();
+        assert!(wrong.to_string().contains("there is no program ./nobody"), "{wrong}");
+    }
 
     #[test]
     fn a_command_line_can_be_pasted_into_a_shell() {
