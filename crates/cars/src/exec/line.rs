@@ -288,3 +288,64 @@ pub(super) fn quote(line: &[u8]) -> String {
     let is_whole = shown.len() >= String::from_utf8_lossy(line).trim_end().len();
     format!("`{shown}{}`", if is_whole { "" } else { "..." })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Programs without a JSON reader search these lines: the order of the fields is part of the contract.
+    #[test]
+    fn lines_are_as_the_contract_has_them() {
+        let welcome = r#"{"answer":"welcome","protocol":1,"run":"r","name":"A","generation":2,"epoch":3,"tick":4,"seed":5,
+            "stream":"robot/A#2","tick_s":0.5,"field_m":[9,8.5],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":2},
+            "roster":["A","B"],"parameters":{"v_mps":1e-7}}"#;
+        let welcome: Welcome = serde_json::from_str(welcome).unwrap();
+        let line = |told: &Told<'_>| String::from_utf8(told.line()).unwrap();
+        assert_eq!(
+            line(&Told::init(&welcome, 6, &[])),
+            "{\"type\":\"init\",\"protocol\":1,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
+             \"stream\":\"robot/A#2\",\"tick_s\":0.5,\"field_m\":[9.0,8.5],\"body_m\":0.6,\"sensing_range_m\":2.0,\
+             \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
+        );
+        let (tick, location) = (6, Point::new(1.0, 2.0));
+        let quiet = Told::Tick { tick, location, blocked: false, commands: &[], sensed: &[] };
+        assert_eq!(line(&quiet), "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0}}\n");
+        let (from, command) = (RobotName::new("B").unwrap(), "say \"x\":\n".to_owned());
+        let commands = [Arrived { from, performative: Performative::Achieve, command }];
+        let sensed = [SensedRobot { name: RobotName::new("B").unwrap(), location }];
+        assert_eq!(
+            line(&Told::Tick { tick, location, blocked: true, commands: &commands, sensed: &sensed }),
+            "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0},\"blocked\":true,\"commands\":[{\"from\":\"B\",\
+             \"performative\":\"achieve\",\"command\":\"say \\\"x\\\":\\n\"}],\"sensed\":[{\"name\":\"B\",\"location\":\
+             {\"x\":1.0,\"y\":2.0}}]}\n"
+        );
+        let answer = |result| line(&Told::Answer { result });
+        assert_eq!(answer(Answered::Value(0.1.into())), "{\"type\":\"answer\",\"value\":0.1}\n");
+        assert_eq!(answer(Answered::Error("too early")), "{\"type\":\"answer\",\"error\":\"too early\"}\n");
+        assert_eq!(
+            line(&Told::End { reason: EndReason::Finished }),
+            "{\"type\":\"end\",\"reason\":\"finished\"}\n"
+        );
+    }
+
+    #[test]
+    fn a_tick_may_end_with_no_more_than_its_type() {
+        let Said::Done(done) = Said::read(b"{\"type\":\"done\"}\n").unwrap() else { panic!("it is done") };
+        assert_eq!((done.proposal, done.speed_mps, done.emotion_state.as_str()), (None, 0.0, ""));
+        let text = br#"{"type":"done","new":1,"proposal":{"x":1,"y":-0.1},"state_variables":{"a":7,"b":true,"c":"d"}}"#;
+        let Said::Done(done) = Said::read(text).unwrap() else { panic!("it is done") };
+        assert_eq!(done.proposal, Some(Point::new(1.0, -0.1)));
+        let expected = [("a", 7.0.into()), ("b", true.into()), ("c", "d".into())];
+        assert_eq!(done.state_variables, expected.map(|(name, value)| (name.to_owned(), value)).into());
+    }
+
+    #[test]
+    fn a_bad_line_is_quoted_in_part_and_harmless() {
+        let wrong = Said::read(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes()).unwrap_err();
+        assert!(wrong.starts_with("its line `\u{fffd}[2J\u{e9}\u{e9}"), "{wrong}");
+        assert!(wrong.contains("\u{e9}...` is not understood: it is no JSON"), "{wrong}");
+        assert!(wrong.chars().filter(|c| *c == '\u{e9}').count() < QUOTED, "{wrong}");
+        assert_eq!(quote(b"short\r\n"), "`short`");
+        assert_eq!(quote(&[0xff, b'x']), "`\u{fffd}x`");
+    }
+}
