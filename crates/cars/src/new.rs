@@ -71,9 +71,9 @@ struct Skeleton {
 const LAUNCH: &str = include_str!("new/launch.toml");
 const SCENARIO: &str = include_str!("new/scenario.toml");
 const README: &str = include_str!("new/README.md");
-const OVER_PIPES: &str = "What can be said in a tick besides the line `done` (questions to other robots, commands to them, \
-                          what is near, chance) is in `docs/protocol.md` of the CARS project, \"Robots over stdin and \
-                          stdout\".";
+const OVER_PIPES: &str = "\
+What can be said in a tick besides the line `done` (questions to other robots, commands to them, what is near, chance) is in
+`docs/protocol.md` of the CARS project, \"Robots over stdin and stdout\".";
 
 impl Language {
     fn skeleton(self) -> Skeleton {
@@ -87,8 +87,8 @@ impl Language {
                 ],
                 command: r#"["./target/release/@PACKAGE@"]"#,
                 build: "cargo build --release --manifest-path @FOLDER@/Cargo.toml",
-                hint: "`docs/new-robot.md` of the CARS project makes a robot with an emotion of its own; `cargo doc --open -p \
-                       robot` says what a robot can do in a tick.",
+                hint: "`docs/new-robot.md` of the CARS project makes a robot with an emotion of its own;\n\
+                       `cargo doc --open -p robot` says what a robot can do in a tick.",
             },
             Self::Python => Skeleton {
                 language: "Python",

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
@@ -82,13 +83,18 @@ pub struct Host {
 
 /// Lets another thread end [`Host::run`]: for a signal, or when what a robot needs is gone.
 #[derive(Debug, Clone)]
-pub struct Stopper(SyncSender<Event>);
+pub struct Stopper {
+    is_stopped: Arc<AtomicBool>,
+    queue: SyncSender<Event>,
+}
 
 impl Stopper {
     /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Questions that the
     /// tick still asks are interrupted.
     pub fn stop(&self) {
-        let _over = self.0.send(Event::Stop);
+        self.is_stopped.store(true, Ordering::SeqCst);
+        // Wakes a loop that waits; one whose queue is full does not.
+        let _woken = self.queue.try_send(Event::Stop);
     }
 }
 
@@ -229,7 +235,7 @@ impl Host {
     /// What ends [`Host::run`] from another thread.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
-        Stopper(self.link.queue())
+        Stopper { is_stopped: self.link.is_stopped.clone(), queue: self.link.queue() }
     }
 
     /// Runs until the run ends.
@@ -246,7 +252,7 @@ impl Host {
                         break Err(error);
                     }
                 }
-                None if self.link.is_stopped => break Err(HostError::Stopped),
+                None if self.link.is_stopped() => break Err(HostError::Stopped),
                 None => {}
             }
             if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())

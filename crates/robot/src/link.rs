@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
@@ -80,7 +81,7 @@ pub(crate) struct Link {
     /// How long to go on without a simulator.
     patience: Duration,
     /// Whether the process wants to leave.
-    pub(crate) is_stopped: bool,
+    pub(crate) is_stopped: Arc<AtomicBool>,
 }
 
 impl Link {
@@ -102,7 +103,7 @@ impl Link {
             repeat_ticks: 2,
             simulator_gone: None,
             patience,
-            is_stopped: false,
+            is_stopped: Arc::default(),
         }
     }
 
@@ -115,7 +116,7 @@ impl Link {
     pub(crate) fn next_clock(&mut self, patience: Duration) -> Option<Clock> {
         let deadline = Instant::now() + patience;
         loop {
-            if self.is_stopped {
+            if self.is_stopped() {
                 return None;
             }
             while let Some(clock) = self.clocks.pop_front() {
@@ -137,6 +138,11 @@ impl Link {
     /// The clock that is being answered: epoch and tick.
     pub(crate) fn current(&self) -> Asked {
         self.current
+    }
+
+    /// Whether the process wants to leave.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::SeqCst)
     }
 
     /// A tick begins: what was known for the one before is of no use any more.
@@ -181,7 +187,7 @@ impl Link {
                     self.percepts.entry((of, asked)).or_insert(percept);
                 }
             }
-            Event::Stop => self.is_stopped = true,
+            Event::Stop => {} // The flag says so.
             Event::Simulator(true) => self.simulator_gone = None,
             Event::Simulator(false) => self.simulator_gone = Some(Instant::now()),
         }
@@ -208,7 +214,7 @@ impl Link {
     /// shows that the simulator has gone on without us, or the process wants to leave.
     fn is_interrupted(&self) -> bool {
         let ends_it = |clock: &Clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some();
-        self.is_stopped || self.clocks.iter().any(ends_it)
+        self.is_stopped() || self.clocks.iter().any(ends_it)
     }
 
     /// Asks for a message once, and follows its key from then on: whoever serves it sends it without being asked, before

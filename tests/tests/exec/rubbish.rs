@@ -37,7 +37,12 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
         r#"say '{"type":"panel","widgets":[{"widget":"dance"}]}'"#,
         &["field widgets[0]", "unknown variant `dance`"],
     ),
-    ("twice", r#"say '{"type":"done"}'"#, &[r#"its program said `{"type":"done"}` outside a tick"#]),
+    // In one piece, so that both are there when the next tick begins.
+    (
+        "twice",
+        r#"printf '{"type":"done"}\n{"type":"done"}\n'; continue"#,
+        &[r#"its program said `{"type":"done"}` outside a tick"#],
+    ),
     (
         "long",
         "head -c 3000000 /dev/zero | tr '\\0' x",
@@ -78,7 +83,6 @@ fn every_mishap_is_named_and_ends_the_robot() {
     std::thread::scope(|scope| {
         for (name, lines, expected) in MISHAPS {
             scope.spawn(move || {
-                // `twice` must be there when the next tick begins, so the extra line comes before the real one.
                 let lines = format!(r#"case $json in *'"type":"tick","tick":3,'*) {lines} ;; esac"#);
                 let (run, stage) = (format!("exec-mishap-{name}"), Stage::each_tick(&lines, ""));
                 let mut launch = stage.start(&run, &["--speed", "20"]);
@@ -120,16 +124,21 @@ fn a_program_that_is_not_there_is_named() {
 
 #[test]
 fn a_dead_program_is_lost_where_the_clock_goes_on() {
-    let stage =
-        Stage::each_tick(r#"case $json in *'"type":"tick","tick":10,'*) exit 3 ;; esac"#, "required = false");
-    for run in ["exec-lost", "exec-lost-again"] {
-        let mut launch = stage.start(run, &["--set", "on_late=continue"]);
-        launch.finish();
-        let lost: Vec<_> =
-            stage.lab.events(run).into_iter().filter(|event| event["event"] == "lost").collect();
-        assert_eq!(lost.len(), 1, "{lost:?}");
-        assert_eq!((&lost[0]["robot"], &lost[0]["tick"]), (&"Leguin".into(), &10.into()));
-        assert!(stage.log(run).contains("its program ended with exit status 3"), "{}", stage.log(run));
-        nobody_is_left(run);
+    let silent = r#"case $json in *'"type":"tick","tick":10,'*) exit 3 ;; esac"#;
+    // A tick that it has answered counts.
+    let answering = r#"case $json in *'"type":"tick","tick":10,'*) say '{"type":"done"}'; exit 3 ;; esac"#;
+    for (name, lines, tick) in [("silent", silent, 10), ("answering", answering, 11)] {
+        let stage = Stage::each_tick(lines, "required = false");
+        for time in 1..=2 {
+            let run = format!("exec-lost-{name}-{time}");
+            stage.start(&run, &["--set", "on_late=continue"]).finish();
+            let mut lost = stage.lab.events(&run);
+            lost.retain(|event| event["event"] == "lost");
+            assert_eq!(lost.len(), 1, "{lost:?}");
+            assert_eq!((&lost[0]["robot"], &lost[0]["tick"]), (&"Leguin".into(), &tick.into()), "{name}");
+            let log = stage.log(&run);
+            assert!(log.contains("its program ended with exit status 3"), "{log}");
+            nobody_is_left(&run);
+        }
     }
 }

@@ -111,10 +111,11 @@ impl Program {
             rest.recv_timeout(REST_OF_OUTPUT) == Err(RecvTimeoutError::Timeout);
         *lock(&self.status) = status.ok();
         self.ended.notify_all();
-        let _over = self.heard.send(Heard::Ended);
+        // Between two ticks nobody listens to the program.
         if let Some(stopper) = stopper.get() {
             stopper.stop();
         }
+        let _over = self.heard.send(Heard::Ended);
     }
 
     /// Writes a line to the program.
@@ -211,7 +212,8 @@ fn read_lines(stdout: ChildStdout, heard: &SyncSender<Heard>) {
 fn forward(mut stderr: ChildStderr, name: &RobotName, tail: &Tail) {
     let (mut buffer, mut lines) = (vec![0; 16 * 1024], Lines::default());
     let show = |line: String| {
-        eprintln!("{name}: {line}");
+        // Who reads ours may be gone; the program is not to notice.
+        let _unread = writeln!(std::io::stderr(), "{name}: {line}");
         tail.push(line);
     };
     while let Ok(read @ 1..) = stderr.read(&mut buffer) {

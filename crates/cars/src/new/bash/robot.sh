@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
 #
-# `cars exec` speaks the simulator's protocol for it: one JSON object a line, over standard input and output. What it writes
-# to standard error is shown by the launcher, and kept in the log of its process.
+# `cars exec` speaks the simulator's protocol for it: it is told and answers with one JSON object a
+# line, over standard input and output. What it writes to standard error is shown by the launcher,
+# and kept in the log of its process.
 #
-# No program but Bash is needed. Lines are searched with regular expressions: `type` is their first field, and a quotation
-# mark inside a text has a backslash before it, so "x": can only be a field. Bash counts in whole numbers only, so this
-# robot counts in millionths: micrometers and microseconds.
+# No program but Bash is needed. Lines are searched with regular expressions: `type` is their first
+# field, and a quotation mark inside a text has a backslash before it, so "x": can only be a field.
+# Bash counts in whole numbers only, so this robot counts in millionths: micrometers, microseconds.
 set -u
 LC_ALL=C
 
@@ -31,21 +32,25 @@ decimal() {
 # Where it really stands: if somebody was in the way, that is where it was.
 stand() {
     millionths 'location":\{"x'; x=$REPLY
-    [[ $line =~ \"location\":\{\"x\":[^,]*,\"y\":([^\}]*)\} ]] && y=${BASH_REMATCH[1]} # As it is: it is only given back.
+    # As it is: it is only given back.
+    [[ $line =~ \"location\":\{\"x\":[^,]*,\"y\":([^\}]*)\} ]] && y=${BASH_REMATCH[1]}
 }
 
-# Before tick 0, and whenever the run begins anew: start from nothing. `parameters` are [robot.params] of the scenario, in
-# SI units.
+# Before tick 0, and whenever the run begins anew: start from nothing. Parameters are [robot.params] of
+# the scenario, in SI units.
 init() {
     stand
     millionths tick_s; tick_us=$REPLY
-    millionths walk_m; from=$x to=$((x + REPLY)) # The ends of its stroll; it is on its way to the second.
+    # The ends of its stroll; it is on its way to the second.
+    millionths walk_m; from=$x to=$((x + REPLY))
     millionths speed_mps; speed=$REPLY
     millionths patience_s; patience_us=$REPLY
     held_up_us=0 # Its measure of progress: for how long it has been held up.
     turns=0 emotion=HAPPY behavior=STROLL
     # What people see of it: two buttons that send it commands.
-    say '{"type":"panel","widgets":[{"widget":"button","label":"Rest","command":"rest"},{"widget":"button","label":"Stroll","command":"stroll"}]}'
+    say '{"type":"panel","widgets":['\
+'{"widget":"button","label":"Rest","command":"rest"},'\
+'{"widget":"button","label":"Stroll","command":"stroll"}]}'
 }
 
 turn() {
@@ -106,7 +111,10 @@ finish() {
     decimal "$goal"; goal_m=$REPLY
     decimal "$now"; now_mps=$REPLY
     decimal "$held_up_us"; held_up_s=$REPLY
-    say '{"type":"done","proposal":{"x":'"$goal_m"',"y":'"$y"'},"speed_mps":'"$now_mps"',"direction_rad":'"$direction"',"emotion_state":"'"$emotion"'","behavior_state":"'"$behavior"'","state_variables":{"held_up_s":'"$held_up_s"',"turns":'"$turns"'}}'
+    say '{"type":"done","proposal":{"x":'"$goal_m"',"y":'"$y"'},'\
+'"speed_mps":'"$now_mps"',"direction_rad":'"$direction"','\
+'"emotion_state":"'"$emotion"'","behavior_state":"'"$behavior"'",'\
+'"state_variables":{"held_up_s":'"$held_up_s"',"turns":'"$turns"'}}'
 }
 
 while IFS= read -r line; do
@@ -116,7 +124,7 @@ while IFS= read -r line; do
             # In the middle of a run it is not answered: the tick that follows at once is.
             if [[ $line == *'"tick":0,'* ]]; then finish; fi
             ;;
-        '{"type":"tick"'*) tick && finish ;;
+        '{"type":"tick"'*) tick; finish ;;
         '{"type":"end"'*) exit 0 ;;
     esac
 done

@@ -1,10 +1,12 @@
 /* @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
  *
- * `cars exec` speaks the simulator's protocol for it: one JSON object a line, over standard input and output. What it writes
- * to standard error is shown by the launcher, and kept in the log of its process.
+ * `cars exec` speaks the simulator's protocol for it: it is told and answers with one JSON object a
+ * line, over standard input and output. What it writes to standard error is shown by the launcher,
+ * and kept in the log of its process.
  *
- * No library but the standard one is needed. Lines are searched for what stands in front of a value: `type` is their first
- * field, and a quotation mark inside a text has a backslash before it, so "x": can only be a field.
+ * No library but the standard one is needed. Lines are searched for what stands in front of a value:
+ * `type` is their first field, and a quotation mark inside a text has a backslash before it, so "x":
+ * can only be a field.
  */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
@@ -15,7 +17,8 @@
 
 /* All that it remembers: init sets everything. Meters, seconds. */
 static struct {
-    double tick_s, walk_m, speed_mps, patience_s; /* the latter three: [robot.params] of the scenario, in SI units */
+    double tick_s;
+    double walk_m, speed_mps, patience_s; /* [robot.params] of the scenario, in SI units */
     double x, y;
     double from_x, to_x; /* the ends of its stroll; it is on its way to the second */
     double held_up_s;    /* its measure of progress: for how long it has been held up */
@@ -55,7 +58,8 @@ static void init(const char *line) {
     robot.from_x = robot.x;
     robot.to_x = robot.x + robot.walk_m;
     /* What people see of it: two buttons that send it commands. */
-    puts("{\"type\":\"panel\",\"widgets\":[{\"widget\":\"button\",\"label\":\"Rest\",\"command\":\"rest\"},"
+    puts("{\"type\":\"panel\",\"widgets\":["
+         "{\"widget\":\"button\",\"label\":\"Rest\",\"command\":\"rest\"},"
          "{\"widget\":\"button\",\"label\":\"Stroll\",\"command\":\"stroll\"}]}");
 }
 
@@ -75,13 +79,16 @@ static void obey(const char *line) {
         command += strlen(what);
         int size = length(command);
         line = command + size;
-        bool rests = size == 4 && !strncmp(command, "rest", 4), strolls = size == 6 && !strncmp(command, "stroll", 6);
+        bool rests = size == 4 && !strncmp(command, "rest", 4);
+        bool strolls = size == 6 && !strncmp(command, "stroll", 6);
         /* The texts are JSON already. */
         if (rests || strolls) {
             robot.is_resting = rests;
-            printf("{\"type\":\"log\",\"text\":\"obeys %.*s: %.*s\"}\n", length(sender), sender, size, command);
+            printf("{\"type\":\"log\",\"text\":\"obeys %.*s: %.*s\"}\n",
+                   length(sender), sender, size, command);
         } else {
-            printf("{\"type\":\"log\",\"text\":\"does not know how to %.*s\"}\n", size, command);
+            printf("{\"type\":\"log\",\"text\":\"does not know how to %.*s\"}\n",
+                   size, command);
         }
     }
 }
@@ -106,13 +113,14 @@ static void tick(const char *line) {
     if (robot.x == robot.to_x) turn();
 }
 
-/* The end of every tick: where it wants to stand at the next one, and what others may learn. 17 digits are the whole
- * number, to the last bit. */
+/* The end of every tick: where it wants to stand at the next one, and what others may learn. 17 digits
+ * are the whole number, to the last bit. */
 static void done(void) {
-    double speed_mps = robot.is_resting ? 0 : robot.speed_mps, step = speed_mps * robot.tick_s;
-    double left = robot.to_x - robot.x;
+    double speed_mps = robot.is_resting ? 0 : robot.speed_mps;
+    double step = speed_mps * robot.tick_s, left = robot.to_x - robot.x;
     double x = fabs(left) <= step ? robot.to_x : robot.x + copysign(step, left);
-    printf("{\"type\":\"done\",\"proposal\":{\"x\":%.17g,\"y\":%.17g},\"speed_mps\":%.17g,\"direction_rad\":%s,"
+    printf("{\"type\":\"done\",\"proposal\":{\"x\":%.17g,\"y\":%.17g},"
+           "\"speed_mps\":%.17g,\"direction_rad\":%s,"
            "\"emotion_state\":\"%s\",\"behavior_state\":\"%s\","
            "\"state_variables\":{\"held_up_s\":%.17g,\"turns\":%d}}\n",
            robot.is_resting ? robot.x : x, robot.y, speed_mps, left < 0 ? "3.141593" : "0",
@@ -126,7 +134,8 @@ int main(void) {
     char *line = NULL;
     size_t size = 0;
     while (getline(&line, &size, stdin) > 0 && !is(line, "{\"type\":\"end\"")) {
-        bool is_init = is(line, "{\"type\":\"init\""), is_tick = is(line, "{\"type\":\"tick\"");
+        bool is_init = is(line, "{\"type\":\"init\"");
+        bool is_tick = is(line, "{\"type\":\"tick\"");
         if (is_init) init(line);
         if (is_tick) tick(line);
         /* An init in the middle of a run is not answered: the tick that follows at once is. */

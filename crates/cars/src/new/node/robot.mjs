@@ -1,8 +1,9 @@
 #!/usr/bin/env node
 // @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
 //
-// `cars exec` speaks the simulator's protocol for it: one JSON object a line, over standard input and output. What it writes
-// to standard error is shown by the launcher, and kept in the log of its process.
+// `cars exec` speaks the simulator's protocol for it: it is told and answers with one JSON object a
+// line, over standard input and output. What it writes to standard error is shown by the launcher,
+// and kept in the log of its process.
 
 import { createInterface } from "node:readline";
 
@@ -17,7 +18,7 @@ function init({ location, parameters, tick_s }) {
     ...parameters, // `[robot.params]` of the scenario, in SI units
     tick_s,
     at: location,
-    // The ends of its stroll, meters from the left edge of the field; it is on its way to the second.
+    // The ends of its stroll, meters from the left edge; it is on its way to the second.
     endsX: [location.x, location.x + parameters.walk_m],
     heldUpS: 0, // its measure of progress: for how long it has been held up, seconds
     turns: 0,
@@ -54,7 +55,8 @@ function tick({ location, blocked = false, commands = [] }) {
   commands.forEach(obey);
 
   // Progress.
-  robot.heldUpS = blocked ? robot.heldUpS + robot.tick_s : Math.max(robot.heldUpS - robot.tick_s / 2, 0);
+  if (blocked) robot.heldUpS += robot.tick_s;
+  else robot.heldUpS = Math.max(robot.heldUpS - robot.tick_s / 2, 0);
 
   // The emotion state generator: progress in, emotion out.
   const wasFrustrated = robot.isFrustrated;

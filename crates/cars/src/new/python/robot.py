@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """@NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
 
-In every tick the methods of the robot are called in this order: ``set_current_location``, ``set_command`` for each command,
-``update_state_variables``, ``update_emotion_state``, ``update_behavior_state``, ``project_location``; then the others learn
-what the getters return.
+In every tick the methods of the robot are called in this order: ``set_current_location``,
+``set_command`` for each command, ``update_state_variables``, ``update_emotion_state``,
+``update_behavior_state``, ``project_location``; then the others learn what the getters return.
 """
 
 import math
@@ -17,7 +17,7 @@ from cars_robot.panel import Button
 
 @dataclass
 class Parameters:
-    """``[robot.params]`` of the scenario, in SI units. An unknown name is an error, and no other experiment."""
+    """``[robot.params]`` of the scenario, in SI units. An unknown name is an error."""
 
     walk_m: float
     speed_mps: float
@@ -29,7 +29,7 @@ class Stroller(cars_robot.Robot):
         """Before tick 0, and whenever the run begins anew: start from nothing."""
         self.parameters = cars.parameters(Parameters)
         self.at = cars.welcome.location
-        # The ends of its stroll, meters from the left edge of the field; it is on its way to the second.
+        # The ends of its stroll, meters from the left edge; it is on its way to the second.
         self.ends_x = [self.at.x, self.at.x + self.parameters.walk_m]
         # Its measure of progress: for how long it has been held up, seconds.
         self.held_up_s = 0.0
@@ -54,7 +54,7 @@ class Stroller(cars_robot.Robot):
         cars.log(f"obeys {sender}: {command}")
 
     def update_state_variables(self, cars: Cars) -> None:
-        """What it measures itself by. To look around or to ask others: ``cars.percept()``,
+        """What it measures itself by. To look around: ``cars.percept()``; to ask others:
         ``cars.get_robot_state("Butler")``."""
         if cars.was_blocked:
             self.held_up_s += cars.tick_s

@@ -1,12 +1,12 @@
 //! @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
 //!
-//! In every tick the methods of `Robot` are called in this order: `set_current_location`, `set_command` for each command,
-//! `update_state_variables`, `update_emotion_state`, `update_behavior_state`, `project_location`; then the others learn
-//! what the getters return.
+//! In every tick the methods of `Robot` are called in this order: `set_current_location`,
+//! `set_command` for each command, `update_state_variables`, `update_emotion_state`,
+//! `update_behavior_state`, `project_location`; then the others learn what the getters return.
 
 use robot::{BadParameters, Cars, Panel, Point, Robot, RobotName, StateVariables, Widget};
 
-/// `[robot.params]` of the scenario, in SI units. An unknown name is an error, and no other experiment.
+/// `[robot.params]` of the scenario, in SI units. An unknown name is an error.
 #[derive(Default, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Parameters {
@@ -20,7 +20,7 @@ struct Parameters {
 struct Stroller {
     parameters: Parameters,
     at: Point,
-    /// The ends of its stroll, meters from the left edge of the field; it is on its way to the second.
+    /// The ends of its stroll, meters from the left edge; it is on its way to the second.
     ends_x: [f64; 2],
     /// Its measure of progress: for how long it has been held up, seconds.
     held_up_s: f64,
@@ -41,7 +41,12 @@ impl Robot for Stroller {
     // Before tick 0, and whenever the run begins anew: start from nothing.
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         let (parameters, at): (Parameters, _) = (cars.parameters()?, cars.welcome().location);
-        *self = Self { ends_x: [at.x, at.x + parameters.walk_m], parameters, at, ..Self::default() };
+        *self = Self {
+            ends_x: [at.x, at.x + parameters.walk_m],
+            parameters,
+            at,
+            ..Self::default()
+        };
         Ok(())
     }
 
@@ -59,7 +64,8 @@ impl Robot for Stroller {
         cars.log(format!("obeys {from}: {command}"));
     }
 
-    // What it measures itself by. To look around or to ask others: `cars.percept()`, `cars.get_robot_state("Butler")`.
+    // What it measures itself by. To look around: `cars.percept()`; to ask others:
+    // `cars.get_robot_state("Butler")`.
     fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
         if cars.was_blocked() {
             self.held_up_s += cars.tick_s();
@@ -91,7 +97,11 @@ impl Robot for Stroller {
     // Where it wants to stand at the next tick.
     fn project_location(&mut self, cars: &mut Cars<'_>) -> Point {
         let (step, left) = (self.speed() * cars.tick_s(), self.ends_x[1] - self.at.x);
-        let x = if left.abs() <= step { self.ends_x[1] } else { self.at.x + step.copysign(left) };
+        let x = if left.abs() <= step {
+            self.ends_x[1]
+        } else {
+            self.at.x + step.copysign(left)
+        };
         Point::new(if self.is_resting { self.at.x } else { x }, self.at.y)
     }
 
@@ -100,19 +110,35 @@ impl Robot for Stroller {
     }
 
     fn speed(&self) -> f64 {
-        if self.is_resting { 0.0 } else { self.parameters.speed_mps }
+        if self.is_resting {
+            0.0
+        } else {
+            self.parameters.speed_mps
+        }
     }
 
     fn direction(&self) -> f64 {
-        if self.ends_x[1] < self.at.x { std::f64::consts::PI } else { 0.0 }
+        if self.ends_x[1] < self.at.x {
+            std::f64::consts::PI
+        } else {
+            0.0
+        }
     }
 
     fn state_variables(&self) -> StateVariables {
-        [("held_up_s".into(), self.held_up_s.into()), ("turns".into(), self.turns.into())].into()
+        [
+            ("held_up_s".into(), self.held_up_s.into()),
+            ("turns".into(), self.turns.into()),
+        ]
+        .into()
     }
 
     fn emotion_state(&self) -> &str {
-        if self.is_frustrated { "FRUSTRATED" } else { "HAPPY" }
+        if self.is_frustrated {
+            "FRUSTRATED"
+        } else {
+            "HAPPY"
+        }
     }
 
     fn behavior_state(&self) -> &str {
@@ -121,8 +147,13 @@ impl Robot for Stroller {
 
     // What people see of it, and two buttons that send it commands.
     fn panel(&self) -> Panel {
-        let button = |label: &str, command: &str| Widget::Button { label: label.into(), command: command.into() };
-        Panel { widgets: vec![button("Rest", "rest"), button("Stroll", "stroll")] }
+        let button = |label: &str, command: &str| Widget::Button {
+            label: label.into(),
+            command: command.into(),
+        };
+        Panel {
+            widgets: vec![button("Rest", "rest"), button("Stroll", "stroll")],
+        }
     }
 }
 
