@@ -5,8 +5,8 @@
  *     cc -std=c11 -O2 -ffp-contract=off -o leguin leguin.c -lm
  *     cars exec --name Leguin -- ./leguin
  *
- * She speaks JSON Lines over stdin and stdout (docs/protocol.md, "Robots over stdin and stdout") and needs the C library
- * and nothing else. Her tables and her arithmetic are those of crates/robots/src/leguin, in the same order, so that a
+ * She speaks JSON Lines over stdin and stdout (docs/protocol.md, "Robots over stdin and stdout"), and needs nothing but
+ * the C library. Her tables and her arithmetic are those of crates/robots/src/leguin, in the same order, so that a
  * run with her is, byte for byte, a run with the Leguin in Rust. Units are SI. [D] and [I] mean what they mean there:
  * documented, chosen. She allocates nothing: a line that does not fit ends her with a message.
  */
@@ -25,11 +25,12 @@
 /*
  * a * b + c rounds twice, here as in every other language. Where the machine can, a compiler may fuse it into one
  * instruction that rounds once (GCC does by itself, unless told -std=c11): another number in the last bit, and soon
- * another run. So it is forbidden here, whatever the command line forgets. Arithmetic that is wider than double, or that
- * is allowed to be sloppy, has no such switch and is refused.
+ * another run. So it is forbidden here, whatever the command line forgets; and so is GCC's vectorizing, which fuses
+ * (a * b - c * d, a * d + b * c) all the same (seen with GCC 12, -O3 -mfma -ffp-contract=off). Arithmetic that is wider
+ * than double, or that is allowed to be sloppy, cannot be forbidden here and is refused.
  */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("fp-contract=off")
+#pragma GCC optimize("fp-contract=off", "no-tree-vectorize", "no-tree-slp-vectorize")
 #else
 #pragma STDC FP_CONTRACT OFF
 #endif
@@ -165,7 +166,7 @@ static double most(double a, double b)
     return b > a ? b : a;
 }
 
-/* A direction, all equally probable: a place in the unit disc, drawn until it is inside and not too near to the middle. */
+/* A direction, all equally probable: a place in the unit disc, drawn until it is inside and not near the middle. */
 static struct heading random_heading(struct stream *stream)
 {
     for (;;) {
@@ -234,12 +235,12 @@ static int32_t hexadecimal(const char *at)
 {
     int32_t code = 0;
     for (int i = 0; i < 4; i++) {
-        char c = at[i];
-        int32_t digit = is_digit(c) ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-        if (digit < 0) {
+        static const char DIGITS[] = "0123456789abcdef0123456789ABCDEF";
+        const char *digit = at[i] ? strchr(DIGITS, at[i]) : NULL;
+        if (!digit) {
             return -1;
         }
-        code = code * 16 + digit;
+        code = code * 16 + (int32_t)((digit - DIGITS) % 16);
     }
     return code;
 }
@@ -249,8 +250,8 @@ static const char *after_sequence(const char *text)
 {
     const unsigned char *at = (const unsigned char *)text;
     unsigned first = at[0], low = 0x80, high = 0xbf;
-    int more = first >= 0xc2 && first <= 0xdf ? 1 : first >= 0xe0 && first <= 0xef ? 2 : first >= 0xf0 && first <= 0xf4 ? 3 : 0;
-    if (more == 0) {
+    int more = first < 0xe0 ? 1 : first < 0xf0 ? 2 : 3;
+    if (first < 0xc2 || first > 0xf4) {
         return NULL;
     }
     switch (first) {
@@ -688,7 +689,8 @@ static void read_bounded(struct parameters *parameters, const struct number_para
 }
 
 /* Reads the parameter if it is a number of this table. */
-static bool read_known(struct parameters *parameters, const struct number_parameter *known, size_t count, const struct walk *given)
+static bool read_known(struct parameters *parameters, const struct number_parameter *known, size_t count,
+                       const struct walk *given)
 {
     for (size_t i = 0; i < count; i++) {
         if (is_text(given->name, known[i].name)) {
@@ -730,10 +732,12 @@ static void read_dynamics(struct parameters *parameters, value given)
         if (is_text(walk.name, "label_cuts")) {
             struct walk cuts = walk_over(walk.value);
             size_t count = 0;
-            while (next(&cuts) && count < COUNT(parameters->label_cuts) && read_number(cuts.value, &parameters->label_cuts[count])) {
-                count++;
+            bool is_good = true;
+            for (; is_good && next(&cuts); count++) {
+                double *cut = count < COUNT(parameters->label_cuts) ? &parameters->label_cuts[count] : NULL;
+                is_good = cut && read_number(cuts.value, cut);
             }
-            if (count != COUNT(parameters->label_cuts)) {
+            if (!is_good || count != COUNT(parameters->label_cuts)) {
                 fail("parameter label_cuts must be four numbers");
             }
         } else if (!read_known(parameters, DYNAMICS, COUNT(DYNAMICS), &walk)) {
@@ -1023,7 +1027,7 @@ static struct point approach(struct point goal, double stop_m, double speed_mps)
     return drive(goal, stop_m, speed_mps);
 }
 
-/* Direction of her last motion, rounded to 1e-6 rad: languages whose arc tangents differ in the last bit publish the same. */
+/* Direction of her last motion. Rounded to 1e-6 rad, so that languages whose arc tangents differ in the last bit agree. */
 static double direction_rad(void)
 {
     double rounded = floor(atan2(her.legs.heading.y, her.legs.heading.x) * 1e6 + 0.5) / 1e6;
@@ -1052,8 +1056,8 @@ static bool ask_waiter(struct point *place)
     return true;
 }
 
-/* Asks and looks: where he is sensed counts for more than where he says he was, because the answer is a tick old. Without
- * an answer, a place within sensing range at which he is not sensed is one at which he is not. */
+/* Asks and looks: where he is sensed counts for more than where he says he was, because the answer is a tick old.
+ * Without an answer, a place within sensing range at which he is not sensed is one at which he is not. */
 static void watch_waiter(void)
 {
     struct peer *waiter = &her.waiter;
@@ -1087,8 +1091,8 @@ static bool is_needed(void)
     return !her.waiter.calls_another && (her.waiter.needs || is_unknown);
 }
 
-/* Whether he stands near enough. Sensing decides, being exact and of this tick; what he says only where sensing does not
- * reach so far. */
+/* Whether he stands near enough. Sensing decides, being exact and of this tick; what he says only where sensing does
+ * not reach so far. */
 static bool is_waiter_here(void)
 {
     double radius_m = told.parameters.exchange_radius_m;
@@ -1295,8 +1299,8 @@ static void update_behavior(void)
 
 /* ------------------------------------------------------------------------------------------------ a tick */
 
-/* An unknown command as the log quotes it: at most 60 characters, what cannot be printed escaped. Beyond ASCII everything
- * is taken to be printable. */
+/* An unknown command as the log quotes it: at most 60 characters, what cannot be printed escaped. Beyond ASCII
+ * everything is taken to be printable. */
 static void wonder(const struct text *command, value from)
 {
     enum { MAX_CHARACTERS = 60 };
@@ -1373,7 +1377,9 @@ static void take_news(void)
 static void update_measures(void)
 {
     const struct parameters *parameters = &told.parameters;
-    double tick_s = told.tick_s, gain = parameters->caution_gain_base + parameters->caution_gain_slope * parameters->caution;
+    double tick_s = told.tick_s;
+    /* How strongly she reacts: 1 with the defaults. */
+    double gain = parameters->caution_gain_base + parameters->caution_gain_slope * parameters->caution;
     her.lasting_s += tick_s;
     her.until_joke_s -= tick_s;
     her.waiting_s = her.behavior == AWAIT_GO_HOME ? her.waiting_s + tick_s : 0.0;
@@ -1505,13 +1511,15 @@ static void put_panel(void)
 {
     bool feels = told.parameters.affect;
     const struct point *to = goal();
-    put("{\"type\":\"panel\",\"widgets\":[{\"widget\":\"face\",\"face\":\"%s\",\"intensity\":", feels ? FEELINGS[her.emotion].face : "neutral");
+    put("{\"type\":\"panel\",\"widgets\":[{\"widget\":\"face\",\"face\":\"%s\",\"intensity\":",
+        feels ? FEELINGS[her.emotion].face : "neutral");
     put_number(her.intensity);
     put("},{\"widget\":\"badge\",\"label\":\"emotion\",\"text\":\"%s\",\"tone\":\"%s\"}", emotion_name(),
         feels ? FEELINGS[her.emotion].tone : "neutral");
     put(",{\"widget\":\"bar\",\"label\":\"intensity (%s)\",\"min\":0,\"max\":1,\"value\":", intensity_label());
     put_number(her.intensity);
-    put("},{\"widget\":\"badge\",\"label\":\"behavior\",\"text\":\"%s\",\"tone\":\"neutral\"}", BEHAVIOR_NAMES[her.behavior]);
+    put("},{\"widget\":\"badge\",\"label\":\"behavior\",\"text\":\"%s\",\"tone\":\"neutral\"}",
+        BEHAVIOR_NAMES[her.behavior]);
     put(",{\"widget\":\"text\",\"label\":\"brings\",\"text\":");
     put_bytes(told.parameters.goods.bytes, told.parameters.goods.length);
     put("},{\"widget\":\"table\",\"rows\":[");
@@ -1536,19 +1544,11 @@ static void put_panel(void)
 
 static uint64_t read_seed(value init)
 {
-    static struct text digits;
-    double number;
-    if (read_text(member(init, "seed_text"), &digits)) {
-        char *end;
-        errno = 0;
-        unsigned long long seed = strtoull(digits.bytes, &end, 10);
-        if (is_digit(digits.bytes[0]) && !*end && errno == 0) {
-            return seed;
-        }
-    } else if (read_number(member(init, "seed"), &number) && number >= 0.0 && number < 9007199254740992.0) {
-        return (uint64_t)number;
+    double seed;
+    if (!read_number(member(init, "seed"), &seed) || seed < 0.0 || seed >= 9007199254740992.0) {
+        fail("the seed is no number from 0 to 2^53 - 1");
     }
-    fail("the seed is no number below 2^64");
+    return (uint64_t)seed;
 }
 
 static void read_told(value init)
