@@ -34,7 +34,7 @@
 #else
 #pragma STDC FP_CONTRACT OFF
 #endif
-#if FLT_EVAL_METHOD != 0 || defined(__FAST_MATH__)
+#if FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD == 2 || defined(__FAST_MATH__)
 #error "doubles must be computed as doubles: compile for SSE2 (-msse2 -mfpmath=sse) and without -ffast-math"
 #endif
 _Static_assert(DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024, "a double must be an IEEE 754 double");
