@@ -1,29 +1,33 @@
 #!/usr/bin/env bash
 # A stroller in Bash alone, without jq, bc or awk: goes straight on, turns where the way is not free, and feels it when it
-# gets nowhere. It answers every hello.
+# gets nowhere. It nods to who says hello.
 #
 #     cars exec --name Bruno -- ./stroller.sh
 #
 # It speaks JSON Lines over stdin and stdout (docs/protocol.md, "Robots over stdin and stdout"). Bash has no fractions, so
-# it counts in whole millimeters and milliseconds. Two patterns read what it needs from a line: inside of JSON text every
-# quotation mark is escaped, so that `"location":` can only be the name of a member.
+# it counts in whole millimeters and milliseconds. Patterns read what it needs from a line: inside of JSON text every
+# quotation mark is escaped, so that `"location":` can only be the name of a member, and the first one is its own.
 set -uo pipefail
 LC_ALL=C # a point is a decimal point, a character is a byte
 
 readonly SPEED_MMPS=450         # how fast it goes
 readonly PATIENCE_MS=6000       # time without progress that makes it GRUMPY
 readonly SHARE_PERCENT=60       # of the last steps must have been refused for it to be no progress
-readonly POINT='\{"x":(-?[0-9.eE+-]+),"y":(-?[0-9.eE+-]+)\}'
+
+# What it reads, as patterns.
+readonly DECIMAL='^(-?)([0-9]{1,9})(\.([0-9]+))?$'
+readonly LOCATION='"location":\{"x":([0-9.eE+-]+),"y":([0-9.eE+-]+)\}'
+readonly VALUE='^\{"type":"answer","value":([0-9.eE+-]+)\}'
+readonly TICK_S='"tick_s":([0-9.]+)'
+readonly HELLO='"from":"([A-Za-z0-9_.-]+)"[^}]*"command":"hello"'
 
 fail() { printf 'stroller: %s\n' "$*" >&2; exit 1; }
 
 # Sets `thousandths` to a decimal number times 1000, rounded toward zero: 7.62 to 7620.
 in_thousandths() {
-    local number=$1 sign='' whole fraction
-    [[ $number == -* ]] && sign=- && number=${number#-}
-    [[ $number =~ ^([0-9]{1,9})(\.([0-9]+))?$ ]] || { thousandths=0; return; } # 1e-7 and its like
-    whole=${BASH_REMATCH[1]} fraction=${BASH_REMATCH[3]:-}000
-    thousandths=$((sign 10#$whole * 1000 + sign 10#${fraction:0:3}))
+    [[ $1 =~ $DECIMAL ]] || { thousandths=0; return; } # 1e-7 and its like
+    local fraction=${BASH_REMATCH[4]}000
+    thousandths=${BASH_REMATCH[1]}$((10#${BASH_REMATCH[2]} * 1000 + 10#${fraction:0:3}))
 }
 
 # Sets `decimal` to thousandths as a decimal number: -50 to -0.050.
@@ -33,15 +37,15 @@ as_decimal() {
     printf -v decimal '%s%d.%03d' "$sign" $((number / 1000)) $((number % 1000))
 }
 
-# Sets `x_mm` and `y_mm` to its own location: the one that stands outside of what it senses.
+# Sets `x_mm` and `y_mm` to its own location.
 read_location() {
-    local own=${1%%\"sensed\":*}
-    [[ $own =~ \"location\":$POINT ]] || [[ $1 =~ \"location\":$POINT ]] || fail "no location in: ${1:0:80}"
+    [[ $1 =~ $LOCATION ]] || fail "no location in: ${1:0:80}"
     local y=${BASH_REMATCH[2]}
     in_thousandths "${BASH_REMATCH[1]}"; x_mm=$thousandths
     in_thousandths "$y"; y_mm=$thousandths
 }
 
+# Sets `line` to what is told next; the end of the input is the end.
 hear() { IFS= read -r line || exit 0; }
 
 say() { printf '%s\n' "$1" || exit 1; }
@@ -50,7 +54,7 @@ say() { printf '%s\n' "$1" || exit 1; }
 draw() {
     say '{"type":"random"}'
     hear
-    [[ $line =~ ^\{.*\"value\":(-?[0-9.eE+-]+) ]] || exit 0 # the end came first
+    [[ $line =~ $VALUE ]] || exit 0 # the end came first
     in_thousandths "${BASH_REMATCH[1]}"; drawn=$thousandths
 }
 
@@ -60,21 +64,17 @@ readonly HEADING_Y=(0 707 1000 707 0 -707 -1000 -707)
 readonly HEADING_RAD=(0 0.785398 1.570796 2.356194 3.141593 -2.356194 -1.570796 -0.785398)
 
 begin() {
-    in_thousandths "$([[ $1 =~ \"tick_s\":([0-9.]+) ]] && echo "${BASH_REMATCH[1]}")"
-    tick_ms=$thousandths
-    ((tick_ms > 0)) || fail "no length of a tick in: ${1:0:80}"
-    name=''
-    [[ $1 =~ \"name\":\"([A-Za-z0-9_.-]+)\" ]] && name=${BASH_REMATCH[1]}
+    [[ $1 =~ $TICK_S ]] || fail "no tick_s in: ${1:0:80}"
+    in_thousandths "${BASH_REMATCH[1]}"; tick_ms=$thousandths
     heading=0 stuck_ms=0 refused=0 turns=0 greetings=0 emotion=CALM behavior=STROLL
 }
 
-# Answers who said hello: one command after the other is cut off the line.
+# Nods to who says hello: one command after the other is cut off the line.
 greet() {
     local rest=$1
-    while [[ $rest =~ \"from\":\"([A-Za-z0-9_.-]+)\"[^\}]*\"command\":\"hello\" ]]; do
+    while [[ $rest =~ $HELLO ]]; do
         rest=${rest#*"${BASH_REMATCH[0]}"}
         greetings=$((greetings + 1))
-        [[ ${BASH_REMATCH[1]} == "$name" || ${BASH_REMATCH[1]} == operator ]] && continue
         say "{\"type\":\"log\",\"text\":\"nods to ${BASH_REMATCH[1]}\"}"
     done
 }
@@ -146,13 +146,13 @@ finish() {
 while hear; do
     is_blocked=0
     case $line in
-        *'"type":"end"'*) exit 0 ;;
-        *'"type":"init"'*)
+        '{"type":"end"'*) exit 0 ;;
+        '{"type":"init"'*)
             begin "$line"
             read_location "$line"
-            [[ $line == *'"tick":0,'* ]] || continue # the tick that follows is answered
+            [[ $line == *'"tick":0,'* ]] || continue # it takes over, and answers the tick that follows
             ;;
-        *'"type":"tick"'*)
+        '{"type":"tick"'*)
             [[ $line == *'"blocked":true'* ]] && is_blocked=1
             read_location "$line"
             greet "$line"
