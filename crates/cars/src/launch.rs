@@ -2,13 +2,13 @@
 
 mod bar;
 mod compose;
-mod ending;
+pub(crate) mod ending;
 mod endpoint;
 pub(crate) mod file;
-mod lines;
+pub(crate) mod lines;
 mod observe;
 mod plan;
-mod process;
+pub(crate) mod process;
 mod program;
 mod restart;
 mod screen;

@@ -5,6 +5,7 @@ mod check;
 mod common;
 mod control;
 mod emotionml;
+mod exec;
 mod experiment;
 mod launch;
 mod run;
@@ -27,6 +28,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Subcommands {
+    /// Run any program as a robot, over its standard input and output: `cars exec --name Leguin -- ./leguin.sh`.
+    Exec(exec::ExecArgs),
     /// Start the processes of a launch file and run them to the end.
     Launch(launch::LaunchArgs),
     /// Run a scenario, or that of a launch file, in this process.
@@ -53,6 +56,8 @@ enum Subcommands {
         shell: clap_complete::Shell,
     },
     #[command(hide = true)]
+    ExecStart(exec::StartArgs),
+    #[command(hide = true)]
     BenchRobot(robot::RobotArgs),
     #[command(hide = true)]
     BenchEcho {
@@ -68,6 +73,8 @@ fn main() -> miette::Result<ExitCode> {
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
     match cli.subcommand {
         Subcommands::Launch(args) => launch::launch(args),
+        Subcommands::Exec(args) => exec::exec(&args),
+        Subcommands::ExecStart(args) => Ok(exec::start(&args)),
         Subcommands::Run(args) => run::run(&args),
         Subcommands::Experiment(args) => experiment::experiment(&args),
         Subcommands::Check(args) => check::check(&args),

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Declared, Publisher, Role};
@@ -11,7 +12,7 @@ use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, PublicState, Refusal, Report, Welcome};
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
-use crate::cri::{BadParameters, Robot};
+use crate::cri::{Robot, RobotError};
 use crate::link::{Event, Link};
 use crate::seat::Seat;
 
@@ -47,9 +48,12 @@ pub enum HostError {
     /// The simulator said something that cannot be understood.
     #[error(transparent)]
     Malformed(#[from] Malformed),
-    /// A robot refuses its parameters.
+    /// A robot refuses its parameters, or gave up.
     #[error(transparent)]
-    Parameters(#[from] BadParameters),
+    Robot(#[from] RobotError),
+    /// The process wants to leave ([`Stopper::stop`]).
+    #[error("stopped from within this process")]
+    Stopped,
     /// Nobody executes the run.
     #[error("no simulator of run {run} answers at {connect}; is it running, and is the run's name right?")]
     NoSimulator {
@@ -74,6 +78,18 @@ pub struct Host {
     link: Link,
     members: BTreeMap<RobotName, Member>,
     declared: Vec<Declared>,
+}
+
+/// Lets another thread end [`Host::run`]: for a signal, or when what a robot needs is gone.
+#[derive(Debug, Clone)]
+pub struct Stopper(SyncSender<Event>);
+
+impl Stopper {
+    /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Questions that the
+    /// tick still asks are interrupted.
+    pub fn stop(&self) {
+        let _over = self.0.send(Event::Stop);
+    }
 }
 
 /// One robot of the process.
@@ -210,6 +226,12 @@ impl Host {
         }
     }
 
+    /// What ends [`Host::run`] from another thread.
+    #[must_use]
+    pub fn stopper(&self) -> Stopper {
+        Stopper(self.link.queue())
+    }
+
     /// Runs until the run ends.
     ///
     /// # Errors
@@ -224,6 +246,7 @@ impl Host {
                         break Err(error);
                     }
                 }
+                None if self.link.is_stopped => break Err(HostError::Stopped),
                 None => {}
             }
             if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())
@@ -311,7 +334,7 @@ impl Member {
         link: &mut Link,
     ) -> Result<Option<(Report, PublicState)>, HostError> {
         if self.is_seated {
-            return Ok(Some(self.seat.tick(clock, link)));
+            return Ok(Some(self.seat.tick(clock, link)?));
         }
         if clock.tick > 0 && !joins {
             return Ok(None); // Its turn has not come: the clock that names it is still to be granted.

@@ -41,6 +41,8 @@ pub(crate) enum Event {
     Percept { of: RobotName, percept: Percept },
     /// The simulator came or went.
     Simulator(bool),
+    /// The process wants to leave.
+    Stop,
 }
 
 /// Epoch and tick of the state that was asked for.
@@ -77,6 +79,8 @@ pub(crate) struct Link {
     pub(crate) simulator_gone: Option<Instant>,
     /// How long to go on without a simulator.
     patience: Duration,
+    /// Whether the process wants to leave.
+    pub(crate) is_stopped: bool,
 }
 
 impl Link {
@@ -98,6 +102,7 @@ impl Link {
             repeat_ticks: 2,
             simulator_gone: None,
             patience,
+            is_stopped: false,
         }
     }
 
@@ -106,10 +111,13 @@ impl Link {
         self.queue.clone()
     }
 
-    /// The next clock, or `None` after `patience` without one.
+    /// The next clock, or `None` after `patience` without one, or where the process wants to leave.
     pub(crate) fn next_clock(&mut self, patience: Duration) -> Option<Clock> {
         let deadline = Instant::now() + patience;
         loop {
+            if self.is_stopped {
+                return None;
+            }
             while let Some(clock) = self.clocks.pop_front() {
                 // Where the simulator has gone on without us, only its last clock can still be answered; the first clock
                 // of an epoch or of an incarnation must be seen all the same.
@@ -173,6 +181,7 @@ impl Link {
                     self.percepts.entry((of, asked)).or_insert(percept);
                 }
             }
+            Event::Stop => self.is_stopped = true,
             Event::Simulator(true) => self.simulator_gone = None,
             Event::Simulator(false) => self.simulator_gone = Some(Instant::now()),
         }
@@ -195,10 +204,11 @@ impl Link {
         }
     }
 
-    /// Whether a clock has arrived that ends the tick under way before it is done: the run is over, the next epoch
-    /// begins, or the simulator has gone on without us.
+    /// Whether the tick under way is of no use any more: a clock has arrived that ends the run, begins the next epoch or
+    /// shows that the simulator has gone on without us, or the process wants to leave.
     fn is_interrupted(&self) -> bool {
-        self.clocks.iter().any(|clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some())
+        let ends_it = |clock: &Clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some();
+        self.is_stopped || self.clocks.iter().any(ends_it)
     }
 
     /// Asks for a message once, and follows its key from then on: whoever serves it sends it without being asked, before

@@ -93,9 +93,31 @@ fn guest(
     let mut env = process.env.clone();
     env.insert("CARS_RUN".to_owned(), execution.run.to_string());
     env.insert("CARS_CONNECT".to_owned(), execution.endpoint.to_owned());
-    let program = program(file, process, places)?;
-    let args = process.command.iter().skip(1).cloned().chain(args).collect();
+    let program = program(file, process, &process.command[0], places)?;
+    let args = with_own_args(&process.command[1..], args);
+    let args = locate_inner(file, process, args, places)?;
     Ok(CommandLine { program, args, env })
+}
+
+/// The arguments of a process with those that the launcher adds: what stands after a `--` is not the process's own.
+pub(super) fn with_own_args(command: &[String], own: Vec<String>) -> Vec<String> {
+    let end = command.iter().position(|arg| arg == "--").unwrap_or(command.len());
+    command[..end].iter().cloned().chain(own).chain(command[end..].iter().cloned()).collect()
+}
+
+/// A program after a `--`, as in `cars exec -- ./robot.sh`, is a path from the launch file's folder if it has a `/`, as
+/// the process's own program is.
+fn locate_inner(
+    file: &LaunchFile,
+    process: &Process,
+    mut args: Vec<String>,
+    places: &Places,
+) -> Result<Vec<String>, FileError> {
+    let inner = args.iter_mut().skip_while(|arg| *arg != "--").nth(1);
+    if let Some(inner) = inner.filter(|inner| inner.contains('/')) {
+        *inner = program(file, process, inner, places)?.display().to_string();
+    }
+    Ok(args)
 }
 
 /// How a program is told which robots it runs.
@@ -120,7 +142,7 @@ fn simulator(file: &LaunchFile, execution: &Execution, places: &Places) -> Resul
         format!("--speed={}", speed_arg(execution.speed)),
     ]);
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
-    let program = program(file, process, places)?;
+    let program = program(file, process, &process.command[0], places)?;
     let command = CommandLine { program, args, env: process.env.clone() };
     Ok(Planned { part: Part::Simulator, ..prepare(process, command) })
 }
@@ -146,8 +168,7 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
 }
 
 /// The program of a process. What somebody else starts need not be here.
-fn program(file: &LaunchFile, process: &Process, places: &Places) -> Result<PathBuf, FileError> {
-    let name = &process.command[0];
+fn program(file: &LaunchFile, process: &Process, name: &str, places: &Places) -> Result<PathBuf, FileError> {
     match places.find(name) {
         Ok(program) => Ok(program),
         Err(_) if process.is_extern => Ok(PathBuf::from(name)),
