@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import queue
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -124,7 +125,7 @@ class Bus:
             self._session = zenoh.open(_configuration(connect, patience_s, config_file))
         except zenoh.ZError as error:
             raise BusError(
-                f"cannot reach the simulator at {connect}: {error}{hint}; start it first, or say by --connect or "
+                f"cannot reach the simulator at {connect}: {_reason(error)}{hint}; start it first, or say by --connect or "
                 "CARS_CONNECT where it listens"
             ) from None
         self._declared: list[object] = []
@@ -153,14 +154,21 @@ class Bus:
         except zenoh.ZError as error:
             raise BusError(f"cannot put on {key}: {error}") from None
 
-    def subscribe(self, keys: str, handle: Callable[[str, bytes], None]) -> zenoh.Subscriber[None]:
-        """Calls ``handle(key, bytes)`` for each message put on ``keys``, on the thread that reads the link: it must
-        hand over and return. It ends when the result is undeclared."""
+    def subscribe(
+        self, keys: str, handle: Callable[[str, bytes], None], has_thread: bool = False
+    ) -> zenoh.Subscriber[None]:
+        """Calls ``handle(key, bytes)`` for each message put on ``keys``. It must hand over and return.
+
+        It runs on the thread that reads the link, so that what was put first is handed over first, also over several
+        keys; or, with ``has_thread``, later on a thread of its own. For what comes in every tick that is faster by a
+        fifth: a thread that Python did not start is made known to it anew for each message. It ends when the result is
+        undeclared.
+        """
 
         def take(sample: zenoh.Sample) -> None:
             handle(str(sample.key_expr), sample.payload.to_bytes())
 
-        return self._session.declare_subscriber(keys, zenoh.handlers.Callback(take, indirect=False))
+        return self._session.declare_subscriber(keys, zenoh.handlers.Callback(take, indirect=has_thread))
 
     def serve(self, key: str, handle: Callable[[Question], None]) -> None:
         """Calls ``handle`` for each question asked on ``key``. It must hand over and return."""
@@ -237,6 +245,11 @@ class Bus:
             self._session.close()  # type: ignore[no-untyped-call]
         except zenoh.ZError as error:
             _log.debug("closing the session: %s", error)
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """What the middleware says, without the places in its source."""
+    return re.sub(r"\s+at \S+\.rs:\d+\.?", "", str(error))
 
 
 def _configuration(connect: str, patience_s: float, config_file: Path | None) -> zenoh.Config:

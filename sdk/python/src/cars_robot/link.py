@@ -106,7 +106,8 @@ class Link:
     def listen(self) -> None:
         """Listens to the clock, and to whether the simulator is there."""
         key = self.keys.clock()
-        self.bus.subscribe(key, lambda _, data: self._hand_over(lambda: self._on_clock(key, data)))
+        # A state or a command that was put before a clock is still handed over before it: only the clock comes later.
+        self.bus.subscribe(key, lambda _, data: self._hand_over(lambda: self._on_clock(key, data)), has_thread=True)
         self.bus.watch(self.keys.alive_sim(), lambda is_there: self._hand_over(lambda: self._on_simulator(is_there)))
 
     def _hand_over(self, event: Event) -> None:

@@ -161,10 +161,13 @@ def _travelling(variables: StateVariables, log: list[str]) -> Mapping[str, Varia
     """The variables that can travel, by name; what cannot is left out, and the log says so."""
     kept: dict[str, Variable] = {}
     for name, value in sorted(variables.items()):
-        complaint = ""
         if len(kept) == MAX_ENTRIES:
-            complaint = f"is one too many of {len(variables)}"
-        elif isinstance(value, str):
+            log.append(
+                f"error: {len(variables)} state variables, more than {MAX_ENTRIES}; the last ones are left out"
+            )
+            break
+        complaint = ""
+        if isinstance(value, str):
             kept[shortened(name, MAX_TEXT_BYTES)] = shortened(value, MAX_TEXT_BYTES)
         elif not isinstance(value, (bool, int, float)):
             complaint = f"is no number, flag or text but a {type(value).__name__}"
@@ -172,6 +175,6 @@ def _travelling(variables: StateVariables, log: list[str]) -> Mapping[str, Varia
             kept[shortened(name, MAX_TEXT_BYTES)] = value
         else:
             complaint = "is not a finite number"
-        if complaint and len(log) < MAX_ENTRIES:
+        if complaint and len(log) < MAX_ENTRIES - 2:
             log.append(f"error: state variable {shortened(name, 100)} {complaint}; left out")
     return kept
