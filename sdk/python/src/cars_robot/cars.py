@@ -21,6 +21,9 @@ from .messages import (
 from .parameters import BadParameters, build
 from .streams import Stream
 
+MAX_LOG_BYTES = 1 << 18
+"""What a robot may log in a tick, UTF-8: a quarter of a message."""
+
 P = TypeVar("P")
 
 
@@ -96,7 +99,7 @@ class Outbox:
 class Cars:
     """The simulation, as one robot sees it during one tick."""
 
-    __slots__ = ("_log", "_network", "_outbox", "news", "random", "tick", "welcome")
+    __slots__ = ("_log", "_logged_bytes", "_network", "_outbox", "news", "random", "tick", "welcome")
 
     def __init__(
         self,
@@ -118,6 +121,7 @@ class Cars:
         """Its own random stream, derived from the seed and its name: the only chance it may use."""
         self._outbox = outbox
         self._log = log
+        self._logged_bytes = 0
         self._network = network
 
     @property
@@ -165,9 +169,11 @@ class Cars:
 
     def log(self, line: str) -> None:
         """Writes a line to the log of the run. It is cut to what a message may hold, and so is their number in a tick."""
-        # Room is left for what the seat itself may have to say.
-        if len(self._log) < MAX_ENTRIES // 2:
-            self._log.append(shortened(line, MAX_TEXT_BYTES))
+        line = shortened(line, MAX_TEXT_BYTES)
+        self._logged_bytes += len(line.encode())
+        # Room is left for what the seat itself may have to say, and in the message for all the rest.
+        if len(self._log) < MAX_ENTRIES // 2 and self._logged_bytes <= MAX_LOG_BYTES:
+            self._log.append(line)
 
     def set_robot_command(self, to: str, command: str) -> int:
         """Sends a command to another robot (``setRobotCommand``) and returns its number.

@@ -15,6 +15,7 @@ from .cars import Interrupted
 from .keys import QUERIES, STATE, Keys
 from .link import Link
 from .messages import (
+    MAX_MESSAGE_BYTES,
     PROTOCOL_VERSION,
     Clock,
     Refused,
@@ -269,6 +270,12 @@ class _Member:
             self._state.put(encode(state_json(report.state)))
         link.board.show(self.name, report.state)
         data = encode(report_json(report))
+        if len(data) > MAX_MESSAGE_BYTES:
+            # The simulator would refuse it and wait for another one for ever.
+            raise HostError(
+                f"the report of {self.name} is {len(data)} bytes long, more than {MAX_MESSAGE_BYTES}: publish fewer or "
+                "shorter state variables, or send shorter commands"
+            )
         self._report.put(data)
         self._last = (asked, data)
         if self._panel.is_watched:
