@@ -55,6 +55,7 @@ class Lab:
         self.programs = programs
         self.folder = folder
         self._processes: list[subprocess.Popen[str]] = []
+        self._simulators: dict[str, subprocess.Popen[str]] = {}
 
     def __enter__(self) -> Lab:
         return self
@@ -67,12 +68,25 @@ class Lab:
 
     def cars(self, *arguments: str) -> str:
         """Runs ``cars`` to its end and returns what it printed; it must succeed."""
+        done = self._run(*arguments)
+        assert done.returncode == 0, f"{arguments}: {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    def until_ready(self, *ctl: str) -> None:
+        """Waits until the simulator of a run has all its robots."""
+
+        def is_ready() -> bool | None:
+            # A simulator that has not begun to listen is one that cannot be asked.
+            asked = self._run("ctl", *ctl, "status")
+            return (asked.returncode == 0 and "ready" in asked.stdout) or None
+
+        eventually("the robots", is_ready)
+
+    def _run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         command = [str(self.programs / "cars"), *arguments]
-        done = subprocess.run(
+        return subprocess.run(
             command, cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=PATIENCE_S, check=False
         )
-        assert done.returncode == 0, f"{command}: {done.returncode}\n{done.stdout}\n{done.stderr}"
-        return done.stdout
 
     def start(self, command: list[str], **more: str) -> subprocess.Popen[str]:
         """Starts a process and leaves it running, to the end of the test at most."""
@@ -98,8 +112,12 @@ class Lab:
         file.write_text(scenario)
         endpoint = free_endpoint()
         out = ["--run", run, "--listen", endpoint, "--out", str(self.folder)]
-        self.start([str(self.programs / "cars-sim"), str(file), *out, *arguments])
+        self._simulators[run] = self.start([str(self.programs / "cars-sim"), str(file), *out, *arguments])
         return {"CARS_RUN": run, "CARS_CONNECT": endpoint}
+
+    def ended(self, run: str) -> None:
+        """Waits until a run's simulator has written everything and ended."""
+        assert self._simulators[run].wait(PATIENCE_S) == 0
 
     def launch(self, run: str, scenario: str, robots: dict[str, str], *changes: str) -> list[str]:
         """Launches a scenario of ``configs/`` with a process for each robot; gives the lines of its events.

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from lab import EXAMPLES, ROOT, Lab, assert_same, eventually
+from lab import EXAMPLES, ROOT, Lab, assert_same
 
 RUST = {"Butler": "cars-butler", "Leguin": "cars-leguin", "Vonda": "cars-vonda"}
 PYTHON = RUST | {"Leguin": "leguin.py", "Vonda": "leguin.py"}
@@ -71,6 +71,7 @@ def test_threads_of_the_middleware_and_start_order_change_nothing(lab: Lab) -> N
         arguments = [[word for name in group for word in ("--name", name)] for group in groups]
         robots = [lab.robot("walker.py", *words, **at, **more) for words in arguments]
         assert [robot.wait(60) for robot in robots] == [0] * len(groups)
+        lab.ended(run)
         runs.append(lab.events(run))
     assert_same(*runs)
 
@@ -81,7 +82,7 @@ def test_init_begins_the_same_run_anew(lab: Lab) -> None:
     ctl = ["--run", "again", "--connect", at["CARS_CONNECT"]]
     digests = []
     for _ in range(2):
-        eventually("the robots", lambda: "ready" in lab.cars("ctl", *ctl, "status") or None)
+        lab.until_ready(*ctl)
         lab.cars("ctl", *ctl, "step", "60")
         digests.append([event["digest"] for event in lab.of_kind("again", "tick")][-60:])
         lab.cars("ctl", *ctl, "init")
@@ -91,19 +92,19 @@ def test_init_begins_the_same_run_anew(lab: Lab) -> None:
 
 
 def test_one_who_is_killed_comes_back_and_takes_over(lab: Lab) -> None:
-    at = lab.simulator("back", (ROOT / "configs/hors_doeuvres.toml").read_text().replace(
-        '"robots/', f'"{ROOT}/configs/robots/'
-    ), "--paused")  # fmt: skip
+    scenario = (ROOT / "configs/hors_doeuvres.toml").read_text().replace('"robots/', f'"{ROOT}/configs/robots/')
+    at = lab.simulator("back", scenario, "--paused")
     ctl = ["--run", "back", "--connect", at["CARS_CONNECT"]]
     butler = lab.start([str(lab.programs / "cars-butler")], **at)
     first = lab.robot("leguin.py", **at)
-    eventually("the robots", lambda: "ready" in lab.cars("ctl", *ctl, "status") or None)
+    lab.until_ready(*ctl)
     lab.cars("ctl", *ctl, "step", "300")
     first.kill()
     second = lab.robot("leguin.py", **at)
     lab.cars("ctl", *ctl, "step", "300")
     lab.cars("ctl", *ctl, "stop")
     assert (butler.wait(30), second.wait(30)) == (0, 0)
+    lab.ended("back")
     said = [event["text"] for event in lab.of_kind("back", "say") if event["robot"] == "Leguin"]
     assert "is back, and takes over where the last one was lost" in said
 
@@ -145,7 +146,7 @@ def test_waiting_costs_nothing(lab: Lab) -> None:
     at = lab.simulator("held", hall("Walker"), "--paused")
     robot = lab.robot("walker.py", **at)
     ctl = ["--run", "held", "--connect", at["CARS_CONNECT"]]
-    eventually("the robot", lambda: "ready" in lab.cars("ctl", *ctl, "status") or None)
+    lab.until_ready(*ctl)
 
     def switches() -> int:
         """How often its threads were put to sleep so far."""
@@ -190,6 +191,7 @@ def test_the_benchmark_measures(lab: Lab) -> None:
 def test_the_summary_names_the_state_variables(lab: Lab) -> None:
     robot = lab.robot("walker.py", **lab.simulator("sum", hall("Walker")))
     assert robot.wait(60) == 0
+    lab.ended("sum")
     summary = json.loads((lab.folder / "sum" / "summary.json").read_text())
     assert summary["robots"]["Walker"]["state_variables"]["steps"] > 100
     assert os.path.getsize(lab.folder / "sum" / "events.jsonl") > 0
