@@ -21,9 +21,11 @@ Json = dict[str, Any]
 
 
 class Stage:
-    """A router and a simulator in one, for robots A, B and C of run ``r``."""
+    """A router and a simulator in one, for robots A, B and C of run ``r`` unless a test says otherwise."""
 
-    def __init__(self) -> None:
+    def __init__(self, run: str = "r") -> None:
+        self.run = run
+        self.root = f"cars/{run}"
         self.endpoint = free_endpoint()
         config = zenoh.Config()
         for key, value in {
@@ -39,18 +41,22 @@ class Stage:
         """Requests to join, and with each whether the robot already listened to the clock, and showed its token."""
         self.welcome: Callable[[Json], Json] = lambda request: welcome(name=request["name"])
         """What is answered to a request."""
+        self.percept: Callable[[zenoh.Query], Json] = one_guest
+        """What is answered to a robot that looks around."""
         self.alive: set[str] = set()
         self.percepts_asked = 0
         self._heard: dict[str, queue.Queue[bytes]] = {}
         self._lock = threading.Lock()
         self._processes: list[subprocess.Popen[str]] = []
-        self._clock = self.session.declare_publisher("cars/r/clock", congestion_control=zenoh.CongestionControl.BLOCK)
+        self._clock = self.session.declare_publisher(
+            f"{self.root}/clock", congestion_control=zenoh.CongestionControl.BLOCK
+        )
         self._keep: list[object] = [
-            self.session.declare_queryable("cars/r/join/**", self._on_join),
-            self.session.declare_queryable("cars/r/robot/*/percept", self._on_percept),
-            self.session.declare_subscriber("cars/r/robot/**", self._on_message),
-            self.session.liveliness().declare_subscriber("cars/r/alive/robot/*", self._on_token, history=True),
-            self.session.liveliness().declare_token("cars/r/alive/sim"),
+            self.session.declare_queryable(f"{self.root}/join/**", self._on_join),
+            self.session.declare_queryable(f"{self.root}/robot/*/percept", self._on_percept),
+            self.session.declare_subscriber(f"{self.root}/robot/**", self._on_message),
+            self.session.liveliness().declare_subscriber(f"{self.root}/alive/robot/*", self._on_token, history=True),
+            self.session.liveliness().declare_token(f"{self.root}/alive/sim"),
         ]
 
     def __enter__(self) -> Stage:
@@ -77,9 +83,7 @@ class Stage:
     def _on_percept(self, query: zenoh.Query) -> None:
         with query:
             self.percepts_asked += 1
-            tick = int(query.parameters.get("tick") or "0")
-            bodies = [{"kind": "guest", "location": {"x": 1, "y": 2}, "unknown": None}]
-            query.reply(query.key_expr, json.dumps({"epoch": 1, "tick": tick, "bodies": bodies}))
+            query.reply(query.key_expr, json.dumps(self.percept(query)))
 
     def _on_message(self, sample: zenoh.Sample) -> None:
         self._queue(str(sample.key_expr)).put(sample.payload.to_bytes())
@@ -98,7 +102,7 @@ class Stage:
         """Starts a robot, by default A."""
         process = subprocess.Popen(
             [sys.executable, str(script), *arguments],
-            env=environment(CARS_RUN="r", CARS_CONNECT=self.endpoint, **more),
+            env=environment(CARS_RUN=self.run, CARS_CONNECT=self.endpoint, **more),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -127,7 +131,7 @@ class Stage:
         if key == "clock":
             self._clock.put(data)
         else:
-            self.session.put(f"cars/r/{key}", data, congestion_control=zenoh.CongestionControl.BLOCK)
+            self.session.put(f"{self.root}/{key}", data, congestion_control=zenoh.CongestionControl.BLOCK)
 
     def command(self, seq: int, text: str, to: str = "A", sender: str = "B", **more: Any) -> None:
         """Sends a command in another robot's name."""
@@ -137,7 +141,7 @@ class Stage:
     def heard_bytes(self, key: str, patience_s: float = PATIENCE_S) -> bytes:
         """What was put next on a key of the run."""
         try:
-            return self._queue(f"cars/r/{key}").get(timeout=patience_s)
+            return self._queue(f"{self.root}/{key}").get(timeout=patience_s)
         except queue.Empty:
             raise AssertionError(f"nothing was put on {key}") from None
 
@@ -156,7 +160,7 @@ class Stage:
 
     def nothing_more(self, key: str) -> bool:
         """Whether all that was put on a key has been looked at."""
-        return self._queue(f"cars/r/{key}").empty()
+        return self._queue(f"{self.root}/{key}").empty()
 
     def tick(self, tick: int, epoch: int = 1, **news: Json) -> Json:
         """Grants a tick and returns A's report of it."""
@@ -165,10 +169,10 @@ class Stage:
         assert (report["epoch"], report["tick"]) == (epoch, tick), report
         return report
 
-    def ask(self, what: str, parameters: str = "") -> Json | str:
-        """Asks A something: the answer, or the refusal in words."""
+    def ask(self, what: str, parameters: str = "", name: str = "A") -> Json | str:
+        """Asks a robot something: the answer, or the refusal in words."""
         replies = self.session.get(
-            f"cars/r/robot/A/{what}?{parameters}", target=zenoh.QueryTarget.ALL, timeout=PATIENCE_S
+            f"{self.root}/robot/{name}/{what}?{parameters}", target=zenoh.QueryTarget.ALL, timeout=PATIENCE_S
         )
         for reply in replies:
             if reply.ok is not None:
@@ -178,6 +182,12 @@ class Stage:
             assert reply.err is not None
             return str(reply.err.payload.to_string())
         raise AssertionError(f"nobody answered {what}?{parameters}")
+
+
+def one_guest(query: zenoh.Query) -> Json:
+    """What a robot senses as of the tick for which it asks."""
+    bodies = [{"kind": "guest", "location": {"x": 1, "y": 2}, "unknown": None}]
+    return {"epoch": 1, "tick": int(query.parameters.get("tick") or "0"), "bodies": bodies}
 
 
 def welcome(**more: Any) -> Json:
