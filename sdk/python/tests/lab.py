@@ -41,11 +41,11 @@ def environment(**more: str) -> dict[str, str]:
     return own | more
 
 
-def free_endpoint() -> str:
+def free_endpoint(protocol: str = "tcp") -> str:
     """An endpoint of the loopback interface at which nobody listens."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
 
 
 class Lab:
@@ -106,11 +106,11 @@ class Lab:
         """Starts a robot in Python."""
         return self.start([sys.executable, str(EXAMPLES / script), *arguments], **more)
 
-    def simulator(self, run: str, scenario: str, *arguments: str) -> dict[str, str]:
+    def simulator(self, run: str, scenario: str, *arguments: str, protocol: str = "tcp") -> dict[str, str]:
         """Starts a simulator of this scenario; gives the environment of those who take part."""
         file = self.folder / f"{run}.toml"
         file.write_text(scenario)
-        endpoint = free_endpoint()
+        endpoint = free_endpoint(protocol)
         out = ["--run", run, "--listen", endpoint, "--out", str(self.folder)]
         self._simulators[run] = self.start([str(self.programs / "cars-sim"), str(file), *out, *arguments])
         return {"CARS_RUN": run, "CARS_CONNECT": endpoint}

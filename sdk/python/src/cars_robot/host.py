@@ -180,11 +180,9 @@ class Host:
             time.sleep(JOIN_AGAIN_S)
 
     def _ask_to_join(self, name: str, request: bytes) -> Welcome | Refused | None:
-        for key in self._keys.joins(name):
-            answer = self._bus.ask(key, request)
-            if answer is not None:
-                return decode(key, "simulator", answer, read_join_answer)
-        return None
+        key = self._keys.join(name)
+        answer = self._bus.ask(key, request)
+        return None if answer is None else decode(key, "simulator", answer, read_join_answer)
 
     def run(self) -> str:
         """Runs until the run ends, and returns how: ``finished``, ``stopped`` or ``aborted``.

@@ -22,12 +22,10 @@ class Keys:
         """Simulator to all: a tick is granted."""
         return f"{self._root}/clock"
 
-    def joins(self, robot: str) -> tuple[str, ...]:
-        """Queryable at the simulator: this robot asks to take part. Asked in turn until one is answered.
-
-        Its name is in the key so that access control can pin it; simulators before that answer on the second key.
-        """
-        return (f"{self._root}/join/{robot}", f"{self._root}/join")
+    def join(self, robot: str) -> str:
+        """Queryable at the simulator: this robot asks to take part; its name is in the key, so that access control can
+        pin it."""
+        return f"{self._root}/join/{robot}"
 
     def report(self, robot: str) -> str:
         """Robot to simulator: its tick is done."""
