@@ -95,7 +95,8 @@ fn streams_draw_the_same_numbers() {
     }
     let names = ["guests", "robot/Butler", "robot/Leguin#2", "", "caf\u{e9}"];
     let seeds = [0, 1, 42, 2002, MAX_SEED, u64::MAX];
-    let streams: Vec<(u64, &str)> = seeds.into_iter().flat_map(|seed| names.map(|name| (seed, name))).collect();
+    let streams: Vec<(u64, &str)> =
+        seeds.into_iter().flat_map(|seed| names.map(|name| (seed, name))).collect();
     let arguments = streams.iter().map(|(seed, name)| format!("{seed} {name}"));
     let output = python().args(["-c", DRAWS]).args(arguments).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
@@ -12,9 +11,6 @@ from typing import NoReturn
 import pytest
 from lab import Lab
 from stage import Stage
-
-EXAMPLES = Path(__file__).parent.parent / "examples"
-sys.path.insert(0, str(EXAMPLES))
 
 
 @pytest.fixture

@@ -39,6 +39,7 @@ class Outer:
 def test_values_become_what_they_are_declared_as() -> None:
     values = {
         "speed_mps": 2,
+        "count": 7.0,
         "mood": "bad",
         "switch": "off",
         "cuts": [1, 2.5],
@@ -49,10 +50,10 @@ def test_values_become_what_they_are_declared_as() -> None:
     }
     built = build(Outer, values)
     expected = Outer(
-        2.0, mood=Mood.BAD, switch="off", cuts=(1.0, 2.5), pair=(1.0, 2.0), table=(3.0, 4.0), anything={"a": 1}
+        2.0, 7, mood=Mood.BAD, switch="off", cuts=(1.0, 2.5), pair=(1.0, 2.0), table=(3.0, 4.0), anything={"a": 1}
     )
     expected.inner = Inner(1.0)
-    assert built == expected and isinstance(built.speed_mps, float)
+    assert built == expected and isinstance(built.speed_mps, float) and isinstance(built.count, int)
 
 
 @pytest.mark.parametrize(

@@ -295,6 +295,29 @@ def test_a_signal_ends_it_cleanly(stage: Stage, number: signal.Signals, order_: 
     stage.until_alive()
 
 
+def test_a_flood_holds_the_link_and_not_the_end(stage: Stage) -> None:
+    """[end.sigterm] More than the queue takes has arrived, and the robot is busy."""
+    robot = begin(stage)
+    stage.command(1, "sleep 600")
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    for seq in range(2, 12_000):
+        stage.command(seq, "note " + "x" * 100)
+    robot.send_signal(signal.SIGTERM)
+    assert robot.wait(20) == -signal.SIGTERM
+
+
+def test_a_flood_is_survived(stage: Stage) -> None:
+    """[command.held]"""
+    begin(stage)
+    stage.command(1, "sleep 0.5")
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    for seq in range(2, 10_000):
+        stage.command(seq, "note " + "x" * 100)
+    stage.heard("robot/A/report")
+    report = stage.tick(2, A={"commands": [{"from": "B", "seq": seq} for seq in (2, 9_999)]})
+    assert sum(line.startswith("command B note") for line in report["log"]) == 2
+
+
 DAMAGED = [
     b"",
     b"\xff\xfe",

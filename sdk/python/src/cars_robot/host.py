@@ -132,7 +132,7 @@ class Host:
             on_open()
             self._take_part(names, robots)
         except BaseException:
-            self._bus.close()
+            self._close()
             raise
 
     def _take_part(self, names: list[str], robots: Mapping[str, Robot]) -> None:
@@ -198,7 +198,11 @@ class Host:
                     return clock.end
                 self._on_clock(clock)
         finally:
-            self._bus.close()
+            self._close()
+
+    def _close(self) -> None:
+        self.link.close()
+        self._bus.close()
 
     def _on_clock(self, clock: Clock) -> None:
         """One tick of every robot of the process, in the order of their names."""

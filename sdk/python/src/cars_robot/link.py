@@ -84,6 +84,7 @@ class Link:
         self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
         self._has_room = threading.Event()
         self._has_room.set()
+        self._is_closed = False
         self._clocks: deque[Clock] = deque()
         self._commands: dict[str, Held] = {}
         self._states: dict[tuple[str, int, int], PublicState] = {}
@@ -112,11 +113,16 @@ class Link:
 
     def _hand_over(self, event: Event) -> None:
         # A full queue holds the link: back-pressure instead of loss.
-        while self._events.qsize() >= QUEUE:
+        while self._events.qsize() >= QUEUE and not self._is_closed:
             self._has_room.clear()
-            if self._events.qsize() >= QUEUE:
+            if self._events.qsize() >= QUEUE and not self._is_closed:
                 self._has_room.wait()
         self._events.put(event)
+
+    def close(self) -> None:
+        """Nobody will look at what arrives: nothing may wait for room any more."""
+        self._is_closed = True
+        self._has_room.set()
 
     def stop(self) -> None:
         """Ends the robots' loop from a signal handler."""

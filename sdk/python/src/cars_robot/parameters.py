@@ -44,31 +44,36 @@ def build(kind: type[P], values: Mapping[str, Any], path: str = "") -> P:
 
 def _convert(kind: Any, value: Any, path: str) -> Any:
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-        if isinstance(value, dict):
-            return build(kind, value, f"{path}.")
-    elif origin is tuple:
-        if isinstance(value, list) and (len(value) == len(arguments) or arguments[1:] == (...,)):
-            kinds = arguments if arguments[1:] != (...,) else arguments[:1] * len(value)
+    if type(None) in arguments:
+        wanted = next(one for one in arguments if one is not type(None))
+        return None if value is None else _convert(wanted, value, path)
+    if isinstance(kind, type) and dataclasses.is_dataclass(kind) and isinstance(value, dict):
+        return build(kind, value, f"{path}.")
+    if origin is tuple and isinstance(value, list):
+        kinds = arguments[:1] * len(value) if arguments[1:] == (...,) else arguments
+        if len(kinds) == len(value):
             return tuple(_convert(one, part, path) for one, part in zip(kinds, value, strict=True))
-    elif origin is typing.Literal:
-        if value in arguments:
-            return value
-        raise ValueError(f"{path} must be one of {', '.join(map(str, arguments))}, not {value!r}")
-    elif isinstance(kind, type) and issubclass(kind, enum.Enum):
-        try:
-            return kind(value)
-        except ValueError:
-            known = ", ".join(str(member.value) for member in kind)
-            raise ValueError(f"{path} must be one of {known}, not {value!r}") from None
-    elif type(None) in arguments:
-        wanted = [one for one in arguments if one is not type(None)]
-        return None if value is None else _convert(wanted[0], value, path)
-    elif kind is float:
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value)
-    elif kind is Any or type(value) is kind:
+    if origin is typing.Literal:
+        return _choose({one: one for one in arguments}, value, path)
+    if isinstance(kind, type) and issubclass(kind, enum.Enum):
+        return _choose({member.value: member for member in kind}, value, path)
+    return _plain(kind, value, path)
+
+
+def _choose(known: Mapping[Any, Any], value: Any, path: str) -> Any:
+    if not isinstance(value, (str, int, float)) or value not in known:
+        raise ValueError(f"{path} must be one of {', '.join(map(str, known))}, not {value!r}")
+    return known[value]
+
+
+def _plain(kind: Any, value: Any, path: str) -> Any:
+    if kind is Any or type(value) is kind:
         return value
+    # 7 and 7.0 are the same number.
+    if kind is float and type(value) is int:
+        return float(value)
+    if kind is int and type(value) is float and value.is_integer():
+        return int(value)
     raise ValueError(f"{path} must be {_words(kind)}, not {value!r}")
 
 
