@@ -55,6 +55,27 @@ def test_leguin_in_python_gives_the_same_run(lab: Lab, scenario: str, team: list
     assert_same(python, lab.play("local", scenario, *changes))
 
 
+FAULTS = {
+    "a crash while the run goes on": 'robot = "Leguin", do = "crash", at = "100 s", until = "120 s"',
+    "a hang while the run goes on": 'robot = "Leguin", do = "hang", at = "50 s", until = "70 s"',
+    "a crash that is waited for": 'robot = "Leguin", do = "crash", at = "50 s", for = "0.5 s"',
+    # Long enough that its link is given up, too.
+    "a hang that is waited for": 'robot = "Leguin", do = "hang", at = "50 s", for = "3 s"',
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_leguin_that_falters_gives_the_same_run(lab: Lab, fault: str) -> None:
+    """What happens to a process is part of the seed, too; who returns takes over as in Rust."""
+    on_late = "wait" if "waited" in fault else "continue"
+    changes = ["--set", f"fault=[{{ {FAULTS[fault]} }}]", "--set", f"on_late={on_late}", "--duration", "200 s"]
+    names = ("Butler", "Leguin")
+    python = lab.launch("python", "hors_doeuvres.toml", {name: PYTHON[name] for name in names}, *changes)
+    assert_same(python, lab.launch("rust", "hors_doeuvres.toml", {name: RUST[name] for name in names}, *changes))
+    returned = [event["robot"] for event in lab.of_kind("python", "joined") if event["tick"] > 0]
+    assert returned == ([] if fault == "a hang that is waited for" else ["Leguin"])
+
+
 def test_the_launch_file_of_the_project_plays(lab: Lab) -> None:
     out = ["--no-console", "-q", "--speed", "max", "--duration", "60 s", "--out", str(lab.folder), "--run", "shipped"]
     lab.cars("launch", "launch/leguin_in_python.toml", *out)
