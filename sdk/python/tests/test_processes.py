@@ -57,7 +57,6 @@ def test_leguin_in_python_gives_the_same_run(lab: Lab, scenario: str, team: list
 
 FAULTS = {
     "a crash while the run goes on": 'robot = "Leguin", do = "crash", at = "100 s", until = "120 s"',
-    "a hang while the run goes on": 'robot = "Leguin", do = "hang", at = "50 s", until = "70 s"',
     "a crash that is waited for": 'robot = "Leguin", do = "crash", at = "50 s", for = "0.5 s"',
     # Long enough that its link is given up, too.
     "a hang that is waited for": 'robot = "Leguin", do = "hang", at = "50 s", for = "3 s"',
