@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod common;
+mod conform;
 mod control;
 mod emotionml;
 mod experiment;
@@ -45,6 +46,8 @@ enum Subcommands {
     Log(control::LogArgs),
     /// Export what the robots of a run felt as EmotionML 1.0.
     Emotionml(emotionml::EmotionmlArgs),
+    /// Check a robot, in whatever language, against the rules of the protocol.
+    Conform(conform::ConformArgs),
     /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
     Bench(bench::BenchArgs),
     /// Print shell completions.
@@ -76,6 +79,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
         Subcommands::Emotionml(args) => emotionml::emotionml(&args),
+        Subcommands::Conform(args) => Ok(conform::conform(&args)),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),
         Subcommands::BenchEcho { address } => bench::echo(&address),

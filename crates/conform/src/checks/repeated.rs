@@ -1,0 +1,114 @@
+//! The same clock again, and clocks that come too late.
+
+use protocol::Tick;
+use protocol::messages::{Clock, Correction, News, Point};
+
+use super::{Findings, seated, usual};
+use crate::comparison::demand_same;
+use crate::kit::Kit;
+use crate::report::Failure;
+use crate::script::{Entry, Script, Twist, play};
+use crate::stage::{Options, PATIENCE, Stage};
+
+/// One clock in so many comes again.
+const EVERY: Tick = 3;
+
+/// A clock that comes again is answered as before, and a tick is done once.
+pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    struct Again;
+    impl Twist for Again {
+        fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+            let has_sent = !entry.report.sent.is_empty();
+            if !entry.clock.tick.is_multiple_of(EVERY) && !has_sent {
+                return Ok(());
+            }
+            let tick = entry.clock.tick;
+            let before = count(stage, tick);
+            let sent = count_sent(stage, entry);
+            stage.put_clock(&entry.clock)?;
+            let expected = format!("the report of tick {tick} again when its clock comes again");
+            stage.until(&expected, PATIENCE, |stage| (count(stage, tick) > before).then_some(()))?;
+            let expected = format!("the commands of tick {tick} again when its clock comes again");
+            stage.until(&expected, PATIENCE, |stage| {
+                let again = count_sent(stage, entry);
+                again.iter().zip(&sent).all(|(again, sent)| again > sent).then_some(())
+            })?;
+            demand_same_bytes(stage, tick)
+        }
+    }
+    let mut stage = seated(kit, Options::default())?;
+    let welcome = stage.welcome();
+    let repeated = play(&mut stage, &welcome, &Script::usual(kit), &mut Again)?;
+    demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
+}
+
+fn count(stage: &Stage<'_>, tick: Tick) -> usize {
+    stage.seen.answers.iter().filter(|answer| answer.reading.report.tick == tick).count()
+}
+
+/// How often each command of a report came so far.
+fn count_sent(stage: &Stage<'_>, entry: &Entry) -> Vec<usize> {
+    let came = |seq| {
+        let is_it =
+            |sent: &&crate::stage::Sent| sent.command.as_ref().is_ok_and(|command| command.seq == seq);
+        stage.seen.commands.iter().filter(is_it).count()
+    };
+    entry.report.sent.iter().map(|sent| came(sent.seq)).collect()
+}
+
+fn demand_same_bytes(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
+    let mut reports = stage.seen.answers.iter().filter(|answer| answer.reading.report.tick == tick);
+    let first = reports.next().map(|answer| &answer.bytes);
+    match reports.find(|answer| Some(&answer.bytes) != first) {
+        None => Ok(()),
+        Some(other) => {
+            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+            let expected = first.map(|bytes| text(bytes)).unwrap_or_default();
+            Err(Failure::new(format!("the same report again: {expected}"), text(&other.bytes)))
+        }
+    }
+}
+
+/// Clocks of earlier ticks and epochs come too late to be answered.
+pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    struct Late;
+    impl Twist for Late {
+        fn before(&mut self, stage: &mut Stage<'_>, clock: &Clock) -> Result<(), Failure> {
+            if clock.tick < 6 || !clock.tick.is_multiple_of(EVERY) {
+                return Ok(());
+            }
+            // Would it heed them, it would stand elsewhere.
+            let correction = Some(Correction { location: Point::new(1.0, 1.0), blocked: true });
+            let news = News { correction, ..News::default() };
+            let news = std::collections::BTreeMap::from([(stage.kit.subject(), news)]);
+            for (epoch, tick) in
+                [(1, clock.tick - 2), (1, clock.tick - 5), (0, clock.tick), (0, clock.tick + 9)]
+            {
+                stage.put_clock(&Clock { epoch, tick, news: news.clone(), end: None })?;
+            }
+            Ok(())
+        }
+
+        fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+            // In order on one link: an answer to a late clock would have come before this one.
+            let late = stage.seen.answers.iter().enumerate().find(|(index, answer)| {
+                let report = &answer.reading.report;
+                let is_first =
+                    stage.seen.answers.iter().position(|first| first.reading.report.tick == report.tick);
+                report.epoch != entry.clock.epoch || is_first != Some(*index)
+            });
+            match late.filter(|_| stage.repeated.is_empty()) {
+                None => Ok(()),
+                Some((_, answer)) => {
+                    let report = &answer.reading.report;
+                    let came = format!("a report for tick {} of epoch {}", report.tick, report.epoch);
+                    Err(Failure::new("no answer to a clock that is over", came))
+                }
+            }
+        }
+    }
+    let mut stage = seated(kit, Options::default())?;
+    let welcome = stage.welcome();
+    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Late)?;
+    demand_same(kit, "a clock of an earlier tick or epoch", usual(kit)?, &played)
+}
