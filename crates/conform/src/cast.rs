@@ -142,7 +142,7 @@ fn add_extras(value: &mut Value) {
                 match name.as_str() {
                     "parameters" | "state_variables" | "value" => {}
                     "news" => {
-                        field.as_object_mut().into_iter().flatten().for_each(|(_, news)| add_extras(news))
+                        field.as_object_mut().into_iter().flatten().for_each(|(_, news)| add_extras(news));
                     }
                     _ => add_extras(field),
                 }

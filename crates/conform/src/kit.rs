@@ -100,11 +100,6 @@ impl Kit {
         self.learned.get().unwrap_or_else(|| unreachable!("the robot is known from its first request on"))
     }
 
-    /// Its first request to join.
-    pub(crate) fn first_request(&self) -> &JoinRequest {
-        &self.learned().request
-    }
-
     /// The robot that is checked.
     pub(crate) fn subject(&self) -> RobotName {
         self.learned().request.name.clone()
@@ -122,14 +117,23 @@ impl Kit {
         self.others().into_keys().next().unwrap_or_else(RobotName::operator)
     }
 
-    /// Two different commands that the robot understands, as far as is known.
-    pub(crate) fn texts(&self) -> [String; 2] {
+    /// Pairs of different commands: first those that the robot understands, as far as is known, then others. A robot that
+    /// shows nothing of the one may show something of the other.
+    pub(crate) fn pairs(&self) -> Vec<[String; 2]> {
         let role = self.learned().cast.get(&self.subject());
-        let hears = role.into_iter().flat_map(|role| role.hears.iter());
-        let mut texts = hears.chain(&self.setting.commands).cloned();
-        let first = texts.next().unwrap_or_else(|| "hello".to_owned());
-        let second = texts.find(|text| *text != first).unwrap_or_else(|| format!("{first} again"));
-        [first, second]
+        let hears = role.map(|role| role.hears.clone()).unwrap_or_default();
+        let unknown = ["hello".to_owned(), "goodbye".to_owned()];
+        let pair = |texts: &[String]| {
+            let one = texts.first()?;
+            let other = texts.iter().find(|text| *text != one).cloned();
+            Some([one.clone(), other.unwrap_or_else(|| format!("{one} again"))])
+        };
+        [&hears[..], &self.setting.commands, &unknown].into_iter().filter_map(pair).collect()
+    }
+
+    /// The first of these pairs.
+    pub(crate) fn texts(&self) -> [String; 2] {
+        self.pairs().into_iter().next().unwrap_or_default()
     }
 
     /// What the robot is told when it joins at tick 0.

@@ -22,8 +22,7 @@ pub struct Setting {
     pub sensing_range_m: f64,
     /// The robots of the roster. Empty: the robot itself, without parameters, and one other.
     pub cast: BTreeMap<RobotName, Role>,
-    /// What the robot's commands say, at least two different texts that it understands. Others' commands to it in
-    /// [`Role::hears`] go before these.
+    /// Texts of commands that the robot understands, if its [`Role::hears`] has none.
     pub commands: Vec<String>,
     /// Ticks of the longer checks.
     pub ticks: Tick,
@@ -61,7 +60,7 @@ impl Default for Setting {
             body_m: 0.5,
             sensing_range_m: 2.0,
             cast: BTreeMap::new(),
-            commands: vec!["hello".to_owned(), "goodbye".to_owned()],
+            commands: Vec::new(),
             ticks: TICKS,
         }
     }

@@ -72,6 +72,8 @@ pub(crate) struct Seen {
     pub(crate) commands: Vec<Sent>,
     /// States that it sent to its followers, with their place among all that came.
     pub(crate) states: Vec<(usize, Result<PublicState, String>)>,
+    /// Requests to join in the middle of a tick.
+    pub(crate) rejoined: Vec<Result<JoinRequest, String>>,
     /// Robots whose liveliness tokens are there.
     present: BTreeSet<String>,
     count: usize,
@@ -103,6 +105,8 @@ pub(crate) struct Stage<'k> {
     pub(crate) process: Process,
     /// Clocks that were repeated while their answer was awaited.
     pub(crate) repeated: BTreeSet<(Epoch, Tick)>,
+    /// What the robot is welcomed with, should it ask in the middle of a tick.
+    pub(crate) rejoin: Option<Welcome>,
     options: Options,
     joins: VecDeque<Joining>,
     queue: SyncSender<Event>,
@@ -160,6 +164,7 @@ impl<'k> Stage<'k> {
             process,
             repeated,
             options,
+            rejoin: None,
             joins,
             queue,
             events,
@@ -174,7 +179,15 @@ impl<'k> Stage<'k> {
         let order = self.seen.count;
         self.seen.count += 1;
         match event {
-            Event::Join(question) => self.joins.push_back(Joining::new(question)),
+            Event::Join(question) => {
+                let joining = Joining::new(question);
+                if let Some(welcome) = &self.rejoin {
+                    self.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
+                    self.seen.rejoined.push(joining.request);
+                } else {
+                    self.joins.push_back(joining);
+                }
+            }
             Event::Report { key, bytes, at } => {
                 match reading::read(&key, Keys::robot_of(&key).unwrap_or_default(), &bytes) {
                     Ok(reading) => self.seen.answers.push(Answer { reading, bytes, at, order }),

@@ -1,13 +1,13 @@
 //! Starting over, and repeating oneself.
 
-use protocol::messages::{Clock, JoinAnswer, Welcome};
+use protocol::messages::Welcome;
 
 use super::{Findings, played, seated, usual};
 use crate::comparison::{demand_same, difference};
 use crate::kit::Kit;
 use crate::report::Failure;
 use crate::script::{Script, Straight, Transcript, play};
-use crate::stage::{Options, PATIENCE};
+use crate::stage::{Options, Stage};
 
 /// Another process, the same seed: the same reports.
 pub(super) fn same_seed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
@@ -33,24 +33,24 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     // A command of the old epoch that was never named: it must not be taken for one of the new epoch.
     stage.put_command(&kit.sender(), 1, (1, 7), &format!("{text}, of an epoch that is over"))?;
     let welcome = Welcome { epoch: 2, ..welcome };
-    let clock = Clock { epoch: 2, ..Clock::default() };
-    stage.cast.begin(2, 0);
-    stage.put_clock(&clock)?;
-    let joining = stage.next_join(PATIENCE).map_err(|failure| {
-        Failure::new("another request to join when a clock begins a higher epoch", failure.came)
-    })?;
-    let first = kit.first_request();
-    let request = joining.request.clone().map_err(|error| Failure::new("a request to join", error))?;
-    if request.name != first.name {
-        return Err(Failure::new(format!("{} joins again", first.name), request.name.to_string()));
-    }
-    stage.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
-    stage.report(&clock, PATIENCE)?;
-    let fresh = usual(kit)?;
-    let mut again = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight)?;
+    stage.rejoin = Some(welcome.clone());
+    let again = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight);
+    demand_joined_again(&stage)?;
+    let mut again = again?;
     demand_epoch(&again)?;
     again.iter_mut().for_each(|entry| entry.report.epoch = 1);
-    demand_same(kit, "to start over in a further epoch instead of a new process", fresh, &again)
+    demand_same(kit, "to start over in a further epoch instead of a new process", usual(kit)?, &again)
+}
+
+/// It asked to join again, once, as the process that it is.
+fn demand_joined_again(stage: &Stage<'_>) -> Result<(), Failure> {
+    let expected = "one more request to join, by the same robot, when a clock begins a higher epoch";
+    match &stage.seen.rejoined[..] {
+        [Ok(request)] if request.name == stage.kit.subject() => Ok(()),
+        [Ok(request)] => Err(Failure::new(expected, format!("{} asks to join", request.name))),
+        [Err(error)] => Err(Failure::new(expected, error)),
+        requests => Err(Failure::new(expected, format!("{} requests", requests.len()))),
+    }
 }
 
 fn demand_epoch(transcript: &Transcript) -> Result<(), Failure> {

@@ -1,7 +1,7 @@
 //! The same clock again, and clocks that come too late.
 
-use protocol::Tick;
-use protocol::messages::{Clock, Correction, News, Point};
+use protocol::messages::{Clock, Correction, News, Point, Report};
+use protocol::{Epoch, Tick};
 
 use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
@@ -42,6 +42,11 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
 }
 
+fn count_of(stage: &Stage<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
+    let is_of = |report: &Report| (report.epoch, report.tick) == (epoch, tick);
+    stage.seen.answers.iter().filter(|answer| is_of(&answer.reading.report)).count()
+}
+
 fn count(stage: &Stage<'_>, tick: Tick) -> usize {
     stage.seen.answers.iter().filter(|answer| answer.reading.report.tick == tick).count()
 }
@@ -71,7 +76,8 @@ fn demand_same_bytes(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
 
 /// Clocks of earlier ticks and epochs come too late to be answered.
 pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    struct Late;
+    /// Reports that had come for the late clocks' epochs and ticks before they were put.
+    struct Late(Vec<((Epoch, Tick), usize)>);
     impl Twist for Late {
         fn before(&mut self, stage: &mut Stage<'_>, clock: &Clock) -> Result<(), Failure> {
             if clock.tick < 6 || !clock.tick.is_multiple_of(EVERY) {
@@ -81,27 +87,20 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             let correction = Some(Correction { location: Point::new(1.0, 1.0), blocked: true });
             let news = News { correction, ..News::default() };
             let news = std::collections::BTreeMap::from([(stage.kit.subject(), news)]);
-            for (epoch, tick) in
-                [(1, clock.tick - 2), (1, clock.tick - 5), (0, clock.tick), (0, clock.tick + 9)]
-            {
+            let late = [(1, clock.tick - 2), (1, clock.tick - 5), (0, clock.tick), (0, clock.tick + 9)];
+            self.0 = late.map(|of| (of, count_of(stage, of))).into();
+            for (epoch, tick) in late {
                 stage.put_clock(&Clock { epoch, tick, news: news.clone(), end: None })?;
             }
             Ok(())
         }
 
-        fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-            // In order on one link: an answer to a late clock would have come before this one.
-            let late = stage.seen.answers.iter().enumerate().find(|(index, answer)| {
-                let report = &answer.reading.report;
-                let is_first =
-                    stage.seen.answers.iter().position(|first| first.reading.report.tick == report.tick);
-                report.epoch != entry.clock.epoch || is_first != Some(*index)
-            });
-            match late.filter(|_| stage.repeated.is_empty()) {
+        fn after(&mut self, stage: &mut Stage<'_>, _: &Entry) -> Result<(), Failure> {
+            // In order on one link: an answer to a late clock would have come before that to this one.
+            match self.0.iter().find(|(of, before)| count_of(stage, *of) > *before) {
                 None => Ok(()),
-                Some((_, answer)) => {
-                    let report = &answer.reading.report;
-                    let came = format!("a report for tick {} of epoch {}", report.tick, report.epoch);
+                Some(((epoch, tick), _)) => {
+                    let came = format!("a report for tick {tick} of epoch {epoch}");
                     Err(Failure::new("no answer to a clock that is over", came))
                 }
             }
@@ -109,6 +108,6 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     }
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
-    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Late)?;
+    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Late(Vec::new()))?;
     demand_same(kit, "a clock of an earlier tick or epoch", usual(kit)?, &played)
 }

@@ -31,7 +31,7 @@ pub(super) fn usual(
     kit: &Kit,
     findings: &mut Findings,
 ) -> Result<(Result<(), Failure>, Option<AnswerTimes>), CannotRun> {
-    let cannot = |failure: Failure| CannotRun::Robot(format!("no {}: {}", failure.expected, failure.came));
+    let cannot = |failure: Failure| CannotRun::Robot(format!("{}: {}", failure.expected, failure.came));
     let mut stage = Stage::open(kit, Options::default()).map_err(|failure| CannotRun::Robot(failure.came))?;
     let joining = stage.next_join(START_PATIENCE).map_err(cannot)?;
     let request = joining.request.clone().map_err(CannotRun::Robot)?;
