@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use conform::{PAGE, RULES, Report, Setting, Verdict};
+use conform::{PAGE, RULES, Report, Rule, Setting, Verdict};
 use system_tests::{programs, root};
 
 /// Robots that pass: what to call it, more arguments of `cars conform`, the command from the project's root.
@@ -91,6 +91,31 @@ fn wrong_robots_fail_by_their_rule(part: usize) {
             rule.name
         );
         assert!(report.to_tap().contains(&format!("see: \"{}\"", rule.reference())), "{report}");
+    }
+}
+
+/// Further ways to break a rule.
+const OTHERWISE: [&str; 11] = [
+    "join.request:instance",
+    "join.ready-last:first",
+    "join.refused:mute",
+    "join.refused:impatient",
+    "tick.answer:generation",
+    "tick.state-first:unheard",
+    "query.early:impatient",
+    "clock.duplicate:commands",
+    "epoch.init:remembers",
+    "return.numbers:stream",
+    "return.replaced:content",
+];
+
+#[test]
+fn rules_can_be_broken_in_more_than_one_way() {
+    for how in OTHERWISE {
+        let rule = Rule::named(how.split(':').next().unwrap()).unwrap();
+        let report = conform::check(&wrong(how), &setting(), &[rule]).unwrap();
+        assert_eq!(report.outcomes.len(), 1);
+        assert!(!report.is_passed(), "{how}: {report}");
     }
 }
 

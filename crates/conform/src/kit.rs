@@ -100,6 +100,11 @@ impl Kit {
         self.learned.get().unwrap_or_else(|| unreachable!("the robot is known from its first request on"))
     }
 
+    /// The instance that its first process claimed.
+    pub(crate) fn first_instance(&self) -> &str {
+        &self.learned().request.instance
+    }
+
     /// The robot that is checked.
     pub(crate) fn subject(&self) -> RobotName {
         self.learned().request.name.clone()

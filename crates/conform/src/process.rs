@@ -9,7 +9,7 @@ use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
 /// What is shown of a program's output, bytes from its end.
-const TAIL_BYTES: u64 = 600;
+const TAIL_BYTES: u64 = 1500;
 
 /// The same command again.
 pub(crate) fn copy(command: &Command) -> Command {
@@ -32,19 +32,20 @@ pub(crate) struct Process {
     child: Child,
     group: Pid,
     output: File,
+    errors: File,
     ended: Option<ExitStatus>,
 }
 
 impl Process {
     /// Starts the command as it is, with more in its environment.
     pub(crate) fn start(command: &Command, environment: &[(&str, String)]) -> std::io::Result<Self> {
-        let output = tempfile::tempfile()?;
+        let (output, errors) = (tempfile::tempfile()?, tempfile::tempfile()?);
         let mut own = copy(command);
         own.envs(environment.iter().map(|(name, value)| (name, value)));
-        own.stdin(Stdio::null()).stdout(output.try_clone()?).stderr(output.try_clone()?);
+        own.stdin(Stdio::null()).stdout(output.try_clone()?).stderr(errors.try_clone()?);
         let child = own.process_group(0).spawn()?;
         let group = Pid::from_raw(i32::try_from(child.id()).map_err(std::io::Error::other)?);
-        Ok(Self { child, group, output, ended: None })
+        Ok(Self { child, group, output, errors, ended: None })
     }
 
     /// How it ended, if it has.
@@ -62,18 +63,9 @@ impl Process {
         let _gone = killpg(self.group, signal);
     }
 
-    /// The last that it printed.
-    pub(crate) fn tail(&self) -> String {
-        // Read in place: the program writes where the file's cursor stands.
-        let read = || -> std::io::Result<Vec<u8>> {
-            let length = self.output.metadata()?.len();
-            let from = length.saturating_sub(TAIL_BYTES);
-            let mut bytes = vec![0; usize::try_from(length - from).map_err(std::io::Error::other)?];
-            self.output.read_exact_at(&mut bytes, from)?;
-            Ok(bytes)
-        };
-        let bytes = read().unwrap_or_default();
-        String::from_utf8_lossy(&bytes).trim().to_owned()
+    /// The last that it wrote to its standard error.
+    pub(crate) fn errors(&self) -> String {
+        tail(&self.errors)
     }
 
     /// What became of it, in words.
@@ -82,11 +74,24 @@ impl Process {
             None => "it runs".to_owned(),
             Some(status) => format!("its process has ended ({status})"),
         };
-        match self.tail() {
-            tail if tail.is_empty() => format!("{fate} and has printed nothing"),
-            tail => format!("{fate} and has printed: {tail}"),
+        let printed = [tail(&self.output), self.errors()].join("\n").trim().to_owned();
+        if printed.is_empty() {
+            return format!("{fate} and has printed nothing");
         }
+        format!("{fate} and has printed: {printed}")
     }
+}
+
+/// The end of a file that somebody may still write: read in place, since its cursor is the writer's.
+fn tail(file: &File) -> String {
+    let read = || -> std::io::Result<Vec<u8>> {
+        let length = file.metadata()?.len();
+        let from = length.saturating_sub(TAIL_BYTES);
+        let mut bytes = vec![0; usize::try_from(length - from).map_err(std::io::Error::other)?];
+        file.read_exact_at(&mut bytes, from)?;
+        Ok(bytes)
+    };
+    String::from_utf8_lossy(&read().unwrap_or_default()).trim().to_owned()
 }
 
 impl Drop for Process {

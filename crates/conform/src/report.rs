@@ -148,7 +148,8 @@ impl fmt::Display for Report {
                 Verdict::Passed => writeln!(f, "ok {number} - {}", rule.name)?,
                 // A line break would end the directive, and a second '#' would be taken for another one by some.
                 Verdict::Skipped { reason } => {
-                    writeln!(f, "ok {number} - {} # SKIP {}", rule.name, reason.replace(['\n', '#'], " "))?
+                    let reason = reason.replace(['\n', '#'], " ");
+                    writeln!(f, "ok {number} - {} # SKIP {reason}", rule.name)?;
                 }
                 Verdict::Failed(Failure { expected, came }) => {
                     writeln!(f, "not ok {number} - {}", rule.name)?;

@@ -44,7 +44,6 @@ enum Event {
 pub(crate) struct Joining {
     question: Question,
     pub(crate) key: String,
-    pub(crate) body: Vec<u8>,
     pub(crate) request: Result<JoinRequest, String>,
 }
 
@@ -72,8 +71,8 @@ pub(crate) struct Seen {
     pub(crate) commands: Vec<Sent>,
     /// States that it sent to its followers, with their place among all that came.
     pub(crate) states: Vec<(usize, Result<PublicState, String>)>,
-    /// Requests to join in the middle of a tick.
-    pub(crate) rejoined: Vec<Result<JoinRequest, String>>,
+    /// Requests to join: the first one, and those in the middle of a tick.
+    pub(crate) requests: Vec<Result<JoinRequest, String>>,
     /// Robots whose liveliness tokens are there.
     present: BTreeSet<String>,
     count: usize,
@@ -183,7 +182,7 @@ impl<'k> Stage<'k> {
                 let joining = Joining::new(question);
                 if let Some(welcome) = &self.rejoin {
                     self.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
-                    self.seen.rejoined.push(joining.request);
+                    self.seen.requests.push(joining.request);
                 } else {
                     self.joins.push_back(joining);
                 }
@@ -292,6 +291,7 @@ impl<'k> Stage<'k> {
         self.prepare()?;
         let joining = self.next_join(START_PATIENCE)?;
         self.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
+        self.seen.requests.push(joining.request);
         self.until_ready()
     }
 
@@ -434,7 +434,7 @@ impl Joining {
     fn new(question: Question) -> Self {
         let (key, body) = (question.key().to_owned(), question.body());
         let request = decode(&key, "a robot", &body).map_err(|error| error.to_string());
-        Self { question, key, body, request }
+        Self { question, key, request }
     }
 }
 

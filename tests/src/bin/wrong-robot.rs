@@ -1,5 +1,5 @@
 //! A small robot that speaks the protocol by hand, to check the conformance kit: correct without arguments, and with
-//! `--wrong RULE` wrong in just one thing, which that rule of `docs/protocol.md` forbids.
+//! `--wrong RULE` or `--wrong RULE:HOW` wrong in just one thing, which that rule of `docs/protocol.md` forbids.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -58,42 +58,67 @@ impl Wrong {
 /// The last two states, for who asks.
 #[derive(Clone)]
 struct Shown {
-    states: Arc<Mutex<Vec<PublicState>>>,
+    board: Arc<Mutex<Board>>,
     wrong: Wrong,
+}
+
+#[derive(Default)]
+struct Board {
+    states: Vec<PublicState>,
+    /// Questions for what comes next.
+    early: Vec<Question>,
 }
 
 impl Shown {
     fn show(&self, state: PublicState) {
-        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
-        states.retain(|old| old.epoch == state.epoch && old.tick < state.tick);
-        states.push(state);
+        let mut board = self.board.lock().unwrap_or_else(PoisonError::into_inner);
+        board.states.retain(|old| old.epoch == state.epoch && old.tick < state.tick);
+        board.states.push(state);
         let kept = if self.wrong.is("query.tick") { 1 } else { 2 };
-        while states.len() > kept {
-            states.remove(0);
+        while board.states.len() > kept {
+            board.states.remove(0);
+        }
+        for question in std::mem::take(&mut board.early) {
+            self.judge(&mut board, question);
         }
     }
 
-    fn answer(&self, question: &Question) {
-        let states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+    fn answer(&self, question: Question) {
+        self.judge(&mut self.board.lock().unwrap_or_else(PoisonError::into_inner), question);
+    }
+
+    fn judge(&self, board: &mut Board, question: Question) {
         let number = |name: &str| question.parameter(name).map(str::parse::<u64>);
         if matches!(number("tick"), Some(Err(_))) && self.wrong.is("query.unknown") {
             std::process::exit(1);
         }
-        let (Some(newest), Ok(tick), Ok(epoch)) =
-            (states.last(), number("tick").transpose(), number("epoch").transpose())
-        else {
-            return question.refuse("not a question that can be answered");
+        let (Ok(tick), Ok(epoch)) = (number("tick").transpose(), number("epoch").transpose()) else {
+            return question.refuse("not a whole number");
         };
-        let is_meant = |state: &&PublicState| {
+        let newest = board.states.last().cloned();
+        let is_early = match &newest {
+            None => true,
+            Some(newest) => {
+                let is_next = tick == Some(newest.tick + 2)
+                    && epoch.is_none_or(|epoch| epoch == u64::from(newest.epoch));
+                is_next || epoch.is_some_and(|epoch| epoch > u64::from(newest.epoch))
+            }
+        };
+        let is_meant = |state: &PublicState| {
             tick.is_none_or(|tick| state.tick + 1 == tick)
-                && epoch.is_none_or(|epoch| u64::from(state.epoch) == epoch)
+                && epoch.is_none_or(|epoch| epoch == u64::from(state.epoch))
         };
-        let is_early = tick.is_some_and(|tick| tick > newest.tick + 1) && self.wrong.is("query.early");
-        let found = states.iter().rev().find(is_meant).or(is_early.then_some(newest));
-        let Some(state) = found else { return question.refuse("not now") };
-        let answer = state.answer(Keys::last_chunk(question.key()));
-        let bytes = answer.map_or_else(|| encode(state), |answer| encode(&answer));
-        question.answer(question.key(), bytes);
+        let found = board.states.iter().rev().find(|state| is_meant(state)).cloned();
+        let found = found.or(newest.filter(|_| self.wrong.is("query.early")));
+        match found {
+            Some(state) => {
+                let answer = state.answer(Keys::last_chunk(question.key()));
+                let bytes = answer.map_or_else(|| encode(&state), |answer| encode(&answer));
+                question.answer(question.key(), bytes);
+            }
+            None if is_early && !self.wrong.is("query.early:impatient") => board.early.push(question),
+            None => question.refuse("not now"),
+        }
     }
 }
 
@@ -117,8 +142,9 @@ struct Robot {
     last_seq: u64,
     is_seated: bool,
     tick: u64,
-    /// The last report and the commands of its tick, to be said again.
-    last: Vec<(String, Vec<u8>)>,
+    /// The last report and the commands of the last ticks, to be said again.
+    last: Vec<u8>,
+    sent: Vec<(u64, String, Vec<u8>)>,
     _declared: Vec<Declared>,
 }
 
@@ -135,6 +161,8 @@ fn main() -> ExitCode {
         Ok(()) if wrong.is("end.clock") => ExitCode::from(3),
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if wrong.is("join.refused") => ExitCode::SUCCESS,
+        Err(_) if wrong.is("join.refused:mute") => ExitCode::FAILURE,
+        Err(_) if wrong.is("return.replaced:content") => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::FAILURE
@@ -155,14 +183,17 @@ fn join(
     wrong: &Wrong,
 ) -> Result<Welcome, Failure> {
     let protocol = if wrong.is("join.request") { 99 } else { PROTOCOL_VERSION };
-    let (instance, sdk) = (bus.id(), "by hand".to_owned());
+    let instance = if wrong.is("join.request:instance") { "me".to_owned() } else { bus.id() };
+    let sdk = "by hand".to_owned();
     let request = JoinRequest { protocol, run: run.clone(), name: name.clone(), instance, sdk };
     let (key, begun) = (Keys::new(run).join(), Instant::now());
     loop {
         let answer = bus.ask(&key, "", Some(encode(&request)))?.and_then(|answer| answer.result.ok());
         match answer.map(|bytes| wrong.read(&key, &bytes).ok_or("an answer that is none")).transpose()? {
             Some(JoinAnswer::Welcome(welcome)) => return Ok(*welcome),
-            Some(JoinAnswer::Refused { reason, explanation }) if reason != Refusal::NameTaken => {
+            Some(JoinAnswer::Refused { reason, explanation })
+                if reason != Refusal::NameTaken || wrong.is("join.refused:impatient") =>
+            {
                 return Err(explanation.into());
             }
             _ if begun.elapsed() > patience => return Err("not let in".into()),
@@ -199,19 +230,21 @@ impl Robot {
         let bus = Bus::open(&Role::Client { connect, patience }, None)?;
         let keys = Keys::new(&run);
         let (queue, events) = sync_channel(4096);
-        let shown = Shown { states: Arc::default(), wrong: wrong.clone() };
+        let shown = Shown { board: Arc::default(), wrong: wrong.clone() };
         let mut declared = Vec::new();
         for what in QUERIES.iter().chain([&STATE]) {
             let shown = shown.clone();
-            declared.push(bus.serve(&keys.query(&name, what), move |question| shown.answer(&question))?);
+            declared.push(bus.serve(&keys.query(&name, what), move |question| shown.answer(question))?);
         }
         let is_late = wrong.is("join.ready-last");
         if !is_late {
             declared.extend(listen(&bus, &keys, &name, &queue, &wrong)?);
         }
+        if wrong.is("join.ready-last:first") {
+            declared.push(bus.token(&keys.alive_robot(&name))?);
+        }
         let welcome = join(&bus, &run, &name, patience, &wrong)?;
-        let (random, mut clocks) = (stream(welcome.seed, &welcome.stream), Vec::new());
-        clocks.reserve(1);
+        let (random, clocks) = (stream(welcome.seed, &welcome.stream), Vec::new());
         welcome.state_before.iter().chain(&welcome.last_state).for_each(|last| shown.show(last.clone()));
         declared.push(bus.token(&keys.alive_robot(&name))?);
         if is_late {
@@ -240,6 +273,7 @@ impl Robot {
             is_seated: false,
             tick: 0,
             last: Vec::new(),
+            sent: Vec::new(),
             _declared: declared,
         };
         robot.begin();
@@ -250,13 +284,16 @@ impl Robot {
     fn begin(&mut self) {
         let welcome = &self.welcome;
         self.random = stream(welcome.seed, &welcome.stream);
+        if self.wrong.is("return.numbers:stream") {
+            self.random = stream(welcome.seed, self.name.as_str());
+        }
         if self.wrong.is("determinism.seed") {
             self.random = stream(std::process::id().into(), &welcome.stream);
         }
         self.last_seq = if self.wrong.is("return.numbers") { 0 } else { welcome.last_seq };
         (self.at, self.proposal, self.heard) = (welcome.location, welcome.location, 0);
         (self.is_seated, self.tick) = (false, welcome.tick);
-        self.last.clear();
+        self.sent.clear();
         let epoch = welcome.epoch;
         self.held.retain(|_, held| held.command.epoch >= epoch);
     }
@@ -290,8 +327,12 @@ impl Robot {
 
     fn on_clock(&mut self, clock: &Clock) -> Result<(), Failure> {
         if clock.epoch > self.welcome.epoch && clock.tick == 0 && !self.wrong.is("epoch.init") {
+            let before = (self.random.clone(), self.heard);
             self.welcome = join(&self.bus, &self.run, &self.name, self.patience, &self.wrong)?;
             self.begin();
+            if self.wrong.is("epoch.init:remembers") {
+                (self.random, self.heard) = before;
+            }
         }
         if clock.epoch != self.welcome.epoch {
             return Ok(());
@@ -318,10 +359,10 @@ impl Robot {
     }
 
     fn say_again(&self) -> Result<(), Failure> {
-        for (key, bytes) in &self.last {
+        for (_, key, bytes) in self.sent.iter().filter(|_| !self.wrong.is("clock.duplicate:commands")) {
             self.bus.put(key, bytes.clone())?;
         }
-        Ok(())
+        Ok(self.bus.put(&self.keys.report(&self.name), self.last.clone())?)
     }
 
     fn do_tick(&mut self, clock: &Clock, news: &News) -> Result<(), Failure> {
@@ -330,7 +371,7 @@ impl Robot {
             _ => self.proposal,
         };
         let (mut log, mut sent, mut missing) = (Vec::new(), Vec::new(), Vec::new());
-        self.last.clear();
+        self.sent.retain(|(tick, ..)| tick + self.welcome.repeat_ticks > clock.tick);
         for (id, command) in self.named(&news.commands) {
             match command {
                 Some(command) => {
@@ -366,7 +407,7 @@ impl Robot {
         let mut report = Report {
             epoch: clock.epoch,
             tick: clock.tick,
-            generation: self.welcome.generation,
+            generation: if self.wrong.is("tick.answer:generation") { 7 } else { self.welcome.generation },
             proposal: self.proposal,
             speed_mps: state.speed_mps,
             direction_rad: state.direction_rad,
@@ -388,9 +429,11 @@ impl Robot {
         let is_late = self.wrong.is("tick.state-first");
         if !is_late {
             self.shown.show(state.clone());
-            self.bus.put(&self.keys.query(&self.name, STATE), encode(&state))?;
+            if !self.wrong.is("tick.state-first:unheard") {
+                self.bus.put(&self.keys.query(&self.name, STATE), encode(&state))?;
+            }
         }
-        self.last.push((self.keys.report(&self.name), encode(report)));
+        self.last = encode(report);
         self.bus.put(&self.keys.report(&self.name), encode(report))?;
         if self.wrong.is("tick.answer") {
             self.bus.put(&self.keys.report(&self.name), encode(report))?;
@@ -420,7 +463,7 @@ impl Robot {
         let message = Command { epoch, tick, seq, performative, command: command.clone() };
         let (key, bytes) = (self.keys.command(to, &self.name), encode(&message));
         self.bus.put(&key, bytes.clone())?;
-        self.last.push((key, bytes));
+        self.sent.push((tick, key, bytes));
         sent.push(SentCommand { to: to.clone(), seq, performative, command });
         Ok(())
     }

@@ -1,8 +1,8 @@
 //! Starting over, and repeating oneself.
 
-use protocol::messages::Welcome;
+use protocol::messages::{JoinRequest, Welcome};
 
-use super::{Findings, played, seated, usual};
+use super::{Findings, seated, usual};
 use crate::comparison::{demand_same, difference};
 use crate::kit::Kit;
 use crate::report::Failure;
@@ -10,8 +10,16 @@ use crate::script::{Script, Straight, Transcript, play};
 use crate::stage::{Options, Stage};
 
 /// Another process, the same seed: the same reports.
-pub(super) fn same_seed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let again = played(kit, &Script::usual(kit))?;
+pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    let welcome = stage.welcome();
+    let again = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight)?;
+    if let [Ok(request)] = &stage.seen.requests[..]
+        && request.instance == kit.first_instance()
+    {
+        let came = format!("two processes have {:?}", request.instance);
+        findings.fail("join.request", Failure::new("an instance that no other process has", came));
+    }
     let found = difference(usual(kit)?, &again);
     if kit.is_deterministic.set(found.is_none()).is_err() {
         unreachable!("it is asked once whether the robot repeats itself");
@@ -44,12 +52,18 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 
 /// It asked to join again, once, as the process that it is.
 fn demand_joined_again(stage: &Stage<'_>) -> Result<(), Failure> {
-    let expected = "one more request to join, by the same robot, when a clock begins a higher epoch";
-    match &stage.seen.rejoined[..] {
-        [Ok(request)] if request.name == stage.kit.subject() => Ok(()),
-        [Ok(request)] => Err(Failure::new(expected, format!("{} asks to join", request.name))),
-        [Err(error)] => Err(Failure::new(expected, error)),
-        requests => Err(Failure::new(expected, format!("{} requests", requests.len()))),
+    let expected =
+        "one more request to join, with the same name and instance, when a clock begins a higher epoch";
+    let who = |request: &JoinRequest| format!("{} with instance {:?}", request.name, request.instance);
+    match &stage.seen.requests[..] {
+        [Ok(first), Ok(again)] if who(first) == who(again) => Ok(()),
+        [Ok(first), Ok(again)] => {
+            Err(Failure::new(expected, format!("{} and before {}", who(again), who(first))))
+        }
+        [.., Err(error)] => Err(Failure::new(expected, error)),
+        requests => {
+            Err(Failure::new(expected, format!("{} more requests", requests.len().saturating_sub(1))))
+        }
     }
 }
 

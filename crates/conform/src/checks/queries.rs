@@ -1,11 +1,11 @@
 //! Questions: in every tick everybody learns of the tick before.
 
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use protocol::bus::AnswerOf;
 use protocol::keys::{QUERIES, STATE};
-use protocol::messages::{Answer, Point, PublicState};
+use protocol::messages::{Answer, Clock, Point, PublicState};
 use protocol::{Epoch, Tick, decode};
 
 use super::{Findings, seated, usual};
@@ -17,6 +17,10 @@ use crate::stage::{Options, Stage};
 
 /// A question has its answer within this time, or has none.
 const QUESTION_PATIENCE: Duration = Duration::from_secs(3);
+/// The last tick before the odd questions.
+const LAST: Tick = 8;
+/// One tick in so many is asked about at length: that costs time.
+const ROUND: Tick = 10;
 /// A state that is shown after the report is there after this time.
 const LATE: Duration = Duration::from_millis(500);
 const ASK_AGAIN: Duration = Duration::from_millis(10);
@@ -37,6 +41,10 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
     let mut asker = Asker { findings: Findings::default(), before: None, location: welcome.location };
     let played = play(&mut stage, &welcome, &Script::usual(kit), &mut asker);
     findings.0.extend(asker.findings.0);
+    if stage.seen.states.is_empty() {
+        let came = "in none of the ticks, although somebody subscribes";
+        findings.fail("tick.state-first", Failure::new("its state is put for those who follow it", came));
+    }
     played.map(drop)
 }
 
@@ -86,10 +94,11 @@ impl Twist for Asker {
             self.findings.fail(rule, failure);
         }
         let Ok(now) = came else { return Ok(()) };
-        self.findings.settle("tick.state-first", check_followed(stage, entry));
+        self.findings.settle("tick.state-first", check_followed(stage, entry, &now));
         self.check_location(entry, &now);
         let matched = check_state(entry, &now)
             .and_then(|()| self.check_before(stage, epoch, tick))
+            .and_then(|()| check_newest(stage, tick, &now))
             .and_then(|()| check_six(stage, epoch, tick, &now));
         self.findings.settle("query.tick", matched);
         self.before = Some(now);
@@ -125,19 +134,20 @@ impl Asker {
     }
 }
 
-/// What followers are sent comes before the report, if it is sent.
-fn check_followed(stage: &Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+/// What followers are sent comes before the report, in every tick once the robot knows that somebody follows.
+fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     let tick = entry.clock.tick;
-    let report = stage.seen.answers.get(entry.index).map(|answer| answer.order);
-    let is_meant = |state: &&(usize, Result<PublicState, String>)| {
-        state.1.as_ref().is_ok_and(|state| state.tick == tick)
-    };
-    let shown = stage.seen.states.iter().find(is_meant).map(|(order, _)| *order);
-    if shown.is_some_and(|shown| report.is_some_and(|report| shown > report)) {
-        let expected = format!("the state of tick {tick} before the report");
-        return Err(Failure::new(expected, "it came after the report"));
+    let report = stage.seen.answers.get(entry.index).map_or(usize::MAX, |answer| answer.order);
+    let mut before = stage.seen.states.iter().filter(|(order, _)| *order < report);
+    let Some((_, last)) = before.next_back() else { return Ok(()) };
+    let expected = format!("the state of tick {tick}, put before the report of tick {tick}");
+    match last {
+        Err(error) => Err(Failure::new(expected, error)),
+        Ok(last) if last == now => Ok(()),
+        Ok(last) => {
+            Err(Failure::new(expected, format!("before it, the state of tick {} was put last", last.tick)))
+        }
     }
-    Ok(())
 }
 
 /// What it shows is what it reports.
@@ -159,10 +169,24 @@ fn check_state(entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     Err(Failure::new(format!("the state shows what is reported: {shown:?}"), format!("{now:?}")))
 }
 
+/// Asked without an epoch, or without anything, it says the same.
+fn check_newest(stage: &Stage<'_>, tick: Tick, now: &PublicState) -> Result<(), Failure> {
+    if !tick.is_multiple_of(ROUND) {
+        return Ok(());
+    }
+    for parameters in [String::new(), format!("tick={}", tick + 1)] {
+        let expected = format!("asked with {parameters:?} after tick {tick}, the state of tick {tick}");
+        let came = state(stage.ask(STATE, &parameters)?, &expected)?;
+        if came != *now {
+            return Err(Failure::new(expected, format!("{came:?}")));
+        }
+    }
+    Ok(())
+}
+
 /// The six queries say the same, each its part.
 fn check_six(stage: &Stage<'_>, epoch: Epoch, tick: Tick, now: &PublicState) -> Result<(), Failure> {
-    // One tick in so many: six questions cost time.
-    if !tick.is_multiple_of(10) {
+    if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
     for what in QUERIES {
@@ -198,46 +222,62 @@ fn same_value(one: &serde_json::Value, two: &serde_json::Value) -> bool {
     }
 }
 
-/// Asked for a tick that is not done, long over or of another epoch, it may refuse, keep silent or wait; it never gives
-/// the state of another tick for it.
-pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    // Before its first tick there is nothing to tell.
-    demand_no_wrong_state(&stage, &[(1, 1)])?;
-    let welcome = stage.welcome();
-    let ticks = 8;
-    let transcript = play(&mut stage, &welcome, &Script::quiet(ticks), &mut Straight)?;
-    let last = transcript.last().map_or(0, |entry| entry.clock.tick);
-    let odd =
-        [(1, last + 2), (1, last + 3), (1, last + 50), (1, last - 3), (1, 0), (9, last + 1), (0, last + 1)];
-    demand_no_wrong_state(&stage, &odd)?;
-    let next = protocol::messages::Clock { epoch: 1, tick: last + 1, ..Default::default() };
-    stage.tick(&next).map(drop)
+/// A question that has been asked: where its answer comes.
+type Pending = Receiver<Option<AnswerOf>>;
+
+/// Asks for the state of the tick before `tick`, and goes on.
+fn ask_early(stage: &Stage<'_>, epoch: Epoch, tick: &str) -> Result<Pending, Failure> {
+    let (sender, answer) = channel();
+    let key = stage.keys.query(&stage.kit.subject(), STATE);
+    stage.kit.bus.ask_then(&key, &format!("tick={tick};epoch={epoch}"), move |came| {
+        // Nobody waits for it any more where this check is over.
+        let _ = sender.send(came);
+    })?;
+    Ok(answer)
 }
 
-/// Asks for each epoch and tick at once. An answer is one for the tick before the one that was asked for.
-fn demand_no_wrong_state(stage: &Stage<'_>, asked: &[(Epoch, Tick)]) -> Result<(), Failure> {
-    let (sender, answers) = channel();
-    let key = stage.keys.query(&stage.kit.subject(), STATE);
-    for &(epoch, tick) in asked {
-        let sender = sender.clone();
-        stage.kit.bus.ask_then(&key, &format!("tick={tick};epoch={epoch}"), move |answer| {
-            // Nobody waits for it any more where this check is over.
-            let _ = sender.send((epoch, tick, answer));
-        })?;
-    }
-    for _ in asked {
-        let Ok((epoch, tick, answer)) = answers.recv_timeout(QUESTION_PATIENCE) else { break };
-        let Some(AnswerOf { result: Ok(bytes), .. }) = answer else { continue };
-        let expected = format!("no state for tick={tick};epoch={epoch}: refused, or no answer");
-        let came: PublicState = decode(&key, "the robot", &bytes)
-            .map_err(|error| Failure::new(expected.clone(), error.to_string()))?;
-        if (came.epoch, came.tick.checked_add(1)) != (epoch, Some(tick)) {
-            let came = format!("the state of tick {} of epoch {}", came.tick, came.epoch);
-            return Err(Failure::new(expected, came));
+/// The answer to it; `None` if there is none.
+fn answer_to(pending: &Pending) -> Option<AnswerOf> {
+    pending.recv_timeout(QUESTION_PATIENCE).ok().flatten()
+}
+
+/// Asked for the report that comes next it waits; asked for any other that it does not have it refuses.
+pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    let pending = ask_early(&stage, 1, "1")?;
+    let welcome = stage.welcome();
+    play(&mut stage, &welcome, &Script::quiet(LAST), &mut Straight)?;
+    demand_state(&pending, 0, "before tick 0")?;
+
+    let pending = ask_early(&stage, 1, &(LAST + 2).to_string())?;
+    stage.tick(&Clock { epoch: 1, tick: LAST + 1, ..Clock::default() })?;
+    demand_state(&pending, LAST + 1, &format!("after tick {LAST}"))?;
+
+    let now = LAST + 1;
+    let never = [(1, 0), (1, now - 1), (1, 1), (1, now + 3), (1, now + 1000), (0, now + 1)];
+    let never = never.map(|(epoch, tick): (Epoch, Tick)| (epoch, tick.to_string()));
+    for (epoch, tick) in never.into_iter().chain([(1, "soon".to_owned()), (1, "-1".to_owned())]) {
+        let expected = format!("after tick {now}, an error reply in words to tick={tick};epoch={epoch}");
+        match answer_to(&ask_early(&stage, epoch, &tick)?) {
+            Some(AnswerOf { result: Err(words), .. }) if !words.trim().is_empty() => {}
+            Some(AnswerOf { result: Err(_), .. }) => return Err(Failure::new(expected, "one without words")),
+            Some(AnswerOf { result: Ok(bytes), .. }) => {
+                return Err(Failure::new(expected, String::from_utf8_lossy(&bytes)));
+            }
+            None => return Err(Failure::new(expected, "no reply")),
         }
     }
-    Ok(())
+    stage.tick(&Clock { epoch: 1, tick: now + 1, ..Clock::default() }).map(drop)
+}
+
+/// A question that came early has its answer as soon as there is one.
+fn demand_state(pending: &Pending, tick: Tick, asked: &str) -> Result<(), Failure> {
+    let expected = format!("asked with tick={} {asked}, the state of tick {tick} once it is there", tick + 1);
+    let came = state(answer_to(pending), &expected)?;
+    if (came.epoch, came.tick) == (1, tick) {
+        return Ok(());
+    }
+    Err(Failure::new(expected, format!("the state of tick {} of epoch {}", came.tick, came.epoch)))
 }
 
 /// Asked what nobody can answer, it gives no answer and goes on.

@@ -1,7 +1,7 @@
 //! The same clock again, and clocks that come too late.
 
 use protocol::messages::{Clock, Correction, News, Point, Report};
-use protocol::{Epoch, Tick};
+use protocol::{Epoch, Seq, Tick};
 
 use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
@@ -15,30 +15,37 @@ const EVERY: Tick = 3;
 
 /// A clock that comes again is answered as before, and a tick is done once.
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    struct Again;
+    /// The commands of the last ticks: tick, seq.
+    struct Again(Vec<(Tick, Seq)>);
     impl Twist for Again {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-            let has_sent = !entry.report.sent.is_empty();
-            if !entry.clock.tick.is_multiple_of(EVERY) && !has_sent {
+            let tick = entry.clock.tick;
+            self.0.retain(|(sent, _)| sent + stage.welcome().repeat_ticks > tick);
+            self.0.extend(entry.report.sent.iter().map(|sent| (tick, sent.seq)));
+            if !tick.is_multiple_of(EVERY) && self.0.is_empty() {
                 return Ok(());
             }
-            let tick = entry.clock.tick;
             let before = count(stage, tick);
-            let sent = count_sent(stage, entry);
+            let sent: Vec<usize> = self.0.iter().map(|sent| count_sent(stage, *sent)).collect();
             stage.put_clock(&entry.clock)?;
             let expected = format!("the report of tick {tick} again when its clock comes again");
             stage.until(&expected, PATIENCE, |stage| (count(stage, tick) > before).then_some(()))?;
-            let expected = format!("the commands of tick {tick} again when its clock comes again");
-            stage.until(&expected, PATIENCE, |stage| {
-                let again = count_sent(stage, entry);
-                again.iter().zip(&sent).all(|(again, sent)| again > sent).then_some(())
-            })?;
+            // On one session, what was put before it has come before it.
+            for (of, sent) in self.0.iter().zip(sent) {
+                if count_sent(stage, *of) == sent {
+                    let expected = format!(
+                        "command {} of tick {} again, before the report, when the clock of tick {tick} comes again",
+                        of.1, of.0
+                    );
+                    return Err(Failure::new(expected, "the report alone"));
+                }
+            }
             demand_same_bytes(stage, tick)
         }
     }
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
-    let repeated = play(&mut stage, &welcome, &Script::usual(kit), &mut Again)?;
+    let repeated = play(&mut stage, &welcome, &Script::usual(kit), &mut Again(Vec::new()))?;
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
 }
 
@@ -51,14 +58,12 @@ fn count(stage: &Stage<'_>, tick: Tick) -> usize {
     stage.seen.answers.iter().filter(|answer| answer.reading.report.tick == tick).count()
 }
 
-/// How often each command of a report came so far.
-fn count_sent(stage: &Stage<'_>, entry: &Entry) -> Vec<usize> {
-    let came = |seq| {
-        let is_it =
-            |sent: &&crate::stage::Sent| sent.command.as_ref().is_ok_and(|command| command.seq == seq);
-        stage.seen.commands.iter().filter(is_it).count()
+/// How often a command came so far.
+fn count_sent(stage: &Stage<'_>, of: (Tick, Seq)) -> usize {
+    let is_it = |sent: &&crate::stage::Sent| {
+        sent.command.as_ref().is_ok_and(|command| (command.tick, command.seq) == of)
     };
-    entry.report.sent.iter().map(|sent| came(sent.seq)).collect()
+    stage.seen.commands.iter().filter(is_it).count()
 }
 
 fn demand_same_bytes(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {

@@ -18,6 +18,9 @@ const LAST: Tick = 8;
 const GENERATION: Generation = 2;
 /// Where the simulator has the second incarnation count from.
 const LAST_SEQ: Seq = 1_000_000_000;
+/// So many streams and seeds are tried, for so many ticks each.
+const DRAWS: u64 = 16;
+const DRAWN: Tick = 12;
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);
 
@@ -39,7 +42,9 @@ fn state_of(entry: &Entry) -> PublicState {
 /// A stage on which the robot has joined as a second incarnation.
 fn returned(kit: &Kit) -> Result<(Stage<'_>, Welcome), Failure> {
     let mut stage = Stage::open(kit, Options::default())?;
-    let last = usual(kit)?.iter().find(|entry| entry.clock.tick == LAST).map(state_of);
+    let state =
+        |tick| usual(kit).map(|usual| usual.iter().find(|entry| entry.clock.tick == tick).map(state_of));
+    let (before, last) = (state(LAST - 1)?, state(LAST)?);
     let welcome = stage.welcome();
     let welcome = Welcome {
         generation: GENERATION,
@@ -47,6 +52,7 @@ fn returned(kit: &Kit) -> Result<(Stage<'_>, Welcome), Failure> {
         stream: format!("robot/{}#{GENERATION}", welcome.name),
         location: last.as_ref().map_or(welcome.location, |last| last.location),
         last_state: last,
+        state_before: before,
         last_seq: LAST_SEQ,
         ..welcome
     };
@@ -65,10 +71,11 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         let came = format!("a report for tick {}", answer.reading.report.tick);
         return Err(Failure::new("no report before a clock names its generation", came));
     }
-    if let Some(last) = &welcome.last_state {
-        let expected = "asked before its first report, the state that its welcome carries";
-        let came = super::queries::state(stage.state_in(1, LAST + 1)?, expected)?;
-        if came != *last {
+    for state in welcome.state_before.iter().chain(&welcome.last_state) {
+        let expected =
+            format!("asked before its first report, the state of tick {} of its welcome", state.tick);
+        let came = super::queries::state(stage.state_in(1, state.tick + 1)?, &expected)?;
+        if came != *state {
             return Err(Failure::new(expected, format!("the state of tick {}", came.tick)));
         }
     }
@@ -92,12 +99,47 @@ pub(super) fn numbers(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
         delivery.sent = delivery.sent.map(|sent| sent + LAST + 1);
     }
     let transcript = play(&mut stage, &welcome, &script, &mut Straight)?;
-    if transcript.iter().all(|entry| entry.report.sent.is_empty()) {
-        findings.skip("return.numbers", "the robot sent no command after it came back");
-        return Ok(());
-    }
     stage.settle(QUIET);
-    match_sent(&stage, &transcript, LAST_SEQ)
+    match_sent(&stage, &transcript, LAST_SEQ)?;
+    let shows_chance = chance(kit)?;
+    if !shows_chance && transcript.iter().all(|entry| entry.report.sent.is_empty()) {
+        let reason = "the robot sent no command after it came back, and no chance is seen in how it moves";
+        findings.skip("return.numbers", reason);
+    }
+    Ok(())
+}
+
+/// The stream that a welcome names decides, together with the seed, what is drawn. Returns whether the robot's moves show
+/// any chance at all. Each welcome is that of a further epoch, so that one process does for all.
+fn chance(kit: &Kit) -> Result<bool, Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    let mut welcome = stage.welcome();
+    let (seed, stream) = (welcome.seed, welcome.stream.clone());
+    play(&mut stage, &welcome, &Script::quiet(DRAWN), &mut Straight)?;
+    let mut moves = |seed, stream: String| {
+        welcome = Welcome { epoch: welcome.epoch + 1, seed, stream, ..welcome.clone() };
+        stage.rejoin = Some(welcome.clone());
+        let played = play(&mut stage, &welcome, &Script::quiet(DRAWN), &mut Straight)?;
+        let shown =
+            |entry: &Entry| (entry.report.proposal, entry.report.speed_mps, entry.report.direction_rad);
+        Ok::<_, Failure>(played.iter().map(shown).collect::<Vec<_>>())
+    };
+    let (mut by_stream, mut by_seed) = (Vec::new(), Vec::new());
+    for number in 1..=DRAWS {
+        by_stream.push(moves(seed, format!("{stream}#{number}"))?);
+        by_seed.push(moves(seed + number, stream.clone())?);
+    }
+    let is_one = |moves: &[Vec<_>]| moves.iter().all(|other| Some(other) == moves.first());
+    // Only where no two are the same is it certain that chance would have shown in the others as well.
+    let is_rich = |moves: &[Vec<_>]| (1..moves.len()).all(|at| !moves[..at].contains(&moves[at]));
+    let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
+    if is_rich(&by_seed) && is_one(&by_stream) {
+        return Err(Failure::new(expected, "the name of the stream makes no difference, the seed does"));
+    }
+    if is_rich(&by_stream) && is_one(&by_seed) {
+        return Err(Failure::new(expected, "the seed makes no difference, the name of the stream does"));
+    }
+    Ok(is_rich(&by_stream) && is_rich(&by_seed))
 }
 
 /// A clock that names a later incarnation: this one ends.
@@ -108,7 +150,12 @@ pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let news = News { joined: Some(GENERATION), ..News::default() };
     let news = BTreeMap::from([(kit.subject(), news)]);
     stage.put_clock(&Clock { epoch: 1, tick: 4, news, end: None })?;
-    stage.until_ended("its process ends when a clock names a later incarnation of it", PATIENCE)?;
+    let expected =
+        "its process ends, with an exit status other than 0, when a clock names a later incarnation of it";
+    let status = stage.until_ended(expected, PATIENCE)?;
+    if status.success() {
+        return Err(Failure::new(expected, format!("{status}")));
+    }
     stage.until_gone()?;
     match stage.seen.answers.iter().find(|answer| answer.reading.report.tick == 4) {
         None => Ok(()),

@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use nix::sys::signal::Signal;
 use protocol::PROTOCOL_VERSION;
-use protocol::messages::{Clock, End, JoinAnswer};
-use serde_json::Value;
+use protocol::messages::{Clock, End, JoinAnswer, Performative};
 
 use super::{Findings, seated};
 use crate::kit::{CannotRun, Kit};
@@ -79,12 +78,13 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
     )?;
     let instance = "an instance that tells this process from all others";
     expect(!request.instance.is_empty(), instance.to_owned(), "an empty one".to_owned())?;
-    let body: Value = serde_json::from_slice(&joining.body).unwrap_or(Value::Null);
-    let sdk = "sdk: the language and version that it is written with";
-    expect(body.get("sdk").is_some_and(Value::is_string), sdk.to_owned(), "none".to_owned())?;
-    let own = joining.key.strip_prefix(&stage.keys.join()).unwrap_or_default().trim_start_matches('/');
     let name = request.name.as_str();
-    expect(own.is_empty() || own == name, format!("the key of {name}"), joining.key.clone())
+    expect(is_join_key(stage, &joining.key, name), format!("the key of {name}"), joining.key.clone())
+}
+
+/// Whether a robot of this name may ask here: at the key with its name, and for the time being at the one for all.
+fn is_join_key(stage: &Stage<'_>, key: &str, name: &str) -> bool {
+    key.strip_prefix(&stage.keys.join()).is_some_and(|own| own.is_empty() || own == format!("/{name}"))
 }
 
 /// One report for each clock, and none else.
@@ -122,14 +122,15 @@ fn check_sent(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Finding
     findings.settle("command.sent", match_sent(stage, transcript, 0));
 }
 
-/// Each command that a report lists was put, each that was put is listed, and the numbers ascend from `last_seq` on.
+/// Each command that a report lists was put, each that was put is listed, and the numbers go on from `last_seq`.
 pub(super) fn match_sent(stage: &Stage<'_>, transcript: &Transcript, last_seq: u64) -> Result<(), Failure> {
     let mut last_seq = last_seq;
     let mut listed = Vec::new();
     for Entry { tick, sent } in transcript.iter().flat_map(Entry::of) {
-        if sent.seq <= last_seq {
-            let expected = format!("numbers above {last_seq} from tick {tick} on");
-            return Err(Failure::new(expected, format!("a command with seq {}", sent.seq)));
+        if sent.seq != last_seq + 1 || sent.performative != Performative::Achieve {
+            let expected = format!("seq {}, performative achieve, in tick {tick}", last_seq + 1);
+            let came = format!("seq {}, performative {}", sent.seq, sent.performative);
+            return Err(Failure::new(expected, came));
         }
         last_seq = sent.seq;
         let matches = |came: &&crate::stage::Sent| {
@@ -194,8 +195,9 @@ fn check_numbers(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Find
     for entry in transcript {
         let (micro, tick) = (entry.report.direction_rad * 1e6, entry.clock.tick);
         let is_rounded = (micro - micro.round()).abs() <= ANGLE_TOLERANCE;
-        if !is_rounded || micro.round().abs() > HALF_TURN {
-            let expected = "direction_rad in (-pi, pi], rounded to 1e-6 rad";
+        let is_minus_zero = micro == 0.0 && micro.is_sign_negative();
+        if !is_rounded || is_minus_zero || micro.round().abs() > HALF_TURN {
+            let expected = "direction_rad from -pi to pi, rounded to 1e-6 rad, 0 instead of -0";
             let came = format!("{} in tick {tick}", entry.report.direction_rad);
             findings.fail("number.angles", Failure::new(expected, came));
         }

@@ -1,6 +1,6 @@
 //! What a robot must bear: fields that it does not know, and messages that are none.
 
-use protocol::messages::Clock;
+use protocol::messages::{Clock, MAX_TEXT_BYTES};
 
 use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
@@ -81,6 +81,10 @@ fn commands(tick: u64) -> Vec<Vec<u8>> {
         format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":-1,\"command\":\"x\"}}"),
         format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":\"1\",\"command\":\"x\"}}"),
         format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":1,\"command\":{{}}}}"),
+        format!(
+            "{{\"epoch\":1,\"tick\":{tick},\"seq\":1,\"command\":\"{}\"}}",
+            "x".repeat(MAX_TEXT_BYTES + 1)
+        ),
         format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":2,\"performative\":\"sing\",\"command\":\"x\"}}"),
     ] {
         rubbish.push(text.into_bytes());
