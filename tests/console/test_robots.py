@@ -1,5 +1,7 @@
 """What is shown of robots: their panels, that they are there, and that nothing they say does anything."""
 
+import random
+
 from playwright.sync_api import expect
 
 from lab import eventually, until
@@ -140,6 +142,49 @@ def test_nothing_that_a_robot_shows_does_anything(launch, open_page):
     foreign = [url for url in requests if not url.startswith((run.address, "data:", "ws:"))]
     assert foreign == []
     assert run.simulator.poll() is None
+
+
+ODD_TEXTS = ("", " ", MARKUP, "${window.hacked=1}", "{{constructor}}", "\u202e\u0000\ufeff", "x" * 4000, "\n\n\t", "🤖" * 200, "NaN")
+ODD_NUMBERS = (0, -0.0, -1, 1, 0.5, 1e308, -1e308, 5e-324, 2**53, -(2**63))
+FACES = ("happy", "sad", "surprised", "disgusted", "angry", "fearful", "neutral")
+
+
+def odd_widget(chance):
+    """A widget that a console accepts, or nearly."""
+    text, number = lambda: chance.choice(ODD_TEXTS), lambda: chance.choice(ODD_NUMBERS)
+    widget = chance.choice(
+        (
+            {"widget": "text", "label": text(), "text": text()},
+            {"widget": "badge", "label": text(), "text": text(), "tone": chance.choice(("good", "neutral", "warning", "bad"))},
+            {"widget": "bar", "label": text(), "value": number(), "min": number(), "max": number()},
+            {"widget": "face", "face": chance.choice(FACES), "intensity": number()},
+            {"widget": "sparkline", "label": text(), "values": [number() for _ in range(chance.choice((0, 1, 2, 900)))]},
+            {"widget": "table", "rows": [[text() for _ in range(chance.randrange(5))] for _ in range(chance.randrange(5))]},
+            {"widget": "svg", "label": text(), "svg": chance.choice((SVG, SVG[: chance.randrange(len(SVG))], *ODD_TEXTS))},
+            {"widget": "button", "label": text(), "command": text()},
+        )
+    )
+    if chance.random() < 0.1:
+        widget[chance.choice(list(widget))] = chance.choice((None, [], {}, True, "odd", 3))
+    return widget
+
+
+def test_whatever_a_robot_shows_the_page_goes_on(launch, open_page):
+    run = launch()
+    page = open_page(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-step").click()
+    panel = page.get_by_test_id("panel-Leguin")
+    expect(panel.get_by_test_id("face")).to_be_visible()
+    chance = random.Random(2002)
+    for number in range(60):
+        run.put("robot/Leguin/panel", {"widgets": [odd_widget(chance) for _ in range(chance.randrange(20))]})
+        if number % 10 == 9:
+            run.put("robot/Leguin/panel", {"widgets": [{"widget": "text", "label": "number", "text": f"shown {number}"}]})
+            expect(panel).to_contain_text(f"shown {number}")
+    assert page.evaluate("typeof window.hacked") == "undefined"
+    page.get_by_test_id("btn-step").click()
+    expect(page.get_by_test_id("tick")).to_have_text("2")
 
 
 def test_many_lines_do_not_pile_up(launch, open_page):

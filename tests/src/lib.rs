@@ -8,6 +8,7 @@
 )]
 
 pub mod hall;
+pub mod network;
 pub mod processes;
 
 use std::path::{Path, PathBuf};
@@ -36,6 +37,15 @@ pub fn programs() -> &'static Path {
         let folder = own.parent().and_then(Path::parent).unwrap().to_owned();
         let mut build = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
         build.current_dir(root()).args(["build", "--workspace", "--bins", "--quiet"]);
+        // What cargo tells a test about its package would make build scripts that look at it run again, and with them
+        // half of the tree be compiled again.
+        let is_of_package =
+            |name: &str| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_");
+        for (name, _) in std::env::vars_os() {
+            if name.to_str().is_some_and(is_of_package) {
+                build.env_remove(name);
+            }
+        }
         if folder.ends_with("release") {
             build.arg("--release");
         }

@@ -39,6 +39,11 @@ impl Running {
 
     /// Waits until it prints a line that contains `text`, and returns when that was.
     pub fn prints(&mut self, text: &str) -> Instant {
+        self.prints_after(text, None)
+    }
+
+    /// The same, but only what it prints after a moment counts.
+    pub fn prints_after(&mut self, text: &str, after: Option<Instant>) -> Instant {
         let printed = self.printed.clone();
         let begun = Instant::now();
         loop {
@@ -46,7 +51,7 @@ impl Running {
                 .lock()
                 .expect("no reader panics")
                 .iter()
-                .find(|(_, line)| line.contains(text))
+                .find(|(at, line)| after.is_none_or(|after| *at > after) && line.contains(text))
                 .map(|(at, _)| *at);
             if let Some(at) = found {
                 return at;
@@ -77,6 +82,12 @@ impl Running {
     pub fn finish(&mut self) {
         let status = self.wait();
         assert!(status.success(), "{status}:\n{}", self.printed());
+    }
+
+    /// Its process id.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.child.id()
     }
 
     /// Sends the program itself a signal.

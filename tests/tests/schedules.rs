@@ -232,6 +232,7 @@ impl Schedule {
             run: run.clone(),
             connect: "this process".to_owned(),
             patience: Duration::from_secs(4),
+            gone_patience: Duration::from_secs(4),
             zenoh_config: None,
         };
         let make = |class: &str| robots::make(class).expect("a shipped class");

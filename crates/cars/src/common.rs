@@ -65,6 +65,19 @@ impl ExecutionArgs {
         }
     }
 
+    /// The same options as arguments of another `cars launch`.
+    pub(crate) fn to_args(&self, run: &RunName) -> Vec<String> {
+        let mut args = vec![format!("--run={run}"), format!("--out={}", self.out.display())];
+        args.extend(self.seed.map(|seed| format!("--seed={seed}")));
+        args.extend(self.duration.map(|duration| format!("--duration={} s", duration.0)));
+        args.extend(self.speed.map(|speed| match speed.0 {
+            Some(factor) => format!("--speed={factor}"),
+            None => "--speed=max".to_owned(),
+        }));
+        args.extend(self.set.iter().map(|change| format!("--set={change}")));
+        args
+    }
+
     /// Name of the run: as given, or as the file is called.
     pub(crate) fn run_name(&self, file: &Path) -> miette::Result<RunName> {
         let from_file = || RunName::new(file.file_stem().and_then(|stem| stem.to_str()).unwrap_or("run"));

@@ -12,7 +12,7 @@ use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
 use protocol::{RobotName, RunName, decode, encode};
 use simulator::RunFolder;
-use simulator::recorder::ENDPOINT;
+use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG};
 use simulator::scenario::{Changes, Scenario};
 use simulator::units::Time;
 
@@ -37,6 +37,9 @@ pub(crate) struct RunRef {
     /// Where run folders are made.
     #[arg(long, global = true, default_value = "runs", value_name = "DIR")]
     out: PathBuf,
+    /// Configuration file for a secured run, for example that of the operator; without it, as its folder says.
+    #[arg(long, global = true, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
+    zenoh_config: Option<PathBuf>,
 }
 
 impl RunRef {
@@ -71,9 +74,19 @@ impl RunRef {
         Ok(text.trim().to_owned())
     }
 
+    /// What is needed to be let in: as said, or as the folder of the run says if it is found by its folder.
+    fn config(&self) -> miette::Result<Option<PathBuf>> {
+        if self.zenoh_config.is_some() || self.connect.is_some() {
+            return Ok(self.zenoh_config.clone());
+        }
+        let noted = std::fs::read_to_string(self.folder()?.file(OPERATOR_CONFIG));
+        Ok(noted.ok().map(|text| PathBuf::from(text.trim())))
+    }
+
     fn open(&self) -> miette::Result<(Bus, Keys)> {
-        let role = Role::Client { connect: self.endpoint()?, patience: PATIENCE };
-        Ok((Bus::open(&role, None).into_diagnostic()?, Keys::new(&self.run()?)))
+        let (connect, config) = (self.endpoint()?, self.config()?);
+        let role = Role::Client { connect, patience: PATIENCE };
+        Ok((Bus::open(&role, config.as_ref()).into_diagnostic()?, Keys::new(&self.run()?)))
     }
 }
 

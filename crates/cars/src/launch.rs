@@ -3,9 +3,10 @@
 mod bar;
 mod compose;
 mod ending;
-mod endpoint;
+pub(crate) mod endpoint;
 pub(crate) mod file;
 mod lines;
+pub(crate) mod link;
 mod observe;
 mod plan;
 mod process;
@@ -21,7 +22,9 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr, miette};
-use protocol::RunName;
+use protocol::bus::check_exposure;
+use protocol::endpoint::connectable;
+use protocol::{RobotName, RunName};
 use simulator::diagnostic::{FileError, Source};
 use simulator::recorder::{LOGS, SUMMARY};
 use simulator::scenario::Changes;
@@ -29,9 +32,11 @@ use simulator::units::Time;
 use simulator::{RunFolder, Scenario, Summary, roster};
 
 use crate::common::{ExecutionArgs, Speed};
+use crate::secure::Secured;
 use crate::table;
 
 use file::LaunchFile;
+use link::Link;
 use observe::{Observer, Watch};
 use plan::{Execution, Planned};
 use screen::{Look, Screen};
@@ -72,9 +77,20 @@ pub(crate) struct LaunchArgs {
     /// Port of the loopback interface at which the simulator listens; without it a free one.
     #[arg(long, value_name = "PORT", conflicts_with = "listen")]
     connect_port: Option<u16>,
-    /// Where the simulator listens. Everything but loopback opens the run to the network.
+    /// Where the simulator listens. Where other machines could connect, only secured, or with --insecure.
     #[arg(long, value_name = "ENDPOINT")]
     listen: Option<String>,
+    /// How a process of the file reaches the simulator, if not directly: by another endpoint, and from within a network
+    /// namespace. `cars net play` says it.
+    #[arg(long = "link", value_name = "PROCESS=ENDPOINT[@NAMESPACE]")]
+    links: Vec<Link>,
+    /// Folder of certificates that `cars secure init` made, instead of the launch file's.
+    #[arg(long, value_name = "DIR")]
+    secure: Option<PathBuf>,
+    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the run
+    /// and pose as any robot.
+    #[arg(long, conflicts_with = "secure")]
+    insecure: bool,
     /// How long a process has to end by itself before it is killed.
     #[arg(long, value_name = "TIME", default_value = "3 s")]
     grace: Time,
@@ -116,6 +132,7 @@ struct Launch {
     /// With the command line's changes.
     scenario: Scenario,
     run: RunName,
+    secured: Option<Secured>,
 }
 
 impl Launch {
@@ -133,13 +150,18 @@ impl Launch {
         };
         file.check_robots(&scenario)?;
         let run = args.execution.run_name(path)?;
-        Ok(Self { args, file, scenario, run })
+        let secured = secured(&args, &file)?;
+        Ok(Self { args, file, scenario, run, secured })
     }
 
     fn export(&self) -> miette::Result<ExitCode> {
         if let Some(roster) = &self.args.roster {
             let help = "write a launch file, with a scenario that the containers can read";
             return Err(miette!(help = help, "{} cannot be exported", roster.display()));
+        }
+        if self.secured.is_some() {
+            let help = "export it without `secure`: the containers have a network of their own";
+            return Err(miette!(help = help, "a secured launch cannot be exported"));
         }
         print!("{}", compose::export(&self.file, &self.run, self.speed())?);
         Ok(ExitCode::SUCCESS)
@@ -158,13 +180,17 @@ impl Launch {
         let execution = Execution {
             run,
             endpoint,
+            secured: self.secured.as_ref(),
+            is_insecure: self.args.insecure,
             out,
             speed: self.speed(),
             is_paused: self.args.paused,
             has_console: !self.args.no_console,
             opens_browser: self.args.open,
         };
-        plan::plan(&self.file, &execution)
+        let mut planned = plan::plan(&self.file, &execution)?;
+        self.args.links.iter().try_for_each(|link| link.lay(&mut planned))?;
+        Ok(planned)
     }
 
     fn speed(&self) -> Speed {
@@ -173,13 +199,28 @@ impl Launch {
 
     /// Where the simulator is to listen.
     fn endpoint(&self) -> miette::Result<String> {
-        match (&self.args.listen, self.args.connect_port) {
-            (Some(endpoint), _) => Ok(endpoint.clone()),
-            (None, Some(port)) => Ok(endpoint::loopback(port)),
-            (None, None) => {
-                endpoint::free().into_diagnostic().wrap_err("no free port of the loopback interface")
-            }
+        if let Some(endpoint) = &self.args.listen {
+            let config = self.simulator_config();
+            check_exposure(endpoint, config.as_ref(), self.args.insecure).into_diagnostic()?;
+            return Ok(endpoint.clone());
         }
+        let free =
+            || endpoint::free_port().into_diagnostic().wrap_err("no free port of the loopback interface");
+        let port = self.args.connect_port.map_or_else(free, Ok)?;
+        Ok(endpoint::loopback(port, self.secured.is_some()))
+    }
+
+    /// The configuration file that the simulator gets: that of a secured run, or what the environment says.
+    fn simulator_config(&self) -> Option<PathBuf> {
+        let secured = self.secured.as_ref().map(|secured| secured.config_of(file::SIMULATOR));
+        secured
+            .or_else(|| self.file.simulator.env.get(plan::ZENOH_CONFIG).map(PathBuf::from))
+            .or_else(inherited)
+    }
+
+    /// The configuration file that the launcher itself uses to watch.
+    fn observer_config(&self) -> Option<PathBuf> {
+        self.secured.as_ref().map(Secured::operator).or_else(inherited)
     }
 
     /// Plays the run, and says what came of it.
@@ -232,7 +273,8 @@ impl Launch {
         let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.tell());
         let faults = (!self.scenario.faults.is_empty()).then(|| supervisor.queue());
         let is_needed = !self.args.quiet || faults.is_some();
-        let watch = || Watch { run, endpoint: endpoint.to_owned(), wants_world, tell, faults };
+        let (endpoint, config) = (connectable(endpoint), self.observer_config());
+        let watch = || Watch { run, endpoint, config, wants_world, tell, faults };
         let observer = is_needed.then(|| Observer::start(watch()));
         let running = async {
             signals::listen(&supervisor.queue())?;
@@ -245,6 +287,20 @@ impl Launch {
         screen.finish();
         Ok(outcome)
     }
+}
+
+/// The certificates with which a launch is secured, if it is: those of the command line, or of the file.
+fn secured(args: &LaunchArgs, file: &LaunchFile) -> miette::Result<Option<Secured>> {
+    let Some(folder) = args.secure.as_ref().or(file.secure.as_ref()) else { return Ok(None) };
+    file.check_certificates()?;
+    let robots = file.processes.iter().flat_map(|process| process.robots.iter().map(RobotName::as_str));
+    let console = file.console.iter().map(|_| file::CONSOLE);
+    Secured::find(folder, robots.chain(console)).map(Some)
+}
+
+/// What the environment says to every program of the project.
+fn inherited() -> Option<PathBuf> {
+    std::env::var_os(plan::ZENOH_CONFIG).map(PathBuf::from)
 }
 
 /// Reads a roster's scenario with the command line's changes, by way of a file: changes are made to files.

@@ -8,7 +8,10 @@ mod control;
 mod emotionml;
 mod experiment;
 mod launch;
+mod net;
+mod router;
 mod run;
+mod secure;
 mod statistics;
 mod table;
 
@@ -48,6 +51,13 @@ enum Subcommands {
     Emotionml(emotionml::EmotionmlArgs),
     /// Check a robot, in whatever language, against the rules of the protocol.
     Conform(conform::ConformArgs),
+    /// Real links with real faults: cut, slow, narrow. Nothing of it is reproducible but the record.
+    #[command(subcommand)]
+    Net(net::NetCommand),
+    /// Forward between a simulator and robots on different machines, and do nothing else.
+    Router(router::RouterArgs),
+    /// Make certificates and access control for a roster, for runs that strangers could reach.
+    Secure(secure::SecureArgs),
     /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
     Bench(bench::BenchArgs),
     /// Print shell completions.
@@ -80,6 +90,9 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Log(args) => control::log(&args),
         Subcommands::Emotionml(args) => emotionml::emotionml(&args),
         Subcommands::Conform(args) => Ok(conform::conform(&args)),
+        Subcommands::Net(command) => net::net(command),
+        Subcommands::Router(args) => router::router(&args),
+        Subcommands::Secure(args) => secure::secure(&args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),
         Subcommands::BenchEcho { address } => bench::echo(&address),

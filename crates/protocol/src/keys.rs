@@ -32,16 +32,48 @@ impl Keys {
         Self { root: format!("cars/{run}") }
     }
 
+    /// The keys of all runs: what is not about one run, as access control is not.
+    #[must_use]
+    pub fn of_any_run() -> Self {
+        Self { root: "cars/*".to_owned() }
+    }
+
+    /// Everything that is said in the run.
+    #[must_use]
+    pub fn all(&self) -> String {
+        format!("{}/**", self.root)
+    }
+
     /// Simulator to all: a tick is granted.
     #[must_use]
     pub fn clock(&self) -> String {
         format!("{}/clock", self.root)
     }
 
-    /// Queryable at the simulator: a robot asks to take part.
+    /// Queryable at the simulator: a robot asks to take part. Open to all; see [`Self::join_as`].
     #[must_use]
     pub fn join(&self) -> String {
         format!("{}/join", self.root)
+    }
+
+    /// Queryable at the simulator: this robot asks to take part; its name is in the key, so that access control can
+    /// pin it.
+    #[must_use]
+    pub fn join_as(&self, robot: &RobotName) -> String {
+        format!("{}/join/{robot}", self.root)
+    }
+
+    /// All that ask to take part, with their name in the key or without.
+    #[must_use]
+    pub fn joins(&self) -> String {
+        format!("{}/join/**", self.root)
+    }
+
+    /// The robot that a key of joining names, if it names one.
+    #[must_use]
+    pub fn joins_as(key: &str) -> Option<&str> {
+        let (before, last) = key.rsplit_once('/')?;
+        before.ends_with("/join").then_some(last)
     }
 
     /// Robot to simulator: its tick is done.
@@ -78,6 +110,11 @@ impl Keys {
     #[must_use]
     pub fn commands_to(&self, to: &RobotName) -> String {
         format!("{}/robot/{to}/command/*", self.root)
+    }
+
+    /// A key about one robot, or about all of them where its name is `*`.
+    pub(crate) fn robot(&self, robot: &str, what: &str) -> String {
+        format!("{}/robot/{robot}/{what}", self.root)
     }
 
     /// Queryable at the robot: `what` is one of [`QUERIES`] or [`STATE`].
@@ -126,6 +163,12 @@ impl Keys {
     #[must_use]
     pub fn faults(&self) -> String {
         format!("{}/faults", self.root)
+    }
+
+    /// All liveliness tokens.
+    #[must_use]
+    pub fn alive(&self) -> String {
+        format!("{}/alive/**", self.root)
     }
 
     /// Liveliness token of the simulator.

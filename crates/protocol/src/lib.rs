@@ -6,8 +6,11 @@
 //!
 //! SI units and REP 103 throughout: meters, seconds, radians counter-clockwise from +x.
 
+pub mod access;
+pub mod asyncapi;
 pub mod bus;
 pub mod codec;
+pub mod endpoint;
 pub mod event;
 pub mod keys;
 pub mod messages;
@@ -15,6 +18,7 @@ pub mod name;
 pub mod random;
 pub mod runtime;
 pub mod schema;
+pub mod secure;
 
 pub use codec::{Malformed, Message, decode, encode};
 pub use event::{Event, Line};

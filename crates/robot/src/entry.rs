@@ -24,9 +24,12 @@ pub struct RobotArgs {
     /// Where its simulator listens.
     #[arg(long, env = "CARS_CONNECT", default_value = DEFAULT_ENDPOINT, value_name = "ENDPOINT")]
     pub connect: String,
-    /// How long to try to reach the simulator and to be let in, and to wait for it when it is gone, seconds.
+    /// How long to try to reach the simulator and to be let in, seconds.
     #[arg(long, env = "CARS_PATIENCE_S", default_value_t = 20.0, value_name = "SECONDS")]
     pub patience_s: f64,
+    /// How long to wait for the simulator once it is gone, or the link to it is cut, seconds.
+    #[arg(long, env = "CARS_GONE_PATIENCE_S", default_value_t = 600.0, value_name = "SECONDS")]
+    pub gone_patience_s: f64,
     /// A configuration file of the middleware instead of the built-in settings.
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     pub zenoh_config: Option<PathBuf>,
@@ -37,8 +40,10 @@ impl RobotArgs {
     #[must_use]
     pub fn options(&self) -> HostOptions {
         let patience = Duration::try_from_secs_f64(self.patience_s).unwrap_or(Duration::from_secs(20));
+        let gone_patience =
+            Duration::try_from_secs_f64(self.gone_patience_s).unwrap_or(Duration::from_secs(600));
         let (run, connect) = (self.run.clone(), self.connect.clone());
-        HostOptions { run, connect, patience, zenoh_config: self.zenoh_config.clone() }
+        HostOptions { run, connect, patience, gone_patience, zenoh_config: self.zenoh_config.clone() }
     }
 }
 

@@ -22,8 +22,10 @@ pub struct HostOptions {
     pub run: RunName,
     /// Endpoint of its simulator or router.
     pub connect: String,
-    /// How long to try to reach it, to be let in, and to wait for it when it is gone.
+    /// How long to try to reach it and to be let in.
     pub patience: Duration,
+    /// How long to wait for it once it is gone: it ended, or the link to it is cut, which look the same from here.
+    pub gone_patience: Duration,
     /// A configuration file of the middleware instead of the built-in settings.
     pub zenoh_config: Option<PathBuf>,
 }
@@ -118,7 +120,7 @@ impl Host {
         options: HostOptions,
     ) -> Result<Self, HostError> {
         let keys = Keys::new(&options.run);
-        let link = Link::new(bus.clone(), keys.clone(), options.patience);
+        let link = Link::new(bus.clone(), keys.clone(), options.gone_patience);
         let mut host = Self { options, bus, keys, link, members: BTreeMap::new(), declared: Vec::new() };
         let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
         host.listen(&names)?;
@@ -182,7 +184,7 @@ impl Host {
             instance: self.bus.id(),
             sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
         };
-        let (key, begun) = (self.keys.join(), Instant::now());
+        let (key, begun) = (self.keys.join_as(name), Instant::now());
         loop {
             let is_last_try = begun.elapsed() > self.options.patience;
             match self.bus.ask(&key, "", Some(encode(&request)))? {
@@ -216,8 +218,7 @@ impl Host {
     /// [`HostError`] if it cannot go on.
     pub fn run(mut self) -> Result<End, HostError> {
         let outcome = loop {
-            let gone = self.link.simulator_gone.map_or(Duration::ZERO, |since| since.elapsed());
-            match self.link.next_clock(self.options.patience.saturating_sub(gone)) {
+            match self.link.next_clock() {
                 Some(Clock { end: Some(end), .. }) => break Ok(end),
                 Some(clock) => {
                     if let Err(error) = self.on_clock(&clock) {
@@ -227,7 +228,7 @@ impl Host {
                 None => {}
             }
             if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())
-                && gone >= self.options.patience
+                && gone >= self.options.gone_patience
             {
                 break Err(HostError::SimulatorGone(gone));
             }

@@ -22,6 +22,8 @@ pub(crate) const QUEUE: usize = 4096;
 const COMMAND_PATIENCE: Duration = Duration::from_secs(10);
 /// A robot that waits looks this often at what else limits its wait; after one of them it tells whom it waits for.
 const LOOK_AGAIN: Duration = Duration::from_millis(250);
+/// How long to sleep where nothing is due: while the simulator is there its silence is its own affair.
+const LOOK_FOR_SIMULATOR: Duration = Duration::from_secs(60);
 /// Between two attempts to ask a robot that does not answer.
 const ASK_AGAIN: Duration = Duration::from_millis(500);
 /// For how many ticks commands are kept at most, whatever the simulator says.
@@ -106,9 +108,8 @@ impl Link {
         self.queue.clone()
     }
 
-    /// The next clock, or `None` after `patience` without one.
-    pub(crate) fn next_clock(&mut self, patience: Duration) -> Option<Clock> {
-        let deadline = Instant::now() + patience;
+    /// The next clock, or `None` once the simulator has been gone for longer than there is patience.
+    pub(crate) fn next_clock(&mut self) -> Option<Clock> {
         loop {
             while let Some(clock) = self.clocks.pop_front() {
                 // Where the simulator has gone on without us, only its last clock can still be answered; the first clock
@@ -120,7 +121,11 @@ impl Link {
                     return Some(clock);
                 }
             }
-            if !self.pump(deadline.saturating_duration_since(Instant::now())) {
+            let left = match self.simulator_gone {
+                Some(since) => self.patience.saturating_sub(since.elapsed()),
+                None => LOOK_FOR_SIMULATOR,
+            };
+            if !self.pump(left) && self.simulator_gone.is_some_and(|since| since.elapsed() >= self.patience) {
                 return None;
             }
         }
@@ -173,10 +178,21 @@ impl Link {
                     self.percepts.entry((of, asked)).or_insert(percept);
                 }
             }
-            Event::Simulator(true) => self.simulator_gone = None,
-            Event::Simulator(false) => self.simulator_gone = Some(Instant::now()),
+            Event::Simulator(is_there) => self.note_simulator(is_there),
         }
         true
+    }
+
+    fn note_simulator(&mut self, is_there: bool) {
+        if is_there {
+            if let Some(since) = self.simulator_gone.take() {
+                tracing::warn!("the simulator is back after {:.1} s", since.elapsed().as_secs_f64());
+            }
+        } else if self.simulator_gone.is_none() {
+            let patience_s = self.patience.as_secs_f64();
+            tracing::warn!("the simulator, or the link to it, is gone: waiting for it up to {patience_s} s");
+            self.simulator_gone = Some(Instant::now());
+        }
     }
 
     fn file_clock(&mut self, clock: Clock) {

@@ -27,6 +27,8 @@ pub const SUMMARY: &str = "summary.json";
 pub const LOGS: &str = "logs";
 /// Where the simulator of a run in progress listens.
 pub const ENDPOINT: &str = "endpoint";
+/// Path of the file with which an operator may control a secured run in progress.
+pub const OPERATOR_CONFIG: &str = "operator_config";
 /// Held by the process that writes the record, as long as it lives.
 const LOCK: &str = ".lock";
 
@@ -39,7 +41,7 @@ pub(crate) fn check_log_name(name: &str) -> Result<(), String> {
     if !is_plain {
         return Err(format!("{name:?} is no file name of letters, digits, `.`, `_` and `-`"));
     }
-    let is_taken = [EVENTS, RECORDING, SUMMARY, LOGS, ENDPOINT].contains(&name)
+    let is_taken = [EVENTS, RECORDING, SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG].contains(&name)
         || name.starts_with("scenario")
         || name.starts_with("events")
         || name.starts_with("recording");
@@ -78,7 +80,8 @@ impl RunFolder {
         }
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
         let lock = self.lock()?;
-        let (log, own) = (self.log(), [EVENTS, RECORDING, SUMMARY, ENDPOINT].map(|name| self.file(name)));
+        let (log, own) =
+            (self.log(), [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name)));
         for file in self.superseded().into_iter().chain(own).chain([log]) {
             if file.exists() {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;

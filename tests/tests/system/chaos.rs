@@ -1,13 +1,17 @@
-//! Processes are killed and stopped at random, drawn from a seed: nothing hangs, nobody is left behind, the record is whole
-//! and names whom it happened to. A short version runs always; `CARS_CHAOS=200` plays as many events as it says.
+//! Processes are killed and stopped and their links cut at random, drawn from a seed: nothing hangs, nobody is left behind,
+//! the record is whole and names whom it happened to. A short version runs always; `CARS_CHAOS=200` plays as many events as
+//! it says, `CARS_CHAOS_SEED` others.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpListener;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 use protocol::random::{Stream, stream, unit};
 use system_tests::processes::{find, named, send};
-use system_tests::{Lab, eventually};
+use system_tests::{Lab, eventually, programs};
 
 /// Events of the short version.
 const EVENTS: usize = 24;
@@ -16,11 +20,58 @@ const ROBOTS: [usize; 4] = [2, 5, 9, 16];
 /// Kills of one robot in one launch: below what the launcher takes for a broken program.
 const MAX_KILLS: usize = 4;
 
-/// What happens to a process.
+/// What happens to a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Blow {
     Kill,
     Stop(Duration),
+    /// Its link to the simulator; meanwhile other things happen.
+    Cut(Duration),
+}
+
+/// The link of a robot: a proxy that obeys.
+struct Cable {
+    proxy: Child,
+    endpoint: String,
+    /// When it is to be whole again.
+    heals: Option<Instant>,
+}
+
+impl Cable {
+    fn new(port: u16) -> Self {
+        let to = format!("tcp/127.0.0.1:{port}");
+        let mut command = Command::new(programs().join("cars"));
+        command.args(["net", "proxy", "--listen", "tcp/127.0.0.1:0", "--to", &to]);
+        let mut proxy = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(proxy.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let address = line.strip_prefix("listening at ").and_then(|rest| rest.split(',').next()).unwrap();
+        let endpoint = format!("tcp/{address}");
+        Self { proxy, endpoint, heals: None }
+    }
+
+    fn say(&mut self, order: &str) {
+        writeln!(self.proxy.stdin.as_mut().unwrap(), "{order}").unwrap();
+    }
+
+    fn cut(&mut self, lasting: Duration) {
+        self.say("cut");
+        self.heals = Some(Instant::now() + lasting);
+    }
+
+    fn heal_by(&mut self, now: Instant) {
+        if self.heals.is_some_and(|at| at <= now) {
+            self.say("heal");
+            self.heals = None;
+        }
+    }
+}
+
+impl Drop for Cable {
+    fn drop(&mut self) {
+        self.proxy.kill().unwrap();
+        self.proxy.wait().unwrap();
+    }
 }
 
 fn below(chance: &mut Stream, n: usize) -> usize {
@@ -45,17 +96,19 @@ fn launch_file(lab: &Lab, n: usize) -> String {
     lab.write("chaos-launch.toml", &launch).to_str().unwrap().to_owned()
 }
 
-/// Strikes robots of a launch `count` times; returns whom.
-fn strike(run: &str, n: usize, count: usize, chance: &mut Stream) -> BTreeSet<String> {
-    let mut kills = vec![0; n];
+/// Strikes robots of a launch `count` times; returns whom. In the end all links are whole.
+fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) -> BTreeSet<String> {
+    let mut kills = vec![0; cables.len()];
     let mut struck = BTreeSet::new();
     for _ in 0..count {
-        let robot = below(chance, n);
-        let can_be_killed = kills[robot] < MAX_KILLS;
-        let blow = if unit(chance) < 0.5 && can_be_killed {
-            Blow::Kill
-        } else {
-            Blow::Stop(Duration::from_millis(500 + below(chance, 500) as u64))
+        let robot = below(chance, cables.len());
+        cables.iter_mut().for_each(|cable| cable.heal_by(Instant::now()));
+        let is_cut = cables[robot].heals.is_some();
+        let blow = match below(chance, 3) {
+            0 if kills[robot] < MAX_KILLS => Blow::Kill,
+            // Shorter and longer than the lease of a link.
+            1 if !is_cut => Blow::Cut(Duration::from_millis(500 + below(chance, 4000) as u64)),
+            _ => Blow::Stop(Duration::from_millis(500 + below(chance, 500) as u64)),
         };
         let name = format!("R{robot}");
         // One that was killed just now is being started again.
@@ -71,9 +124,14 @@ fn strike(run: &str, n: usize, count: usize, chance: &mut Stream) -> BTreeSet<St
                 std::thread::sleep(lasting);
                 send(pid, Signal::SIGCONT);
             }
+            Blow::Cut(lasting) => cables[robot].cut(lasting),
         }
         struck.insert(name);
     }
+    // One that was cut a moment ago has to be missed before it is back.
+    let last = cables.iter().filter_map(|cable| cable.heals).max().unwrap_or_else(Instant::now);
+    std::thread::sleep(last.saturating_duration_since(Instant::now()));
+    cables.iter_mut().for_each(|cable| cable.heal_by(last));
     struck
 }
 
@@ -86,14 +144,19 @@ fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
     for (index, n) in ROBOTS.iter().take(launches).enumerate() {
         let run = format!("chaos-{index}");
         let file = launch_file(&lab, *n);
-        let mut launch = lab.start(&run, &["launch", &file]);
+        let port = TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
+        let mut cables: Vec<Cable> = (0..*n).map(|_| Cable::new(port)).collect();
+        let links = cables.iter().enumerate().map(|(i, cable)| format!("--link=R{i}={}", cable.endpoint));
+        let args = ["launch".to_owned(), file, format!("--connect-port={port}")].into_iter().chain(links);
+        let args: Vec<String> = args.collect();
+        let mut launch = lab.start(&run, &args.iter().map(String::as_str).collect::<Vec<_>>());
         // Its first lines may have been said before the launcher listened: whether it runs is asked.
         eventually("the clock to run", || {
             let output = lab.cars(&["ctl", "status", "--json", "--run", &run]).output().ok()?;
             String::from_utf8_lossy(&output.stdout).contains("\"phase\":\"running\"").then_some(())
         });
         let mut chance = stream(seed, &run);
-        let struck = strike(&run, *n, events / launches, &mut chance);
+        let struck = strike(&run, &mut cables, events / launches, &mut chance);
         // The clock still goes, whoever is missing.
         let status = || -> u64 {
             let text = lab.ok(&["ctl", "status", "--json", "--run", &run]);

@@ -2,20 +2,22 @@
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 
+use protocol::endpoint::TLS;
+
 /// A loopback port that is free at this moment.
-pub(super) fn free() -> std::io::Result<String> {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
-    Ok(format!("tcp/{}", listener.local_addr()?))
+pub(crate) fn free_port() -> std::io::Result<u16> {
+    Ok(TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()?.port())
 }
 
 /// This port of the loopback interface.
-pub(super) fn loopback(port: u16) -> String {
-    format!("tcp/127.0.0.1:{port}")
+pub(crate) fn loopback(port: u16, is_secured: bool) -> String {
+    let protocol = if is_secured { TLS } else { "tcp" };
+    format!("{protocol}/{}:{port}", Ipv4Addr::LOCALHOST)
 }
 
 /// Whether somebody listens there now.
 pub(super) fn is_taken(endpoint: &str) -> bool {
-    let address: Option<SocketAddr> = endpoint.strip_prefix("tcp/").and_then(|address| address.parse().ok());
+    let address: Option<SocketAddr> = endpoint.split_once('/').and_then(|(_, address)| address.parse().ok());
     let bound = address.map(TcpListener::bind);
     matches!(bound, Some(Err(error)) if error.kind() == std::io::ErrorKind::AddrInUse)
 }
@@ -27,10 +29,10 @@ mod tests {
     #[test]
     fn a_port_is_taken_while_somebody_listens() {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        let endpoint = loopback(listener.local_addr().unwrap().port());
-        assert!(is_taken(&endpoint));
+        let port = listener.local_addr().unwrap().port();
+        assert!(is_taken(&loopback(port, false)) && is_taken(&loopback(port, true)));
         drop(listener);
-        assert!(!is_taken(&endpoint));
-        assert!(!is_taken(&free().unwrap()));
+        assert!(!is_taken(&loopback(port, false)));
+        assert!(!is_taken(&loopback(free_port().unwrap(), false)));
     }
 }

@@ -40,6 +40,8 @@ pub(crate) struct LaunchFile {
     scenario_span: Option<Range<usize>>,
     /// How fast the clock goes.
     pub(crate) speed: Option<Speed>,
+    /// The folder of certificates that secures the run, found from the current directory.
+    pub(crate) secure: Option<PathBuf>,
     /// The simulator's own process.
     pub(crate) simulator: Process,
     /// The console's process, unless it is not wanted.
@@ -77,6 +79,7 @@ pub(crate) struct Process {
 struct RawFile {
     scenario: Spanned<PathBuf>,
     speed: Option<Spanned<RawSpeed>>,
+    secure: Option<PathBuf>,
     #[serde(default)]
     simulator: RawSimulator,
     #[serde(default)]
@@ -162,8 +165,9 @@ impl LaunchFile {
         }
         let scenario_span = Some(raw.scenario.span());
         let scenario = tidy(&folder.join(raw.scenario.into_inner()));
+        let secure = raw.secure.map(|secure| tidy(&folder.join(secure)));
         let folder = folder.to_owned();
-        Ok(Self { source, folder, scenario, scenario_span, speed, simulator, console, processes })
+        Ok(Self { source, folder, scenario, scenario_span, speed, secure, simulator, console, processes })
     }
 
     /// What a plain roster means: one process for each robot, its program called after its class.
@@ -178,6 +182,7 @@ impl LaunchFile {
             scenario: roster.to_owned(),
             scenario_span: None,
             speed: None,
+            secure: None,
             simulator: Process::new(SIMULATOR, vec![SIMULATOR_PROGRAM.to_owned()]),
             console: Some(console(RawConsole::default())),
             processes: scenario.robots.iter().map(process).collect(),
@@ -204,6 +209,18 @@ impl LaunchFile {
         match scenario.robots.keys().find(|robot| !run_by.contains_key(robot)) {
             None => Ok(()),
             Some(robot) => Err(self.nobody_runs(robot, &scenario.robots[robot].class)),
+        }
+    }
+
+    /// Checks that every process of a secured run can show who it is.
+    pub(crate) fn check_certificates(&self) -> Result<(), FileError> {
+        match self.processes.iter().find(|process| process.robots.len() > 1) {
+            None => Ok(()),
+            Some(process) => {
+                let text = "several robots in one process cannot take part in a secured run";
+                let help = "a certificate is that of one robot: give each a process of its own";
+                Err(FileError::at(&self.source, process.robots_span.clone(), text).with_help(help))
+            }
         }
     }
 

@@ -23,6 +23,8 @@ const GATHERING: Duration = Duration::from_secs(1);
 pub(super) struct Watch {
     pub(super) run: RunName,
     pub(super) endpoint: String,
+    /// How an operator is let into a secured run.
+    pub(super) config: Option<PathBuf>,
     /// Whether pictures of the field are wanted, for the progress bar.
     pub(super) wants_world: bool,
     pub(super) tell: Tell,
@@ -58,9 +60,8 @@ impl Observer {
 
 impl Watch {
     fn open(&self, end: Sender<()>) -> Result<(Bus, Vec<Declared>), BusError> {
-        let overrides = std::env::var_os("CARS_ZENOH_CONFIG").map(PathBuf::from);
         let role = Role::Client { connect: self.endpoint.clone(), patience: PATIENCE };
-        let bus = Bus::open(&role, overrides.as_ref())?;
+        let bus = Bus::open(&role, self.config.as_ref())?;
         let keys = Keys::new(&self.run);
         let tell = self.tell.clone();
         let mut declared = vec![bus.subscribe(&keys.log(), move |key, bytes| {

@@ -4,15 +4,20 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use protocol::endpoint::connectable;
 use protocol::{RobotName, RunName};
 use simulator::RunFolder;
 use simulator::diagnostic::FileError;
 use simulator::recorder::SCENARIO;
 
-use super::file::{LaunchFile, Process, SIMULATOR};
+use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
 use super::program::{NotFound, Places};
 use super::restart::Restart;
 use crate::common::Speed;
+use crate::secure::Secured;
+
+/// Variable that tells every program of the project a configuration file of the middleware.
+pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
 
 /// A command line with its environment.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +60,12 @@ pub(super) enum Part {
 #[derive(Debug, Clone)]
 pub(super) struct Execution<'a> {
     pub(super) run: &'a RunName,
+    /// Where the simulator listens.
     pub(super) endpoint: &'a str,
+    /// Certificates, for a secured run.
+    pub(super) secured: Option<&'a Secured>,
+    /// Whether everybody who can reach the simulator is trusted.
+    pub(super) is_insecure: bool,
     /// Where run folders are made.
     pub(super) out: &'a Path,
     pub(super) speed: Speed,
@@ -92,7 +102,13 @@ fn guest(
 ) -> Result<CommandLine, FileError> {
     let mut env = process.env.clone();
     env.insert("CARS_RUN".to_owned(), execution.run.to_string());
-    env.insert("CARS_CONNECT".to_owned(), execution.endpoint.to_owned());
+    env.insert("CARS_CONNECT".to_owned(), connectable(execution.endpoint));
+    // A process is let in as its robot; only the console is none.
+    let name =
+        if process.name == CONSOLE { Some(CONSOLE) } else { process.robots.first().map(RobotName::as_str) };
+    if let (Some(secured), Some(name)) = (execution.secured, name) {
+        env.entry(ZENOH_CONFIG.to_owned()).or_insert_with(|| secured.config_of(name).display().to_string());
+    }
     let program = program(file, process, places)?;
     let args = process.command.iter().skip(1).cloned().chain(args).collect();
     Ok(CommandLine { program, args, env })
@@ -120,8 +136,14 @@ fn simulator(file: &LaunchFile, execution: &Execution, places: &Places) -> Resul
         format!("--speed={}", speed_arg(execution.speed)),
     ]);
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
+    args.extend(execution.is_insecure.then(|| "--insecure".to_owned()));
+    let mut env = process.env.clone();
+    if let Some(secured) = execution.secured {
+        env.insert(ZENOH_CONFIG.to_owned(), secured.config_of(SIMULATOR).display().to_string());
+        args.push(format!("--operator-config={}", secured.operator().display()));
+    }
     let program = program(file, process, places)?;
-    let command = CommandLine { program, args, env: process.env.clone() };
+    let command = CommandLine { program, args, env };
     Ok(Planned { part: Part::Simulator, ..prepare(process, command) })
 }
 

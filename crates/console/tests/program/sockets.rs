@@ -3,6 +3,10 @@
 use std::io::Read;
 use std::time::{Duration, Instant};
 
+use proptest::prelude::*;
+use proptest::sample::Index;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
 use tungstenite::Message;
 
 use crate::client::{Console, Page};
@@ -51,6 +55,44 @@ fn what_cannot_be_understood_is_answered_with_the_reason() {
     page.say(&control(6, &long));
     let answer = page.until("answer");
     assert!(answer["error"].as_str().unwrap().contains("command: 5000 bytes"), "{answer}");
+}
+
+/// Requests that are understood.
+const GOOD: &[&str] = &[
+    r#"{"type":"control","id":1,"control":{"do":"start"}}"#,
+    r#"{"type":"control","id":2,"control":{"do":"step","n":3}}"#,
+    r#"{"type":"control","id":3,"control":{"do":"speed","factor":2.5}}"#,
+    r#"{"type":"control","id":4,"control":{"do":"command","to":"Butler","command":"refill"}}"#,
+    r#"{"type":"control","id":5,"control":{"do":"late","robot":"A","on_late":"continue","deadline_s":0.5}}"#,
+    r#"{"type":"control","id":6,"control":{"do":"init","seed":5,"setup":{"guests":3,"field_m":[15,15]}}}"#,
+    r#"{"type":"control","id":7,"control":{"do":"load","scenario":"seed = 1"}}"#,
+];
+
+/// A good request with a few characters replaced, or anything.
+fn saying() -> impl Strategy<Value = String> {
+    let slip = (any::<Index>(), prop_oneof!["[0-9{}\\[\\]\",:.e-]", "\\PC"]);
+    let damaged =
+        (prop::sample::select(GOOD), prop::collection::vec(slip, 0..4)).prop_map(|(good, slips)| {
+            let mut characters: Vec<String> = good.chars().map(String::from).collect();
+            for (at, with) in slips {
+                *at.get_mut(&mut characters) = with;
+            }
+            characters.concat()
+        });
+    prop_oneof![4 => damaged, 1 => "\\PC{0,200}", 1 => any::<f64>().prop_map(|number| number.to_string())]
+}
+
+#[test]
+fn whatever_is_said_is_answered() {
+    let console = Console::live();
+    let mut page = console.page();
+    let (mut runner, strategy) = (TestRunner::default(), saying());
+    for _ in 0..400 {
+        let text = strategy.new_tree(&mut runner).unwrap().current();
+        page.say(&text);
+        let answer = page.until("answer");
+        assert!(answer["error"].as_str().is_some_and(|why| !why.is_empty()), "{text}: {answer}");
+    }
 }
 
 #[test]

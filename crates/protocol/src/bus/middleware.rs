@@ -1,6 +1,6 @@
 //! The middleware: the only file of the project that names it, with the settings that a lock-step system needs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -13,7 +13,13 @@ use zenoh::query::{ConsolidationMode, Query, QueryTarget, Reply};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
 
+use super::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
 use super::{AnswerOf, BusError, Declared, Pending, QUERY_TIMEOUT, Role};
+use crate::endpoint::{is_local, is_tls};
+
+/// What else may be the matter with an encrypted endpoint.
+const TLS_HINT: &str =
+    " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
 
 /// A session of the middleware. Clones share it; the last one closes it.
 #[derive(Debug, Clone)]
@@ -28,12 +34,30 @@ fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T
 impl Session {
     pub(super) fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
         let (doing, endpoint) = match role {
-            Role::Router { listen } => ("listen at", listen),
-            Role::Client { connect, .. } => ("reach the simulator at", connect),
+            Role::Router { listen, trusts_network } => {
+                check_exposure(listen, overrides, *trusts_network)?;
+                ("listen at", listen.clone())
+            }
+            Role::Client { connect, .. } => {
+                if is_tls(connect) && overrides.is_none() {
+                    return Err(BusError::NoCertificate(connect.clone()));
+                }
+                ("reach the simulator at", connect.clone())
+            }
+            Role::Relay { listen, trusts_network, .. } => {
+                let failed =
+                    |reason| BusError::Open { doing: "listen at", endpoint: listen.join(", "), reason };
+                for endpoint in relay_listens(listen, overrides).map_err(failed)? {
+                    check_exposure(&endpoint, overrides, *trusts_network)?;
+                }
+                ("listen at", listen.join(", "))
+            }
         };
         let failed = |reason: String| BusError::Open { doing, endpoint: endpoint.clone(), reason };
         let config = configuration(role, overrides).map_err(&failed)?;
-        let session = zenoh::open(config).wait().map_err(|error| failed(error.to_string()))?;
+        // The middleware tries again without a word when certificates do not fit.
+        let hint = if is_tls(&endpoint) { TLS_HINT } else { "" };
+        let session = zenoh::open(config).wait().map_err(|error| failed(format!("{error}{hint}")))?;
         Ok(Self { session })
     }
 
@@ -248,49 +272,212 @@ impl Question {
     }
 }
 
-/// The settings that were measured to suit a lock-step system, on top of the middleware's defaults.
+/// Setting of an encrypted listener: who connects must have shown a certificate within this time, milliseconds.
+const HANDSHAKE_TIMEOUT: &str = "tls_handshake_timeout_ms=2000";
+
+/// The built-in settings, or those of a file, and what the role says, which is never the file's affair.
 fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, String> {
     let mut config = match overrides {
-        Some(file) => Config::from_file(file).map_err(|error| error.to_string())?,
+        Some(file) => from_file(file)?,
         None => Config::default(),
     };
     let mut set = |key: &str, value: &str| {
         config.insert_json5(key, value).map_err(|error| format!("setting {key} = {value}: {error}"))
     };
-    match role {
-        Role::Router { listen } => {
-            set("mode", "\"router\"")?;
-            set("listen/endpoints", &format!("[{listen:?}]"))?;
+    let mode = match role {
+        Role::Router { listen, .. } => {
+            set("listen/endpoints", &format!("[{:?}]", listener(listen)))?;
+            ROUTER_MODE
         }
         Role::Client { connect, patience } => {
-            set("mode", "\"client\"")?;
             set("connect/endpoints", &format!("[{connect:?}]"))?;
             set("connect/timeout_ms", &patience.as_millis().to_string())?;
-            set("connect/retry", "{period_init_ms: 100, period_max_ms: 500, period_increase_factor: 2}")?;
-            // A connection attempt into a cut link must not outlive the cut by ten seconds.
-            set("transport/unicast/open_timeout", "1000")?;
+            CLIENT_MODE
         }
-    }
-    if overrides.is_some() {
-        return Ok(config);
-    }
-    for (key, value) in [
-        // A router waits half a second for scouting that is switched off below.
-        ("scouting/delay", "0"),
-        ("scouting/multicast/enabled", "false"),
-        ("scouting/gossip/enabled", "false"),
-        // A process that hangs or a link that is cut is noticed within this time, milliseconds.
-        ("transport/link/tx/lease", "2000"),
-        ("transport/link/tx/keep_alive", "4"),
-        // A receiver that does not read holds the sender for at most this long, microseconds.
-        ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
-        ("transport/link/rx/max_message_size", "4194304"),
-        // Hundreds of robots may connect at the same moment.
-        ("transport/unicast/accept_pending", "1000"),
-        ("transport/unicast/max_sessions", "2000"),
-        ("transport/unicast/accept_timeout", "2000"),
-    ] {
+        Role::Relay { listen, connect, .. } => {
+            let listen: Vec<String> = listen.iter().map(|endpoint| listener(endpoint)).collect();
+            for (key, endpoints) in [("listen/endpoints", &listen), ("connect/endpoints", connect)] {
+                if !endpoints.is_empty() {
+                    set(key, &format!("{endpoints:?}"))?;
+                }
+            }
+            ROUTER_MODE
+        }
+    };
+    let common = SETTINGS.iter().filter(|_| overrides.is_none());
+    for Setting { key, value, .. } in [&mode].into_iter().chain(common) {
         set(key, value)?;
     }
     Ok(config)
+}
+
+fn from_file(file: &Path) -> Result<Config, String> {
+    Config::from_file(file).map_err(|error| format!("{}: {error}", file.display()))
+}
+
+/// An endpoint to listen at, with what an encrypted one needs in addition.
+fn listener(endpoint: &str) -> String {
+    let separator = if endpoint.contains('#') { ';' } else { '#' };
+    if is_tls(endpoint) { format!("{endpoint}{separator}{HANDSHAKE_TIMEOUT}") } else { endpoint.to_owned() }
+}
+
+/// Where a relay listens: what the command line says, or else its configuration file.
+fn relay_listens(listen: &[String], overrides: Option<&PathBuf>) -> Result<Vec<String>, String> {
+    let Some(file) = overrides.filter(|_| listen.is_empty()) else { return Ok(listen.to_vec()) };
+    let said = from_file(file)?.get_json("listen/endpoints").map_err(|error| error.to_string())?;
+    let said = serde_json::from_str(&said).map_err(|error| error.to_string())?;
+    let mut endpoints = Vec::new();
+    texts(&said, &mut endpoints);
+    Ok(endpoints)
+}
+
+/// All texts in a value: endpoints may be listed for all modes or for each.
+fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
+    match value {
+        serde_json::Value::String(text) => found.push(text.clone()),
+        serde_json::Value::Array(items) => items.iter().for_each(|item| texts(item, found)),
+        serde_json::Value::Object(fields) => fields.values().for_each(|field| texts(field, found)),
+        _ => {}
+    }
+}
+
+/// Refuses to listen where strangers could connect, unless they need certificates, or `trusts_network`.
+///
+/// # Errors
+/// [`BusError::Exposed`] says what it would mean, and what to do. [`BusError::Unencrypted`] if the configuration has
+/// access control and the endpoint no certificates: it would refuse everybody.
+pub fn check_exposure(
+    listen: &str,
+    overrides: Option<&PathBuf>,
+    trusts_network: bool,
+) -> Result<(), BusError> {
+    let guards = match overrides {
+        Some(file) => guards(file).map_err(|reason| BusError::Open {
+            doing: "listen at",
+            endpoint: listen.to_owned(),
+            reason,
+        })?,
+        None => Guards::default(),
+    };
+    if guards.has_access_control && !is_tls(listen) {
+        return Err(BusError::Unencrypted(listen.to_owned()));
+    }
+    let is_guarded = guards.has_access_control && guards.wants_certificates;
+    if is_local(listen) || is_guarded || trusts_network {
+        return Ok(());
+    }
+    Err(BusError::Exposed(listen.to_owned()))
+}
+
+/// What a configuration file asks of those who connect.
+#[derive(Default)]
+struct Guards {
+    wants_certificates: bool,
+    has_access_control: bool,
+}
+
+fn guards(file: &Path) -> Result<Guards, String> {
+    let config = from_file(file)?;
+    // A setting that is not there guards nothing.
+    let is = |key: &str, value: &str| config.get_json(key).is_ok_and(|found| found == value);
+    Ok(Guards {
+        wants_certificates: is("transport/link/tls/enable_mtls", "true"),
+        has_access_control: is("access_control/enabled", "true")
+            && is("access_control/default_permission", "\"deny\""),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::DEFAULT_ENDPOINT;
+    use crate::secure::{Credentials, client_config, simulator_config};
+    use crate::{RobotName, keys::Keys};
+
+    fn credentials() -> Credentials<'static> {
+        Credentials { ca: "a CA", certificate: "a certificate", key: "a key", validity: "some time" }
+    }
+
+    fn robots() -> Vec<RobotName> {
+        ["Butler", "r-2_d.2"].map(|name| RobotName::new(name).unwrap()).to_vec()
+    }
+
+    fn assert_settings(config: &Config, settings: &[Setting]) {
+        for Setting { key, value, .. } in settings.iter().filter(|setting| !setting.key.ends_with("retry")) {
+            assert_eq!(config.get_json(key).unwrap(), *value, "{key}");
+        }
+        assert_eq!(config.get_json("transport/link/tls/enable_mtls").unwrap(), "true");
+    }
+
+    #[test]
+    fn generated_configurations_are_complete() {
+        let client = client_config("Butler", &credentials());
+        let config = Config::from_json5(&client).unwrap();
+        assert_settings(&config, &SETTINGS);
+        assert_settings(&config, &[CLIENT_MODE]);
+        assert!(config.get_json("connect/retry").unwrap().contains("\"period_init_ms\":100"));
+        let simulator = simulator_config(&Keys::of_any_run(), &robots(), &credentials());
+        let config = Config::from_json5(&simulator).unwrap();
+        assert_settings(&config, &SETTINGS);
+        assert_settings(&config, &[ROUTER_MODE]);
+        assert_eq!(config.get_json("access_control/default_permission").unwrap(), "\"deny\"");
+        let subjects = config.get_json("access_control/subjects").unwrap();
+        for name in ["Butler", "r-2_d.2", "operator", "console"] {
+            assert!(subjects.contains(&format!("\"cert_common_names\":[\"{name}\"]")), "{subjects}");
+        }
+    }
+
+    #[test]
+    fn a_listener_for_strangers_needs_certificates_and_access_control_or_a_word() {
+        let folder = std::env::temp_dir().join(format!("cars-exposure-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let write = |name: &str, text: &str| {
+            let file = folder.join(name);
+            std::fs::write(&file, text).unwrap();
+            file
+        };
+        let guarded =
+            write("guarded.json5", &simulator_config(&Keys::of_any_run(), &robots(), &credentials()));
+        let encrypted = write("encrypted.json5", "{transport: {link: {tls: {enable_mtls: true}}}}");
+        let refused =
+            |listen: &str, file: Option<&PathBuf>, trusts: bool| match check_exposure(listen, file, trusts) {
+                Ok(()) => "",
+                Err(BusError::Exposed(_)) => "exposed",
+                Err(BusError::Unencrypted(_)) => "unencrypted",
+                Err(error) => panic!("{error}"),
+            };
+        let all = "tcp/0.0.0.0:7447";
+        assert_eq!(refused(DEFAULT_ENDPOINT, None, false), "");
+        assert_eq!(refused(all, None, false), "exposed");
+        assert_eq!(refused(all, None, true), "");
+        assert_eq!(refused("tls/0.0.0.0:7447", None, false), "exposed");
+        assert_eq!(refused("tls/0.0.0.0:7447", Some(&encrypted), false), "exposed");
+        assert_eq!(refused("tls/0.0.0.0:7447", Some(&guarded), false), "");
+        assert_eq!(refused(all, Some(&guarded), true), "unencrypted");
+        assert_eq!(refused(DEFAULT_ENDPOINT, Some(&guarded), false), "unencrypted");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    /// `configs/zenoh/` says what is built in, so that who changes one thing there changes nothing else.
+    #[test]
+    fn the_configuration_files_say_what_is_built_in() {
+        let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/zenoh"));
+        let here = || "tcp/127.0.0.1:7447".to_owned();
+        for (file, role) in [
+            ("simulator.json5", Role::Router { listen: here(), trusts_network: false }),
+            ("robot.json5", Role::Client { connect: here(), patience: QUERY_TIMEOUT }),
+            ("router.json5", Role::Relay { listen: Vec::new(), connect: Vec::new(), trusts_network: false }),
+        ] {
+            let built_in = configuration(&role, None).unwrap();
+            let from_file = configuration(&role, Some(&folder.join(file))).unwrap();
+            for Setting { key, .. } in SETTINGS.iter().chain(&[ROUTER_MODE]) {
+                assert_eq!(
+                    from_file.get_json(key).ok(),
+                    built_in.get_json(key).ok(),
+                    "{key} in {file} and as it is built in"
+                );
+                assert!(built_in.get_json(key).is_ok_and(|value| value != "null"), "{key} is set");
+            }
+        }
+    }
 }

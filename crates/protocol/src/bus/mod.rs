@@ -8,11 +8,13 @@
 
 mod memory;
 mod middleware;
+pub(crate) mod settings;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-pub use memory::{Faults, MemoryNetwork, Traffic};
+pub use memory::{Faults, MemoryNetwork, Overheard, Traffic};
+pub use middleware::check_exposure;
 
 /// Where a simulator listens and others connect unless told otherwise.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
@@ -33,6 +35,22 @@ pub enum BusError {
         /// What the middleware says.
         reason: String,
     },
+    /// A simulator would be open to a network.
+    #[error(
+        "{0} can be reached from other machines, and whoever reaches it may control the run and pose as any robot; \
+         either secure the run (`cars secure init` says how) and listen at tls/…, or say --insecure if you trust \
+         everybody who can reach it"
+    )]
+    Exposed(String),
+    /// Somebody would connect to a secured run and has nothing to show.
+    #[error(
+        "{0} wants a certificate: name a file zenoh.json5 that `cars secure init` made, by --zenoh-config or \
+         CARS_ZENOH_CONFIG"
+    )]
+    NoCertificate(String),
+    /// A configuration with access control does not fit a listener without certificates.
+    #[error("{0} is not encrypted, so nobody could show a certificate there: a secured run listens at tls/…")]
+    Unencrypted(String),
     /// A session that was open cannot do what was asked.
     #[error("bus: cannot {doing} {key}: {reason}")]
     Use {
@@ -52,6 +70,8 @@ pub enum Role {
     Router {
         /// For example `tcp/127.0.0.1:7447`.
         listen: String,
+        /// Whether other machines may reach it without certificates and access control.
+        trusts_network: bool,
     },
     /// Connect to this endpoint: everybody else.
     Client {
@@ -59,6 +79,16 @@ pub enum Role {
         connect: String,
         /// How long to go on trying to reach it.
         patience: Duration,
+    },
+    /// Only forward, between a simulator and robots on different machines. What is empty is left to the
+    /// configuration file.
+    Relay {
+        /// Where others reach it, for example `tcp/192.0.2.1:7447`.
+        listen: Vec<String>,
+        /// Other relays that it reaches.
+        connect: Vec<String>,
+        /// Whether other machines may reach it without certificates and access control.
+        trusts_network: bool,
     },
 }
 
@@ -97,7 +127,8 @@ macro_rules! on {
 
 impl Bus {
     /// Opens a session. `overrides` is a configuration file of the middleware that replaces the built-in settings,
-    /// for set-ups across machines.
+    /// for set-ups across machines; `configs/zenoh/` has files that say the same as the built-in ones. What the role
+    /// says (mode, where to listen or connect) holds in either case.
     ///
     /// # Errors
     /// [`BusError::Open`] names the address that was tried and what went wrong.

@@ -1,14 +1,15 @@
 //! `cars-sim`: the simulator process of one run.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use miette::IntoDiagnostic;
+use miette::{IntoDiagnostic, WrapErr};
 use protocol::RunName;
-use protocol::bus::{Bus, DEFAULT_ENDPOINT, Role};
+use protocol::bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
+use protocol::endpoint::connectable;
 use protocol::messages::End;
-use simulator::recorder::ENDPOINT;
+use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG};
 use simulator::scenario::{Changes, Override, Scenario};
 use simulator::server::{Event, Options, REPEAT_AFTER, Server};
 use simulator::units::Time;
@@ -23,7 +24,7 @@ struct Args {
     /// Name of the run; its robots must name it, too.
     #[arg(long, env = "CARS_RUN", default_value = "default")]
     run: RunName,
-    /// Where to listen. Everything but loopback opens the run to the network.
+    /// Where to listen. Where other machines could connect, only with certificates, or with --insecure.
     #[arg(long, env = "CARS_LISTEN", default_value = DEFAULT_ENDPOINT, value_name = "ENDPOINT")]
     listen: String,
     /// Where run folders are made.
@@ -47,6 +48,13 @@ struct Args {
     /// A configuration file of the middleware instead of the built-in settings.
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
+    /// The operator's configuration file of a secured run: `cars ctl` and others find it by the run's folder.
+    #[arg(long, value_name = "FILE")]
+    operator_config: Option<PathBuf>,
+    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the run
+    /// and pose as any robot.
+    #[arg(long)]
+    insecure: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -75,9 +83,11 @@ fn run(args: &Args) -> miette::Result<Summary> {
     let duration_s = args.duration.map(|duration| duration.0);
     let scenario =
         Scenario::load(&args.scenario, &Changes { seed: args.seed, duration_s, set: args.set.clone() })?;
+    // Before anything is made: a refusal leaves nothing behind.
+    check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
     let folder = RunFolder::new(&args.out, &args.run);
     let _lock = folder.create(&scenario)?;
-    let role = Role::Router { listen: args.listen.clone() };
+    let role = Role::Router { listen: args.listen.clone(), trusts_network: args.insecure };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
     let options = Options {
         run: args.run.clone(),
@@ -89,10 +99,24 @@ fn run(args: &Args) -> miette::Result<Summary> {
     let queue = server.queue();
     // The queue is closed only when the run is over, and then there is nothing left to end.
     ctrlc::set_handler(move || drop(queue.send(Event::Terminate))).into_diagnostic()?;
-    std::fs::write(folder.file(ENDPOINT), format!("{}\n", args.listen)).into_diagnostic()?;
+    if let Some(file) = &args.operator_config {
+        write_line(&folder.file(OPERATOR_CONFIG), &std::path::absolute(file).into_diagnostic()?.display())?;
+    }
+    write_line(&folder.file(ENDPOINT), &connectable(&args.listen))?;
     let outcome = server.run(scenario, &folder).into_diagnostic();
-    if let Err(error) = std::fs::remove_file(folder.file(ENDPOINT)) {
-        tracing::debug!(%error, "the endpoint file is gone already");
+    for name in [ENDPOINT, OPERATOR_CONFIG].map(|name| folder.file(name)).iter().filter(|file| file.exists())
+    {
+        if let Err(error) = std::fs::remove_file(name) {
+            tracing::debug!(%error, "{} is gone already", name.display());
+        }
     }
     outcome
+}
+
+/// Writes a file that others wait for: they see it whole or not at all.
+fn write_line(file: &Path, line: &dyn std::fmt::Display) -> miette::Result<()> {
+    let unfinished = file.with_extension("new");
+    let written = std::fs::write(&unfinished, format!("{line}\n"));
+    let written = written.and_then(|()| std::fs::rename(&unfinished, file));
+    written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", file.display()))
 }

@@ -29,6 +29,13 @@ impl std::str::FromStr for Override {
     }
 }
 
+impl std::fmt::Display for Override {
+    /// As it is read again, by another process of the same run.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}={}", self.path.join("."), self.value)
+    }
+}
+
 /// The file with the changes made, as a text of its own.
 pub(super) fn apply(source: &Source, changes: &Changes) -> Result<Source, FileError> {
     let mut root = toml::Value::Table(source.parse()?);

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use protocol::bus::Question;
+use protocol::keys::Keys;
 use protocol::messages::{JoinAnswer, JoinRequest, Phase, Presence, Refusal};
 use protocol::{Generation, PROTOCOL_VERSION, decode, encode};
 
@@ -138,6 +139,10 @@ impl Server {
         let request: JoinRequest = decode(question.key(), "a robot", &question.body())
             .map_err(|error| (Refusal::Malformed, error.to_string()))?;
         let (name, run) = (&request.name, &self.options.run);
+        // Access control looks at keys: whoever is in the key must be who is meant.
+        if let Some(asker) = Keys::joins_as(question.key()).filter(|asker| *asker != name.as_str()) {
+            return Err((Refusal::Malformed, format!("{asker} cannot join as {name}")));
+        }
         if request.protocol != PROTOCOL_VERSION {
             let text = format!(
                 "{name} speaks version {} of the protocol, this simulator version {PROTOCOL_VERSION}: update the older one",

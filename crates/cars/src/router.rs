@@ -1,0 +1,51 @@
+//! `cars router`: forwards between a simulator and robots on different machines. It is a session of the same middleware
+//! with the same settings as `zenohd` with `configs/zenoh/router.json5`, for machines where there is no `zenohd`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use miette::IntoDiagnostic;
+use protocol::bus::{Bus, Role};
+
+/// `cars router`.
+#[derive(Debug, Args)]
+pub(crate) struct RouterArgs {
+    /// Where the simulator, robots and other routers reach this one, for example `tcp/192.0.2.1:7447`.
+    #[arg(long, value_name = "ENDPOINT", required_unless_present = "zenoh_config")]
+    listen: Vec<String>,
+    /// Another router that this one reaches.
+    #[arg(long, value_name = "ENDPOINT")]
+    connect: Vec<String>,
+    /// A configuration file of the middleware instead of the built-in settings.
+    #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
+    zenoh_config: Option<PathBuf>,
+    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the runs
+    /// behind it and pose as any robot.
+    #[arg(long)]
+    insecure: bool,
+}
+
+/// Forwards until it is told to end.
+pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
+    protocol::runtime::use_one_thread();
+    let (end, ended) = std::sync::mpsc::sync_channel(1);
+    // A second signal finds the queue full and changes nothing.
+    ctrlc::set_handler(move || {
+        let _asked_already = end.try_send(());
+    })
+    .into_diagnostic()?;
+    let role = Role::Relay {
+        listen: args.listen.clone(),
+        connect: args.connect.clone(),
+        trusts_network: args.insecure,
+    };
+    let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
+    println!(
+        "forwarding at {}",
+        if args.listen.is_empty() { "what the file says".to_owned() } else { args.listen.join(", ") }
+    );
+    ended.recv().into_diagnostic()?;
+    bus.close();
+    Ok(ExitCode::SUCCESS)
+}

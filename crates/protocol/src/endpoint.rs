@@ -1,0 +1,104 @@
+//! Endpoints as the middleware writes them: `tcp/127.0.0.1:7447`, `tls/hall.example:7447`, `unixsock-stream/hall.sock`.
+
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+
+/// Beginning of the endpoints that are encrypted and ask for certificates.
+pub const TLS: &str = "tls";
+
+/// The protocol and the address of an endpoint, without its metadata (`?…`) and settings (`#…`).
+fn parts(endpoint: &str) -> Option<(&str, &str)> {
+    let (protocol, rest) = endpoint.split_once('/')?;
+    Some((protocol, rest.split(['?', '#']).next().unwrap_or(rest)))
+}
+
+/// The host and the port of an address; brackets around an IPv6 host are not part of it.
+fn host_and_port(address: &str) -> Option<(&str, &str)> {
+    let (host, port) = address.rsplit_once(':')?;
+    let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
+    Some((bare.unwrap_or(host), port))
+}
+
+/// Whether what is said there is encrypted.
+#[must_use]
+pub fn is_tls(endpoint: &str) -> bool {
+    parts(endpoint).is_some_and(|(protocol, _)| protocol == TLS)
+}
+
+/// Whether nobody but this machine reaches a listener there. What cannot be read counts as reachable.
+///
+/// ```
+/// use protocol::endpoint::is_local;
+/// assert!(is_local("tcp/127.0.0.1:7447") && is_local("tls/localhost:7447") && is_local("unixsock-stream/x.sock"));
+/// assert!(!is_local("tcp/0.0.0.0:7447") && !is_local("tcp/[::]:7447") && !is_local("tcp/localhost.example:7447"));
+/// ```
+#[must_use]
+pub fn is_local(endpoint: &str) -> bool {
+    let Some((protocol, address)) = parts(endpoint) else { return false };
+    if protocol == "unixsock-stream" {
+        return true;
+    }
+    let is_loopback = |host: &str| match host.parse::<IpAddr>() {
+        Ok(address) => address.to_canonical().is_loopback(),
+        Err(_) => host == "localhost",
+    };
+    host_and_port(address).is_some_and(|(host, _)| is_loopback(host))
+}
+
+/// Where to connect on this machine to somebody who listens at `endpoint`: an address that means "all of mine", as
+/// `0.0.0.0`, is none that a certificate could name.
+#[must_use]
+pub fn connectable(endpoint: &str) -> String {
+    let Some((protocol, address)) = parts(endpoint) else { return endpoint.to_owned() };
+    let Some((host, port)) = host_and_port(address) else { return endpoint.to_owned() };
+    match host.parse::<IpAddr>() {
+        Ok(IpAddr::V4(Ipv4Addr::UNSPECIFIED)) => format!("{protocol}/{}:{port}", Ipv4Addr::LOCALHOST),
+        Ok(IpAddr::V6(Ipv6Addr::UNSPECIFIED)) => format!("{protocol}/[{}]:{port}", Ipv6Addr::LOCALHOST),
+        _ => endpoint.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_surely_local_counts_as_local() {
+        for local in [
+            "tcp/127.0.0.1:7447",
+            "tcp/127.8.9.1:0",
+            "tls/[::1]:7447",
+            "tcp/localhost:7447",
+            "tcp/[::ffff:127.0.0.1]:7447",
+            "tcp/127.0.0.1:7447?rel=1#so_sndbuf=65000",
+            "unixsock-stream//tmp/cars.sock",
+        ] {
+            assert!(is_local(local), "{local}");
+        }
+        for reachable in [
+            "tcp/0.0.0.0:7447",
+            "tcp/[::]:7447",
+            "tcp/0:7447",
+            "tcp/192.168.1.7:7447",
+            "tls/hall.example:7447",
+            "tcp/127.0.0.1.example:7447",
+            "tcp/10.0.0.1:7447#bind=127.0.0.1:1",
+            "udp/localhost",
+            "7447",
+            "",
+        ] {
+            assert!(!is_local(reachable), "{reachable}");
+        }
+    }
+
+    #[test]
+    fn an_address_that_means_all_is_reached_by_loopback() {
+        for (listen, connect) in [
+            ("tcp/0.0.0.0:7447", "tcp/127.0.0.1:7447"),
+            ("tls/[::]:1", "tls/[::1]:1"),
+            ("tcp/10.0.0.1:7447", "tcp/10.0.0.1:7447"),
+            ("unixsock-stream/x.sock", "unixsock-stream/x.sock"),
+        ] {
+            assert_eq!(connectable(listen), connect);
+        }
+    }
+}

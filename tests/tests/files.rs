@@ -1,0 +1,185 @@
+//! Damaged scenario and launch files: reading one gives what it says, or an error that names the file; nothing else ever
+//! happens. Damage is drawn anew each time; what once failed is kept beside this file and tried first.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use proptest::prelude::*;
+use proptest::sample::Index;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+use simulator::Scenario;
+use simulator::diagnostic::Source;
+use system_tests::{programs, root};
+
+/// One thing that goes wrong in a file.
+#[derive(Debug, Clone)]
+enum Damage {
+    DropLine(Index),
+    RepeatLine(Index),
+    /// Another value behind one of the equals signs.
+    Value(Index, String),
+    /// Another key before one of them.
+    Key(Index, String),
+    Insert(Index, char),
+    CutOff(Index),
+}
+
+/// Values that tend to be handled wrongly.
+const ODD: &[&str] = &[
+    "0",
+    "-1",
+    "1e308",
+    "nan",
+    "inf",
+    "-inf",
+    "9223372036854775807",
+    "1000000000",
+    "\"\"",
+    "\"0 s\"",
+    "\"-1 ft\"",
+    "\"1e308 m\"",
+    "\"1e-300 m\"",
+    "\"nan s\"",
+    "\"../../../etc/passwd\"",
+    "\"/dev/zero\"",
+    "\"\\u0000\"",
+    "\"operator\"",
+    "[]",
+    "[[]]",
+    "[\"1 m\"]",
+    "[\"1 km\", \"1 km\"]",
+    "[\"0 m\", \"0 m\"]",
+    "[\"\"]",
+    "{}",
+    "{ a = 1 }",
+    "{ min = \"2 s\", mode = \"1 s\", max = \"0 s\" }",
+    "{ command = [] }",
+    "true",
+    "1979-05-27",
+    "max",
+];
+
+fn damage() -> impl Strategy<Value = Damage> {
+    let odd = prop_oneof![
+        8 => prop::sample::select(ODD).prop_map(str::to_owned),
+        1 => "\\PC{0,20}",
+        1 => Just(format!("\"{}\"", "x".repeat(10_000))),
+    ];
+    prop_oneof![
+        any::<Index>().prop_map(Damage::DropLine),
+        any::<Index>().prop_map(Damage::RepeatLine),
+        5 => (any::<Index>(), odd).prop_map(|(at, value)| Damage::Value(at, value)),
+        (any::<Index>(), "[a-z_]{1,8}").prop_map(|(at, key)| Damage::Key(at, key)),
+        (any::<Index>(), any::<char>()).prop_map(|(at, with)| Damage::Insert(at, with)),
+        any::<Index>().prop_map(Damage::CutOff),
+    ]
+}
+
+impl Damage {
+    fn apply(&self, text: &str) -> String {
+        let lines: Vec<&str> = text.lines().collect();
+        let is_pair = |line: &&str| line.contains('=') && !line.starts_with('#');
+        let pairs: Vec<usize> = (0..lines.len()).filter(|i| is_pair(&lines[*i])).collect();
+        let with_line = |at: usize, change: &dyn Fn(&str) -> String| {
+            let changed =
+                |(i, line): (usize, &&str)| if i == at { change(line) } else { format!("{line}\n") };
+            lines.iter().enumerate().map(changed).collect::<String>()
+        };
+        let in_pair = |at: &Index, change: &dyn Fn(&str, &str) -> String| match pairs.as_slice() {
+            [] => text.to_owned(),
+            pairs => with_line(*at.get(pairs), &|line| {
+                let (key, value) = line.split_once('=').unwrap();
+                change(key, value)
+            }),
+        };
+        match self {
+            _ if lines.is_empty() => text.to_owned(),
+            Self::DropLine(at) => with_line(at.index(lines.len()), &|_| String::new()),
+            Self::RepeatLine(at) => with_line(at.index(lines.len()), &|line| format!("{line}\n{line}\n")),
+            Self::Value(at, odd) => in_pair(at, &|key, _| format!("{key}= {odd}\n")),
+            Self::Key(at, odd) => in_pair(at, &|_, value| format!("{odd} ={value}\n")),
+            Self::Insert(at, with) => {
+                let places: Vec<usize> = text.char_indices().map(|(i, _)| i).collect();
+                let (before, after) = text.split_at(*at.get(&places));
+                format!("{before}{with}{after}")
+            }
+            Self::CutOff(at) => {
+                let places: Vec<usize> = text.char_indices().map(|(i, _)| i).collect();
+                text[..*at.get(&places)].to_owned()
+            }
+        }
+    }
+}
+
+fn shipped(folder: &str) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<_> = files.filter(|file| file.extension().is_some_and(|end| end == "toml")).collect();
+    files.sort();
+    files
+}
+
+/// A shipped file of this folder, damaged: its text.
+fn damaged(folder: &str) -> impl Strategy<Value = String> + use<> {
+    let texts: Vec<String> =
+        shipped(folder).iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    let damages = prop::collection::vec(damage(), 1..5);
+    (prop::sample::select(texts), damages)
+        .prop_map(|(text, damages)| damages.iter().fold(text, |text, damage| damage.apply(&text)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
+
+    /// What is accepted is a hall that can be made, and says the same when it is written and read again.
+    #[test]
+    fn a_damaged_scenario_is_read_or_refused(text in damaged("configs")) {
+        let source = Source { name: "damaged.toml".to_owned(), text };
+        match Scenario::parse(&source, &root().join("configs")) {
+            Ok(scenario) => {
+                let text = scenario.to_toml().unwrap();
+                let again = Scenario::parse(&Source { name: "again.toml".to_owned(), text }, Path::new("."));
+                prop_assert_eq!(again.map_err(|error| error.in_words()), Ok(scenario));
+            }
+            Err(error) => prop_assert!(!error.in_words().is_empty()),
+        }
+    }
+}
+
+/// The real program, with the errors as people see them.
+#[test]
+fn the_program_survives_damaged_files() {
+    const FILES: usize = 300;
+    let folder = tempfile::tempdir().unwrap();
+    for (kind, others) in [("launch", "configs"), ("configs", "launch")] {
+        // Launch files find their scenarios beside them, and scenarios their robots' parameters.
+        for name in [kind, others, "configs/robots"] {
+            std::fs::create_dir_all(folder.path().join(name)).unwrap();
+        }
+        for file in shipped(others).into_iter().chain(shipped("configs/robots")) {
+            std::fs::copy(&file, folder.path().join(file.strip_prefix(root()).unwrap())).unwrap();
+        }
+        let (mut runner, strategy) = (TestRunner::default(), damaged(kind));
+        let files: Vec<PathBuf> = (0..FILES)
+            .map(|i| {
+                let file = folder.path().join(kind).join(format!("damaged-{i}.toml"));
+                std::fs::write(&file, strategy.new_tree(&mut runner).unwrap().current()).unwrap();
+                file
+            })
+            .collect();
+        let output = Command::new(programs().join("cars")).arg("check").args(&files).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+        let said =
+            [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        for file in &files {
+            let name = file.file_name().unwrap().to_str().unwrap();
+            assert!(
+                said.contains(name),
+                "nothing is said about {name}:\n{}",
+                std::fs::read_to_string(file).unwrap()
+            );
+        }
+    }
+}
