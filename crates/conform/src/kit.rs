@@ -179,7 +179,7 @@ fn open_router() -> Result<(Bus, String), CannotRun> {
             .map_err(|error| CannotRun::Robot(format!("no free port on this machine: {error}")))?
             .port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
-        match Bus::open(&BusRole::Router { listen: endpoint.clone() }, None) {
+        match Bus::open(&BusRole::Router { listen: endpoint.clone(), trusts_network: false }, None) {
             Ok(bus) => return Ok((bus, endpoint)),
             Err(error) if attempt == ATTEMPTS => return Err(error.into()),
             Err(_) => attempt += 1,

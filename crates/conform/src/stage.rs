@@ -134,7 +134,7 @@ impl<'k> Stage<'k> {
             let _ = sender.send(Event::Report { key: key.into(), bytes: bytes.into(), at: Instant::now() });
         })?);
         let sender = events_of();
-        declared.push(bus.serve(&join_keys(&keys), move |question| {
+        declared.push(bus.serve(&keys.joins(), move |question| {
             let _ = sender.send(Event::Join(question));
         })?);
         let sender = events_of();
@@ -436,9 +436,4 @@ impl Joining {
         let request = decode(&key, "a robot", &body).map_err(|error| error.to_string());
         Self { question, key, request }
     }
-}
-
-/// Where a robot asks to take part: a key for all, and one with its name.
-fn join_keys(keys: &Keys) -> String {
-    format!("{}/**", keys.join())
 }

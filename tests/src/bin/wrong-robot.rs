@@ -186,7 +186,7 @@ fn join(
     let instance = if wrong.is("join.request:instance") { "me".to_owned() } else { bus.id() };
     let sdk = "by hand".to_owned();
     let request = JoinRequest { protocol, run: run.clone(), name: name.clone(), instance, sdk };
-    let (key, begun) = (Keys::new(run).join(), Instant::now());
+    let (key, begun) = (Keys::new(run).join_as(name), Instant::now());
     loop {
         let answer = bus.ask(&key, "", Some(encode(&request)))?.and_then(|answer| answer.result.ok());
         match answer.map(|bytes| wrong.read(&key, &bytes).ok_or("an answer that is none")).transpose()? {

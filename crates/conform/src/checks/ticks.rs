@@ -78,13 +78,8 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
     )?;
     let instance = "an instance that tells this process from all others";
     expect(!request.instance.is_empty(), instance.to_owned(), "an empty one".to_owned())?;
-    let name = request.name.as_str();
-    expect(is_join_key(stage, &joining.key, name), format!("the key of {name}"), joining.key.clone())
-}
-
-/// Whether a robot of this name may ask here: at the key with its name, and for the time being at the one for all.
-fn is_join_key(stage: &Stage<'_>, key: &str, name: &str) -> bool {
-    key.strip_prefix(&stage.keys.join()).is_some_and(|own| own.is_empty() || own == format!("/{name}"))
+    let own = stage.keys.join_as(&request.name);
+    expect(joining.key == own, format!("a request at {own}"), format!("one at {}", joining.key))
 }
 
 /// One report for each clock, and none else.
