@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod common;
+mod conform;
 mod control;
 mod emotionml;
 mod exec;
@@ -54,6 +55,8 @@ enum Subcommands {
     Log(control::LogArgs),
     /// Export what the robots of a run felt as EmotionML 1.0.
     Emotionml(emotionml::EmotionmlArgs),
+    /// Check a robot, in whatever language, against the rules of the protocol.
+    Conform(conform::ConformArgs),
     /// Real links with real faults: cut, slow, narrow. Nothing of it is reproducible but the record.
     #[command(subcommand)]
     Net(net::NetCommand),
@@ -97,6 +100,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
         Subcommands::Emotionml(args) => emotionml::emotionml(&args),
+        Subcommands::Conform(args) => Ok(conform::conform(&args)),
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),
         Subcommands::Secure(args) => secure::secure(&args),
