@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot set up its subject fails")]
 
 use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
@@ -322,6 +323,29 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
     assert!(refused > 100, "only {refused} of 300 damaged sessions were refused");
 }
 
+#[test]
+fn the_page_makes_a_robot_from_nothing() {
+    if lacks("Python", succeeds(Command::new("python3").arg("--version")), "`apt-get install python3`") {
+        return;
+    }
+    let page = std::fs::read_to_string(root().join("sdk/stdio/README.md")).unwrap();
+    let mut blocks = page.split("\n```").skip(1).step_by(2);
+    let [program, scenario, launch] = ["python\n", "toml\n", "toml\n"].map(|language| {
+        let block = blocks.next().and_then(|block| block.strip_prefix(language));
+        block.unwrap_or_else(|| panic!("no block of {language}"))
+    });
+    let lab = Lab::new();
+    let program = lab.write("walker.py", &format!("{program}\n"));
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    lab.write("walk.toml", scenario);
+    let launch = lab.write("walk-launch.toml", launch).display().to_string();
+    lab.ok(&["launch", &launch, "--no-console", "--speed", "max", "--duration", "60 s", "--run", "page"]);
+    // Half a meter a second, but where a guest is in the way.
+    let way_m = way_m(&lab, "page", "Walker");
+    assert!((10.0..=30.0).contains(&way_m), "it walked {way_m} m in a minute");
+    assert!(String::from_utf8(lab.bytes("page")).unwrap().contains("\"to\":\"CALM\""));
+}
+
 /// Compiles the robot in TypeScript as the launch file says; `npx` would fetch the compiler that the console's check has.
 fn companion_is_compiled() {
     static DONE: OnceLock<()> = OnceLock::new();
@@ -426,7 +450,7 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
         let launch = ["launch", MIXED, "--run", run, "--no-console", "--speed", "max"];
         let mut launch = lab.cars(&launch.iter().chain(more).copied().collect::<Vec<_>>());
         // As it is here, installed or not.
-        launch.env("PYTHONPATH", root().join("sdk/python/src"));
+        launch.env("PYTHONPATH", root().join("sdk/python/src")).env("PYTHONDONTWRITEBYTECODE", "1");
         ok(&mut launch);
         assert_same(("all in Rust", &lab.bytes(&alone)), ("in three languages", &lab.bytes(run)));
         let end = &lab.events(run).pop().unwrap();
