@@ -10,13 +10,25 @@ mod echo;
 mod stage;
 mod transcript;
 
-use protocol::messages::Control;
+use protocol::bus::{Bus, Role};
+use protocol::keys::Keys;
+use protocol::messages::{Control, ControlAnswer};
 use protocol::random::{MAX_SEED, stream, unit};
+use protocol::{RunName, decode, encode};
 use rand_xoshiro::rand_core::Rng;
 use stage::{Stage, name};
-use system_tests::root;
+use system_tests::{Lab, PATIENCE, eventually, root};
 
 const ECHO: &str = "docs/vectors/echo.toml";
+/// Ticks of Leguin's story.
+const LEGUIN_TICKS: u64 = 60;
+/// A hall in which something happens early: few treats, eager guests.
+const EARLY: [&str; 4] = [
+    "robot.Butler.params.treat_capacity=6",
+    "robot.Butler.params.treat_mean_s=0.5 s",
+    "robot.Butler.params.resend=on",
+    "robot.Butler.params.resend_s=2 s",
+];
 
 /// Demands that the file says this, or makes it so.
 fn check(file: &str, text: &str) {
@@ -47,18 +59,11 @@ fn last_clock(story: &str) -> String {
 
 #[test]
 fn leguin_in_the_hall() {
-    // A hall in which something happens early: few treats, eager guests.
-    let set = [
-        "robot.Butler.params.treat_capacity=6",
-        "robot.Butler.params.treat_mean_s=0.5 s",
-        "robot.Butler.params.resend=on",
-        "robot.Butler.params.resend_s=2 s",
-    ];
-    let mut stage = Stage::new("configs/hors_doeuvres.toml", &set, "Leguin");
+    let mut stage = Stage::new("configs/hors_doeuvres.toml", &EARLY, "Leguin");
     stage.seat("Butler", || robots::make("Butler").unwrap());
     stage.seat("Leguin", || robots::make("Leguin").unwrap());
     stage.begin(1);
-    stage.step_to(60);
+    stage.step_to(LEGUIN_TICKS);
     check("leguin.jsonl", &stage.end());
 }
 
@@ -114,4 +119,54 @@ fn streams() {
         })
         .collect();
     check("streams.json", &(serde_json::to_string_pretty(&vectors).unwrap() + "\n"));
+}
+
+/// What the transcript of the hall says is what goes over zenoh between processes, byte for byte.
+#[test]
+fn leguin_in_the_hall_as_processes() {
+    let (lab, run) = (Lab::new(), "vectors");
+    let mut args = vec!["launch", "launch/hors_doeuvres.toml", "--paused", "--speed", "max"];
+    args.extend(EARLY.iter().flat_map(|change| ["--set", *change]));
+    let mut launch = lab.start(run, &args);
+    let endpoint = eventually("the endpoint", || std::fs::read_to_string(lab.file(run, "endpoint")).ok());
+    let role = Role::Client { connect: endpoint.trim().to_owned(), patience: PATIENCE };
+    let (bus, keys) = (Bus::open(&role, None).unwrap(), Keys::new(&RunName::new(run).unwrap()));
+    let leguin = name("Leguin");
+    let (sender, heard) = std::sync::mpsc::channel();
+    let listen = |key: &str| {
+        let sender = sender.clone();
+        let hear = move |key: &str, bytes: &[u8]| {
+            let message = String::from_utf8(bytes.to_vec()).unwrap();
+            let _ = sender.send(format!(r#""key":"{key}","message":{message}}}"#));
+        };
+        bus.subscribe(key, hear).unwrap()
+    };
+    let _listening = [
+        listen(&keys.clock()),
+        listen(&keys.report(&leguin)),
+        listen(&keys.commands_to(&leguin)),
+        listen(&keys.command(&name("Butler"), &leguin)),
+    ];
+    // An answer shows that what was declared before the question is in effect.
+    let step = encode(&Control::Step { n: LEGUIN_TICKS });
+    eventually("tick 0", || {
+        let answer =
+            bus.ask_within(&keys.control(), "", Some(step.clone()), PATIENCE).unwrap()?.result.unwrap();
+        let answer: ControlAnswer = decode("control", "simulator", &answer).unwrap();
+        matches!(answer, ControlAnswer::Done(_)).then_some(())
+    });
+    let text = std::fs::read_to_string(root().join("docs/vectors/leguin.jsonl")).unwrap();
+    let is_put =
+        |line: &&str| line.contains(r#""message":"#) && !line.contains("/join") && !line.contains("/state\"");
+    let from_tick_1 = text.lines().skip_while(|line| !line.contains(r#""message":{"epoch":1,"tick":1"#));
+    let wanted = from_tick_1.filter(is_put).filter(|line| !line.contains(r#""end""#));
+    let mut wanted: Vec<&str> = wanted.map(|line| line.split_once(',').unwrap().1).collect();
+    assert!(wanted.len() > 2 * LEGUIN_TICKS as usize, "{}", wanted.len());
+    while !wanted.is_empty() {
+        let line = heard.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("never came: {wanted:#?}"));
+        // A clock that is repeated on a slow machine is there no more.
+        wanted.retain(|wanted| *wanted != line);
+    }
+    lab.ok(&["ctl", "stop", "--run", run]);
+    launch.finish();
 }
