@@ -7,6 +7,7 @@
 //! SI units and REP 103 throughout: meters, seconds, radians counter-clockwise from +x.
 
 pub mod access;
+pub mod asyncapi;
 pub mod bus;
 pub mod codec;
 pub mod endpoint;

@@ -171,3 +171,56 @@ fn the_schemas_on_file_are_those_of_the_types() {
         assert!(on_file == text, "{} is out of date: run the test with CARS_UPDATE=1", file.display());
     }
 }
+
+/// Set `CARS_UPDATE=1` to write the file anew.
+#[test]
+fn the_asyncapi_document_on_file_is_that_of_the_types() {
+    let document = protocol::asyncapi::document();
+    let text = serde_json::to_string_pretty(&document).unwrap() + "\n";
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/asyncapi.json");
+    if std::env::var_os("CARS_UPDATE").is_some() {
+        std::fs::write(&file, &text).unwrap();
+    }
+    let on_file = std::fs::read_to_string(&file).unwrap_or_default();
+    assert!(on_file == text, "{} is out of date: run the test with CARS_UPDATE=1", file.display());
+}
+
+/// All values of `$ref` in a document.
+fn references(value: &serde_json::Value) -> Vec<&str> {
+    match value {
+        serde_json::Value::Object(fields) => fields
+            .iter()
+            .flat_map(|(name, field)| match field.as_str() {
+                Some(reference) if name == "$ref" => vec![reference],
+                _ => references(field),
+            })
+            .collect(),
+        serde_json::Value::Array(values) => values.iter().flat_map(references).collect(),
+        _ => Vec::new(),
+    }
+}
+
+#[test]
+fn the_asyncapi_document_holds_together() {
+    let document = protocol::asyncapi::document();
+    let references = references(&document);
+    assert!(references.len() > 100, "{}", references.len());
+    for reference in references {
+        let path = reference.strip_prefix('#').unwrap();
+        assert!(document.pointer(path).is_some(), "{reference} leads nowhere");
+    }
+    for (name, channel) in document["channels"].as_object().unwrap() {
+        let address = channel["address"].as_str().unwrap();
+        let parameters = channel["parameters"].as_object().unwrap();
+        let open: Vec<&str> = address.split('/').filter_map(|chunk| chunk.strip_prefix('{')).collect();
+        assert_eq!(open.len(), parameters.len(), "{name}: {address}");
+        assert!(open.iter().all(|chunk| parameters.contains_key(chunk.trim_end_matches('}'))), "{address}");
+        assert!(!address.contains('-'), "a placeholder is left in {address}");
+    }
+    // Every message that has a schema on file and travels has one here, too.
+    let messages = document["components"]["messages"].as_object().unwrap();
+    let on_disk_only = ["event", "recorded_tick", "recording_header"];
+    for name in schema::all().keys().filter(|name| !on_disk_only.contains(name)) {
+        assert!(messages.contains_key(*name), "{name}");
+    }
+}

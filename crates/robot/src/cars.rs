@@ -37,6 +37,7 @@ pub struct Cars<'a> {
     pub(crate) random: &'a mut Stream,
     pub(crate) outbox: &'a mut Outbox,
     pub(crate) log: &'a mut Vec<String>,
+    pub(crate) gave_up: &'a mut Option<String>,
     pub(crate) network: &'a mut dyn Network,
 }
 
@@ -126,6 +127,12 @@ impl Cars<'_> {
         if self.log.len() < MAX_ENTRIES / 2 {
             self.log.push(line);
         }
+    }
+
+    /// It cannot go on, and says why: whatever this tick comes to is thrown away, and its process leaves the run. The
+    /// first reason counts.
+    pub fn give_up(&mut self, reason: impl Into<String>) {
+        self.gave_up.get_or_insert(reason.into());
     }
 
     /// Sends a command to another robot (`setRobotCommand`). It arrives at a later tick, if the network lets it.

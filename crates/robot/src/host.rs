@@ -4,6 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Declared, Publisher, Role};
@@ -11,7 +13,7 @@ use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, PublicState, Refusal, Report, Welcome};
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
-use crate::cri::{BadParameters, Robot};
+use crate::cri::{Robot, RobotError};
 use crate::link::{Event, Link};
 use crate::seat::Seat;
 
@@ -49,9 +51,12 @@ pub enum HostError {
     /// The simulator said something that cannot be understood.
     #[error(transparent)]
     Malformed(#[from] Malformed),
-    /// A robot refuses its parameters.
+    /// A robot refuses its parameters, or gave up.
     #[error(transparent)]
-    Parameters(#[from] BadParameters),
+    Robot(#[from] RobotError),
+    /// The process wants to leave ([`Stopper::stop`]).
+    #[error("stopped from within this process")]
+    Stopped,
     /// Nobody executes the run.
     #[error("no simulator of run {run} answers at {connect}; is it running, and is the run's name right?")]
     NoSimulator {
@@ -76,6 +81,23 @@ pub struct Host {
     link: Link,
     members: BTreeMap<RobotName, Member>,
     declared: Vec<Declared>,
+}
+
+/// Lets another thread end [`Host::run`]: for a signal, or when what a robot needs is gone.
+#[derive(Debug, Clone)]
+pub struct Stopper {
+    is_stopped: Arc<AtomicBool>,
+    queue: SyncSender<Event>,
+}
+
+impl Stopper {
+    /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Questions that the
+    /// tick still asks are interrupted.
+    pub fn stop(&self) {
+        self.is_stopped.store(true, Ordering::SeqCst);
+        // Wakes a loop that waits; one whose queue is full does not.
+        let _woken = self.queue.try_send(Event::Stop);
+    }
 }
 
 /// One robot of the process.
@@ -212,6 +234,12 @@ impl Host {
         }
     }
 
+    /// What ends [`Host::run`] from another thread.
+    #[must_use]
+    pub fn stopper(&self) -> Stopper {
+        Stopper { is_stopped: self.link.is_stopped.clone(), queue: self.link.queue() }
+    }
+
     /// Runs until the run ends.
     ///
     /// # Errors
@@ -225,6 +253,7 @@ impl Host {
                         break Err(error);
                     }
                 }
+                None if self.link.is_stopped() => break Err(HostError::Stopped),
                 None => {}
             }
             if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())
@@ -312,7 +341,7 @@ impl Member {
         link: &mut Link,
     ) -> Result<Option<(Report, PublicState)>, HostError> {
         if self.is_seated {
-            return Ok(Some(self.seat.tick(clock, link)));
+            return Ok(Some(self.seat.tick(clock, link)?));
         }
         if clock.tick > 0 && !joins {
             return Ok(None); // Its turn has not come: the clock that names it is still to be granted.

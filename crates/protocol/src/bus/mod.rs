@@ -13,7 +13,7 @@ pub(crate) mod settings;
 use std::path::PathBuf;
 use std::time::Duration;
 
-pub use memory::{Faults, MemoryNetwork, Traffic};
+pub use memory::{Faults, MemoryNetwork, Overheard, Traffic};
 pub use middleware::check_exposure;
 
 /// Where a simulator listens and others connect unless told otherwise.

@@ -58,6 +58,41 @@ pub struct Traffic {
     pub naps: u64,
 }
 
+/// What somebody hears who listens in at the router, in the order in which it came there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Overheard {
+    /// A message was put.
+    Put {
+        /// Where.
+        key: String,
+        /// The message.
+        message: Vec<u8>,
+    },
+    /// A question was asked.
+    Asked {
+        /// Its number.
+        question: u64,
+        /// The key that was asked.
+        key: String,
+        /// As in `tick=12;epoch=1`.
+        parameters: String,
+        /// What came with it.
+        body: Vec<u8>,
+    },
+    /// It was answered.
+    Answered {
+        /// Its number.
+        question: u64,
+        /// The message, or the refusal in words.
+        result: Result<Vec<u8>, String>,
+    },
+    /// A token was shown.
+    Token {
+        /// Where.
+        key: String,
+    },
+}
+
 /// A network inside this process. Its sessions work until it is dropped.
 #[derive(Debug)]
 pub struct MemoryNetwork {
@@ -129,6 +164,12 @@ impl MemoryNetwork {
             self.shared.changed.notify_one();
             calls.into_iter().for_each(|call| call());
         }
+    }
+
+    /// Everything that came to the router since this was called last; the first call begins to listen in.
+    #[must_use]
+    pub fn overhear(&self) -> Vec<Overheard> {
+        self.shared.lock().overheard.replace(Vec::new()).unwrap_or_default()
     }
 
     /// What it has done so far.

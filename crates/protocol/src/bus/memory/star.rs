@@ -8,7 +8,7 @@ use std::sync::{Arc, Weak};
 use std::time::Instant;
 
 use super::super::{AnswerOf, Pending};
-use super::{Asked, Ending, Faults, Question, Shared, Traffic};
+use super::{Asked, Ending, Faults, Overheard, Question, Shared, Traffic};
 use crate::random::{Stream, stream, unit};
 
 /// Number of a session.
@@ -99,6 +99,8 @@ pub(super) struct Star {
     /// What is to be dropped without the lock: a callback may own questions, and a question that is dropped sends.
     rubbish: Vec<Box<dyn Any + Send>>,
     pub(super) traffic: Traffic,
+    /// What the router has heard, while somebody listens in.
+    pub(super) overheard: Option<Vec<Overheard>>,
     pub(super) is_over: bool,
 }
 
@@ -146,6 +148,26 @@ impl Peer {
     }
 }
 
+impl Overheard {
+    /// What a message says to whoever listens in; `None` if it is of no interest to anybody else.
+    fn of(message: &Message) -> Option<Self> {
+        Some(match message {
+            Message::Put(key, bytes) => Self::Put { key: key.to_string(), message: bytes.to_vec() },
+            Message::Ask(question, asked) => Self::Asked {
+                question: *question,
+                key: asked.key.clone(),
+                parameters: asked.parameters.clone(),
+                body: asked.body.clone(),
+            },
+            Message::Reply(question, answer) => {
+                Self::Answered { question: *question, result: answer.result.clone() }
+            }
+            Message::Declare(_, Declaration::Token(key)) => Self::Token { key: key.clone() },
+            _ => return None,
+        })
+    }
+}
+
 impl Star {
     pub(super) fn new(seed: u64, faults: Faults, shared: Weak<Shared>) -> Self {
         Self {
@@ -159,6 +181,7 @@ impl Star {
             shared,
             rubbish: Vec::new(),
             traffic: Traffic::default(),
+            overheard: None,
             is_over: false,
         }
     }
@@ -408,6 +431,9 @@ impl Star {
 
     /// A message has come up to the router.
     fn route(&mut self, from: PeerId, message: Message) {
+        if let (Some(overheard), Some(heard)) = (&mut self.overheard, Overheard::of(&message)) {
+            overheard.push(heard);
+        }
         match message {
             Message::Put(key, bytes) => {
                 for peer in self.peers.values_mut().filter(|peer| peer.subscribes_to(&key)) {

@@ -1,0 +1,377 @@
+//! `docs/protocol.md` says what the code does: keys, limits, times, variables, examples, random streams, links.
+
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
+
+use std::collections::BTreeSet;
+
+use clap::CommandFactory;
+use protocol::codec::MAX_MESSAGE_BYTES;
+use protocol::keys::{Keys, QUERIES, STATE};
+use protocol::messages::{
+    Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, Percept, PublicState, Report, Waiting, WorldFrame,
+};
+use protocol::name::MAX_NAME_LEN;
+use protocol::random::{MAX_SEED, stream, unit};
+use protocol::{Malformed, Message, PROTOCOL_VERSION, RobotName, RunName, decode, schema};
+use rand_xoshiro::rand_core::Rng;
+use serde_json::Value;
+use system_tests::root;
+
+fn page() -> String {
+    std::fs::read_to_string(root().join("docs/protocol.md")).unwrap()
+}
+
+/// The rows of the table whose header begins with this cell, cell by cell.
+fn table(page: &str, header: &str) -> Vec<Vec<String>> {
+    let begin = format!("| {header} |");
+    let rows =
+        page.lines().skip_while(|line| !line.starts_with(&begin)).take_while(|line| line.starts_with('|'));
+    let cells = |row: &str| row.trim_matches('|').split(" | ").map(|cell| cell.trim().to_owned()).collect();
+    let rows: Vec<Vec<String>> = rows.skip(2).map(cells).collect();
+    assert!(!rows.is_empty(), "there is no table with {header:?}");
+    rows
+}
+
+/// What stands between single backticks.
+fn code(text: &str) -> &str {
+    text.split('`').nth(1).unwrap_or_else(|| panic!("no code in {text:?}"))
+}
+
+/// Names of the schemas that a text links to.
+fn schemas(text: &str) -> Vec<&str> {
+    let links = text.split("crates/protocol/schemas/").skip(1);
+    links.filter_map(|link| link.split_once(".json").map(|(name, _)| name)).collect()
+}
+
+/// A heading as GitHub names it in links.
+fn anchor(heading: &str) -> String {
+    let kept = heading.chars().filter(|c| c.is_alphanumeric() || *c == ' ' || *c == '-' || *c == '_');
+    kept.collect::<String>().to_lowercase().replace(' ', "-")
+}
+
+#[test]
+fn the_sections_have_the_names_that_others_link_to() {
+    let page = page();
+    let sections: Vec<String> =
+        page.lines().filter_map(|line| line.strip_prefix("## ")).map(anchor).collect();
+    let expected = [
+        "words-and-transport",
+        "keys",
+        "joining",
+        "a-tick",
+        "commands",
+        "queries",
+        "repeated-and-late-messages",
+        "epochs",
+        "incarnations",
+        "the-end",
+        "tolerance",
+        "numbers-and-chance",
+        "robots-over-stdin-and-stdout",
+        "versions",
+        "test-vectors",
+    ];
+    assert_eq!(sections, expected);
+}
+
+/// `cars conform` names these rules: each is one sentence of the page.
+#[test]
+fn the_rules_are_there_once_each() {
+    const RULES: [&str; 28] = [
+        "join.request",
+        "join.ready-last",
+        "join.refused",
+        "tick.answer",
+        "tick.correction",
+        "tick.initial",
+        "tick.state-first",
+        "command.order",
+        "command.held",
+        "command.twice",
+        "command.missing",
+        "command.sent",
+        "query.tick",
+        "query.early",
+        "query.unknown",
+        "clock.duplicate",
+        "clock.late",
+        "epoch.init",
+        "determinism.seed",
+        "return.generation",
+        "return.numbers",
+        "return.replaced",
+        "end.clock",
+        "end.sigterm",
+        "compat.unknown-fields",
+        "robust.malformed",
+        "number.angles",
+        "number.finite",
+    ];
+    let page: &'static str = page().leak();
+    let found: Vec<&str> =
+        page.split("**`").skip(1).filter_map(|rest| rest.split_once("`**").map(|(rule, _)| rule)).collect();
+    let sorted = |mut rules: Vec<&'static str>| {
+        rules.sort_unstable();
+        rules
+    };
+    assert_eq!(sorted(found), sorted(RULES.to_vec()));
+}
+
+#[test]
+fn the_table_of_keys_is_that_of_the_code() {
+    let (run, name) = (RunName::new("RUN").unwrap(), |name| RobotName::new(name).unwrap());
+    let (keys, robot, from) = (Keys::new(&run), name("NAME"), name("FROM"));
+    let mut expected = vec![
+        keys.clock(),
+        keys.join_as(&robot),
+        keys.report(&robot),
+        keys.waiting(&robot),
+        keys.command(&robot, &from),
+        keys.query(&robot, STATE),
+        keys.percept(&robot),
+        keys.panel(&robot),
+        keys.alive_robot(&robot),
+        keys.alive_sim(),
+        keys.control(),
+        keys.world(),
+        keys.log(),
+        keys.faults(),
+    ];
+    expected.extend(QUERIES.map(|what| keys.query(&robot, what)));
+    let open = |key: String| key.replace("RUN", "{run}").replace("NAME", "{name}").replace("FROM", "{from}");
+    let expected: BTreeSet<String> = expected.into_iter().map(open).collect();
+
+    let page = page();
+    let rows = table(&page, "Key");
+    let found: BTreeSet<String> = rows.iter().map(|row| code(&row[0]).to_owned()).collect();
+    assert_eq!(found, expected);
+    assert_eq!(found.len(), rows.len(), "a key stands there twice");
+
+    // The same keys are in the AsyncAPI document, and all messages that travel are named.
+    let document = protocol::asyncapi::document();
+    let channels = document["channels"].as_object().unwrap().values();
+    let addresses: BTreeSet<String> = channels.map(|c| c["address"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(addresses, found);
+    let named: BTreeSet<&str> = rows.iter().flat_map(|row| schemas(row.last().unwrap())).collect();
+    let mut travel: BTreeSet<&str> = schema::all().into_keys().collect();
+    for file_only in ["event", "recorded_tick", "recording_header"] {
+        assert!(travel.remove(file_only));
+    }
+    assert_eq!(named, travel);
+}
+
+#[test]
+fn limits_times_and_version_are_those_of_the_code() {
+    let page = page();
+    let rows = table(&page, "What");
+    let limits: Vec<&str> = rows.iter().map(|row| row[1].as_str()).collect();
+    let expected = [
+        format!("{MAX_MESSAGE_BYTES} bytes"),
+        format!("{MAX_TEXT_BYTES} bytes"),
+        MAX_ENTRIES.to_string(),
+        MAX_WIDGETS.to_string(),
+        format!("{MAX_NAME_LEN} bytes"),
+        "below 2^53".to_owned(),
+        MAX_SEED.to_string(),
+    ];
+    assert_eq!(limits, expected);
+    assert!(page.contains(&format!("The version of the protocol is {PROTOCOL_VERSION}.")));
+
+    // Constants that are nobody else's business stay private; the page names their values.
+    let flat = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    for (file, constant, sentence) in [
+        (
+            "robot/src/link.rs",
+            "COMMAND_PATIENCE: Duration = Duration::from_secs(10)",
+            "waited for, up to 10 s",
+        ),
+        ("robot/src/link.rs", "LOOK_AGAIN: Duration = Duration::from_millis(250)", "once, after 0.25 s"),
+        ("robot/src/link.rs", "ASK_AGAIN: Duration = Duration::from_millis(500)", "ask again every 0.5 s"),
+        ("robot/src/held.rs", "MAX_COMMANDS: usize = 16_384", "Keep 16384 at least"),
+        ("robot/src/board.rs", "MAX_EARLY: usize = 1024", "at most 1024 are kept"),
+        ("robot/src/host.rs", "JOIN_AGAIN: Duration = Duration::from_millis(100)", "every 0.1 s or so"),
+        (
+            "robot/src/host.rs",
+            "PANEL_INTERVAL: Duration = Duration::from_millis(50)",
+            "at most 20 times a second",
+        ),
+        ("simulator/src/server.rs", "SAY_AFTER: Duration = Duration::from_millis(500)", "business for 0.5 s"),
+        (
+            "simulator/src/server.rs",
+            "REPEAT_AFTER: Duration = Duration::from_secs(2)",
+            "same clock again every 2 s",
+        ),
+        (
+            "simulator/src/server/member.rs",
+            "TOKEN_PATIENCE: Duration = Duration::from_secs(2)",
+            "within 2 s of its welcome",
+        ),
+        (
+            "simulator/src/simulation.rs",
+            "SEQS_OF_A_GENERATION: Seq = 1_000_000_000",
+            "1,000,000,001 for generation 2",
+        ),
+        ("protocol/src/bus/mod.rs", "QUERY_TIMEOUT: Duration = Duration::from_secs(2)", "timeout 2 s"),
+        ("protocol/src/bus/settings.rs", "\"transport/link/tx/lease\",\n        \"2000\"", "lease: 2000"),
+    ] {
+        let source = std::fs::read_to_string(root().join("crates").join(file)).unwrap();
+        assert!(
+            source.contains(constant),
+            "{file} does not say {constant} any more: mend the page and this list"
+        );
+        assert!(flat.contains(sentence), "the page does not say {sentence:?} any more");
+    }
+}
+
+#[test]
+fn the_variables_are_those_of_a_robot_program() {
+    let page = page();
+    let rows = table(&page, "Variable");
+    let command = robot::RobotArgs::command();
+    let mut count = 0;
+    for argument in command.get_arguments() {
+        let Some(variable) = argument.get_env() else { continue };
+        let variable = variable.to_str().unwrap();
+        let row = rows.iter().find(|row| code(&row[0]) == variable);
+        let row = row.unwrap_or_else(|| panic!("{variable} is not in the page"));
+        let default = argument.get_default_values().first().map(|value| value.to_str().unwrap());
+        assert_eq!(row[1].trim_matches('`'), default.unwrap_or("none"), "{variable}");
+        count += 1;
+    }
+    assert!(count >= 4, "{count}");
+}
+
+fn check<M: Message>(text: &str) -> Result<(), Malformed> {
+    decode::<M>("an example", "the page", text.as_bytes()).map(drop)
+}
+
+fn check_as(schema: &str, text: &str) -> Result<(), Malformed> {
+    match schema {
+        "answer" => check::<Answer>(text),
+        "clock" => check::<Clock>(text),
+        "command" => check::<Command>(text),
+        "control" => check::<Control>(text),
+        "control_answer" => check::<ControlAnswer>(text),
+        "fault_order" => check::<FaultOrder>(text),
+        "join_answer" => check::<JoinAnswer>(text),
+        "join_request" => check::<JoinRequest>(text),
+        "log_record" => check::<LogRecord>(text),
+        "panel" => check::<Panel>(text),
+        "percept" => check::<Percept>(text),
+        "public_state" => check::<PublicState>(text),
+        "report" => check::<Report>(text),
+        "waiting" => check::<Waiting>(text),
+        "world_frame" => check::<WorldFrame>(text),
+        other => panic!("an example of {other}?"),
+    }
+}
+
+/// Whether a recorded message or answer is this.
+fn is_recorded(file: &str, example: &Value) -> bool {
+    let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
+    let mut lines = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    lines.any(|line| line["message"] == *example || line["answer"] == *example)
+}
+
+#[test]
+fn the_examples_are_messages_and_those_of_runs_were_recorded() {
+    let page = page();
+    let (mut shown, mut recorded) = (BTreeSet::new(), 0);
+    let mut blocks = page.split("\n```json\n");
+    let mut before = blocks.next().unwrap();
+    for block in blocks {
+        let (example, rest) = block.split_once("\n```").unwrap();
+        let caption = before.trim_end().lines().last().unwrap();
+        let [schema] = schemas(caption)[..] else { panic!("which message is this? {caption}") };
+        check_as(schema, example).unwrap_or_else(|error| panic!("{error}\n{example}"));
+        if let Some((_, link)) = caption.split_once("(vectors/") {
+            let file = link.split(')').next().unwrap();
+            let example: Value = serde_json::from_str(example).unwrap();
+            assert!(is_recorded(file, &example), "{file} has no such message: {example}");
+            recorded += 1;
+        }
+        shown.insert(schema);
+        before = rest;
+    }
+    // Those that a robot says or hears come from runs.
+    assert!(recorded >= 11, "{recorded}");
+    for schema in ["clock", "join_request", "join_answer", "report", "waiting", "command", "public_state"] {
+        assert!(shown.contains(schema), "no example of {schema}");
+    }
+}
+
+/// Every line of the transcripts reads as what its key says.
+#[test]
+fn the_transcripts_are_messages() {
+    let mut count = 0;
+    for file in ["leguin.jsonl", "echo.jsonl", "return.jsonl"] {
+        let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
+        for line in text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()) {
+            let Some(key) = line["key"].as_str() else { continue };
+            let (message, answer) = (line["message"].to_string(), line["answer"].to_string());
+            let chunk = match Keys::last_chunk(key) {
+                _ if key.contains("/command/") => "command",
+                _ if key.contains("/join") => "join",
+                _ if key.contains("/alive/") => continue,
+                chunk => chunk,
+            };
+            let read = match chunk {
+                "join" => check::<JoinRequest>(&message).and(check::<JoinAnswer>(&answer)),
+                "command" => check::<Command>(&message),
+                "clock" => check::<Clock>(&message),
+                "report" => check::<Report>(&message),
+                "waiting" => check::<Waiting>(&message),
+                _ if line["refused"].is_string() => Ok(()),
+                "percept" => check::<Percept>(&answer),
+                STATE if line["way"] == "from" => check::<PublicState>(&message),
+                STATE => check::<PublicState>(&answer),
+                what => {
+                    assert!(QUERIES.contains(&what), "{key}");
+                    check::<Answer>(&answer)
+                }
+            };
+            read.unwrap_or_else(|error| panic!("{file}: {error}\n{line}"));
+            count += 1;
+        }
+    }
+    assert!(count > 500, "{count}");
+}
+
+#[test]
+fn the_random_streams_are_those_of_the_code() {
+    let page = page();
+    let rows = table(&page, "Seed");
+    let vectors = std::fs::read_to_string(root().join("docs/vectors/streams.json")).unwrap();
+    let vectors: Vec<Value> = serde_json::from_str(&vectors).unwrap();
+    assert_eq!(rows.len(), vectors.len());
+    for row in rows {
+        let (seed, name) = (row[0].parse().unwrap(), code(&row[1]));
+        assert_eq!(row[2], stream(seed, name).next_u64().to_string(), "{name}");
+        assert_eq!(
+            row[3].parse::<f64>().unwrap().to_bits(),
+            unit(&mut stream(seed, name)).to_bits(),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn the_links_lead_somewhere() {
+    let page = page();
+    let anchors: BTreeSet<String> = page
+        .lines()
+        .filter(|line| line.starts_with('#'))
+        .map(|line| anchor(line.trim_start_matches(['#', ' '])))
+        .collect();
+    let mut count = 0;
+    for link in page.split("](").skip(1).map(|rest| rest.split(')').next().unwrap()) {
+        count += 1;
+        match link.strip_prefix('#') {
+            Some(to) => assert!(anchors.contains(to), "{link}"),
+            None if link.starts_with("https://") => {}
+            None => assert!(root().join("docs").join(link).exists(), "{link}"),
+        }
+    }
+    assert!(count > 40, "{count}");
+}

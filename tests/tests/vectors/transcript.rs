@@ -1,0 +1,203 @@
+//! What was heard at the router, as one robot's own story: lines in an order that no schedule changes.
+
+use protocol::RobotName;
+use protocol::bus::Overheard;
+use protocol::keys::{Keys, STATE};
+use protocol::messages::{Clock, Percept, PublicState};
+
+/// One line of a transcript; the fields are explained in section "Test vectors" of `docs/protocol.md`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Line(String);
+
+/// Where a line stands among those of its tick. Within a place lines keep the order of the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    Join,
+    Token,
+    Clock,
+    /// A command that the clock of the tick in which it comes has named already.
+    Named,
+    Ask,
+    Waiting,
+    Sent,
+    State,
+    Report,
+    /// A command that a later clock names.
+    Held,
+}
+
+/// The story of one robot.
+pub(super) struct Transcript {
+    keys: Keys,
+    robot: RobotName,
+    /// What the others reported for the tick before: what they answer in the one under way.
+    states: Vec<(String, Vec<u8>)>,
+    lines: Vec<Line>,
+}
+
+/// A message as it stands on the wire: JSON within JSON.
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("messages are UTF-8")
+}
+
+fn put(way: &str, key: &str, message: &[u8]) -> Line {
+    Line(format!(r#"{{"way":"{way}","key":"{key}","message":{}}}"#, text(message)))
+}
+
+/// A question and what came back. `way` is `ask` where the robot asks and `asked` where it is asked.
+fn question(
+    way: &str,
+    key: &str,
+    parameters: &str,
+    body: Option<&[u8]>,
+    result: &Result<Vec<u8>, String>,
+) -> Line {
+    let mut line = format!(r#"{{"way":"{way}","key":"{key}""#);
+    if !parameters.is_empty() {
+        line += &format!(r#","parameters":"{parameters}""#);
+    }
+    if let Some(body) = body {
+        line += &format!(r#","message":{}"#, text(body));
+    }
+    line += &match result {
+        Ok(answer) => format!(r#","answer":{}}}"#, text(answer)),
+        Err(reason) => format!(r#","refused":{}}}"#, serde_json::Value::from(reason.as_str())),
+    };
+    Line(line)
+}
+
+impl Transcript {
+    pub(super) fn new(keys: Keys, robot: RobotName, scenario: &str) -> Self {
+        let start = format!(
+            r#"{{"way":"start","robot":"{robot}","scenario":{}}}"#,
+            serde_json::Value::from(scenario)
+        );
+        Self { keys, robot, states: Vec::new(), lines: vec![Line(start)] }
+    }
+
+    /// The lines of a tick, or of what happened between two.
+    pub(super) fn add(&mut self, heard: Vec<Overheard>) {
+        let clock = heard.iter().find_map(|heard| self.clock(heard));
+        let mut placed: Vec<(Place, Line)> = Vec::new();
+        let mut states = Vec::new();
+        for (at, one) in heard.iter().enumerate() {
+            match one {
+                Overheard::Put { key, message } => {
+                    placed.extend(self.place(key, message, clock.as_ref()));
+                    if self.is_state_of_another(key) {
+                        states.push((key.clone(), message.clone()));
+                    }
+                }
+                Overheard::Asked { question: number, key, body, .. } if self.is_own_join(key, body) => {
+                    let is_answer = |later: &&Overheard| matches!(later, Overheard::Answered { question, .. } if question == number);
+                    if let Some(Overheard::Answered { result, .. }) = heard[at..].iter().find(is_answer) {
+                        placed.push((Place::Join, question("ask", key, "", Some(body), result)));
+                    }
+                }
+                Overheard::Token { key } if *key == self.keys.alive_robot(&self.robot) => {
+                    placed.push((Place::Token, Line(format!(r#"{{"way":"token","key":"{key}"}}"#))));
+                }
+                _ => {}
+            }
+        }
+        placed.extend(self.answers(clock.as_ref()));
+        if !states.is_empty() {
+            self.states = states;
+        }
+        placed.sort_by_key(|(place, _)| *place);
+        // How often a robot repeats what was lost is its own affair.
+        let from = self.lines.len();
+        for (place, line) in placed {
+            if place != Place::Sent || !self.lines[from..].contains(&line) {
+                self.lines.push(line);
+            }
+        }
+    }
+
+    /// A question to the robot, and what it answered.
+    pub(super) fn asked(&mut self, key: &str, parameters: &str, result: &Result<Vec<u8>, String>) {
+        self.lines.push(question("asked", key, parameters, None, result));
+    }
+
+    pub(super) fn text(&self) -> String {
+        self.lines.iter().map(|line| line.0.clone() + "\n").collect()
+    }
+
+    fn clock(&self, heard: &Overheard) -> Option<Clock> {
+        match heard {
+            Overheard::Put { key, message } if *key == self.keys.clock() => {
+                Some(serde_json::from_slice(message).expect("a clock"))
+            }
+            _ => None,
+        }
+    }
+
+    fn is_own_join(&self, key: &str, body: &[u8]) -> bool {
+        let request: serde_json::Value = serde_json::from_slice(body).unwrap_or_default();
+        key.starts_with(&self.keys.join()) && request["name"] == self.robot.as_str()
+    }
+
+    fn is_state_of_another(&self, key: &str) -> bool {
+        Keys::last_chunk(key) == STATE && Keys::robot_of(key) != Some(self.robot.as_str())
+    }
+
+    /// What concerns the robot among the messages that were put.
+    fn place(&self, key: &str, message: &[u8], clock: Option<&Clock>) -> Option<(Place, Line)> {
+        let to = |place| Some((place, put("to", key, message)));
+        let from = |place| Some((place, put("from", key, message)));
+        let own = |of: fn(&Keys, &RobotName) -> String| key == of(&self.keys, &self.robot);
+        if key == self.keys.clock() {
+            return to(Place::Clock);
+        }
+        if own(Keys::report) {
+            return from(Place::Report);
+        }
+        if own(Keys::waiting) {
+            return from(Place::Waiting);
+        }
+        if key == self.keys.query(&self.robot, STATE) {
+            return from(Place::State);
+        }
+        if own(Keys::percept) {
+            let Percept { epoch, tick, .. } = serde_json::from_slice(message).expect("a percept");
+            let parameters = format!("tick={tick};epoch={epoch}");
+            return Some((Place::Ask, question("ask", key, &parameters, None, &Ok(message.to_vec()))));
+        }
+        let (before, sender) = key.rsplit_once('/')?;
+        if !before.ends_with("/command") {
+            return None;
+        }
+        if sender == self.robot.as_str() {
+            return from(Place::Sent);
+        }
+        if Keys::robot_of(key) != Some(self.robot.as_str()) {
+            return None;
+        }
+        let seq = serde_json::from_slice::<serde_json::Value>(message).ok()?["seq"].as_u64();
+        let named = clock.and_then(|clock| clock.news.get(&self.robot)).map(|news| &news.commands);
+        let is_named =
+            named.is_some_and(|ids| ids.iter().any(|id| id.from.as_str() == sender && Some(id.seq) == seq));
+        to(if is_named { Place::Named } else { Place::Held })
+    }
+
+    /// All that the robot may ask in this tick, and what it would be answered. Whether it asks or follows the keys, the
+    /// answers are the same, so the lines do not depend on that.
+    fn answers(&self, clock: Option<&Clock>) -> Vec<(Place, Line)> {
+        let Some(clock) = clock.filter(|clock| clock.tick > 0 && clock.end.is_none()) else {
+            return Vec::new();
+        };
+        let parameters = format!("tick={};epoch={}", clock.tick, clock.epoch);
+        let unreachable =
+            clock.news.get(&self.robot).map(|news| news.unreachable.clone()).unwrap_or_default();
+        let mut asks = Vec::new();
+        for (key, state) in &self.states {
+            let of = Keys::robot_of(key).unwrap_or_default();
+            let reported: PublicState = serde_json::from_slice(state).expect("a state");
+            let is_last = (reported.epoch, reported.tick + 1) == (clock.epoch, clock.tick);
+            if is_last && unreachable.iter().all(|name| name.as_str() != of) {
+                asks.push((Place::Ask, question("ask", key, &parameters, None, &Ok(state.clone()))));
+            }
+        }
+        asks
+    }
+}
