@@ -217,6 +217,13 @@ def test_a_folder_of_certificates_is_enough(lab: Lab) -> None:
         assert robot.returncode == 1 and reason in said
 
 
+def test_the_kit_finds_no_fault(lab: Lab) -> None:
+    """Every rule of docs/protocol.md, as `cars conform` checks it."""
+    echo = Path(__file__).with_name("echo.py")
+    found = lab.cars("conform", "--say", "hello", "--say", "world", "--", sys.executable, str(echo))
+    assert "not ok" not in found and "# SKIP" not in found and found.count("\nok ") >= 28, found
+
+
 def test_the_benchmark_measures(lab: Lab) -> None:
     bench = [sys.executable, str(ROOT / "sdk/python/bench.py"), "--rounds", "1", "--robots", "2", "--ticks", "400"]
     measured = lab.start(bench, CARS_BIN_DIR=str(lab.programs))
