@@ -56,7 +56,7 @@ fn the_package_passes_its_tests() {
     let file = std::fs::File::create(&printed).unwrap();
     let mut pytest = python();
     pytest.current_dir(root().join("sdk/python")).env("CARS_BIN_DIR", programs());
-    pytest.args(["-m", "pytest", "-v", "-rP", "--tb=short", "-p", "no:cacheprovider"]);
+    pytest.args(["-m", "pytest", "-v", "-ra", "--tb=short", "-p", "no:cacheprovider"]);
     pytest.arg("--basetemp").arg(lab.out().join("pytest"));
     // A group of its own, so that nothing that its tests have started outlives it.
     let mut pytest = pytest.process_group(0).stdout(file.try_clone().unwrap()).stderr(file).spawn().unwrap();

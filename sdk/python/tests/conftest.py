@@ -20,7 +20,7 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
     cars = shutil.which("cars", path=folder) or shutil.which("cars")
     if cars is None:
         missing("the program cars is not there: `cargo build --release`, and name its folder by CARS_BIN_DIR")
-    with Lab(Path(cars).parent, tmp_path) as made:
+    with Lab(Path(cars).resolve().parent, tmp_path) as made:
         yield made
 
 

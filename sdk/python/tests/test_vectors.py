@@ -16,8 +16,6 @@ from cars_robot import stream
 VECTORS = ROOT / "docs" / "vectors"
 ECHO = Path(__file__).with_name("echo.py")
 
-pytestmark = pytest.mark.skipif(not VECTORS.exists(), reason="this checkout has no docs/vectors")
-
 
 class Replay:
     """A transcript, played to a robot line by line."""
