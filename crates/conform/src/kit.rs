@@ -75,7 +75,7 @@ impl Kit {
         let (bus, endpoint) = open_router()?;
         let mut own = process::copy(command);
         // The robot meets this kit and nobody else.
-        own.env_remove("CARS_ZENOH_CONFIG").env_remove("CARS_SECURE");
+        own.env_remove("CARS_ZENOH_CONFIG");
         let (runs, learned, usual) = (AtomicUsize::new(0), OnceLock::new(), OnceLock::new());
         let (setting, is_deterministic) = (setting.clone(), OnceLock::new());
         Ok(Self { bus, endpoint, command: own, setting, runs, learned, usual, is_deterministic })

@@ -12,6 +12,9 @@ use protocol::{RobotName, Seq, Tick};
 use crate::cri::BadParameters;
 use crate::seat::{Network, Undelivered};
 
+/// What a robot may write to the log in a tick, all lines together.
+const MAX_LOG_BYTES: usize = 256 * 1024;
+
 /// Why a call between robots gave nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
@@ -123,8 +126,9 @@ impl Cars<'_> {
             let end = (0..=MAX_TEXT_BYTES).rev().find(|at| line.is_char_boundary(*at)).unwrap_or(0);
             line.truncate(end);
         }
-        // Room is left for what the seat itself may have to say.
-        if self.log.len() < MAX_ENTRIES / 2 {
+        // Room is left for what the seat itself may have to say, and for the rest of the report.
+        let bytes: usize = self.log.iter().map(String::len).sum();
+        if self.log.len() < MAX_ENTRIES / 2 && bytes + line.len() <= MAX_LOG_BYTES {
             self.log.push(line);
         }
     }

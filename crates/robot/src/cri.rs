@@ -29,6 +29,16 @@ pub enum RobotError {
         /// Why, for people.
         reason: String,
     },
+    /// What it says of itself is beyond the limits of a message.
+    #[error("{robot} says too much: {field}: {reason}")]
+    TooMuch {
+        /// Which robot.
+        robot: RobotName,
+        /// Where in its report.
+        field: String,
+        /// What is wrong with it.
+        reason: String,
+    },
 }
 
 /// A robot, as the simulation and the other robots see it (`CARSRobotInterface`; `getName` is [`Cars::name`], since

@@ -9,6 +9,7 @@ use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Declared, Publisher, Role};
+use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, PublicState, Refusal, Report, Welcome};
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
@@ -322,15 +323,20 @@ impl Member {
         }
         let is_named = joined == Some(welcome.generation);
         let Some((report, state)) = self.tick(clock, is_named, link)? else { return Ok(()) };
+        let bytes = encode(&report);
+        if bytes.len() > MAX_MESSAGE_BYTES {
+            let reason = format!("{} bytes, more than the {MAX_MESSAGE_BYTES} allowed", bytes.len());
+            let (robot, field) = (name.clone(), "its report".to_owned());
+            return Err(RobotError::TooMuch { robot, field, reason }.into());
+        }
         // First what others may ask for, then the report: after it the clock may go on and they will ask.
         // Who follows has the state before the next clock, because both come the same way.
         if self.state.is_watched() {
             self.state.put(encode(&state))?;
         }
         link.board.show(name, Arc::new(state));
-        let report = encode(&report);
-        self.report.put(report.clone())?;
-        self.last = Some((Clock { epoch: clock.epoch, tick: clock.tick, ..Clock::default() }, report));
+        self.report.put(bytes.clone())?;
+        self.last = Some((Clock { epoch: clock.epoch, tick: clock.tick, ..Clock::default() }, bytes));
         self.paint()
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use protocol::messages::{Clock, Command, CommandId, News, Percept, Point, PublicState, Report, Welcome};
 use protocol::random::{Stream, stream};
-use protocol::{Epoch, RobotName, Tick};
+use protocol::{Epoch, Message, RobotName, Tick};
 
 use crate::cars::{Cars, Outbox};
 use crate::cri::{Robot, RobotError};
@@ -216,7 +216,12 @@ impl Seat {
             emotion_state,
             behavior_state,
         };
-        Ok((self.report(&state, missing, log), state))
+        let report = self.report(&state, missing, log);
+        // A simulator would refuse it and wait for another one.
+        match report.check() {
+            Ok(()) => Ok((report, state)),
+            Err((field, reason)) => Err(RobotError::TooMuch { robot: welcome.name.clone(), field, reason }),
+        }
     }
 
     fn report(&mut self, state: &PublicState, missing: Vec<CommandId>, log: Vec<String>) -> Report {

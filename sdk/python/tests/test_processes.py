@@ -197,24 +197,10 @@ def test_a_secured_run_takes_a_robot_with_its_certificate(lab: Lab) -> None:
     assert_same(secured, lab.play("local", "hors_doeuvres.toml", "--duration", "60 s"))
 
 
-def test_a_folder_of_certificates_is_enough(lab: Lab) -> None:
-    folder = lab.folder / "certificates"
-    lab.cars("secure", "init", str(folder), "--robots", "A,B")
-    config = ["--zenoh-config", str(folder / "simulator" / "zenoh.json5")]
-    at = lab.simulator("folder", hall("A", "B"), *config, protocol="tls")
-    robots = [
-        lab.robot("walker.py", "--name", "A", CARS_SECURE=str(folder), **at),
-        lab.robot("walker.py", "--name", "B", "--secure", str(folder / "B"), **at),
-    ]
-    assert [robot.wait(30) for robot in robots] == [0, 0]
-    for arguments, reason in [
-        (["--name", "A"], "wants a certificate: name a file zenoh.json5"),
-        (["--name", "C", "--secure", str(folder)], "there is neither"),
-        (["--name", "A", "--name", "B", "--secure", str(folder)], "each robot needs a process of its own"),
-    ]:
-        robot = lab.robot("walker.py", *arguments, **at)
-        _, said = robot.communicate(timeout=30)
-        assert robot.returncode == 1 and reason in said
+def test_an_encrypted_endpoint_wants_a_certificate(lab: Lab) -> None:
+    robot = lab.robot("walker.py", "--name", "A", "--connect", "tls/127.0.0.1:1")
+    _, said = robot.communicate(timeout=30)
+    assert robot.returncode == 1 and "wants a certificate: name a file zenoh.json5" in said
 
 
 def test_the_kit_finds_no_fault(lab: Lab) -> None:

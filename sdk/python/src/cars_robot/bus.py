@@ -116,7 +116,7 @@ class Bus:
             if config_file is None:
                 raise BusError(
                     f"{connect} wants a certificate: name a file zenoh.json5 that `cars secure init` made, by "
-                    "--zenoh-config or CARS_ZENOH_CONFIG, or its folder by CARS_SECURE"
+                    "--zenoh-config or CARS_ZENOH_CONFIG"
                 )
             hint = (
                 " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)"

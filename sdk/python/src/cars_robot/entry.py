@@ -49,9 +49,7 @@ def main(default_name: str, make: Callable[[str], Robot], arguments: Sequence[st
         print("error: a robot is named twice; name each once", file=sys.stderr)
         return 2
     _start_log()
-    options = HostOptions(
-        given.run, given.connect, given.patience_s, given.gone_patience_s, given.zenoh_config, given.secure
-    )
+    options = HostOptions(given.run, given.connect, given.patience_s, given.gone_patience_s, given.zenoh_config)
     try:
         return _play({name: make(name) for name in names}, options)
     except (HostError, BusError, BadParameters, Malformed) as error:
@@ -152,13 +150,6 @@ def _parser(default_name: str) -> argparse.ArgumentParser:
         type=Path,
         default=os.environ.get("CARS_ZENOH_CONFIG") or None,
         help="a configuration file of the middleware instead of the built-in settings [CARS_ZENOH_CONFIG]",
-    )
-    parser.add_argument(
-        "--secure",
-        metavar="DIR",
-        type=Path,
-        default=os.environ.get("CARS_SECURE") or None,
-        help="folder of certificates that `cars secure init` made [CARS_SECURE]",
     )
     parser.add_argument("-V", "--version", action="version", version=f"%(prog)s {__version__}")
     return parser

@@ -59,50 +59,22 @@ class HostOptions:
     """How long to wait for it once it is gone: it ended, or the link to it is cut, which look the same from here."""
     zenoh_config: Path | None = None
     """A configuration file of the middleware instead of the built-in settings."""
-    secure: Path | None = None
-    """Folder of certificates that ``cars secure init`` made, or a robot's own folder in it; used where there is no
-    ``zenoh_config``."""
 
     @staticmethod
     def from_environment() -> HostOptions:
-        """What ``CARS_RUN``, ``CARS_CONNECT``, ``CARS_PATIENCE_S``, ``CARS_GONE_PATIENCE_S``, ``CARS_ZENOH_CONFIG`` and
-        ``CARS_SECURE`` say, as a launcher sets them.
+        """What ``CARS_RUN``, ``CARS_CONNECT``, ``CARS_PATIENCE_S``, ``CARS_GONE_PATIENCE_S`` and ``CARS_ZENOH_CONFIG``
+        say, as a launcher sets them.
 
         :raises ValueError: a patience is not a number.
         """
         default = HostOptions()
-
-        def path(name: str) -> Path | None:
-            return Path(value) if (value := os.environ.get(name)) else None
-
+        zenoh_config = os.environ.get("CARS_ZENOH_CONFIG")
         return HostOptions(
             run=os.environ.get("CARS_RUN", default.run),
             connect=os.environ.get("CARS_CONNECT", default.connect),
             patience_s=float(os.environ.get("CARS_PATIENCE_S", default.patience_s)),
             gone_patience_s=float(os.environ.get("CARS_GONE_PATIENCE_S", default.gone_patience_s)),
-            zenoh_config=path("CARS_ZENOH_CONFIG"),
-            secure=path("CARS_SECURE"),
-        )
-
-    def config_file(self, robots: list[str]) -> Path | None:
-        """The configuration file for a process of these robots.
-
-        :raises HostError: there is none in the folder of certificates, or one process has several robots.
-        """
-        if self.zenoh_config is not None or self.secure is None:
-            return self.zenoh_config
-        if len(robots) != 1:
-            raise HostError(
-                f"{' and '.join(robots)} have one connection and so one certificate: in a secured run each robot needs "
-                "a process of its own"
-            )
-        candidates = [self.secure / robots[0] / "zenoh.json5", self.secure / "zenoh.json5"]
-        for file in candidates:
-            if file.exists():
-                return file
-        raise HostError(
-            f"there is neither {candidates[0]} nor {candidates[1]}: `cars secure init {self.secure} --robots "
-            f"{robots[0]},...` makes them"
+            zenoh_config=Path(zenoh_config) if zenoh_config else None,
         )
 
 
@@ -124,7 +96,7 @@ class Host:
                 )
         self._options = options
         names = sorted(robots)
-        self._bus = Bus(options.connect, options.patience_s, options.config_file(names))
+        self._bus = Bus(options.connect, options.patience_s, options.zenoh_config)
         self._keys = Keys(options.run)
         self.link = Link(self._bus, self._keys, options.gone_patience_s)
         self._members: list[_Member] = []
