@@ -26,7 +26,7 @@ pub(crate) use start::{StartArgs, start};
 /// Signals that ask to end.
 const ASKING: [Signal; 3] = [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP];
 /// A signal that goes to a group of processes ends the program at once and reaches us, too: within this time.
-const SAME_SIGNAL: Duration = Duration::from_millis(250);
+const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
 /// `cars exec`.
 #[derive(Debug, Args)]
@@ -89,11 +89,11 @@ fn listen(asking: SigSet, program: &Arc<Program>, stopper: Arc<OnceLock<Stopper>
         let _over = tell.send(signal);
         program.interrupt();
         match stopper.get() {
-            Some(stopper) => stopper.stop(),
+            Some(stopper) => {
+                stopper.stop();
+                std::thread::sleep(END_PATIENCE);
+            }
             None => program.end(EndReason::Interrupted), // Still on its way into the run.
-        }
-        if stopper.get().is_some() {
-            std::thread::sleep(END_PATIENCE);
         }
         // Whatever still hangs: a robot that is asked to end ends.
         program.kill();

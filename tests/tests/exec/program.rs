@@ -2,7 +2,7 @@
 
 use system_tests::assert_same;
 
-use crate::stage::{Stage, nobody_is_left, ready};
+use crate::stage::{Stage, nobody_is_left, ready, says};
 
 /// Walks to and fro by chance, asks, looks around, commands and says what it hears.
 const WALKER: &str = r#"
@@ -91,7 +91,7 @@ fn a_slow_program_is_late_and_named_and_changes_nothing() {
     let stage = Stage::each_tick(slow, "");
     let mut launch = stage.start("exec-slow", &[]);
     launch.finish();
-    assert!(launch.printed().contains("waiting for Leguin"), "{}", launch.printed());
+    says(&launch, &["waiting for Leguin"]);
     let held_s =
         stage.lab.summary("exec-slow")["wall"]["held_up_by"]["Leguin"]["longest_s"].as_f64().unwrap();
     assert!(held_s > 1.0, "the summary says who held up the run: {held_s}");

@@ -1,6 +1,6 @@
 //! A program that does not keep to the contract ends its robot, and the reason is named.
 
-use crate::stage::{Stage, nobody_is_left};
+use crate::stage::{Stage, nobody_is_left, says};
 
 /// What a program does in tick 3, and what is said about it.
 const MISHAPS: &[(&str, &str, &[&str])] = &[
@@ -87,11 +87,8 @@ fn every_mishap_is_named_and_ends_the_robot() {
                 let (run, stage) = (format!("exec-mishap-{name}"), Stage::each_tick(&lines, ""));
                 let mut launch = stage.start(&run, &["--speed", "20"]);
                 let status = launch.wait();
-                let printed = launch.printed();
-                assert_eq!(status.code(), Some(1), "{name}: {printed}");
-                for part in [&["Leguin gives up: "], *expected].concat() {
-                    assert!(printed.contains(part), "{name}: no {part:?} in\n{printed}");
-                }
+                assert_eq!(status.code(), Some(1), "{name}: {}", launch.printed());
+                says(&launch, &[&["Leguin gives up: "], *expected].concat());
                 nobody_is_left(&run);
             });
         }
@@ -104,7 +101,7 @@ fn a_program_that_is_not_there_is_named() {
     std::fs::remove_file(stage.lab.out().join("leguin.sh")).unwrap();
     let mut launch = stage.start("exec-nowhere", &[]);
     assert!(!launch.wait().success());
-    assert!(launch.printed().contains("there is no program ./leguin.sh"), "{}", launch.printed());
+    says(&launch, &["there is no program ./leguin.sh"]);
 
     let args = [
         "exec",
@@ -125,13 +122,13 @@ fn a_program_that_is_not_there_is_named() {
 #[test]
 fn a_dead_program_is_lost_where_the_clock_goes_on() {
     let silent = r#"case $json in *'"type":"tick","tick":10,'*) exit 3 ;; esac"#;
-    // A tick that it has answered counts.
+    // A tick that it has answered counts. Nobody is given up for being slow here.
     let answering = r#"case $json in *'"type":"tick","tick":10,'*) say '{"type":"done"}'; exit 3 ;; esac"#;
     for (name, lines, tick) in [("silent", silent, 10), ("answering", answering, 11)] {
         let stage = Stage::each_tick(lines, "required = false");
         for time in 1..=2 {
             let run = format!("exec-lost-{name}-{time}");
-            stage.start(&run, &["--set", "on_late=continue"]).finish();
+            stage.start(&run, &["--set", "on_late=continue", "--set", "deadline=60 s"]).finish();
             let mut lost = stage.lab.events(&run);
             lost.retain(|event| event["event"] == "lost");
             assert_eq!(lost.len(), 1, "{lost:?}");

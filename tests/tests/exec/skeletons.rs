@@ -19,9 +19,18 @@ struct Robot {
 impl Robot {
     fn new(language: &str) -> Self {
         let lab = Lab::new();
-        let text = lab.ok(&["new", "robot", "Rosie", "--lang", language, "--cars", root().to_str().unwrap()]);
+        let out = lab.out().to_owned();
+        Self::new_in(&out, lab, language)
+    }
+
+    fn new_in(out: &Path, lab: Lab, language: &str) -> Self {
+        let (root, out) = (root(), out.to_str().unwrap());
+        let args =
+            ["new", "robot", "Rosie", "--lang", language, "--out", out, "--cars", root.to_str().unwrap()];
+        let (code, text) = lab.cars_without_out(&args);
+        assert_eq!(code, 0, "{text}");
         assert!(text.contains("launch.toml"), "it says what comes next: {text}");
-        let folder = lab.out().join("Rosie");
+        let folder = Path::new(out).join("Rosie");
         Self { lab, folder }
     }
 
@@ -122,7 +131,12 @@ fn build(command: &mut Command) {
 
 /// The robot in Rust, built where the project is, so that nothing is compiled twice.
 fn rust() -> Robot {
-    let robot = Robot::new("rust");
+    // The same folder every time: cargo keeps what it builds by place, and a program is large.
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("new-rust");
+    if out.exists() {
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+    let robot = Robot::new_in(&out, Lab::new(), "rust");
     let target = programs().parent().unwrap();
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(&robot.folder).env("CARGO_TARGET_DIR", target);

@@ -1,9 +1,10 @@
 //! A launch of Butler and of Leguin, whom a shell script plays over its standard input and output.
 
 use std::os::unix::fs::PermissionsExt;
+use std::time::{Duration, Instant};
 
 use system_tests::processes::{Running, find};
-use system_tests::{Lab, eventually, root};
+use system_tests::{Lab, PATIENCE, eventually, root};
 
 /// What a script can use: `json` is the line that it was told, `is TYPE` asks for its type, `say` says a line and `ask`
 /// says one and puts the answer into `json`.
@@ -71,6 +72,16 @@ impl Stage {
 /// Waits until a run has no process any more.
 pub(crate) fn nobody_is_left(run: &str) {
     eventually("the last process to be gone", || find(run).is_empty().then_some(()));
+}
+
+/// Waits until a program has printed all of this; it may be over, and its last lines still on their way.
+#[track_caller]
+pub(crate) fn says(launch: &Running, parts: &[&str]) {
+    let begun = Instant::now();
+    while let Some(missing) = parts.iter().find(|part| !launch.printed().contains(**part)) {
+        assert!(begun.elapsed() < PATIENCE, "no {missing:?} in\n{}", launch.printed());
+        std::thread::sleep(Duration::from_millis(10));
+    }
 }
 
 /// Waits until a launch that is paused has gathered its robots.

@@ -26,7 +26,10 @@ pub(super) const MAX_LINE: usize = 1 << 20;
 /// Lines that are read before the program must wait for them to be heeded.
 const QUEUE: usize = 16;
 /// Longest wait for the rest of what a program wrote that is over, should somebody else hold its pipes.
-const REST_OF_OUTPUT: Duration = Duration::from_millis(500);
+const REST_OF_OUTPUT: Duration = Duration::from_secs(2);
+/// A program that answers a tick and dies has answered it: so long its robot stays, unless the next clock comes, for its
+/// report to get through. The middleware may let its leaving overtake it.
+const LAST_REPORT: Duration = Duration::from_secs(1);
 
 /// What is heard of the program.
 #[derive(Debug)]
@@ -112,8 +115,11 @@ impl Program {
         *lock(&self.status) = status.ok();
         self.ended.notify_all();
         // Between two ticks nobody listens to the program.
-        if let Some(stopper) = stopper.get() {
-            stopper.stop();
+        if let Some(stopper) = stopper.get().cloned() {
+            std::thread::spawn(move || {
+                std::thread::sleep(LAST_REPORT);
+                stopper.stop();
+            });
         }
         let _over = self.heard.send(Heard::Ended);
     }
