@@ -7,6 +7,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+pub mod conformance;
 pub mod hall;
 pub mod network;
 pub mod processes;

@@ -10,6 +10,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
 use protocol::random::{Stream, stream, unit};
+use system_tests::conformance::assert_conforms;
 use system_tests::{Lab, assert_same, eventually, root};
 
 const C: &str = "sdk/stdio/c/leguin.c";
@@ -388,6 +389,24 @@ fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
     }
 }
 
+#[test]
+fn robots_over_stdin_and_stdout_keep_the_rules_of_the_protocol() {
+    if lacks_compiler() || lacks_node() || lacks_typescript() {
+        return;
+    }
+    companion_is_compiled();
+    let cast = Cast::in_c("configs/three_robots.toml", true, PLAIN);
+    let (in_c, any_language) = (PathBuf::from(&cast.file), root().join(ANY_LANGUAGE));
+    std::thread::scope(|scope| {
+        for robot in ["Leguin", "Vonda"] {
+            scope.spawn(|| assert_conforms(&in_c, robot));
+        }
+        for robot in ["Nora", "Tove", "Bruno"] {
+            scope.spawn(|| assert_conforms(&any_language, robot));
+        }
+    });
+}
+
 /// How far a robot has gone in a run.
 fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
     let text = std::fs::read_to_string(lab.file(run, "recording.jsonl")).unwrap();
@@ -456,4 +475,5 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
         let end = &lab.events(run).pop().unwrap();
         assert_eq!((&end["event"], &end["tick"]), (&"end".into(), &1200.into()), "{end}");
     }
+    assert_conforms(&root().join(MIXED), "Leguin");
 }

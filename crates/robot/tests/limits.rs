@@ -93,6 +93,6 @@ fn what_cannot_be_sent_ends_the_robot_with_the_reason() {
     let error = chatterbox(true).exchange(&clock, &mut |_| Percept::default()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "A says too much: state_variables.secret: 5000 bytes, more than the 4096 allowed"
+        "A says too much: state_variables.secret: 5000 bytes of text, more than the 4096 allowed"
     );
 }

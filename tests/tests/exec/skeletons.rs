@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use system_tests::conformance::assert_conforms;
 use system_tests::processes::Running;
 use system_tests::{Lab, assert_same, programs, root};
 
@@ -70,6 +71,7 @@ impl Robot {
         let recording = std::fs::read_to_string(self.lab.file(&runs[0], "recording.jsonl")).unwrap();
         assert!(recording.lines().any(|line| line.contains("\"x\":12.192")), "it reaches the end of its way");
         self.obeys(language);
+        assert_conforms(&self.folder.join("launch.toml"), "Rosie");
         first
     }
 
