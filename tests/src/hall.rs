@@ -4,7 +4,7 @@ use std::path::Path;
 
 use protocol::messages::{Clock, Point};
 use protocol::{RobotName, RunName};
-use robot::{BadParameters, LocalHost};
+use robot::{LocalHost, RobotError};
 use simulator::scenario::Changes;
 use simulator::{Barrier, Event, Exchange, Scenario, Simulation};
 
@@ -20,8 +20,8 @@ pub struct Hall {
 struct Robots(LocalHost);
 
 impl Barrier for Robots {
-    type Interrupt = BadParameters;
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, BadParameters> {
+    type Interrupt = RobotError;
+    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
         let reports = self.0.exchange(&clock, &mut |name| simulation.percept(name))?;
         Ok(Exchange { reports, membership: Vec::new() })
     }

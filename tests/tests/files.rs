@@ -69,12 +69,12 @@ fn damage() -> impl Strategy<Value = Damage> {
         1 => Just(format!("\"{}\"", "x".repeat(10_000))),
     ];
     prop_oneof![
-        any::<Index>().prop_map(Damage::DropLine),
-        any::<Index>().prop_map(Damage::RepeatLine),
+        1 => any::<Index>().prop_map(Damage::DropLine),
+        1 => any::<Index>().prop_map(Damage::RepeatLine),
         5 => (any::<Index>(), odd).prop_map(|(at, value)| Damage::Value(at, value)),
-        (any::<Index>(), "[a-z_]{1,8}").prop_map(|(at, key)| Damage::Key(at, key)),
-        (any::<Index>(), any::<char>()).prop_map(|(at, with)| Damage::Insert(at, with)),
-        any::<Index>().prop_map(Damage::CutOff),
+        1 => (any::<Index>(), "[a-z_]{1,8}").prop_map(|(at, key)| Damage::Key(at, key)),
+        1 => (any::<Index>(), any::<char>()).prop_map(|(at, with)| Damage::Insert(at, with)),
+        1 => any::<Index>().prop_map(Damage::CutOff),
     ]
 }
 
@@ -140,8 +140,9 @@ proptest! {
         match Scenario::parse(&source, &root().join("configs")) {
             Ok(scenario) => {
                 let text = scenario.to_toml().unwrap();
-                let again = Scenario::parse(&Source { name: "again.toml".to_owned(), text }, Path::new("."));
-                prop_assert_eq!(again.map_err(|error| error.in_words()), Ok(scenario));
+                let again = Source { name: "again.toml".to_owned(), text: text.clone() };
+                let again = Scenario::parse(&again, Path::new(".")).and_then(|scenario| scenario.to_toml());
+                prop_assert_eq!(again.map_err(|error| error.in_words()), Ok(text));
             }
             Err(error) => prop_assert!(!error.in_words().is_empty()),
         }

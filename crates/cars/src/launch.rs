@@ -2,14 +2,14 @@
 
 mod bar;
 mod compose;
-mod ending;
+pub(crate) mod ending;
 pub(crate) mod endpoint;
 pub(crate) mod file;
-mod lines;
+pub(crate) mod lines;
 pub(crate) mod link;
 mod observe;
 mod plan;
-mod process;
+pub(crate) mod process;
 mod program;
 mod restart;
 mod screen;

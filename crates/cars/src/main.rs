@@ -3,11 +3,14 @@
 mod bench;
 mod check;
 mod common;
+mod conform;
 mod control;
 mod emotionml;
+mod exec;
 mod experiment;
 mod launch;
 mod net;
+mod new;
 mod router;
 mod run;
 mod secure;
@@ -30,6 +33,10 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Subcommands {
+    /// Run any program as a robot, over its standard input and output: `cars exec --name Leguin -- ./leguin.sh`.
+    Exec(exec::ExecArgs),
+    /// Make a skeleton of a robot of your own: `cars new robot Rosie --lang python`.
+    New(new::NewArgs),
     /// Start the processes of a launch file and run them to the end.
     Launch(launch::LaunchArgs),
     /// Run a scenario, or that of a launch file, in this process.
@@ -48,6 +55,8 @@ enum Subcommands {
     Log(control::LogArgs),
     /// Export what the robots of a run felt as EmotionML 1.0.
     Emotionml(emotionml::EmotionmlArgs),
+    /// Check a robot, in whatever language, against the rules of the protocol.
+    Conform(conform::ConformArgs),
     /// Real links with real faults: cut, slow, narrow. Nothing of it is reproducible but the record.
     #[command(subcommand)]
     Net(net::NetCommand),
@@ -62,6 +71,8 @@ enum Subcommands {
         /// The shell.
         shell: clap_complete::Shell,
     },
+    #[command(hide = true)]
+    ExecStart(exec::StartArgs),
     #[command(hide = true)]
     BenchRobot(robot::RobotArgs),
     #[command(hide = true)]
@@ -78,6 +89,9 @@ fn main() -> miette::Result<ExitCode> {
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
     match cli.subcommand {
         Subcommands::Launch(args) => launch::launch(args),
+        Subcommands::Exec(args) => exec::exec(&args),
+        Subcommands::ExecStart(args) => Ok(exec::start(&args)),
+        Subcommands::New(args) => new::new(&args),
         Subcommands::Run(args) => run::run(&args),
         Subcommands::Experiment(args) => experiment::experiment(&args),
         Subcommands::Check(args) => check::check(&args),
@@ -86,6 +100,7 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
         Subcommands::Emotionml(args) => emotionml::emotionml(&args),
+        Subcommands::Conform(args) => Ok(conform::conform(&args)),
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),
         Subcommands::Secure(args) => secure::secure(&args),

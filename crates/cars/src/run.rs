@@ -9,7 +9,7 @@ use clap::Args;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
 use protocol::messages::{Clock, End};
-use robot::{BadParameters, LocalHost, Robot, Welcome};
+use robot::{LocalHost, Robot, RobotError, Welcome};
 use simulator::{Barrier, Exchange, Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
 
 use crate::common::ExecutionArgs;
@@ -50,9 +50,9 @@ pub(crate) fn run(args: &RunArgs) -> miette::Result<ExitCode> {
 struct InProcess(LocalHost);
 
 impl Barrier for InProcess {
-    type Interrupt = BadParameters;
+    type Interrupt = RobotError;
 
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, BadParameters> {
+    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
         let reports = self.0.exchange(&clock, &mut |name| simulation.percept(name))?;
         Ok(Exchange { reports, membership: Vec::new() })
     }

@@ -63,10 +63,10 @@ impl Keys {
         format!("{}/join/{robot}", self.root)
     }
 
-    /// All that ask to take part, with their name in the key or without.
+    /// All that ask to take part with their name in the key.
     #[must_use]
     pub fn joins(&self) -> String {
-        format!("{}/join/**", self.root)
+        format!("{}/join/*", self.root)
     }
 
     /// The robot that a key of joining names, if it names one.

@@ -12,6 +12,9 @@ use protocol::{RobotName, Seq, Tick};
 use crate::cri::BadParameters;
 use crate::seat::{Network, Undelivered};
 
+/// What a robot may write to the log in a tick, all lines together.
+const MAX_LOG_BYTES: usize = 256 * 1024;
+
 /// Why a call between robots gave nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
@@ -37,6 +40,7 @@ pub struct Cars<'a> {
     pub(crate) random: &'a mut Stream,
     pub(crate) outbox: &'a mut Outbox,
     pub(crate) log: &'a mut Vec<String>,
+    pub(crate) gave_up: &'a mut Option<String>,
     pub(crate) network: &'a mut dyn Network,
 }
 
@@ -122,10 +126,17 @@ impl Cars<'_> {
             let end = (0..=MAX_TEXT_BYTES).rev().find(|at| line.is_char_boundary(*at)).unwrap_or(0);
             line.truncate(end);
         }
-        // Room is left for what the seat itself may have to say.
-        if self.log.len() < MAX_ENTRIES / 2 {
+        // Room is left for what the seat itself may have to say, and for the rest of the report.
+        let bytes: usize = self.log.iter().map(String::len).sum();
+        if self.log.len() < MAX_ENTRIES / 2 && bytes + line.len() <= MAX_LOG_BYTES {
             self.log.push(line);
         }
+    }
+
+    /// It cannot go on, and says why: whatever this tick comes to is thrown away, and its process leaves the run. The
+    /// first reason counts.
+    pub fn give_up(&mut self, reason: impl Into<String>) {
+        self.gave_up.get_or_insert(reason.into());
     }
 
     /// Sends a command to another robot (`setRobotCommand`). It arrives at a later tick, if the network lets it.

@@ -15,6 +15,32 @@ pub struct BadParameters {
     pub reason: String,
 }
 
+/// Why a robot cannot take part any more.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RobotError {
+    /// It refuses its parameters.
+    #[error(transparent)]
+    Parameters(#[from] BadParameters),
+    /// It gave up in the middle of a tick ([`Cars::give_up`]).
+    #[error("{robot} gives up: {reason}")]
+    GaveUp {
+        /// Which robot.
+        robot: RobotName,
+        /// Why, for people.
+        reason: String,
+    },
+    /// What it says of itself is beyond the limits of a message.
+    #[error("{robot} says too much: {field}: {reason}")]
+    TooMuch {
+        /// Which robot.
+        robot: RobotName,
+        /// Where in its report.
+        field: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
 /// A robot, as the simulation and the other robots see it (`CARSRobotInterface`; `getName` is [`Cars::name`], since
 /// the roster names a robot).
 ///

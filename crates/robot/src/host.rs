@@ -4,14 +4,17 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use protocol::bus::{Bus, BusError, Declared, Publisher, Role};
+use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, PublicState, Refusal, Report, Welcome};
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
-use crate::cri::{BadParameters, Robot};
+use crate::cri::{Robot, RobotError};
 use crate::link::{Event, Link};
 use crate::seat::Seat;
 
@@ -49,9 +52,12 @@ pub enum HostError {
     /// The simulator said something that cannot be understood.
     #[error(transparent)]
     Malformed(#[from] Malformed),
-    /// A robot refuses its parameters.
+    /// A robot refuses its parameters, or gave up.
     #[error(transparent)]
-    Parameters(#[from] BadParameters),
+    Robot(#[from] RobotError),
+    /// The process wants to leave ([`Stopper::stop`]).
+    #[error("stopped from within this process")]
+    Stopped,
     /// Nobody executes the run.
     #[error("no simulator of run {run} answers at {connect}; is it running, and is the run's name right?")]
     NoSimulator {
@@ -76,6 +82,23 @@ pub struct Host {
     link: Link,
     members: BTreeMap<RobotName, Member>,
     declared: Vec<Declared>,
+}
+
+/// Lets another thread end [`Host::run`]: for a signal, or when what a robot needs is gone.
+#[derive(Debug, Clone)]
+pub struct Stopper {
+    is_stopped: Arc<AtomicBool>,
+    queue: SyncSender<Event>,
+}
+
+impl Stopper {
+    /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Questions that the
+    /// tick still asks are interrupted.
+    pub fn stop(&self) {
+        self.is_stopped.store(true, Ordering::SeqCst);
+        // Wakes a loop that waits; one whose queue is full does not.
+        let _woken = self.queue.try_send(Event::Stop);
+    }
 }
 
 /// One robot of the process.
@@ -212,6 +235,12 @@ impl Host {
         }
     }
 
+    /// What ends [`Host::run`] from another thread.
+    #[must_use]
+    pub fn stopper(&self) -> Stopper {
+        Stopper { is_stopped: self.link.is_stopped.clone(), queue: self.link.queue() }
+    }
+
     /// Runs until the run ends.
     ///
     /// # Errors
@@ -225,6 +254,7 @@ impl Host {
                         break Err(error);
                     }
                 }
+                None if self.link.is_stopped() => break Err(HostError::Stopped),
                 None => {}
             }
             if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())
@@ -293,15 +323,20 @@ impl Member {
         }
         let is_named = joined == Some(welcome.generation);
         let Some((report, state)) = self.tick(clock, is_named, link)? else { return Ok(()) };
+        let bytes = encode(&report);
+        if bytes.len() > MAX_MESSAGE_BYTES {
+            let reason = format!("{} bytes, more than the {MAX_MESSAGE_BYTES} allowed", bytes.len());
+            let (robot, field) = (name.clone(), "its report".to_owned());
+            return Err(RobotError::TooMuch { robot, field, reason }.into());
+        }
         // First what others may ask for, then the report: after it the clock may go on and they will ask.
         // Who follows has the state before the next clock, because both come the same way.
         if self.state.is_watched() {
             self.state.put(encode(&state))?;
         }
         link.board.show(name, Arc::new(state));
-        let report = encode(&report);
-        self.report.put(report.clone())?;
-        self.last = Some((Clock { epoch: clock.epoch, tick: clock.tick, ..Clock::default() }, report));
+        self.report.put(bytes.clone())?;
+        self.last = Some((Clock { epoch: clock.epoch, tick: clock.tick, ..Clock::default() }, bytes));
         self.paint()
     }
 
@@ -312,7 +347,7 @@ impl Member {
         link: &mut Link,
     ) -> Result<Option<(Report, PublicState)>, HostError> {
         if self.is_seated {
-            return Ok(Some(self.seat.tick(clock, link)));
+            return Ok(Some(self.seat.tick(clock, link)?));
         }
         if clock.tick > 0 && !joins {
             return Ok(None); // Its turn has not come: the clock that names it is still to be granted.

@@ -49,9 +49,9 @@ mod local;
 mod seat;
 
 pub use cars::{CallError, Cars};
-pub use cri::{BadParameters, Robot};
+pub use cri::{BadParameters, Robot, RobotError};
 pub use entry::{RobotArgs, main};
-pub use host::{Host, HostError, HostOptions};
+pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::{LocalHost, Sense};
 pub use protocol::messages::{
     Clock, Command, CommandId, Correction, End, Face, News, Panel, Parameters, Percept, Point, PublicState,

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
@@ -43,6 +44,8 @@ pub(crate) enum Event {
     Percept { of: RobotName, percept: Percept },
     /// The simulator came or went.
     Simulator(bool),
+    /// The process wants to leave.
+    Stop,
 }
 
 /// Epoch and tick of the state that was asked for.
@@ -79,6 +82,8 @@ pub(crate) struct Link {
     pub(crate) simulator_gone: Option<Instant>,
     /// How long to go on without a simulator.
     patience: Duration,
+    /// Whether the process wants to leave.
+    pub(crate) is_stopped: Arc<AtomicBool>,
 }
 
 impl Link {
@@ -100,6 +105,7 @@ impl Link {
             repeat_ticks: 2,
             simulator_gone: None,
             patience,
+            is_stopped: Arc::default(),
         }
     }
 
@@ -108,9 +114,13 @@ impl Link {
         self.queue.clone()
     }
 
-    /// The next clock, or `None` once the simulator has been gone for longer than there is patience.
+    /// The next clock, or `None` once the simulator has been gone for longer than there is patience, or where the process
+    /// wants to leave.
     pub(crate) fn next_clock(&mut self) -> Option<Clock> {
         loop {
+            if self.is_stopped() {
+                return None;
+            }
             while let Some(clock) = self.clocks.pop_front() {
                 // Where the simulator has gone on without us, only its last clock can still be answered; the first clock
                 // of an epoch or of an incarnation must be seen all the same.
@@ -134,6 +144,11 @@ impl Link {
     /// The clock that is being answered: epoch and tick.
     pub(crate) fn current(&self) -> Asked {
         self.current
+    }
+
+    /// Whether the process wants to leave.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::SeqCst)
     }
 
     /// A tick begins: what was known for the one before is of no use any more.
@@ -178,6 +193,7 @@ impl Link {
                     self.percepts.entry((of, asked)).or_insert(percept);
                 }
             }
+            Event::Stop => {} // The flag says so.
             Event::Simulator(is_there) => self.note_simulator(is_there),
         }
         true
@@ -211,10 +227,11 @@ impl Link {
         }
     }
 
-    /// Whether a clock has arrived that ends the tick under way before it is done: the run is over, the next epoch
-    /// begins, or the simulator has gone on without us.
+    /// Whether the tick under way is of no use any more: a clock has arrived that ends the run, begins the next epoch or
+    /// shows that the simulator has gone on without us, or the process wants to leave.
     fn is_interrupted(&self) -> bool {
-        self.clocks.iter().any(|clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some())
+        let ends_it = |clock: &Clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some();
+        self.is_stopped() || self.clocks.iter().any(ends_it)
     }
 
     /// Asks for a message once, and follows its key from then on: whoever serves it sends it without being asked, before

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use protocol::messages::{Clock, Command, CommandId, Percept, PublicState, Report, Welcome};
 use protocol::{Epoch, RobotName, Tick};
 
-use crate::cri::{BadParameters, Robot};
+use crate::cri::{Robot, RobotError};
 use crate::held::Held;
 use crate::seat::{Network, Seat, Undelivered};
 
@@ -73,18 +73,18 @@ impl LocalHost {
     /// Runs one tick of every robot. Everybody sees the others as they reported themselves for the tick before.
     ///
     /// # Errors
-    /// [`BadParameters`] in tick 0, if a robot refuses its parameters.
+    /// [`RobotError`] if a robot refuses its parameters, or gives up.
     pub fn exchange(
         &mut self,
         clock: &Clock,
         sense: &mut Sense<'_>,
-    ) -> Result<BTreeMap<RobotName, Report>, BadParameters> {
+    ) -> Result<BTreeMap<RobotName, Report>, RobotError> {
         let (mut reports, mut states) = (BTreeMap::new(), BTreeMap::new());
         for seat in &mut self.seats {
             let mut network = LocalNetwork { known: &mut self.known, sense };
             let (report, state) = match clock.tick {
                 0 => seat.init(clock, &mut network)?,
-                _ => seat.tick(clock, &mut network),
+                _ => seat.tick(clock, &mut network)?,
             };
             let name = seat.welcome().name.clone();
             reports.insert(name.clone(), report);

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use protocol::messages::{Clock, Command, CommandId, News, Percept, Point, PublicState, Report, Welcome};
 use protocol::random::{Stream, stream};
-use protocol::{Epoch, RobotName, Tick};
+use protocol::{Epoch, Message, RobotName, Tick};
 
 use crate::cars::{Cars, Outbox};
-use crate::cri::{BadParameters, Robot};
+use crate::cri::{Robot, RobotError};
 
 /// What a seat needs from outside during a tick.
 pub trait Network {
@@ -52,6 +52,8 @@ pub struct Seat {
     random: Stream,
     outbox: Outbox,
     proposal: Point,
+    /// Why the robot cannot go on.
+    gave_up: Option<String>,
 }
 
 impl Seat {
@@ -61,7 +63,7 @@ impl Seat {
         let random = stream(welcome.seed, &welcome.stream);
         let proposal = welcome.location;
         let outbox = Outbox { last_seq: welcome.last_seq, ..Outbox::default() };
-        Self { robot, welcome: Arc::new(welcome), random, outbox, proposal }
+        Self { robot, welcome: Arc::new(welcome), random, outbox, proposal, gave_up: None }
     }
 
     /// What it was told when it joined.
@@ -87,30 +89,30 @@ impl Seat {
     /// The first tick of the epoch: initialize, and propose where to go. Nobody has said anything yet.
     ///
     /// # Errors
-    /// [`BadParameters`] if the robot refuses its parameters.
+    /// [`RobotError`] if the robot refuses its parameters, or gives up.
     pub fn init(
         &mut self,
         clock: &Clock,
         network: &mut dyn Network,
-    ) -> Result<(Report, PublicState), BadParameters> {
+    ) -> Result<(Report, PublicState), RobotError> {
         let (mut log, welcome) = (Vec::new(), self.welcome.clone());
         let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
         self.proposal = welcome.location;
         let (robot, mut cars) = self.enter(&welcome, clock.tick, &news, &mut log, network);
         robot.init_robot(&mut cars)?;
         robot.set_current_location(&mut cars, welcome.location);
-        Ok(self.leave(clock.tick, &news, Vec::new(), log, network))
+        self.leave(clock.tick, &news, Vec::new(), log, network)
     }
 
     /// The first tick of an incarnation that takes over in the middle of an epoch.
     ///
     /// # Errors
-    /// [`BadParameters`] if the robot refuses its parameters.
+    /// [`RobotError`] if the robot refuses its parameters, or gives up.
     pub fn resume(
         &mut self,
         clock: &Clock,
         network: &mut dyn Network,
-    ) -> Result<(Report, PublicState), BadParameters> {
+    ) -> Result<(Report, PublicState), RobotError> {
         let (mut log, welcome) = (Vec::new(), self.welcome.clone());
         let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
         let (robot, mut cars) = self.enter(&welcome, clock.tick, &news, &mut log, network);
@@ -118,13 +120,20 @@ impl Seat {
         if let Some(last) = &welcome.last_state {
             robot.resume(&mut cars, &last.state_variables);
         }
-        let (mut report, state) = self.tick(clock, network);
+        let (mut report, state) = self.tick(clock, network)?;
         report.log.splice(0..0, log);
         Ok((report, state))
     }
 
     /// One tick, in the order of the seed's Figure 5.
-    pub fn tick(&mut self, clock: &Clock, network: &mut dyn Network) -> (Report, PublicState) {
+    ///
+    /// # Errors
+    /// [`RobotError`] if the robot gives up.
+    pub fn tick(
+        &mut self,
+        clock: &Clock,
+        network: &mut dyn Network,
+    ) -> Result<(Report, PublicState), RobotError> {
         let (mut log, mut missing, welcome) = (Vec::new(), Vec::new(), self.welcome.clone());
         let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
         let location = news.correction.map_or(self.proposal, |correction| correction.location);
@@ -158,8 +167,8 @@ impl Seat {
         log: &'a mut Vec<String>,
         network: &'a mut dyn Network,
     ) -> (&'a mut dyn Robot, Cars<'a>) {
-        let Self { robot, random, outbox, .. } = self;
-        (robot.as_mut(), Cars { welcome, tick, news, random, outbox, log, network })
+        let Self { robot, random, outbox, gave_up, .. } = self;
+        (robot.as_mut(), Cars { welcome, tick, news, random, outbox, log, gave_up, network })
     }
 
     /// The end of every tick: where to go next, and what to tell.
@@ -170,7 +179,7 @@ impl Seat {
         missing: Vec<CommandId>,
         mut log: Vec<String>,
         network: &mut dyn Network,
-    ) -> (Report, PublicState) {
+    ) -> Result<(Report, PublicState), RobotError> {
         let welcome = self.welcome.clone();
         let (robot, mut cars) = self.enter(&welcome, tick, news, &mut log, network);
         let location = robot.current_location();
@@ -179,6 +188,9 @@ impl Seat {
         let (emotion_state, behavior_state) =
             (robot.emotion_state().to_owned(), robot.behavior_state().to_owned());
         let mut state_variables = robot.state_variables();
+        if let Some(reason) = self.gave_up.take() {
+            return Err(RobotError::GaveUp { robot: welcome.name.clone(), reason });
+        }
 
         // A number that is none cannot travel. The run goes on, and its log says whose fault it is.
         if !(projected.x.is_finite() && projected.y.is_finite()) {
@@ -204,7 +216,12 @@ impl Seat {
             emotion_state,
             behavior_state,
         };
-        (self.report(&state, missing, log), state)
+        let report = self.report(&state, missing, log);
+        // A simulator would refuse it and wait for another one.
+        match report.check() {
+            Ok(()) => Ok((report, state)),
+            Err((field, reason)) => Err(RobotError::TooMuch { robot: welcome.name.clone(), field, reason }),
+        }
     }
 
     fn report(&mut self, state: &PublicState, missing: Vec<CommandId>, log: Vec<String>) -> Report {

@@ -1,10 +1,16 @@
-//! A robot that talks too much does not hold the run: its report stays within what a message may hold.
+//! A robot that talks too much does not hold the run: its report stays within what a message may hold. One that cannot go
+//! on says so.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use protocol::Message;
 use protocol::messages::{Clock, JoinAnswer};
 use robot::{BadParameters, Cars, LocalHost, Percept, Point, Robot, RobotName, StateVariables};
 
 struct Chatterbox;
+
+/// The tick in which it has nothing more to say.
+const SILENT_AT: u64 = 3;
 
 impl Robot for Chatterbox {
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
@@ -17,7 +23,12 @@ impl Robot for Chatterbox {
     fn direction(&self) -> f64 {
         0.0
     }
-    fn update_state_variables(&mut self, _: &mut Cars<'_>) {}
+    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
+        if cars.tick() == SILENT_AT {
+            cars.give_up("there is nothing left to say");
+            cars.give_up("the first reason counts");
+        }
+    }
     fn state_variables(&self) -> StateVariables {
         [("x".to_owned(), f64::INFINITY.into())].into()
     }
@@ -39,15 +50,32 @@ impl Robot for Chatterbox {
     }
 }
 
-#[test]
-fn reports_stay_within_the_limits_of_a_message() {
+/// One of them, in a run of its own.
+fn chatterbox() -> LocalHost {
     let welcome = br#"{"answer":"welcome","protocol":1,"run":"r","name":"A","generation":1,"epoch":1,"tick":0,"seed":1,
         "stream":"robot/A","tick_s":0.5,"field_m":[9,9],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":1},
         "roster":["A"],"parameters":{}}"#;
     let JoinAnswer::Welcome(welcome) = protocol::decode("join", "simulator", welcome).unwrap() else {
         unreachable!("it is a welcome")
     };
-    let mut host = LocalHost::new(vec![(Box::new(Chatterbox), *welcome)]);
+    LocalHost::new(vec![(Box::new(Chatterbox), *welcome)])
+}
+
+#[test]
+fn a_robot_that_gives_up_says_why_and_reports_nothing() {
+    let mut host = chatterbox();
+    for tick in 0..SILENT_AT {
+        let clock = Clock { epoch: 1, tick, ..Clock::default() };
+        host.exchange(&clock, &mut |_| Percept::default()).unwrap();
+    }
+    let clock = Clock { epoch: 1, tick: SILENT_AT, ..Clock::default() };
+    let error = host.exchange(&clock, &mut |_| Percept::default()).unwrap_err();
+    assert_eq!(error.to_string(), "A gives up: there is nothing left to say");
+}
+
+#[test]
+fn reports_stay_within_the_limits_of_a_message() {
+    let mut host = chatterbox();
     let clock = Clock { epoch: 1, ..Clock::default() };
     let reports = host.exchange(&clock, &mut |_| Percept::default()).unwrap();
     let report = reports.values().next().unwrap();

@@ -118,7 +118,7 @@ fn vera_accounts_for_what_she_feels() {
     };
     seat.init(&clock(0), &mut Crowd(0)).unwrap();
     let mut why = |tick, near| {
-        seat.tick(&clock(tick), &mut Crowd(near));
+        seat.tick(&clock(tick), &mut Crowd(near)).unwrap();
         match seat.panel().widgets.as_slice() {
             [Widget::Text { text, .. }] => text.clone(),
             widgets => panic!("{widgets:?}"),

@@ -210,7 +210,8 @@ impl Server {
             let _ = queue.send(Event::Waiting(decode(key, robot, bytes), robot.to_owned()));
         })?);
         for (key, event) in [
-            (self.keys.joins(), Event::Join as fn(Question) -> Event),
+            (self.keys.join(), Event::Join as fn(Question) -> Event),
+            (self.keys.joins(), Event::Join),
             (self.keys.percepts(), Event::Percept),
             (self.keys.control(), Event::Control),
         ] {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// For each crate of this project: which others of this project it may depend on, tests included.
-const ALLOWED: [(&str, &[&str]); 9] = [
+const ALLOWED: [(&str, &[&str]); 10] = [
     ("world", &[]),
     ("affect", &[]),
     ("protocol", &[]),
@@ -13,8 +13,9 @@ const ALLOWED: [(&str, &[&str]); 9] = [
     ("robots", &["robot", "affect"]),
     ("simulator", &["world", "protocol"]),
     ("console", &["protocol"]),
-    ("cars", &["simulator", "robot", "robots", "affect", "protocol"]),
-    ("system-tests", &["simulator", "robot", "robots", "protocol"]),
+    ("conform", &["protocol"]),
+    ("cars", &["simulator", "robot", "robots", "affect", "conform", "protocol"]),
+    ("system-tests", &["simulator", "robot", "robots", "conform", "protocol"]),
 ];
 
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use protocol::RunName;
 use protocol::messages::{Clock, Point};
-use robot::{BadParameters, LocalHost};
+use robot::{LocalHost, RobotError};
 use simulator::{Barrier, Event, Exchange, Simulation};
 use system_tests::hall::{Hall, scenario};
 use system_tests::{Lab, programs, root};
@@ -409,8 +409,8 @@ fn t21_with_a_quarter_of_commands_lost_emotions_do_better_than_a_timer() {
 struct Reordered(LocalHost);
 
 impl Barrier for Reordered {
-    type Interrupt = BadParameters;
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, BadParameters> {
+    type Interrupt = RobotError;
+    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
         let reports = self.0.exchange(&clock, &mut |name| simulation.percept(name))?;
         Ok(Exchange { reports, membership: Vec::new() })
     }

@@ -9,7 +9,7 @@ use protocol::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use simulator::diagnostic::FileError;
 
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
-use super::plan::{name_args, speed_arg};
+use super::plan::{name_args, speed_arg, with_own_args};
 use super::restart::Restart;
 use crate::common::Speed;
 
@@ -113,7 +113,7 @@ fn guest_env(process: &Process, run: &RunName) -> BTreeMap<String, String> {
 }
 
 fn robot_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
-    let command: Vec<String> = process.command.iter().cloned().chain(name_args(&process.robots)).collect();
+    let command = with_own_args(&process.command, name_args(&process.robots));
     let mut service = Service::begin(text, &process.name.to_lowercase(), &command);
     service.map("environment", guest_env(process, run).iter());
     service.list("depends_on", &[SIMULATOR.to_owned()]);

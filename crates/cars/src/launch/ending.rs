@@ -13,7 +13,7 @@ const SIGNALS: u8 = 128;
 
 /// How a process ended.
 #[derive(Debug)]
-pub(super) enum Ended {
+pub(crate) enum Ended {
     /// It ran and is over.
     Exited(ExitStatus),
     /// It never ran; the reason.
@@ -78,6 +78,6 @@ impl std::fmt::Display for Failure {
 }
 
 /// Exit status of a process that was asked to end by a signal.
-pub(super) fn code_of(signal: Signal) -> u8 {
+pub(crate) fn code_of(signal: Signal) -> u8 {
     SIGNALS.saturating_add(u8::try_from(signal as i32).unwrap_or_default())
 }

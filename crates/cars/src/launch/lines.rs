@@ -5,13 +5,13 @@ const MAX_LINE: usize = 4096;
 
 /// Splits what comes in pieces into lines.
 #[derive(Debug, Default)]
-pub(super) struct Lines {
+pub(crate) struct Lines {
     rest: Vec<u8>,
 }
 
 impl Lines {
     /// Takes the next bytes; calls `each` for every line that is complete.
-    pub(super) fn push(&mut self, bytes: &[u8], mut each: impl FnMut(String)) {
+    pub(crate) fn push(&mut self, bytes: &[u8], mut each: impl FnMut(String)) {
         for piece in bytes.split_inclusive(|byte| *byte == b'\n') {
             self.rest.extend_from_slice(piece);
             if piece.ends_with(b"\n") || self.rest.len() >= MAX_LINE {
@@ -21,7 +21,7 @@ impl Lines {
     }
 
     /// The pipe is at its end; so is its last line.
-    pub(super) fn finish(&mut self, mut each: impl FnMut(String)) {
+    pub(crate) fn finish(&mut self, mut each: impl FnMut(String)) {
         if !self.rest.is_empty() {
             each(self.take());
         }
@@ -34,7 +34,7 @@ impl Lines {
 }
 
 /// A text from outside without what would steer a terminal.
-pub(super) fn harmless(text: &str) -> String {
+pub(crate) fn harmless(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 

@@ -109,9 +109,31 @@ fn guest(
     if let (Some(secured), Some(name)) = (execution.secured, name) {
         env.entry(ZENOH_CONFIG.to_owned()).or_insert_with(|| secured.config_of(name).display().to_string());
     }
-    let program = program(file, process, places)?;
-    let args = process.command.iter().skip(1).cloned().chain(args).collect();
+    let program = program(file, process, &process.command[0], places)?;
+    let args = with_own_args(&process.command[1..], args);
+    let args = locate_inner(file, process, args, places)?;
     Ok(CommandLine { program, args, env })
+}
+
+/// The arguments of a process with those that the launcher adds: what stands after a `--` is not the process's own.
+pub(super) fn with_own_args(command: &[String], own: Vec<String>) -> Vec<String> {
+    let end = command.iter().position(|arg| arg == "--").unwrap_or(command.len());
+    command[..end].iter().cloned().chain(own).chain(command[end..].iter().cloned()).collect()
+}
+
+/// A program after a `--`, as in `cars exec -- ./robot.sh`, is a path from the launch file's folder if it has a `/`, as
+/// the process's own program is.
+fn locate_inner(
+    file: &LaunchFile,
+    process: &Process,
+    mut args: Vec<String>,
+    places: &Places,
+) -> Result<Vec<String>, FileError> {
+    let inner = args.iter_mut().skip_while(|arg| *arg != "--").nth(1);
+    if let Some(inner) = inner.filter(|inner| inner.contains('/')) {
+        *inner = program(file, process, inner, places)?.display().to_string();
+    }
+    Ok(args)
 }
 
 /// How a program is told which robots it runs.
@@ -142,7 +164,7 @@ fn simulator(file: &LaunchFile, execution: &Execution, places: &Places) -> Resul
         env.insert(ZENOH_CONFIG.to_owned(), secured.config_of(SIMULATOR).display().to_string());
         args.push(format!("--operator-config={}", secured.operator().display()));
     }
-    let program = program(file, process, places)?;
+    let program = program(file, process, &process.command[0], places)?;
     let command = CommandLine { program, args, env };
     Ok(Planned { part: Part::Simulator, ..prepare(process, command) })
 }
@@ -168,8 +190,7 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
 }
 
 /// The program of a process. What somebody else starts need not be here.
-fn program(file: &LaunchFile, process: &Process, places: &Places) -> Result<PathBuf, FileError> {
-    let name = &process.command[0];
+fn program(file: &LaunchFile, process: &Process, name: &str, places: &Places) -> Result<PathBuf, FileError> {
     match places.find(name) {
         Ok(program) => Ok(program),
         Err(_) if process.is_extern => Ok(PathBuf::from(name)),
@@ -211,7 +232,35 @@ fn quote(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use simulator::diagnostic::Source;
+
     use super::*;
+
+    #[test]
+    fn what_stands_after_two_dashes_is_not_told_the_robots_name() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let with_name = |text| with_own_args(&words(text), words("--name Rosie")).join(" ");
+        assert_eq!(with_name("exec -- ./robot.sh -- -v"), "exec --name Rosie -- ./robot.sh -- -v");
+        assert_eq!(with_name("--loud"), "--loud --name Rosie");
+    }
+
+    #[test]
+    fn a_program_after_two_dashes_is_found_from_the_launch_file() {
+        let text = "scenario = \"x.toml\"\n[[process]]\nname = \"Rosie\"\n\
+                    command = [\"sh\", \"-c\", \"./sh\", \"--\", \"./sh\", \"./sh\"]";
+        let file = |text: &str| {
+            let source = Source { name: "launch.toml".to_owned(), text: text.to_owned() };
+            LaunchFile::parse(source, Path::new("/usr/../bin")).unwrap()
+        };
+        let located = |file: &LaunchFile| {
+            let (process, places) = (&file.processes[0], Places::new(&file.folder));
+            locate_inner(file, process, process.command[1..].to_vec(), &places)
+        };
+        assert_eq!(located(&file(text)).unwrap(), ["-c", "./sh", "--", "/usr/../bin/sh", "./sh"]);
+        let wrong = located(&file(&text.replace("\"--\", \"./sh\"", "\"--\", \"./nobody\""))).unwrap_err();
+        let wrong = format!("{:?}", miette::Report::from(wrong));
+        assert!(wrong.contains("there is no program ./nobody"), "{wrong}");
+    }
 
     #[test]
     fn a_command_line_can_be_pasted_into_a_shell() {

@@ -11,8 +11,11 @@ use protocol::{Epoch, Tick};
 use super::{Interrupt, REPEAT_AFTER, Server};
 use crate::simulation::Simulation;
 
-/// Longest wait for a launcher, and for a robot to go or to be back; then the run goes on and says so.
+/// Longest wait for a launcher to carry out an order, and for a robot to go or to be back; then the run goes on and says
+/// so.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// Longest wait for a launcher to listen at all: it starts the simulator first, and a fast run may be ahead of it.
+const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
 /// While waiting, this often is looked whether what is waited for has come about.
 const LOOK: Duration = Duration::from_millis(250);
 
@@ -43,12 +46,7 @@ impl Server {
             return Ok(());
         }
         simulation.note_faults(&orders);
-        if !self.orders.publisher.is_watched() {
-            if !std::mem::replace(&mut self.orders.has_complained, true) {
-                tracing::error!(
-                    "the scenario has faults of processes, and no launcher is here to carry them out"
-                );
-            }
+        if !self.has_launcher(simulation)? {
             return Ok(());
         }
         let order = FaultOrder { epoch: simulation.epoch(), tick: simulation.tick() + 1, orders };
@@ -71,6 +69,26 @@ impl Server {
             }
         }
         Ok(())
+    }
+
+    /// Whether somebody hears the orders. It is waited for once; if nobody comes, the run goes on and has said so.
+    fn has_launcher(&mut self, simulation: &mut Simulation) -> Result<bool, Interrupt> {
+        let begun = Instant::now();
+        while !self.orders.publisher.is_watched() {
+            if self.orders.has_complained {
+                return Ok(false);
+            }
+            if begun.elapsed() > LAUNCHER_PATIENCE {
+                self.orders.has_complained = true;
+                tracing::error!(
+                    "the scenario has faults of processes, and no launcher is here to carry them out"
+                );
+            }
+            if let Some(event) = self.receive(LOOK) {
+                self.handle(event, simulation)?;
+            }
+        }
+        Ok(true)
     }
 
     /// Whether the launcher has done its part, and the robots are as they must be: a killed one is gone, one whose fault is

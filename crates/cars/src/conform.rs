@@ -1,0 +1,137 @@
+//! `cars conform`: checks one robot, in whatever language, against the rules of the protocol.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use clap::Args;
+use conform::{Report, Role, Rule, Setting};
+use miette::{IntoDiagnostic, miette};
+use protocol::messages::PublicState;
+use protocol::{Event, RobotName, RunName, Tick};
+use simulator::{Scenario, Simulation, TickRecord};
+
+use crate::{launch, run};
+
+/// `cars conform`.
+///
+/// Plays simulator to the robot that COMMAND starts, several times, and checks the rules of docs/protocol.md one by one.
+/// Exit status: 0 all passed, 1 some failed, 2 nothing could be checked.
+#[derive(Debug, Args)]
+pub(crate) struct ConformArgs {
+    /// Whom the robot must ask to be; without it whoever it asks to be.
+    #[arg(long)]
+    name: Option<RobotName>,
+    /// A scenario, or a launch file whose scenario is meant: its parameters, field and roster. The other robots behave as
+    /// they do in it.
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Report in the Test Anything Protocol (the default).
+    #[arg(long, conflicts_with = "json")]
+    tap: bool,
+    /// Report as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Check this rule only; may be repeated.
+    #[arg(long = "rule", value_name = "NAME", value_parser = parse_rule)]
+    rules: Vec<Rule>,
+    /// Ticks of the longer checks.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(24..=100_000))]
+    ticks: Option<Tick>,
+    /// A command that the robot understands; may be repeated. Two of them show in which order it executes them.
+    #[arg(long = "say", value_name = "TEXT")]
+    says: Vec<String>,
+    /// The robot's program and its arguments.
+    #[arg(last = true, required = true, value_name = "COMMAND")]
+    command: Vec<String>,
+}
+
+fn parse_rule(name: &str) -> Result<Rule, String> {
+    let names = || conform::RULES.map(|rule| rule.name).join(", ");
+    Rule::named(name).ok_or_else(|| format!("there is no such rule; the rules are {}", names()))
+}
+
+/// Checks a robot.
+pub(crate) fn conform(args: &ConformArgs) -> ExitCode {
+    match check(args) {
+        Ok(report) => {
+            if args.json {
+                println!("{:#}", report.to_json());
+            } else {
+                print!("{}", report.to_tap());
+            }
+            if report.is_passed() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        }
+        Err(error) => {
+            eprintln!("{error:?}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn check(args: &ConformArgs) -> miette::Result<Report> {
+    let mut setting = Setting { name: args.name.clone(), ..Setting::default() };
+    if let Some(ticks) = args.ticks {
+        setting.ticks = ticks;
+    }
+    if let Some(file) = &args.scenario {
+        stage(&mut setting, &launch::scenario_file(file)?)?;
+    }
+    // What the user says goes first.
+    for role in setting.cast.values_mut() {
+        role.hears.splice(0..0, args.says.iter().cloned());
+    }
+    setting.commands.splice(0..0, args.says.iter().cloned());
+    let (program, arguments) = args.command.split_first().ok_or_else(|| miette!("no command is given"))?;
+    let mut command = Command::new(program);
+    command.args(arguments);
+    conform::check(&command, &setting, &args.rules).map_err(|error| miette!("{program}: {error}"))
+}
+
+/// Field and roster of a scenario. What the other robots do, and what they command, is what they do when the scenario is
+/// run in this process; robots of classes that cannot run here stand still.
+fn stage(setting: &mut Setting, file: &Path) -> miette::Result<()> {
+    let scenario = Scenario::load(file, &simulator::scenario::Changes::default())?;
+    (setting.seed, setting.tick_s) = (scenario.seed, scenario.tick_s);
+    (setting.field_m, setting.body_m) = (scenario.field_m, scenario.body_m);
+    setting.sensing_range_m = scenario.sensing_range_m;
+    let role = |(name, spec): (&RobotName, &simulator::scenario::RobotSpec)| {
+        let (location, parameters) = (spec.at, spec.parameters.clone());
+        (name.clone(), Role { location, parameters, ..Role::default() })
+    };
+    setting.cast = scenario.robots.iter().map(role).collect();
+    if scenario.robots.values().all(|spec| robots::make(&spec.class).is_some()) {
+        let run = RunName::new("conform").into_diagnostic()?;
+        run::play(scenario, &run, |simulation, record| {
+            watch(&mut setting.cast, setting.ticks, simulation, record);
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+/// Keeps what a tick told of the robots.
+fn watch(cast: &mut BTreeMap<RobotName, Role>, ticks: Tick, simulation: &Simulation, record: &TickRecord) {
+    for event in &record.events {
+        if let Event::CommandSent { to, command, .. } = event
+            && let Some(role) = cast.get_mut(to).filter(|role| !role.hears.contains(command))
+        {
+            role.hears.push(command.clone());
+        }
+    }
+    for (name, role) in cast.iter_mut().filter(|_| record.tick <= ticks) {
+        let (Some(report), Some(location)) = (simulation.report(name), simulation.location(name)) else {
+            continue;
+        };
+        role.states.push(PublicState {
+            epoch: report.epoch,
+            tick: record.tick,
+            location,
+            speed_mps: report.speed_mps,
+            direction_rad: report.direction_rad,
+            state_variables: report.state_variables.clone(),
+            emotion_state: report.emotion_state.clone(),
+            behavior_state: report.behavior_state.clone(),
+        });
+    }
+}

@@ -1,0 +1,103 @@
+//! The robot's process: started in a group of its own, watched, and never left behind.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, ExitStatus, Stdio};
+
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
+
+/// What is shown of a program's output, bytes from its end.
+const TAIL_BYTES: u64 = 1500;
+
+/// The same command again.
+pub(crate) fn copy(command: &Command) -> Command {
+    let mut own = Command::new(command.get_program());
+    own.args(command.get_args());
+    if let Some(folder) = command.get_current_dir() {
+        own.current_dir(folder);
+    }
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => own.env(name, value),
+            None => own.env_remove(name),
+        };
+    }
+    own
+}
+
+/// A robot's process, with all that it started.
+pub(crate) struct Process {
+    child: Child,
+    group: Pid,
+    output: File,
+    errors: File,
+    ended: Option<ExitStatus>,
+}
+
+impl Process {
+    /// Starts the command as it is, with more in its environment.
+    pub(crate) fn start(command: &Command, environment: &[(&str, String)]) -> std::io::Result<Self> {
+        let (output, errors) = (tempfile::tempfile()?, tempfile::tempfile()?);
+        let mut own = copy(command);
+        own.envs(environment.iter().map(|(name, value)| (name, value)));
+        own.stdin(Stdio::null()).stdout(output.try_clone()?).stderr(errors.try_clone()?);
+        let child = own.process_group(0).spawn()?;
+        let group = Pid::from_raw(i32::try_from(child.id()).map_err(std::io::Error::other)?);
+        Ok(Self { child, group, output, errors, ended: None })
+    }
+
+    /// How it ended, if it has.
+    pub(crate) fn ended(&mut self) -> Option<ExitStatus> {
+        if self.ended.is_none() {
+            // It is our child and was not waited for before: asking cannot fail.
+            self.ended = self.child.try_wait().ok().flatten();
+        }
+        self.ended
+    }
+
+    /// Sends a signal to the program and all that it started, as a launcher does.
+    pub(crate) fn signal(&self, signal: Signal) {
+        // A group that is gone needs none.
+        let _gone = killpg(self.group, signal);
+    }
+
+    /// The last that it wrote to its standard error.
+    pub(crate) fn errors(&self) -> String {
+        tail(&self.errors)
+    }
+
+    /// What became of it, in words.
+    pub(crate) fn fate(&mut self) -> String {
+        let fate = match self.ended() {
+            None => "it runs".to_owned(),
+            Some(status) => format!("its process has ended ({status})"),
+        };
+        let printed = [tail(&self.output), self.errors()].join("\n").trim().to_owned();
+        if printed.is_empty() {
+            return format!("{fate} and has printed nothing");
+        }
+        format!("{fate} and has printed: {printed}")
+    }
+}
+
+/// The end of a file that somebody may still write: read in place, since its cursor is the writer's.
+fn tail(file: &File) -> String {
+    let read = || -> std::io::Result<Vec<u8>> {
+        let length = file.metadata()?.len();
+        let from = length.saturating_sub(TAIL_BYTES);
+        let mut bytes = vec![0; usize::try_from(length - from).map_err(std::io::Error::other)?];
+        file.read_exact_at(&mut bytes, from)?;
+        Ok(bytes)
+    };
+    String::from_utf8_lossy(&read().unwrap_or_default()).trim().to_owned()
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.signal(Signal::SIGKILL);
+        // Only our own child can be waited for; what it started ends with the group.
+        let _ = self.child.wait();
+    }
+}

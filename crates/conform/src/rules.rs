@@ -1,0 +1,63 @@
+//! The rules that are checked, and where the page explains them.
+
+/// The page that states the rules, from the project's root.
+pub const PAGE: &str = "docs/protocol.md";
+
+/// A rule of the protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rule {
+    /// Its name; the page states it in a sentence that begins with the name.
+    pub name: &'static str,
+    /// Anchor of its section in [`PAGE`].
+    pub section: &'static str,
+}
+
+impl Rule {
+    /// The rule called `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        RULES.iter().copied().find(|rule| rule.name == name)
+    }
+
+    /// Where the page explains it.
+    #[must_use]
+    pub fn reference(self) -> String {
+        format!("{PAGE}#{}", self.section)
+    }
+}
+
+const fn rule(name: &'static str, section: &'static str) -> Rule {
+    Rule { name, section }
+}
+
+/// All rules, in the order of the page.
+pub const RULES: [Rule; 28] = [
+    rule("join.request", "joining"),
+    rule("join.ready-last", "joining"),
+    rule("join.refused", "joining"),
+    rule("tick.answer", "a-tick"),
+    rule("tick.correction", "a-tick"),
+    rule("tick.initial", "a-tick"),
+    rule("tick.state-first", "a-tick"),
+    rule("command.order", "commands"),
+    rule("command.held", "commands"),
+    rule("command.twice", "commands"),
+    rule("command.missing", "commands"),
+    rule("command.sent", "commands"),
+    rule("query.tick", "queries"),
+    rule("query.early", "queries"),
+    rule("query.unknown", "queries"),
+    rule("clock.duplicate", "repeated-and-late-messages"),
+    rule("clock.late", "repeated-and-late-messages"),
+    rule("epoch.init", "epochs"),
+    rule("determinism.seed", "epochs"),
+    rule("return.generation", "incarnations"),
+    rule("return.numbers", "incarnations"),
+    rule("return.replaced", "incarnations"),
+    rule("end.clock", "the-end"),
+    rule("end.sigterm", "the-end"),
+    rule("compat.unknown-fields", "tolerance"),
+    rule("robust.malformed", "tolerance"),
+    rule("number.angles", "numbers-and-chance"),
+    rule("number.finite", "numbers-and-chance"),
+];

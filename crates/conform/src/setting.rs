@@ -1,0 +1,91 @@
+//! What the robot finds: the field, the parameters, the other robots.
+
+use std::collections::BTreeMap;
+
+use protocol::messages::{Parameters, Point, PublicState};
+use protocol::{RobotName, Tick};
+
+/// What a conformance check plays.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    /// Whom the robot must ask to be; without it whoever it asks to be.
+    pub name: Option<RobotName>,
+    /// Where all chance comes from.
+    pub seed: u64,
+    /// Length of a tick, simulated seconds.
+    pub tick_s: f64,
+    /// Width and height of the field, meters.
+    pub field_m: [f64; 2],
+    /// Side of every body, meters.
+    pub body_m: f64,
+    /// Distance within which the robot senses other bodies, meters.
+    pub sensing_range_m: f64,
+    /// The robots of the roster. Empty: the robot itself, without parameters, and one other.
+    pub cast: BTreeMap<RobotName, Role>,
+    /// Texts of commands that the robot understands, if its [`Role::hears`] has none.
+    pub commands: Vec<String>,
+    /// Ticks of the longer checks.
+    pub ticks: Tick,
+}
+
+/// A robot of the roster.
+#[derive(Debug, Clone, Default)]
+pub struct Role {
+    /// Where it starts, meters.
+    pub location: Point,
+    /// What it is told about itself, if it is the one that is checked.
+    pub parameters: Parameters,
+    /// What others learn of it, by tick, if it is not; after the last one it stays as it is.
+    pub states: Vec<PublicState>,
+    /// Texts of the commands that it understands.
+    pub hears: Vec<String>,
+}
+
+/// Ticks of the longer checks unless told otherwise.
+const TICKS: Tick = 100;
+/// Where a robot without a scenario starts, and where the other one stands, meters.
+const CENTER: Point = Point { x: 5.0, y: 5.0 };
+const BESIDE: Point = Point { x: 7.0, y: 6.0 };
+/// The other one, and what it is called where the robot itself has that name.
+const OTHERS: [&str; 2] = ["Echo", "Echo2"];
+
+impl Default for Setting {
+    /// A small field with one other robot, and no parameters.
+    fn default() -> Self {
+        Self {
+            name: None,
+            seed: 2002,
+            tick_s: 0.5,
+            field_m: [10.0, 10.0],
+            body_m: 0.5,
+            sensing_range_m: 2.0,
+            cast: BTreeMap::new(),
+            commands: Vec::new(),
+            ticks: TICKS,
+        }
+    }
+}
+
+impl Setting {
+    /// The roster for a robot that asks to be `name`, or why it is not of the roster.
+    pub(crate) fn cast_for(&self, name: &RobotName) -> Result<BTreeMap<RobotName, Role>, String> {
+        if let Some(wanted) = self.name.as_ref().filter(|wanted| *wanted != name) {
+            return Err(format!("the robot asks to be {name}, and {wanted} is checked"));
+        }
+        if self.cast.is_empty() {
+            let others = OTHERS.iter().filter_map(|other| RobotName::new(other).ok());
+            let other = others.into_iter().find(|other| other != name);
+            let beside = Role { location: BESIDE, ..Role::default() };
+            let own = Role { location: CENTER, ..Role::default() };
+            return Ok(other.map(|other| (other, beside)).into_iter().chain([(name.clone(), own)]).collect());
+        }
+        if !self.cast.contains_key(name) {
+            let roster: Vec<&str> = self.cast.keys().map(RobotName::as_str).collect();
+            return Err(format!(
+                "no robot of the scenario is called {name}; its robots are {}",
+                roster.join(", ")
+            ));
+        }
+        Ok(self.cast.clone())
+    }
+}

@@ -1,0 +1,126 @@
+"""Emotion state generator (ESG) and behavior state generator (BSG) as tables, and the sensory-motor level.
+
+Emotion acts on behavior directly, behavior on emotion only through the progress it makes: each generator is shown the
+other's state and owns nothing but its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, TypeVar
+
+SLACK_S = 1e-9
+"""Sums of steps such as 0.1 s fall short of what they mean by far less than this, and no step is as short."""
+
+
+class Emotion(Enum):
+    """The emotions of the documented refiller."""
+
+    HAPPY = "HAPPY"
+    CONFIDENT = "CONFIDENT"
+    CONCERNED = "CONCERNED"
+    FRUSTRATED = "FRUSTRATED"
+
+    @property
+    def is_negative(self) -> bool:
+        """Whether it is unpleasant."""
+        return self in (Emotion.CONCERNED, Emotion.FRUSTRATED)
+
+
+@dataclass(frozen=True, slots=True)
+class Feeling:
+    """What is felt now: an emotion, and how strongly, 0 to 1."""
+
+    emotion: Emotion
+    intensity: float
+
+
+M = TypeVar("M")
+B = TypeVar("B")
+C = TypeVar("C")
+A = TypeVar("A")
+
+
+@dataclass(frozen=True, slots=True)
+class EmotionRow(Generic[M, B]):
+    """During these behaviors, if the guard holds, this is felt."""
+
+    during: Sequence[B]
+    when: Callable[[M], bool]
+    feel: Emotion
+
+
+class RuleGenerator(Generic[M, B]):
+    """An ESG: the first matching row says what is felt, a formula how strongly. Without a row the emotion stays."""
+
+    def __init__(self, rows: Sequence[EmotionRow[M, B]], intensity: Callable[[M], float], start: Emotion) -> None:
+        self._rows = rows
+        self._intensity = intensity
+        self.feeling = Feeling(start, 0.0)
+
+    def update(self, measures: M, behavior: B) -> None:
+        """One step: measures of progress in, emotion out."""
+        emotion = self.feeling.emotion
+        for row in self._rows:
+            if behavior in row.during and row.when(measures):
+                emotion = row.feel
+                break
+        self.feeling = Feeling(emotion, min(max(self._intensity(measures), 0.0), 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Row(Generic[B, C, A]):
+    """From these behaviors, if the guard holds, do this, and go there; ``None`` reads on."""
+
+    come_from: Sequence[B]
+    when: Callable[[C], bool]
+    act: Sequence[A]
+    go: B | None
+
+
+class BehaviorGenerator(Generic[B, C, A]):
+    """A BSG: a table of guarded transitions, and the behavior it has led to.
+
+    Rows are read from the top. A row applies if it is for the current behavior and its guard holds. Any number of rows
+    that read on may act in a step; the first row that goes ends it. The context is the snapshot from the step's start.
+    """
+
+    def __init__(self, rows: Sequence[Row[B, C, A]], start: B) -> None:
+        self._rows = rows
+        self.current = start
+        self.lasting_s = 0.0
+
+    def advance(self, dt_s: float) -> None:
+        """Lets time pass."""
+        self.lasting_s += dt_s
+
+    def has_lasted(self, seconds: float) -> bool:
+        """Whether the behavior has lasted so long or longer."""
+        return self.lasting_s + SLACK_S >= seconds
+
+    def update(self, context: C) -> list[A]:
+        """Decides, goes where the decision leads, and gives the actions for the robot to perform."""
+        actions: list[A] = []
+        for row in self._rows:
+            if self.current not in row.come_from or not row.when(context):
+                continue
+            actions.extend(row.act)
+            if row.go is not None:
+                self.current, self.lasting_s = row.go, 0.0
+                break
+        return actions
+
+
+def motor_gain(feeling: Feeling, negative_gain: float, onset: float) -> float:
+    """The sensory-motor level: a factor on motor output under negative affect from ``onset`` on, else 1."""
+    return negative_gain if feeling.emotion.is_negative and feeling.intensity >= onset else 1.0
+
+
+LABELS = ("very low", "low", "medium", "high", "very high")
+
+
+def intensity_label(intensity: float, cuts: Sequence[float]) -> str:
+    """One of five words for an intensity, by the intensities at which the upper four begin."""
+    return LABELS[sum(intensity >= cut for cut in cuts)]

@@ -1,0 +1,468 @@
+#!/usr/bin/env python3
+"""Leguin, the refiller, in Python: waits at the table until she is called, brings treats, hurries when she is asked to,
+and goes home when she is sent or has had enough.
+
+She does what ``crates/robots/src/leguin`` does, with the same parameters and the same chance: put her in the place of
+``cars-leguin`` and the run is the same, byte for byte (``launch/leguin_in_python.toml``). Vonda is Leguin under another
+name: ``leguin.py --name Vonda``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass, field, fields
+from enum import Enum, auto
+from typing import Literal
+
+from affect import (
+    BehaviorGenerator,
+    Emotion,
+    EmotionRow,
+    Feeling,
+    Row,
+    RuleGenerator,
+    intensity_label,
+    motor_gain,
+)
+from chance import Chance
+from drive import Course, Legs
+from peer import Peer
+
+import cars_robot
+from cars_robot import BadParameters, Cars, Panel, Point, StateVariables
+from cars_robot.panel import Badge, Bar, Button, Face, FaceName, Table, Text, Tone, Widget
+
+FT_M = 0.3048
+REFILL, HURRY, GO_HOME = "refill", "hurry", "go home"
+JOKES = (
+    "Waiting is easy. I have it in my state table.",
+    "I asked the table for a joke. It said the spread was good enough.",
+    "My favorite distance is four feet.",
+    "They say a watched pot never boils. Nobody has tried it with a watched robot.",
+)
+
+Switch = Literal["on", "off"]
+
+
+@dataclass(frozen=True)
+class Feelings:
+    """The constants of her emotions; what each means is in ``configs/robots/leguin.toml``."""
+
+    caution_gain_base: float = 0.5
+    caution_gain_slope: float = 1.0
+    th_concerned: float = 0.45
+    label_cuts: tuple[float, float, float, float] = (0.2, 0.4, 0.6, 0.8)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What she can be told about herself, in SI units; what each means is in ``configs/robots/leguin.toml``."""
+
+    waiter: str = "Butler"
+    goods: str = "treats"
+    affect: Switch = "on"
+    sensory_motor: Switch = "on"
+    schematic: Switch = "on"
+    caution: float = 0.5
+    exchange_radius_m: float = 4.0 * FT_M
+    exchange_s: float = 2.0
+    v_refill_mps: float = 3.0 * FT_M
+    hurry_mult: float = 1.5
+    prep_s: float = 1.0
+    block_patience_s: float = 60.0
+    await_patience_s: float = 20.0
+    progress_share: float = 0.1
+    arrive_m: float = 1.5 * FT_M
+    settle_s: float = 5.0
+    settle_m: float = 6.0 * FT_M
+    stand_off_m: float = 3.0 * FT_M
+    query_stale_s: float = 5.0
+    turn_mean_s: float = 5.0
+    look_s: float = 2.0
+    joke_mean_s: float = 60.0
+    dynamics: Feelings = field(default_factory=Feelings)
+
+    POSITIVE = ("exchange_radius_m", "block_patience_s", "await_patience_s", "turn_mean_s", "joke_mean_s")
+
+    def check(self) -> None:
+        """:raises ValueError: what is wrong with the values, if anything is."""
+        for name in (one.name for one in fields(self)):
+            value = getattr(self, name)
+            if isinstance(value, float) and (value < 0.0 or (name in self.POSITIVE and value == 0.0)):
+                least = "above 0" if name in self.POSITIVE else "at least 0"
+                raise ValueError(f"{name} must be {least}, not {value:g}")
+        if self.dynamics.caution_gain_base <= 0.0:
+            raise ValueError(f"dynamics.caution_gain_base must be above 0, not {self.dynamics.caution_gain_base:g}")
+        if self.dynamics.caution_gain_slope < 0.0:
+            raise ValueError(
+                f"dynamics.caution_gain_slope must be at least 0, not {self.dynamics.caution_gain_slope:g}"
+            )
+        for name, share in (("caution", self.caution), ("dynamics.th_concerned", self.dynamics.th_concerned)):
+            if not 0.0 <= share <= 1.0:
+                raise ValueError(f"{name} must lie in [0, 1], not {share:g}")
+
+    @property
+    def gain(self) -> float:
+        """How strongly she reacts: 1 with the defaults."""
+        return self.dynamics.caution_gain_base + self.dynamics.caution_gain_slope * self.caution
+
+
+class Behavior(Enum):
+    """Her behaviors, by the names under which they are published."""
+
+    WAIT = "WAIT"
+    REFILL = "REFILL"
+    EXCHANGE = "EXCHANGE"
+    AWAIT_GO_HOME = "AWAIT_GO_HOME"
+    GO_HOME = "GO_HOME"
+
+
+class Act(Enum):
+    """What a row of the table has her do."""
+
+    TAKE_ERRAND = auto()
+    HURRY = auto()
+    FINISH_ERRAND = auto()
+    GIVE_UP = auto()
+    TURN_HOME = auto()
+    JOKE = auto()
+
+
+@dataclass(frozen=True)
+class Measures:
+    """The progress measures."""
+
+    hurried: bool = False
+    blocked: float = 0.0
+    """Time without progress on the way, as a share of her patience with that."""
+    waiting: float = 0.0
+    """Time for which she has waited to be sent home, as a share of her patience with that."""
+    th_concerned: float = 0.45
+    """Intensity of the concern of one who is told to hurry."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a row's guard can see."""
+
+    emotion: Emotion | None
+    """What she feels; ``None`` if that has no say."""
+    pending: str
+    """What she was told to do and has not begun: "refill", "hurry", or nothing."""
+    waiter_is_needy_here: bool
+    exchange_is_over: bool
+    sent_home: bool
+    is_home: bool
+    has_joke: bool
+
+
+WAIT, DRIVE, EXCHANGE, AWAIT, HOME = Behavior
+HAPPY, CONFIDENT, CONCERNED, FRUSTRATED = Emotion
+
+# fmt: off
+EMOTIONS: tuple[EmotionRow[Measures, Behavior], ...] = (
+    # Emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts.
+    EmotionRow((WAIT, EXCHANGE, HOME), lambda m: True,             HAPPY),
+    EmotionRow((DRIVE,),               lambda m: m.blocked >= 1.0, FRUSTRATED),
+    EmotionRow((DRIVE,),               lambda m: m.hurried,        CONCERNED),
+    EmotionRow((DRIVE,),               lambda m: True,             CONFIDENT),
+    EmotionRow((AWAIT,),               lambda m: m.waiting >= 1.0, FRUSTRATED),
+    EmotionRow((AWAIT,),               lambda m: m.waiting >= 0.5, CONCERNED),
+    EmotionRow((AWAIT,),               lambda m: True,             CONFIDENT),
+)
+
+TABLE: tuple[Row[Behavior, Context, Act], ...] = (
+    # Behavior state generator.
+    Row((WAIT, DRIVE),  lambda c: c.waiter_is_needy_here,             (Act.FINISH_ERRAND,), EXCHANGE),
+    Row((WAIT,),        lambda c: c.pending != "",                    (Act.TAKE_ERRAND,),   DRIVE),
+    Row((DRIVE,),       lambda c: c.pending == HURRY,                 (Act.HURRY,),         None),
+    Row((EXCHANGE,),    lambda c: c.exchange_is_over,                 (),                   AWAIT),
+    Row((AWAIT,),       lambda c: c.sent_home,                        (Act.TURN_HOME,),     HOME),
+    Row((AWAIT, DRIVE), lambda c: c.emotion is FRUSTRATED,            (Act.GIVE_UP,),       HOME),
+    Row((HOME,),        lambda c: c.is_home,                          (),                   WAIT),
+    Row((WAIT, HOME),   lambda c: c.emotion is HAPPY and c.has_joke,  (Act.JOKE,),          None),
+)
+
+EXPRESSIONS: dict[Emotion, tuple[FaceName, Tone, str]] = {
+    # What people see of an emotion, and how she accounts for it: {g} is her goal, {a} who is in the way of it.
+    HAPPY:      ("happy",   "good",    "something good is happening; I wanted this: {g}; because of this I feel good"),
+    CONFIDENT:  ("neutral", "neutral", "I want {g}; I think this will happen; I know what to do"),
+    CONCERNED:  ("fearful", "warning", "I want {g}; {a} is not here; something bad can happen soon"),
+    FRUSTRATED: ("angry",   "bad",     "I want {g}; I cannot do this now; {a} is not here; I tried"),
+}
+# fmt: on
+
+
+def intensity(measures: Measures) -> float:
+    """How strongly she feels it."""
+    return max(measures.th_concerned if measures.hurried else 0.0, measures.blocked, measures.waiting)
+
+
+class Leguin(cars_robot.Robot):
+    """The refiller."""
+
+    def init_robot(self, cars: Cars) -> None:
+        self.parameters = cars.parameters(Parameters)
+        try:
+            self.parameters.check()
+        except ValueError as error:
+            raise BadParameters(cars.name, str(error)) from None
+        self.esg = RuleGenerator(EMOTIONS, intensity, HAPPY)
+        self.bsg = BehaviorGenerator(TABLE, WAIT)
+        self.measures = Measures()
+        self.at = self.before = self.home = cars.welcome.location
+        self.aim: tuple[Point, float] | None = None  # Where she was driving, and how far she meant to get.
+        self.legs = Legs()
+        self.hurried = self.sent_home = False
+        self.pending = ""
+        self.begin_way()
+        self.waiting_s = 0.0  # How long she has waited to be sent home.
+        self.trips = self.given_up = 0
+        self.waiter = Peer(self.parameters.waiter)
+        self.waiter_needs = False  # Whether he needed a refill when he last answered, and of whom.
+        self.waiter_calls: str | None = None
+        self.turns, self.jokes = Chance.split(cars.random), Chance.split(cars.random)
+        self.until_joke_s = self.jokes.exponential(self.parameters.joke_mean_s)
+
+    def begin_way(self) -> None:
+        """What she did before counts no more: time without progress, how far she has come, and how far at best."""
+        self.blocked_s = self.way_m = self.best_way_m = 0.0
+
+    @property
+    def feeling(self) -> Feeling:
+        """What she feels."""
+        return self.esg.feeling
+
+    # Progress.
+
+    def set_current_location(self, cars: Cars, location: Point) -> None:
+        self.at = location
+
+    def set_command(self, cars: Cars, sender: str, command: str) -> None:
+        behavior = self.bsg.current
+        if command in (REFILL, HURRY) and behavior is EXCHANGE:
+            pass  # What was meant to bring her about is over once she is there.
+        elif command == REFILL:
+            if behavior is not DRIVE:
+                self.pending = self.pending or REFILL
+        elif command == HURRY:
+            self.pending = HURRY
+        elif command == GO_HOME:
+            # The waiter may be done with the exchange a tick before her.
+            self.sent_home = self.sent_home or behavior in (EXCHANGE, AWAIT)
+        else:
+            shown = command if len(command) <= 60 else command[:60] + "..."
+            cars.log(f"does not understand {json.dumps(shown, ensure_ascii=False)} from {sender}")
+
+    def update_state_variables(self, cars: Cars) -> None:
+        behavior, parameters = self.bsg.current, self.parameters
+        self.bsg.advance(cars.tick_s)
+        self.measure_progress(behavior, cars.tick_s)
+        self.measures = Measures(
+            hurried=self.hurried,
+            blocked=self.blocked_s * parameters.gain / parameters.block_patience_s if behavior is DRIVE else 0.0,
+            waiting=self.waiting_s * parameters.gain / parameters.await_patience_s,
+            th_concerned=parameters.dynamics.th_concerned,
+        )
+        state = self.waiter.look(cars, self.at)
+        if state is not None:
+            needs, calls = state.state_variables.get("need"), state.state_variables.get("refiller")
+            self.waiter_needs = needs is True
+            self.waiter_calls = calls if isinstance(calls, str) else None
+
+    def measure_progress(self, behavior: Behavior, tick_s: float) -> None:
+        """A tick went by in this behavior: was there progress, how long has she waited?"""
+        self.until_joke_s -= tick_s
+        self.waiting_s = self.waiting_s + tick_s if behavior is AWAIT else 0.0
+        if behavior not in (DRIVE, HOME):
+            self.begin_way()
+        elif self.aim is not None:
+            # Her own share of what brings them together: the waiter's motion is not hers. To and fro is no progress.
+            goal, step_m = self.aim
+            self.way_m += self.before.distance_m(goal) - self.at.distance_m(goal)
+            is_progress = self.way_m >= self.best_way_m + self.parameters.progress_share * step_m
+            self.best_way_m = max(self.best_way_m, self.way_m)
+            self.blocked_s = 0.0 if is_progress else self.blocked_s + tick_s
+
+    # Emotion.
+
+    def update_emotion_state(self, cars: Cars) -> None:
+        if self.parameters.affect == "on":
+            self.esg.update(self.measures, self.bsg.current)
+
+    def emotion_state(self) -> str:
+        return self.feeling.emotion.value if self.parameters.affect == "on" else "NEUTRAL"
+
+    # Behavior.
+
+    def update_behavior_state(self, cars: Cars) -> None:
+        for act in self.bsg.update(self.context(cars)):
+            self.perform(act, cars)
+
+    def behavior_state(self) -> str:
+        return self.bsg.current.value
+
+    def context(self, cars: Cars) -> Context:
+        """What the rows of her table see in this tick."""
+        parameters = self.parameters
+        acts_by_emotion = parameters.affect == "on" and parameters.schematic == "on"
+        is_here = self.waiter.is_within(parameters.exchange_radius_m, self.at, cars.welcome.sensing_range_m)
+        return Context(
+            emotion=self.feeling.emotion if acts_by_emotion else None,
+            pending=self.pending,
+            waiter_is_needy_here=self.is_needed(cars) and is_here,
+            exchange_is_over=self.bsg.has_lasted(parameters.exchange_s),
+            sent_home=self.sent_home,
+            is_home=self.is_home(),
+            has_joke=self.until_joke_s <= 0.0,
+        )
+
+    def is_needed(self, cars: Cars) -> bool:
+        """Whether the waiter wants treats of her. Where he cannot be asked she takes it that he does, unless he is known
+        to call for somebody else: Vonda does not step in for Leguin."""
+        if self.waiter_calls not in (None, cars.name):
+            return False
+        return self.waiter_needs or self.waiter.is_unknown(self.parameters.query_stale_s)
+
+    def is_home(self) -> bool:
+        """Whether she is back at the table: at her place, or near it if somebody stands there and does not go."""
+        away_m = self.at.distance_m(self.home)
+        is_kept_away = self.blocked_s >= self.parameters.settle_s
+        return away_m <= self.parameters.arrive_m or (away_m <= self.parameters.settle_m and is_kept_away)
+
+    def perform(self, act: Act, cars: Cars) -> None:
+        """Does what a row says."""
+        match act:
+            case Act.TAKE_ERRAND:
+                self.hurried, self.pending = self.pending == HURRY, ""
+            case Act.HURRY:
+                self.hurried, self.pending = True, ""
+            case Act.FINISH_ERRAND:
+                self.hurried, self.pending, self.sent_home = False, "", False
+            case Act.TURN_HOME:
+                self.trips, self.sent_home = self.trips + 1, False
+            case Act.GIVE_UP:
+                self.given_up, self.hurried = self.given_up + 1, False
+                self.begin_way()
+            case Act.JOKE:
+                cars.log(f"jokes: {JOKES[self.jokes.one_of(len(JOKES))]}")
+                self.until_joke_s = self.jokes.exponential(self.parameters.joke_mean_s)
+
+    # Motion.
+
+    def project_location(self, cars: Cars) -> Point:
+        self.before, self.aim = self.at, None
+        match self.bsg.current:
+            case Behavior.REFILL:
+                return self.refill(cars)
+            case Behavior.GO_HOME:
+                return self.approach(cars, self.home, 0.0, self.parameters.v_refill_mps)
+            case _:
+                return self.legs.stay(self.at)
+
+    def goal(self) -> Point | None:
+        """Where she is going."""
+        match self.bsg.current:
+            case Behavior.REFILL:
+                return None if self.waiter.is_missing else self.waiter.place
+            case Behavior.GO_HOME:
+                return self.home
+            case _:
+                return None
+
+    def refill(self, cars: Cars) -> Point:
+        """On the way to the waiter; if he is not where he was last known to be, in search of him."""
+        parameters, goal = self.parameters, self.goal()
+        speed_mps = parameters.v_refill_mps
+        if parameters.sensory_motor == "on":
+            # The sensory-motor level: concern speeds her up at once, nothing else changes her speed.
+            speed_mps *= motor_gain(self.feeling, parameters.hurry_mult, parameters.dynamics.th_concerned)
+        if not self.bsg.has_lasted(parameters.prep_s):
+            return self.legs.stay(self.at)
+        if goal is None:
+            # Toward nowhere: whatever she does now is no progress.
+            self.aim = (self.at, speed_mps * cars.tick_s)
+            return self.legs.walk(cars, self.at, speed_mps, parameters.turn_mean_s, self.turns)
+        return self.approach(cars, goal, parameters.stand_off_m, speed_mps)
+
+    def approach(self, cars: Cars, goal: Point, stop_m: float, speed_mps: float) -> Point:
+        """A step of the way, remembering what would be progress."""
+        step_m = min(speed_mps * cars.tick_s, self.at.distance_m(goal) - stop_m)
+        self.aim = (goal, step_m) if step_m > 0.0 else None
+        return self.legs.drive(cars, self.at, Course(goal, stop_m, speed_mps, self.parameters.look_s))
+
+    # What others see.
+
+    def current_location(self) -> Point:
+        return self.at
+
+    def speed(self) -> float:
+        return self.legs.speed_mps
+
+    def direction(self) -> float:
+        return self.legs.direction_rad
+
+    def state_variables(self) -> StateVariables:
+        goal = self.goal()
+        return {
+            "hurried": self.hurried,
+            "blocked_s": self.blocked_s,
+            "waiting_s": self.waiting_s,
+            "distance_m": 0.0 if goal is None else self.at.distance_m(goal),
+            "intensity": self.feeling.intensity,
+            "pending": self.pending,
+            "trips": self.trips,
+            "given_up": self.given_up,
+            "waiter": self.waiter.name,
+            "behavior": self.bsg.current.value,
+            "home_x_m": self.home.x,
+            "home_y_m": self.home.y,
+        }
+
+    def resume(self, cars: Cars, last: StateVariables) -> None:
+        def number(name: str) -> float | None:
+            value = last.get(name)
+            return value if isinstance(value, float) else None
+
+        self.hurried = last.get("hurried") is True
+        self.pending = pending if (pending := last.get("pending")) in (REFILL, HURRY) else ""
+        self.trips, self.given_up = int(number("trips") or 0), int(number("given_up") or 0)
+        x, y = number("home_x_m"), number("home_y_m")
+        if x is not None and y is not None:
+            self.home = Point(x, y)
+        known = {behavior.value: behavior for behavior in Behavior}
+        self.bsg = BehaviorGenerator(TABLE, known.get(str(last.get("behavior")), HOME))
+        cars.log("is back, and takes over where the last one was lost")
+
+    def panel(self) -> Panel:
+        # On the way it is the crowd that blocks her, unless it is the waiter who presses.
+        is_crowd = self.bsg.current is DRIVE and not self.hurried
+        goal = f"to bring {self.parameters.goods} to {self.parameters.waiter}"
+        face, tone, account = EXPRESSIONS[self.feeling.emotion]
+        strength = self.feeling.intensity
+        account = account.format(g=goal, a="the crowd" if is_crowd else self.parameters.waiter)
+        label = intensity_label(strength, self.parameters.dynamics.label_cuts)
+        feeling: list[Widget] = [
+            Face(face, strength),
+            Badge("emotion", self.emotion_state(), tone),
+            Bar(f"intensity ({label})", strength),
+            Text("why", account[0].upper() + account[1:] + "."),
+        ]
+        if self.parameters.affect != "on":
+            feeling = [Face("neutral", 0.0), Badge("emotion", self.emotion_state())]
+        way = "-" if (to := self.goal()) is None else f"{self.at.distance_m(to):.1f} m"
+        rows = [
+            ("waiter", self.parameters.waiter),
+            ("way to go", way),
+            ("hurried", "yes" if self.hurried else "no"),
+            ("blocked for", f"{self.blocked_s:.1f} s"),
+            ("kept waiting for", f"{self.waiting_s:.1f} s"),
+            ("trips, given up", f"{self.trips}, {self.given_up}"),
+        ]
+        buttons = [Button(command, command) for command in (REFILL, HURRY, GO_HOME)]
+        return Panel([*feeling, Badge("behavior", self.behavior_state()), Table(rows), *buttons])
+
+
+if __name__ == "__main__":
+    sys.exit(cars_robot.main("Leguin", lambda name: Leguin()))

@@ -1,0 +1,45 @@
+"""What the tests stand on: the programs of the project, a folder for runs, and a stage for a single robot."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NoReturn
+
+import pytest
+from lab import Lab
+from stage import Stage
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[Lab]:
+    """A folder of its own for runs, and the programs to execute them."""
+    folder = os.environ.get("CARS_BIN_DIR")
+    cars = shutil.which("cars", path=folder) or shutil.which("cars")
+    if cars is None:
+        missing("the program cars is not there: `cargo build --release`, and name its folder by CARS_BIN_DIR")
+    with Lab(Path(cars).resolve().parent, tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    """A stage for robots, with nobody on it yet."""
+    with Stage() as made:
+        yield made
+
+
+def missing(what: str) -> NoReturn:
+    """A tool is missing: a reason to skip a test, and a failure where everything must be checked."""
+    if os.environ.get("CI"):
+        pytest.fail(what)
+    pytest.skip(what)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Says loudly what was not tested."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    if skipped:
+        terminalreporter.write_line(f"\nSKIPPED: {len(skipped)} tests; the reasons are above\n", red=True)

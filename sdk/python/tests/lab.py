@@ -1,0 +1,155 @@
+"""Runs of real processes, in a folder of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+ROOT = Path(__file__).resolve().parents[3]
+EXAMPLES = ROOT / "sdk" / "python" / "examples"
+PATIENCE_S = 90.0
+"""Longest that anything here may take before it counts as hung."""
+
+T = TypeVar("T")
+
+
+def eventually(what: str, ready: Callable[[], T | None], patience_s: float = PATIENCE_S) -> T:
+    """Waits until ``ready`` gives something, and fails if it never does."""
+    begun = time.monotonic()
+    while True:
+        found = ready()
+        if found is not None:
+            return found
+        assert time.monotonic() - begun < patience_s, f"waited in vain for {what}"
+        time.sleep(0.01)
+
+
+def environment(**more: str) -> dict[str, str]:
+    """The environment of a process that knows no run but what ``more`` says."""
+    own = {name: value for name, value in os.environ.items() if not name.startswith("CARS_")}
+    source = str(ROOT / "sdk" / "python" / "src")
+    own["PYTHONPATH"] = os.pathsep.join(filter(None, [source, own.get("PYTHONPATH")]))
+    # Scripts find the interpreter of these tests.
+    own["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), own.get("PATH", "")])
+    return own | more
+
+
+def free_endpoint(protocol: str = "tcp") -> str:
+    """An endpoint of the loopback interface at which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class Lab:
+    """The programs of the project, and a folder for their runs."""
+
+    def __init__(self, programs: Path, folder: Path) -> None:
+        self.programs = programs
+        self.folder = folder
+        self._processes: list[subprocess.Popen[str]] = []
+        self._simulators: dict[str, subprocess.Popen[str]] = {}
+
+    def __enter__(self) -> Lab:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in self._processes:
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+
+    def cars(self, *arguments: str) -> str:
+        """Runs ``cars`` to its end and returns what it printed; it must succeed."""
+        done = self._run(*arguments)
+        assert done.returncode == 0, f"{arguments}: {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    def until_ready(self, *ctl: str) -> None:
+        """Waits until the simulator of a run has all its robots."""
+
+        def is_ready() -> bool | None:
+            # A simulator that has not begun to listen is one that cannot be asked.
+            asked = self._run("ctl", *ctl, "status")
+            return (asked.returncode == 0 and "ready" in asked.stdout) or None
+
+        eventually("the robots", is_ready)
+
+    def _run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [str(self.programs / "cars"), *arguments]
+        return subprocess.run(
+            command, cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=PATIENCE_S, check=False
+        )
+
+    def start(self, command: list[str], **more: str) -> subprocess.Popen[str]:
+        """Starts a process and leaves it running, to the end of the test at most."""
+        process = subprocess.Popen(
+            command,
+            cwd=ROOT,
+            env=environment(**more),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._processes.append(process)
+        return process
+
+    def robot(self, script: str, *arguments: str, **more: str) -> subprocess.Popen[str]:
+        """Starts a robot in Python."""
+        return self.start([sys.executable, str(EXAMPLES / script), *arguments], **more)
+
+    def simulator(self, run: str, scenario: str, *arguments: str, protocol: str = "tcp") -> dict[str, str]:
+        """Starts a simulator of this scenario; gives the environment of those who take part."""
+        file = self.folder / f"{run}.toml"
+        file.write_text(scenario)
+        endpoint = free_endpoint(protocol)
+        out = ["--run", run, "--listen", endpoint, "--out", str(self.folder)]
+        self._simulators[run] = self.start([str(self.programs / "cars-sim"), str(file), *out, *arguments])
+        return {"CARS_RUN": run, "CARS_CONNECT": endpoint}
+
+    def ended(self, run: str) -> None:
+        """Waits until a run's simulator has written everything and ended."""
+        assert self._simulators[run].wait(PATIENCE_S) == 0
+
+    def launch(self, run: str, scenario: str, robots: dict[str, str], *changes: str) -> list[str]:
+        """Launches a scenario of ``configs/`` with a process for each robot; gives the lines of its events.
+
+        A robot's program is one of the project, or a script of the examples.
+        """
+        text = f'scenario = "{ROOT / "configs" / scenario}"\nspeed = "max"\n'
+        for name, program in robots.items():
+            path = str(EXAMPLES / program) if program.endswith(".py") else program
+            text += f'[[process]]\nname = "{name}"\ncommand = ["{path}"]\n'
+        file = self.folder / f"{run}-launch.toml"
+        file.write_text(text)
+        out = ["--no-console", "-q", "--out", str(self.folder), "--run", run]
+        self.cars("launch", str(file), *out, *changes)
+        return self.events(run)
+
+    def play(self, run: str, scenario: str, *changes: str) -> list[str]:
+        """Plays a scenario of ``configs/`` in one process, in Rust; gives the lines of its events."""
+        self.cars("run", f"configs/{scenario}", "-q", "--out", str(self.folder), "--run", run, *changes)
+        return self.events(run)
+
+    def events(self, run: str) -> list[str]:
+        """The lines of a run's events."""
+        return (self.folder / run / "events.jsonl").read_text().splitlines(keepends=True)
+
+    def of_kind(self, run: str, kind: str) -> list[dict[str, Any]]:
+        """A run's events of one kind."""
+        return [event for event in map(json.loads, self.events(run)) if event["event"] == kind]
+
+
+def assert_same(left: list[str], right: list[str]) -> None:
+    """Two runs are the same, byte for byte; shows the first event that differs if not."""
+    for number, (one, other) in enumerate(zip(left, right, strict=False), start=1):
+        assert one == other, f"the runs differ from line {number} on:\n  {one}  {other}"
+    assert len(left) == len(right)

@@ -1,0 +1,421 @@
+"""The protocol as a robot's process speaks it, rule by rule; the names in brackets are the rules' in docs/protocol.md."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import threading
+from typing import Any
+
+import pytest
+from stage import Stage, welcome
+
+from cars_robot import stream
+
+Json = dict[str, Any]
+NAMED = {"joined": 1}
+
+
+def begin(stage: Stage, *arguments: str) -> subprocess.Popen[str]:
+    """A robot that has answered tick 0."""
+    process = stage.ready(*arguments)
+    stage.tick(0, A=NAMED)
+    return process
+
+
+def order(stage: Stage, tick: int, text: str, seq: int = 1) -> Json:
+    """A's report of a tick in which B's command arrives."""
+    stage.command(seq, text)
+    return stage.tick(tick, A={"commands": [{"from": "B", "seq": seq}]})
+
+
+def test_it_listens_before_it_asks_and_shows_its_token_last(stage: Stage) -> None:
+    """[join.request, join.ready-last]"""
+    stage.ready()
+    assert len(stage.joins) == 1
+    request = stage.joins[0]
+    assert (request["protocol"], request["run"], request["name"]) == (1, "r", "A")
+    assert request["instance"] and request["sdk"].startswith("python/")
+    assert request["listens"] and not request["alive"] and request["key"] == "cars/r/join/A"
+    # It takes part at once: nothing that comes after the token is lost.
+    assert stage.tick(0, A=NAMED)["generation"] == 1
+
+
+def test_a_refusal_ends_it_with_the_reason(stage: Stage) -> None:
+    """[join.refused]"""
+    stage.welcome = lambda _: {"answer": "refused", "reason": "unknown_name", "explanation": "who is A?"}
+    robot = stage.robot()
+    _, said = robot.communicate(timeout=20)
+    assert (robot.returncode, said) == (1, "error: A may not join: who is A?\n")
+
+
+def test_a_name_that_is_taken_is_asked_for_again(stage: Stage) -> None:
+    """[join.refused]"""
+    taken = {"answer": "refused", "reason": "name_taken", "explanation": "another one is A"}
+    stage.welcome = lambda _: taken if len(stage.joins) < 3 else welcome()
+    stage.ready()
+    assert len(stage.joins) == 3
+    stage.welcome = lambda _: taken
+    robot = stage.robot("--name", "B", CARS_PATIENCE_S="0.3")
+    _, said = robot.communicate(timeout=20)
+    assert (robot.returncode, said) == (1, "error: B may not join: another one is A\n")
+
+
+def test_a_tick_is_what_figure_5_says(stage: Stage) -> None:
+    """[tick.answer, tick.initial, tick.correction]"""
+    stage.ready()
+    first = stage.tick(0, A=NAMED)
+    assert first["proposal"] == {"x": 4.0, "y": 4.0} and first["log"] == ["init", "location", "project"]
+    assert first["state_variables"] == {"whole": 7, "part": 0.1, "flag": True, "text": "caf\u00e9"}
+    assert first["direction_rad"] == 0.123457  # [number.angles]
+    second = stage.tick(1)
+    assert second["log"] == ["location", "variables", "emotion", "behavior", "project"]
+    assert second["proposal"] == {"x": 5.0, "y": 4.0}
+    moved = stage.tick(2, A={"correction": {"location": {"x": 1, "y": 1}, "blocked": True}})
+    assert moved["proposal"] == {"x": 2.0, "y": 1.0}
+    assert stage.tick(3)["proposal"] == {"x": 3.0, "y": 1.0}
+
+
+def test_the_same_clock_brings_the_same_bytes_and_the_commands_again(stage: Stage) -> None:
+    """[clock.duplicate, command.sent]"""
+    begin(stage)
+    stage.command(1, "tell C hello there")
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    first, sent = stage.heard_bytes("robot/A/report"), stage.heard_bytes("robot/C/command/A")
+    told = {"to": "C", "seq": 1, "performative": "achieve", "command": "hello there"}
+    assert json.loads(first)["sent"] == [told]
+    assert json.loads(sent) == {"epoch": 1, "tick": 1} | {name: told[name] for name in list(told)[1:]}
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    assert stage.heard_bytes("robot/A/report") == first
+    assert stage.all_heard("robot/C/command/A") == {sent}
+    # Commands are repeated for as many ticks as the welcome says, here for two; reports for one.
+    for tick, repeated in [(2, {sent}), (3, set())]:
+        second = stage.tick(tick)
+        stage.clock(tick)
+        assert stage.heard("robot/A/report") == second
+        assert stage.all_heard("robot/C/command/A") == repeated
+
+
+def test_late_clocks_are_echoes(stage: Stage) -> None:
+    """[clock.late]"""
+    begin(stage)
+    stage.tick(1)
+    stage.clock(0)
+    stage.clock(1, epoch=0)
+    assert stage.tick(2)["tick"] == 2 and stage.nothing_more("robot/A/report")
+
+
+def test_commands_wait_for_the_clock_and_go_in_its_order(stage: Stage) -> None:
+    """[command.held, command.order, command.twice]"""
+    begin(stage)
+    for seq, sender in [(2, "C"), (1, "B"), (1, "C")]:
+        stage.command(seq, f"note {sender}{seq}", sender=sender)
+    assert not any(line.startswith("command") for line in stage.tick(1)["log"])
+    ids = [("B", 1), ("C", 2), ("C", 2), ("C", 1)]
+    report = stage.tick(2, A={"commands": [{"from": sender, "seq": seq} for sender, seq in ids]})
+    obeyed = [line for line in report["log"] if line.startswith("command")]
+    assert obeyed == [f"command {sender} note {sender}{seq}" for sender, seq in ids]
+    assert "missing" not in report
+
+
+def test_a_command_that_is_named_first_is_waited_for_and_says_so(stage: Stage) -> None:
+    begin(stage)
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 5}]})
+    assert stage.heard("robot/A/waiting") == {"epoch": 1, "tick": 1, "on": "B"}
+    stage.command(5, "note at last")
+    assert "command B note at last" in stage.heard("robot/A/report")["log"]
+
+
+def test_a_command_that_never_comes_is_missing(stage: Stage) -> None:
+    """[command.missing]"""
+    begin(stage)
+    stage.command(1, "note of another epoch", epoch=2)
+    report = stage.tick(1, A={"commands": [{"from": "B", "seq": 1}]})
+    assert report["missing"] == [{"from": "B", "seq": 1}]
+    assert not any(line.startswith("command") for line in report["log"])
+
+
+def test_questions_get_the_state_of_the_tick_before(stage: Stage) -> None:
+    """[query.tick, query.early, query.unknown, tick.state-first]"""
+    begin(stage)
+    stage.tick(1)
+    stage.tick(2)
+    answers = {tick: stage.ask("location", f"tick={tick};epoch=1") for tick in (2, 3)}
+    assert answers == {
+        tick: {"performative": "tell", "epoch": 1, "tick": tick - 1, "value": {"x": 2.0 + tick, "y": 4.0}}
+        for tick in (2, 3)
+    }
+    assert stage.ask("state")["tick"] == 2  # type: ignore[index]
+    for what, value in [("speed", 1.0), ("emotion_state", "CALM"), ("behavior_state", "WALK")]:
+        assert stage.ask(what) == {"performative": "tell", "epoch": 1, "tick": 2, "value": value}
+    assert stage.ask("speed", "tick=1") == "that tick is over"
+    assert stage.ask("speed", "tick=9") == "that tick is far away"
+    assert stage.ask("speed", "tick=x") == "parameter tick: not a whole number"
+    assert stage.ask("speed", "tick=3;epoch=0") == "that epoch is over"
+    # One that comes a tick early is answered as soon as there is an answer.
+    early: list[Json | str] = []
+    asker = threading.Thread(target=lambda: early.append(stage.ask("location", "tick=4;epoch=1")))
+    asker.start()
+    stage.tick(3)
+    asker.join(20)
+    assert early[0]["tick"] == 3  # type: ignore[index]
+
+
+def test_who_follows_has_the_state_before_the_report(stage: Stage) -> None:
+    """[tick.state-first]"""
+    begin(stage)
+    report = stage.tick(1)
+    first, second = stage.heard("robot/A/state"), stage.heard("robot/A/state")
+    assert (first["tick"], second["tick"]) == (0, 1)
+    assert second["state_variables"] == report["state_variables"] and second["location"] == {"x": 4.0, "y": 4.0}
+
+
+def test_it_asks_others_once_and_follows_them(stage: Stage) -> None:
+    begin(stage)
+    state = {
+        "epoch": 1,
+        "tick": 0,
+        "location": {"x": 1, "y": 1},
+        "speed_mps": 0,
+        "direction_rad": 0,
+        "state_variables": {"n": 7},
+        "emotion_state": "SAD",
+        "behavior_state": "SIT",
+    }
+    asked: list[str] = []
+
+    def answer(query: Any) -> None:
+        with query:
+            asked.append(str(query.parameters))
+            query.reply(query.key_expr, json.dumps(state))
+
+    stage._keep.append(stage.session.declare_queryable("cars/r/robot/B/state", answer))
+    assert "B is SAD" in order(stage, 1, "ask B")["log"]
+    assert asked == ["tick=1;epoch=1"]
+    # From now on it is told.
+    stage.put("robot/B/state", state | {"tick": 1, "emotion_state": "GLAD"})
+    stage.put("robot/B/state", b"{}")
+    assert "B is GLAD" in order(stage, 2, "ask B", seq=2)["log"]
+    assert asked == ["tick=1;epoch=1"]
+
+
+def test_calls_that_give_nothing_say_why(stage: Stage) -> None:
+    begin(stage)
+    assert any("UnknownRobot: no robot is called 'X'" in line for line in order(stage, 1, "ask X")["log"])
+    stage.command(2, "ask B")
+    report = stage.tick(2, A={"commands": [{"from": "B", "seq": 2}], "unreachable": ["B"]})
+    assert "Unreachable: B is unreachable" in report["log"]
+    assert "sees ['guest']" in order(stage, 3, "look", seq=3)["log"]
+    assert stage.percepts_asked == 1
+
+
+def test_a_wait_ends_with_the_epoch(stage: Stage) -> None:
+    """[epoch.init]"""
+    begin(stage)
+    stage.command(1, "ask B")
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    assert stage.heard("robot/A/waiting")["on"] == "B"
+    stage.welcome = lambda _: welcome(epoch=2, location={"x": 9, "y": 9})
+    report = stage.tick(0, epoch=2, A=NAMED)
+    assert report["log"][0] == "init" and report["proposal"] == {"x": 10.0, "y": 9.0}
+    assert len(stage.joins) == 2 and stage.joins[0]["instance"] == stage.joins[1]["instance"]
+
+
+def test_an_epoch_begins_everything_anew(stage: Stage) -> None:
+    """[epoch.init, determinism.seed]"""
+    begin(stage)
+    draws = [order(stage, 1, "draw")["log"][3]]
+    stage.command(2, "note of the old epoch")
+    stage.welcome = lambda _: welcome(epoch=2)
+    stage.tick(0, epoch=2, A=NAMED)
+    stage.command(1, "draw", epoch=2)
+    draws.append(stage.tick(1, epoch=2, A={"commands": [{"from": "B", "seq": 1}]})["log"][3])
+    assert draws == [f"draws {stream(42, 'robot/A').next_u64()}"] * 2
+
+
+def test_a_successor_waits_for_its_clock_and_takes_over(stage: Stage) -> None:
+    """[return.generation, return.numbers]"""
+    last = {
+        "epoch": 1,
+        "tick": 6,
+        "location": {"x": 5, "y": 5},
+        "speed_mps": 0,
+        "direction_rad": 0,
+        "state_variables": {"trips": 3},
+        "emotion_state": "SAD",
+        "behavior_state": "SIT",
+    }
+    before = last | {"tick": 5, "emotion_state": "GLAD"}
+    stage.welcome = lambda _: welcome(
+        generation=2, tick=7, stream="robot/A#2", last_seq=10**9, last_state=last, state_before=before
+    )
+    stage.ready()
+    # Others may still ask what its predecessor has said.
+    assert [stage.ask("emotion_state", f"tick={tick};epoch=1")["value"] for tick in (6, 7)] == ["GLAD", "SAD"]  # type: ignore[index]
+    stage.clock(7)
+    stage.command(1, "tell C I am back")
+    report = stage.tick(8, A={"joined": 2, "commands": [{"from": "B", "seq": 1}]})
+    assert report["generation"] == 2 and report["sent"][0]["seq"] == 10**9 + 1
+    assert report["log"][:2] == ["init", "resumes [('trips', 3.0)]"]
+    assert stage.nothing_more("robot/A/report")
+
+
+def test_one_who_is_replaced_ends(stage: Stage) -> None:
+    """[return.replaced]"""
+    robot = begin(stage)
+    stage.clock(1, A={"joined": 2})
+    _, said = robot.communicate(timeout=20)
+    assert (robot.returncode, said) == (1, "error: another process is A now\n")
+    stage.until_alive()
+
+
+@pytest.mark.parametrize("end", ["finished", "stopped", "aborted"])
+def test_it_ends_with_the_run(stage: Stage, end: str) -> None:
+    """[end.clock]"""
+    robot = begin(stage)
+    stage.clock(1, end=end)
+    assert robot.wait(20) == 0
+    stage.until_alive()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("order_", ["", "sleep 600", "ask B"])
+def test_a_signal_ends_it_cleanly(stage: Stage, number: signal.Signals, order_: str) -> None:
+    """[end.sigterm] Between two ticks, within one, and while it waits for an answer."""
+    robot = begin(stage)
+    if order_:
+        stage.command(1, order_)
+        stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+        if order_ == "ask B":
+            stage.heard("robot/A/waiting")
+    robot.send_signal(number)
+    assert robot.wait(20) == -number
+    # The token was taken back before: a process that is killed is noticed as fast, but closes nothing.
+    stage.until_alive()
+
+
+def test_a_flood_holds_the_link_and_not_the_end(stage: Stage) -> None:
+    """[end.sigterm] More than the queue takes has arrived, and the robot is busy."""
+    robot = begin(stage)
+    stage.command(1, "sleep 600")
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    for seq in range(2, 12_000):
+        stage.command(seq, "note " + "x" * 100)
+    robot.send_signal(signal.SIGTERM)
+    assert robot.wait(20) == -signal.SIGTERM
+
+
+def test_a_flood_is_survived(stage: Stage) -> None:
+    """[command.held]"""
+    begin(stage)
+    stage.command(1, "sleep 0.5")
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    for seq in range(2, 10_000):
+        stage.command(seq, "note " + "x" * 100)
+    stage.heard("robot/A/report")
+    report = stage.tick(2, A={"commands": [{"from": "B", "seq": seq} for seq in (2, 9_999)]})
+    assert sum(line.startswith("command B note") for line in report["log"]) == 2
+
+
+DAMAGED = [
+    b"",
+    b"\xff\xfe",
+    b"null",
+    b"[]",
+    b"{}",
+    b'{"epoch":1,"tick":-1}',
+    b'{"epoch":1,"tick":1.0}',
+    b'{"epoch":1,"tick":"1"}',
+    b'{"epoch":1,"tick":9007199254740992}',
+    b'{"epoch":1,"tick":1,"end":"sometime"}',
+    b'{"epoch":1,"tick":1,"end":{}}',
+    b'{"epoch":1,"tick":1,"news":null}',
+    b'{"epoch":1,"tick":1,"news":{"A":{"correction":{"location":{"x":NaN,"y":0}}}}}',
+    b'{"epoch":1,"tick":1,"news":{"A":{"correction":{"location":{"x":1e999,"y":0}}}}}',
+    b'{"epoch":1,"tick":1,"news":{"A":{"commands":[{"from":"a/b","seq":1}]}}}',
+    b'{"epoch":1,"tick":1,"news":{"..":{}}}',
+    b'{"epoch":1,"tick":1}trailing',
+    b"[" * 100_000,
+    b'{"epoch":1,"tick":1,"x":"' + b"x" * (1 << 20) + b'"}',
+]
+
+WRONG: list[Json] = [{"command": "x" * 5000}, {"command": None}, {"performative": []}, {"seq": -1}]
+
+
+def test_what_is_damaged_changes_nothing(stage: Stage) -> None:
+    """[robust.malformed, compat.unknown-fields]"""
+    robot = begin(stage)
+    for data in DAMAGED:
+        stage.put("clock", data)
+        stage.put("robot/A/command/B", data)
+    for seq, command in enumerate(WRONG):
+        stage.put("robot/A/command/B", {"epoch": 1, "tick": 0, "seq": seq, "command": "note"} | command)
+    stage.put("robot/A/command/\u00e9", {"epoch": 1, "tick": 0, "seq": 1, "command": "note"})
+    report = order(stage, 1, "note fine", seq=99)
+    assert "command B note fine" in report["log"]
+    assert robot.poll() is None
+    stage.clock(2, end="finished")
+    _, said = robot.communicate(timeout=20)
+    assert robot.returncode == 0
+    assert said.count("malformed message on cars/r/clock from simulator") == len(DAMAGED)
+    assert said.count("malformed message on cars/r/robot/A/command/B from B: field") == len(DAMAGED) + len(WRONG)
+
+
+def test_numbers_that_are_none_do_not_travel(stage: Stage) -> None:
+    """[number.finite]"""
+    begin(stage)
+    report = order(stage, 1, "nan")
+    assert report["proposal"] == {"x": 4.0, "y": 4.0}
+    assert (report["speed_mps"], report["direction_rad"]) == (0.0, 0.0)
+    assert sorted(report["state_variables"]) == ["flag", "part", "text", "whole"]
+    assert report["log"][-3:] == [
+        "error: the projected location is not a number; staying",
+        "error: state variable huge is not a finite number; left out",
+        "error: state variable inf is not a finite number; left out",
+    ]
+
+
+def test_a_robot_that_fails_ends_with_its_traceback(stage: Stage) -> None:
+    robot = begin(stage)
+    stage.command(1, "fail")
+    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    _, said = robot.communicate(timeout=20)
+    assert robot.returncode == 1 and "ZeroDivisionError: as it was told" in said and said.endswith("see above\n")
+    stage.until_alive()
+
+
+def test_a_panel_is_shown_to_who_looks(stage: Stage) -> None:
+    begin(stage)
+    shown = stage.heard("robot/A/panel")["widgets"]
+    assert shown[0] == {"widget": "bar", "label": "nothing", "value": 0.0, "min": 0.0, "max": 1.0}
+    assert shown[1]["widget"] == "text"
+
+
+def test_several_robots_share_a_session(stage: Stage) -> None:
+    stage.robot("--name", "B", "--name", "A")
+    stage.until_alive("A", "B")
+    assert len({request["instance"] for request in stage.joins}) == 1
+    stage.tick(0, A=NAMED, B=NAMED)
+    assert stage.heard("robot/B/report")["tick"] == 0
+    # What one asks the other needs no network.
+    stage.command(1, "ask B", sender="C")
+    report = stage.tick(1, A={"commands": [{"from": "C", "seq": 1}]})
+    assert "B is CALM" in report["log"]
+    assert stage.heard("robot/B/report")["tick"] == 1
+
+
+def test_a_simulator_that_is_gone_is_waited_for(stage: Stage) -> None:
+    robot = begin(stage, "--gone-patience-s", "0.5")
+    stage.session.close()  # type: ignore[no-untyped-call]
+    _, said = robot.communicate(timeout=20)
+    assert robot.returncode == 1 and said.endswith("error: the simulator has been gone for 0.5 s\n"), said
+
+
+def test_where_nobody_is_it_says_what_to_do(stage: Stage) -> None:
+    robot = stage.robot("--run", "another", CARS_PATIENCE_S="0.3")
+    _, said = robot.communicate(timeout=20)
+    assert robot.returncode == 1 and "no simulator of run another answers at tcp/" in said
+    robot = stage.robot("--connect", "tcp/127.0.0.1:1", CARS_PATIENCE_S="0.3")
+    _, said = robot.communicate(timeout=20)
+    assert robot.returncode == 1 and "cannot reach the simulator at tcp/127.0.0.1:1" in said and ".rs" not in said

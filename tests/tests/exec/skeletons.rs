@@ -1,0 +1,223 @@
+//! `cars new robot`: what it makes is built and launched as its README says.
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use system_tests::processes::Running;
+use system_tests::{Lab, assert_same, programs, root};
+
+use crate::stage::{nobody_is_left, ready};
+
+/// A new robot in a folder of its own.
+struct Robot {
+    lab: Lab,
+    folder: PathBuf,
+}
+
+impl Robot {
+    fn new(language: &str) -> Self {
+        let lab = Lab::new();
+        let text = lab.ok(&["new", "robot", "Rosie", "--lang", language, "--cars", root().to_str().unwrap()]);
+        assert!(text.contains("launch.toml"), "it says what comes next: {text}");
+        let folder = lab.out().join("Rosie");
+        Self { lab, folder }
+    }
+
+    /// Starts a launch of it.
+    fn start(&self, run: &str, more: &[&str]) -> Running {
+        let file = self.folder.join("launch.toml");
+        let mut command = self.lab.cars(&[
+            "launch",
+            file.to_str().unwrap(),
+            "--no-console",
+            "--speed",
+            "max",
+            "--run",
+            run,
+        ]);
+        command.args(more).env("PYTHONPATH", python_path());
+        Running::start(command, run, self.lab.out().join(run))
+    }
+
+    fn cars_log(&self, run: &str) -> String {
+        std::fs::read_to_string(self.lab.file(run, "cars.log")).unwrap()
+    }
+
+    /// It moves and feels, twice in the same way; it obeys; and it starts over. Returns its events.
+    fn plays(&self, language: &str) -> Vec<u8> {
+        let runs = ["first", "second"].map(|which| format!("new-{language}-{which}"));
+        for run in &runs {
+            self.start(run, &[]).finish();
+            nobody_is_left(run);
+        }
+        let [first, second] = runs.each_ref().map(|run| self.lab.bytes(run));
+        assert_same(("the first launch", &first), ("the second launch", &second));
+        let log = self.cars_log(&runs[0]);
+        for part in ["behavior STROLL", "emotion HAPPY -> FRUSTRATED", "emotion FRUSTRATED -> HAPPY"] {
+            assert!(log.contains(part), "{language}: no {part:?} in\n{log}");
+        }
+        let recording = std::fs::read_to_string(self.lab.file(&runs[0], "recording.jsonl")).unwrap();
+        assert!(recording.lines().any(|line| line.contains("\"x\":12.192")), "it reaches the end of its way");
+        self.obeys(language);
+        first
+    }
+
+    fn obeys(&self, language: &str) {
+        let run = format!("new-{language}-orders");
+        let mut launch = self.start(&run, &["--paused"]);
+        let cars = |args: &[&str]| self.lab.cars(&[args, &["--run", &run]].concat()).output().unwrap();
+        ready(&self.lab, &run);
+        for order in ["rest", r#"say "boo" \ backwards"#] {
+            assert!(cars(&["command", "Rosie", order]).status.success());
+        }
+        assert!(cars(&["ctl", "step", "9"]).status.success());
+        assert!(cars(&["command", "Rosie", "stroll"]).status.success());
+        assert!(cars(&["ctl", "step", "9"]).status.success());
+        let log = self.cars_log(&run);
+        for part in [
+            "obeys operator: rest",
+            "behavior STROLL -> REST",
+            "does not know how to say \"boo\" \\ backwards",
+            "obeys operator: stroll",
+            "behavior REST -> STROLL",
+        ] {
+            assert!(log.contains(part), "{language}: no {part:?} in\n{log}");
+        }
+        // The next epoch is that of a fresh start.
+        assert!(cars(&["ctl", "init"]).status.success());
+        assert!(cars(&["ctl", "start"]).status.success());
+        launch.finish();
+        nobody_is_left(&run);
+        let digest = |run: &str| self.lab.summary(run)["digest"].clone();
+        assert_eq!(digest(&run), digest(&format!("new-{language}-first")), "{language}");
+    }
+}
+
+/// Where Python finds the SDK: that of the project first.
+fn python_path() -> OsString {
+    let own = root().join("sdk/python/src");
+    let others = std::env::var_os("PYTHONPATH").unwrap_or_default();
+    std::env::join_paths([own].into_iter().chain(std::env::split_paths(&others))).unwrap()
+}
+
+/// Whether a tool is there; where it is not, that is said aloud, and in CI it is a failure.
+fn has(tool: &str, test: &mut Command, help: &str) -> bool {
+    let found = test.stdin(Stdio::null()).output().is_ok_and(|output| output.status.success());
+    if !found {
+        let text = format!("the test of a new robot in {tool} is skipped: {help}");
+        assert!(std::env::var_os("CI").is_none(), "{text}");
+        // Past the test harness, which keeps what a passing test prints to itself.
+        let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
+    }
+    found
+}
+
+fn build(command: &mut Command) {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// The robot in Rust, built where the project is, so that nothing is compiled twice.
+fn rust() -> Robot {
+    let robot = Robot::new("rust");
+    let target = programs().parent().unwrap();
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(&robot.folder).env("CARGO_TARGET_DIR", target);
+    build(cargo.args(["build", "--quiet", "--offline", "--release"]));
+    let launch = robot.folder.join("launch.toml");
+    let text = std::fs::read_to_string(&launch).unwrap();
+    let program = target.join("release/cars-rosie");
+    assert!(text.contains("\"./target/release/cars-rosie\""), "{text}");
+    let text = text.replace("./target/release/cars-rosie", program.to_str().unwrap());
+    std::fs::write(&launch, text).unwrap();
+    robot
+}
+
+/// As the README of the robot says.
+fn c() -> Robot {
+    let robot = Robot::new("c");
+    let text = std::fs::read_to_string(robot.folder.join("README.md")).unwrap();
+    let line = text.lines().find(|line| line.starts_with("cc ")).unwrap();
+    build(Command::new("sh").args(["-c", &line.replace("cc ", "cc -Werror ")]));
+    robot
+}
+
+#[test]
+fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
+    let rust = rust().plays("rust");
+    let version = |program: &str| {
+        let mut command = Command::new(program);
+        command.arg("--version");
+        command
+    };
+    if has("C", &mut version("cc"), "install a C compiler that is called `cc`") {
+        assert_same(("Rust", &rust), ("C", &c().plays("c")));
+    }
+    if has("Node.js", &mut version("node"), "install Node.js 18 or newer") {
+        assert_same(("Rust", &rust), ("Node.js", &Robot::new("node").plays("node")));
+    }
+    let mut python = Command::new("python3");
+    python.args(["-c", "import cars_robot"]).env("PYTHONPATH", python_path());
+    if has("Python", &mut python, "install what sdk/python needs: pip install ./sdk/python") {
+        assert_same(("Rust", &rust), ("Python", &Robot::new("python").plays("python")));
+    }
+}
+
+#[test]
+fn a_new_robot_in_bash_plays() {
+    let mut bash = Command::new("bash");
+    if has("Bash", bash.arg("--version"), "install Bash 4 or newer") {
+        Robot::new("bash").plays("bash");
+    }
+}
+
+#[test]
+fn nothing_is_overwritten_and_what_is_wrong_is_said() {
+    let robot = Robot::new("c");
+    let source = robot.folder.join("robot.c");
+    std::fs::write(&source, "mine").unwrap();
+    let again = |args: &[&str]| robot.lab.fails(&[&["new", "robot"], args].concat());
+    let (code, text) = again(&["Rosie", "--lang", "c"]);
+    assert!(
+        code == 1 && text.contains("is there already") && text.contains("nothing is overwritten"),
+        "{text}"
+    );
+    assert_eq!(std::fs::read_to_string(&source).unwrap(), "mine");
+    let (_, text) = again(&["../Rosie", "--lang", "c"]);
+    assert!(text.contains("is not a usable name"), "{text}");
+    let (_, text) = again(&["Rita", "--lang", "cobol"]);
+    assert!(text.contains("rust, python, c, bash, node"), "{text}");
+    let (_, text) = again(&["Rita", "--lang", "rust", "--cars", "/"]);
+    assert!(text.contains("whose SDK this robot uses, is not at /") && text.contains("--cars DIR"), "{text}");
+    assert!(!robot.lab.out().join("Rita").exists(), "a robot that cannot be made leaves nothing");
+}
+
+#[test]
+fn whatever_its_name_is_its_files_are_read() {
+    let lab = Lab::new();
+    for (name, language) in
+        [("a.b-C_9", "rust"), ("9", "bash"), ("_", "c"), ("R2-D2", "node"), ("x.y", "python")]
+    {
+        lab.ok(&["new", "robot", name, "--lang", language, "--cars", root().to_str().unwrap()]);
+        let folder = lab.out().join(name);
+        for file in walk(&folder) {
+            let text = std::fs::read_to_string(&file).unwrap();
+            assert!(!text.contains("@NAME@") && !text.contains("@CARS@"), "{}", file.display());
+            let left =
+                text.split('@').skip(1).step_by(2).find(|word| word.chars().all(|c| c.is_ascii_uppercase()));
+            assert_eq!(left, None, "{}", file.display());
+        }
+        let (code, text) = lab.cars_without_out(&["check", folder.join("scenario.toml").to_str().unwrap()]);
+        assert_eq!(code, 0, "{text}");
+    }
+    let manifest = std::fs::read_to_string(lab.out().join("a.b-C_9/Cargo.toml")).unwrap();
+    assert!(manifest.contains("name = \"cars-a-b-c_9\""), "{manifest}");
+}
+
+fn walk(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
+}

@@ -1,0 +1,459 @@
+//! Robots in other languages over their standard input and output (`sdk/stdio`): compiled as their pages say, and launched
+//! as they are shipped.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its subject fails")]
+
+use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+use protocol::random::{Stream, stream, unit};
+use system_tests::{Lab, assert_same, eventually, root};
+
+const C: &str = "sdk/stdio/c/leguin.c";
+const ANY_LANGUAGE: &str = "launch/any_language.toml";
+const MIXED: &str = "launch/mixed.toml";
+
+/// Whether a test cannot run for want of a tool. It says so on a user's machine, and fails where everything must be there.
+fn lacks(tool: &str, is_there: bool, remedy: &str) -> bool {
+    if is_there {
+        return false;
+    }
+    let text = format!("a test of robots in other languages is skipped: there is no {tool}; {remedy}");
+    assert!(std::env::var_os("CI").is_none(), "{text}");
+    // Past the test harness, which keeps what a passing test prints to itself.
+    let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
+    true
+}
+
+fn succeeds(command: &mut Command) -> bool {
+    command.stdin(Stdio::null()).output().is_ok_and(|output| output.status.success())
+}
+
+fn lacks_compiler() -> bool {
+    lacks("C compiler", succeeds(Command::new("cc").arg("--version")), "`apt-get install gcc libc6-dev`")
+}
+
+fn lacks_node() -> bool {
+    let is_there =
+        succeeds(Command::new("node").args(["-e", "if (parseInt(process.versions.node) < 18) throw 0"]));
+    lacks("Node.js", is_there, "install version 18 or later")
+}
+
+fn lacks_typescript() -> bool {
+    lacks("TypeScript", tsc().exists(), "`npm --prefix crates/console/check install`")
+}
+
+fn tsc() -> PathBuf {
+    root().join("crates/console/check/node_modules/.bin/tsc")
+}
+
+/// Runs a command from the project's root; it must succeed.
+fn ok(command: &mut Command) -> Output {
+    let output = command.current_dir(root()).stdin(Stdio::null()).output().unwrap();
+    assert!(output.status.success(), "{command:?}: {}", said(&output));
+    output
+}
+
+fn said(output: &Output) -> String {
+    let [out, err] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    format!("{}\n{out}\n{err}", output.status)
+}
+
+/// The commands that the head of a launch file tells to type before the first launch.
+fn commands_of(launch_file: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(root().join(launch_file)).unwrap();
+    let commands = text.lines().filter_map(|line| line.strip_prefix("#     ")).map(str::to_owned);
+    commands.collect()
+}
+
+/// Leguin in C, compiled with these options.
+fn compiled(lab: &Lab, options: &str) -> PathBuf {
+    let program = lab.out().join("leguin");
+    let mut cc = Command::new("cc");
+    cc.args(options.split_whitespace()).arg("-o").arg(&program).args([C, "-lm"]);
+    ok(&mut cc);
+    program
+}
+
+/// A launch of a scenario in which `program`, or the SDK's own where there is none, is Leguin, and Vonda.
+struct Cast {
+    lab: Lab,
+    scenario: PathBuf,
+    /// The scenario of the launch, and of the run to compare it with.
+    file: String,
+}
+
+impl Cast {
+    fn new(lab: Lab, scenario: &str, has_vonda: bool, leguin: &str) -> Self {
+        let scenario = root().join(scenario);
+        let head = format!("scenario = {:?}\n[console]\nenabled = false\n", scenario.display().to_string());
+        let process = |name: &str, command: &str| {
+            format!("[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n")
+        };
+        let mut text = head + &process("Butler", r#"["cars-butler"]"#) + &process("Leguin", leguin);
+        if has_vonda {
+            text += &process("Vonda", leguin);
+        }
+        let file = lab.write("launch.toml", &text).display().to_string();
+        Self { lab, scenario, file }
+    }
+
+    /// With Leguin in C, compiled with these options.
+    fn in_c(scenario: &str, has_vonda: bool, options: &str) -> Self {
+        let lab = Lab::new();
+        compiled(&lab, options);
+        Self::new(lab, scenario, has_vonda, r#"["cars", "exec", "--", "./leguin"]"#)
+    }
+
+    /// The launch is, byte for byte, the run in one process with the robots in Rust.
+    fn is_the_run_in_rust(&self, more: &[&str]) {
+        let scenario = self.scenario.display().to_string();
+        let mut local = vec!["run", &scenario, "--run", "in-rust"];
+        local.extend(more);
+        self.lab.ok(&local);
+        let mut launch = vec!["launch", &self.file, "--run", "in-c", "--speed", "max"];
+        launch.extend(more);
+        self.lab.ok(&launch);
+        let (in_rust, in_c) = (self.lab.bytes("in-rust"), self.lab.bytes("in-c"));
+        assert_same((&format!("{scenario} {more:?} in Rust"), &in_rust), ("with C", &in_c));
+    }
+}
+
+/// As the page says.
+const PLAIN: &str = "-std=c11 -O2 -ffp-contract=off";
+
+#[test]
+fn leguin_in_c_is_leguin_in_rust_byte_for_byte() {
+    if lacks_compiler() {
+        return;
+    }
+    for (scenario, has_vonda) in [
+        ("configs/hors_doeuvres.toml", false),
+        ("configs/partition.toml", false),
+        ("configs/museum.toml", false),
+        ("configs/three_robots.toml", true),
+    ] {
+        let cast = Cast::in_c(scenario, has_vonda, PLAIN);
+        for seed in ["1", "2", "2002"] {
+            cast.is_the_run_in_rust(&["--seed", seed]);
+            // Nothing would be shown by runs in which she does nothing.
+            let text = String::from_utf8(cast.lab.bytes("in-c")).unwrap();
+            for part in [
+                r#""robot":"Leguin","from":"REFILL","to":"EXCHANGE""#,
+                "jokes: ",
+                r#""blocked","robot":"Leguin""#,
+            ] {
+                assert!(text.contains(part), "{scenario}, seed {seed}: no {part}");
+            }
+        }
+    }
+}
+
+#[test]
+fn her_parameters_and_vonda_mean_the_same_in_c() {
+    if lacks_compiler() {
+        return;
+    }
+    let cast = Cast::in_c("configs/three_robots.toml", true, PLAIN);
+    let shorter = ["--duration", "200 s", "--seed", "5"];
+    for changes in [
+        &["robot.Butler.params.refiller=Vonda"][..],
+        &["robot.Leguin.params.hurry_mult=1.3", "robot.Leguin.params.caution=0.9"],
+        &["robot.Leguin.params.affect=off", "robot.Vonda.params.schematic=off"],
+        // Of somebody who is not there nothing is known: she searches.
+        &["robot.Leguin.params.waiter=Nobody", "robot.Leguin.params.turn_mean_s=2.0"],
+        &[
+            "robot.Leguin.params.sensory_motor=off",
+            "robot.Leguin.params.dynamics.th_concerned=0.3",
+            "tick=0.1s",
+        ],
+        &["network.commands.loss=0.3", "network.queries.loss=0.3", "robot.Leguin.params.block_patience_s=10"],
+    ] {
+        let sets = changes.iter().flat_map(|change| ["--set", change]);
+        let more: Vec<&str> = shorter.into_iter().chain(sets).collect();
+        cast.is_the_run_in_rust(&more);
+    }
+}
+
+#[test]
+fn no_compiler_fuses_her_arithmetic() {
+    if lacks_compiler() {
+        return;
+    }
+    // Where the machine can fuse, this asks for it.
+    Cast::in_c("configs/hors_doeuvres.toml", false, "-O3 -march=native").is_the_run_in_rust(&["--seed", "3"]);
+    let mut sloppy = Command::new("cc");
+    let output = sloppy.current_dir(root()).args(["-Ofast", "-c", "-o", "/dev/null", C]).output().unwrap();
+    assert!(said(&output).contains("doubles must be computed as doubles"), "{}", said(&output));
+}
+
+#[test]
+fn she_starts_over_and_takes_over_in_c_as_in_rust() {
+    if lacks_compiler() {
+        return;
+    }
+    let commands = [(r#"["cars-leguin"]"#, "rust"), (r#"["cars", "exec", "--", "./leguin"]"#, "c")];
+    let [in_rust, in_c] = commands.map(|(command, run)| {
+        let lab = Lab::new();
+        compiled(&lab, PLAIN);
+        let cast = Cast::new(lab, "configs/hors_doeuvres.toml", false, command);
+        let fault = "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"60 s\", for = \"0.1 s\" }]";
+        let args = ["--set", fault, "--duration", "150 s", "--speed", "max", "--seed", "6", "--paused"];
+        let name = format!("over-{run}");
+        let args: Vec<&str> = ["launch", &cast.file].into_iter().chain(args).collect();
+        let mut launch = cast.lab.start(&name, &args);
+        let ctl = |args: &[&str]| {
+            let args: Vec<&str> = ["ctl"].iter().chain(args).chain(&["--run", &name]).copied().collect();
+            cast.lab.cars(&args).output().is_ok_and(|output| output.status.success())
+        };
+        // Into the first epoch, back to the beginning, and through the second one with its crash.
+        eventually("the first ticks", || ctl(&["step", "50"]).then_some(()));
+        eventually("the second epoch", || ctl(&["init"]).then_some(()));
+        eventually("its start", || ctl(&["start"]).then_some(()));
+        launch.finish();
+        cast.lab.bytes(&name)
+    });
+    assert_same(("in Rust", &in_rust), ("in C", &in_c));
+    let text = String::from_utf8(in_c).unwrap();
+    for part in ["is back, and takes over where the last one was lost", r#""generation":2"#] {
+        assert!(text.contains(part), "no {part}");
+    }
+}
+
+/// What may be told to Leguin; every question of hers has an answer here.
+const TOLD: &[&str] = &[
+    r#"{"type":"init","protocol":1,"run":"r","name":"Leguin","generation":1,"epoch":1,"tick":0,"seed":42,"stream":"robot/Leguin","tick_s":0.5,"field_m":[15.24,15.24],"body_m":0.6096,"sensing_range_m":1.8288,"location":{"x":1.2192,"y":1.2192},"roster":["Butler","Leguin"],"parameters":{"waiter":"Butler","affect":"on","dynamics":{"label_cuts":[0.2,0.4,0.6,0.8]}}}"#,
+    r#"{"type":"tick","tick":1,"location":{"x":1.2192,"y":1.2192},"commands":[{"from":"Butler","performative":"achieve","command":"refill"},{"from":"Bot","performative":"achieve","command":"\u00e9\ud83d\ude00 \"\\\u0007\u0000\n 0123456789012345678901234567890123456789012345678901234567890"}],"sensed":[{"name":"Vonda","location":{"x":1.0,"y":2e0}}]}"#,
+    r#"{"type":"answer","value":{"epoch":1,"tick":0,"location":{"x":7.62,"y":7.62},"state_variables":{"need":true,"refiller":"Leguin"}}}"#,
+    r#"{"type":"tick","tick":2,"location":{"x":1.2192,"y":1.2192}}"#,
+    r#"{"type":"answer","error":"unreachable"}"#,
+    r#"{"type":"tick","tick":3,"location":{"x":1.2192,"y":1.2192},"blocked":true}"#,
+    r#"{"type":"answer","error":"unreachable"}"#,
+    r#"{"type":"answer","value":{"bodies":[{"kind":"guest","location":{"x":1.5,"y":1.5}}]}}"#,
+    r#"{"type":"end","reason":"finished"}"#,
+];
+
+/// The session with a few bytes changed, doubled, cut out, or replaced by what parsers stumble over.
+fn damaged(chance: &mut Stream) -> Vec<u8> {
+    const STUMBLING: &[&str] = &[
+        "null",
+        "1e999",
+        "-",
+        "\\ud800",
+        "\n",
+        "\0",
+        "{",
+        "]",
+        "\"",
+        "[[[[[[[[[[[[",
+        "99999999999999999999",
+    ];
+    let mut session = TOLD.join("\n").into_bytes();
+    let mut below = |count: usize| (unit(chance) * count as f64) as usize;
+    for _ in 0..1 + below(4) {
+        let (at, len) = (below(session.len()), below(12));
+        let end = (at + len).min(session.len());
+        match below(5) {
+            0 => session[at] = u8::try_from(below(256)).unwrap(),
+            1 => drop(session.drain(at..end)),
+            2 => drop(session.splice(at..at, session[at..end].to_vec())),
+            3 => drop(session.splice(at..at, STUMBLING[below(STUMBLING.len())].bytes())),
+            _ => drop(session.splice(at..at, vec![b'['; 100 * len])),
+        }
+        session.push(b'\n');
+    }
+    session
+}
+
+/// What becomes of a program that is told all of this at once.
+fn told(program: &Path, session: &[u8]) -> Output {
+    let mut command = Command::new(program);
+    command.env("ASAN_OPTIONS", "exitcode=99").env("UBSAN_OPTIONS", "halt_on_error=1:exitcode=99");
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let session = session.to_vec();
+    // It may end before it has read everything.
+    let writer = std::thread::spawn(move || input.write_all(&session).is_ok());
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap();
+    output
+}
+
+#[test]
+fn nothing_that_she_is_told_breaks_leguin_in_c() {
+    const STRICT: &str = "-std=c11 -O1 -g -Wall -Wextra -Wshadow -Wconversion -pedantic -Werror \
+                          -fsanitize=address,undefined -fno-sanitize-recover=all";
+    if lacks_compiler() {
+        return;
+    }
+    let lab = Lab::new();
+    let empty = lab.write("empty.c", "int main(void) { return 0; }\n");
+    let program = lab.out().join("empty");
+    let sanitizes =
+        succeeds(Command::new("cc").args(["-fsanitize=address,undefined", "-o"]).args([&program, &empty]));
+    if lacks("C compiler with sanitizers", sanitizes, "`apt-get install gcc`") {
+        return;
+    }
+    let cast = Cast::in_c("configs/three_robots.toml", true, STRICT);
+    cast.is_the_run_in_rust(&["--seed", "4", "--duration", "120 s"]);
+
+    let program = cast.lab.out().join("leguin");
+    let whole = told(&program, TOLD.join("\n").as_bytes());
+    assert!(whole.status.success(), "{}", said(&whole));
+    assert_eq!(String::from_utf8_lossy(&whole.stdout).matches("\"done\"").count(), 4, "{}", said(&whole));
+    let mut chance = stream(1, "damage");
+    let mut refused = 0;
+    for _ in 0..300 {
+        let session = damaged(&mut chance);
+        let output = told(&program, &session);
+        let (status, text) = (output.status.code(), String::from_utf8_lossy(&output.stderr));
+        let is_refusal = status == Some(1) && text.starts_with("leguin: ") && text.lines().count() == 1;
+        assert!(
+            status == Some(0) || is_refusal,
+            "{}\nafter\n{}",
+            said(&output),
+            String::from_utf8_lossy(&session)
+        );
+        refused += usize::from(is_refusal);
+    }
+    assert!(refused > 100, "only {refused} of 300 damaged sessions were refused");
+}
+
+#[test]
+fn the_page_makes_a_robot_from_nothing() {
+    if lacks("Python", succeeds(Command::new("python3").arg("--version")), "`apt-get install python3`") {
+        return;
+    }
+    let page = std::fs::read_to_string(root().join("sdk/stdio/README.md")).unwrap();
+    let mut blocks = page.split("\n```").skip(1).step_by(2);
+    let [program, scenario, launch] = ["python\n", "toml\n", "toml\n"].map(|language| {
+        let block = blocks.next().and_then(|block| block.strip_prefix(language));
+        block.unwrap_or_else(|| panic!("no block of {language}"))
+    });
+    let lab = Lab::new();
+    let program = lab.write("walker.py", &format!("{program}\n"));
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    lab.write("walk.toml", scenario);
+    let launch = lab.write("walk-launch.toml", launch).display().to_string();
+    lab.ok(&["launch", &launch, "--no-console", "--speed", "max", "--duration", "60 s", "--run", "page"]);
+    // Half a meter a second, but where a guest is in the way.
+    let way_m = way_m(&lab, "page", "Walker");
+    assert!((10.0..=30.0).contains(&way_m), "it walked {way_m} m in a minute");
+    assert!(String::from_utf8(lab.bytes("page")).unwrap().contains("\"to\":\"CALM\""));
+}
+
+/// Compiles the robot in TypeScript as the launch file says; `npx` would fetch the compiler that the console's check has.
+fn companion_is_compiled() {
+    static DONE: OnceLock<()> = OnceLock::new();
+    DONE.get_or_init(|| {
+        let [command] = commands_of(ANY_LANGUAGE).try_into().unwrap();
+        let args = command.strip_prefix("npx -p typescript tsc ").unwrap();
+        ok(Command::new(tsc()).args(args.split_whitespace()));
+    });
+}
+
+#[test]
+fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
+    if lacks_node() || lacks_typescript() {
+        return;
+    }
+    companion_is_compiled();
+    let lab = Lab::new();
+    for run in ["any-first", "any-second"] {
+        lab.start(run, &["launch", ANY_LANGUAGE, "--no-console", "--speed", "max"]).finish();
+    }
+    let [first, second] = ["any-first", "any-second"].map(|run| lab.bytes(run));
+    assert_same(("the first launch", &first), ("the second launch", &second));
+
+    let events = lab.events("any-first");
+    for (robot, felt) in [("Nora", "LONELY"), ("Tove", "WORRIED"), ("Bruno", "GRUMPY")] {
+        let changes = |kind: &str| {
+            let own = events.iter().filter(|event| event["event"] == kind && event["robot"] == robot);
+            own.filter(|event| event["from"].is_string())
+                .map(|event| event["to"].as_str().unwrap())
+                .collect::<Vec<_>>()
+        };
+        assert!(changes("emotion").contains(&felt), "{robot} never was {felt}: {:?}", changes("emotion"));
+        assert!(!changes("behavior").is_empty(), "{robot} did the same all the time");
+        let way_m = way_m(&lab, "any-first", robot);
+        assert!(way_m > 20.0, "{robot} moved by {way_m} m in 300 s");
+    }
+    // They speak with one another.
+    for part in [r#""command_sent","from":"Nora","to":"Tove""#, "nods to Nora"] {
+        assert!(String::from_utf8_lossy(&first).contains(part), "no {part}");
+    }
+}
+
+/// How far a robot has gone in a run.
+fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
+    let text = std::fs::read_to_string(lab.file(run, "recording.jsonl")).unwrap();
+    let places: Vec<(f64, f64)> = text
+        .lines()
+        .filter_map(|line| {
+            let tick: serde_json::Value = serde_json::from_str(line).unwrap();
+            let own = tick["robots"].as_array()?.iter().find(|other| other["name"] == robot)?;
+            Some((own["location"]["x"].as_f64()?, own["location"]["y"].as_f64()?))
+        })
+        .collect();
+    places.windows(2).map(|pair| (pair[1].0 - pair[0].0).abs() + (pair[1].1 - pair[0].1).abs()).sum()
+}
+
+#[test]
+fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
+    if lacks_compiler() || lacks_node() || lacks_typescript() {
+        return;
+    }
+    companion_is_compiled();
+    let lab = Lab::new();
+    let stdio = root().join("sdk/stdio");
+    let programs = [
+        compiled(&lab, PLAIN),
+        stdio.join("node/greeter.mjs"),
+        stdio.join("typescript/companion"),
+        stdio.join("bash/stroller.sh"),
+    ];
+    for program in programs {
+        let end = told(&program, b"{\"type\":\"end\",\"reason\":\"finished\"}\n");
+        assert!(end.status.success() && end.stdout.is_empty(), "{}: {}", program.display(), said(&end));
+        let silence = told(&program, b"");
+        assert!(
+            silence.status.success() && silence.stdout.is_empty(),
+            "{}: {}",
+            program.display(),
+            said(&silence)
+        );
+        let rubbish = told(&program, b"rubbish\n");
+        assert_eq!(rubbish.status.code(), Some(1), "{}: {}", program.display(), said(&rubbish));
+        assert!(!rubbish.stderr.is_empty(), "{} says nothing about rubbish", program.display());
+    }
+}
+
+#[test]
+fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
+    let python = Command::new("python3").args(["-c", "import zenoh"]).output();
+    let has_zenoh = python.is_ok_and(|output| output.status.success());
+    if lacks_compiler() || lacks("Python with zenoh", has_zenoh, "`pip install ./sdk/python`") {
+        return;
+    }
+    let compile = commands_of(MIXED).into_iter().find(|command| command.starts_with("cc "));
+    ok(Command::new("sh").args(["-c", &compile.unwrap()]));
+    let lab = Lab::new();
+    for (run, more) in [("mixed", &[][..]), ("mixed-vonda", &["--set", "robot.Butler.params.refiller=Vonda"])]
+    {
+        let alone = format!("{run}-rust");
+        let local: Vec<&str> = ["run", MIXED, "--run", &alone].iter().chain(more).copied().collect();
+        lab.ok(&local);
+        let launch = ["launch", MIXED, "--run", run, "--no-console", "--speed", "max"];
+        let mut launch = lab.cars(&launch.iter().chain(more).copied().collect::<Vec<_>>());
+        // As it is here, installed or not.
+        launch.env("PYTHONPATH", root().join("sdk/python/src")).env("PYTHONDONTWRITEBYTECODE", "1");
+        ok(&mut launch);
+        assert_same(("all in Rust", &lab.bytes(&alone)), ("in three languages", &lab.bytes(run)));
+        let end = &lab.events(run).pop().unwrap();
+        assert_eq!((&end["event"], &end["tick"]), (&"end".into(), &1200.into()), "{end}");
+    }
+}

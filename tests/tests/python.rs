@@ -1,0 +1,112 @@
+//! Robots in Python: the tests of `sdk/python`, with the programs of this build; and the random streams of both languages,
+//! side by side.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::io::Write;
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
+use protocol::random::{MAX_SEED, stream, unit};
+use system_tests::{Lab, programs, root};
+
+/// Longest that the tests in Python may take, all together.
+const PATIENCE: Duration = Duration::from_secs(540);
+
+/// A Python that knows the package of this checkout.
+fn python() -> Command {
+    let mut python = Command::new("python3");
+    python.current_dir(root()).env("PYTHONPATH", package()).env("PYTHONDONTWRITEBYTECODE", "1");
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARS_")) {
+        python.env_remove(name);
+    }
+    python.stdin(Stdio::null());
+    python
+}
+
+fn package() -> PathBuf {
+    root().join("sdk/python/src")
+}
+
+/// Whether there is a Python with all that is needed. If not, says so past the test harness, which keeps what a passing
+/// test prints to itself; and fails where everything must be tested.
+fn is_equipped() -> bool {
+    let missing = match python().args(["-c", "import zenoh, pytest, mypy"]).output() {
+        Ok(output) if output.status.success() => return true,
+        Ok(_) => "python3 lacks eclipse-zenoh, pytest or mypy; `pip install './sdk/python[test]'`".to_owned(),
+        Err(error) => format!("python3 does not run ({error}); install Python 3.10 or later"),
+    };
+    let text = format!("the tests of the SDK in Python are skipped: {missing}");
+    assert!(std::env::var_os("CI").is_none(), "{text}");
+    let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
+    false
+}
+
+#[test]
+fn the_package_passes_its_tests() {
+    if !is_equipped() {
+        return;
+    }
+    let lab = Lab::new();
+    let printed = lab.out().join("pytest.txt");
+    let file = std::fs::File::create(&printed).unwrap();
+    let mut pytest = python();
+    pytest.current_dir(root().join("sdk/python")).env("CARS_BIN_DIR", programs());
+    pytest.args(["-m", "pytest", "-v", "-ra", "--tb=short", "-p", "no:cacheprovider"]);
+    pytest.arg("--basetemp").arg(lab.out().join("pytest"));
+    // A group of its own, so that nothing that its tests have started outlives it.
+    let mut pytest = pytest.process_group(0).stdout(file.try_clone().unwrap()).stderr(file).spawn().unwrap();
+    let group = Pid::from_raw(i32::try_from(pytest.id()).unwrap());
+    let begun = Instant::now();
+    let status = loop {
+        if let Some(status) = pytest.try_wait().unwrap() {
+            break Some(status);
+        }
+        if begun.elapsed() > PATIENCE {
+            killpg(group, Signal::SIGKILL).unwrap();
+            pytest.wait().unwrap();
+            break None;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    println!("{}", std::fs::read_to_string(&printed).unwrap_or_default());
+    let status = status.unwrap_or_else(|| panic!("not done after {PATIENCE:?}"));
+    assert!(status.success(), "pytest: {status}");
+}
+
+/// Draws of many streams, as a program in Python prints them.
+const DRAWS: &str = "
+import sys
+from cars_robot import stream
+for line in sys.argv[1:]:
+    seed, name = line.split(' ', 1)
+    own = stream(int(seed), name)
+    print(*(own.unit() for _ in range(100)))
+";
+
+#[test]
+fn streams_draw_the_same_numbers() {
+    if !is_equipped() {
+        return;
+    }
+    let names = ["guests", "robot/Butler", "robot/Leguin#2", "", "caf\u{e9}"];
+    let seeds = [0, 1, 42, 2002, MAX_SEED, u64::MAX];
+    let streams: Vec<(u64, &str)> =
+        seeds.into_iter().flat_map(|seed| names.map(|name| (seed, name))).collect();
+    let arguments = streams.iter().map(|(seed, name)| format!("{seed} {name}"));
+    let output = python().args(["-c", DRAWS]).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(printed.lines().count(), streams.len());
+    for ((seed, name), line) in streams.into_iter().zip(printed.lines()) {
+        let mut own = stream(seed, name);
+        // Numbers are written so that they read back to the last bit.
+        let found: Vec<f64> = line.split(' ').map(|unit| unit.parse().unwrap()).collect();
+        let drawn: Vec<f64> = (0..100).map(|_| unit(&mut own)).collect();
+        assert_eq!(found, drawn, "seed {seed}, stream {name}");
+    }
+}
