@@ -1,6 +1,6 @@
 //! `docs/protocol.md` says what the code does: keys, limits, times, variables, examples, random streams, links.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its subject fails")]
 
 use std::collections::BTreeSet;
 

@@ -146,7 +146,7 @@ impl Stage {
 
     /// Files what has been said since the last time.
     fn write(&mut self) {
-        self.transcript.add(self.network.overhear());
+        self.transcript.add(&self.network.overhear());
     }
 
     /// Waits for tick 0 of an epoch.
@@ -183,7 +183,7 @@ impl Stage {
             let is_report = |one: &Overheard| matches!(one, Overheard::Put { key, .. } if *key == report);
             heard.iter().any(is_report).then_some(())
         });
-        self.transcript.add(heard);
+        self.transcript.add(&heard);
     }
 
     /// Asks the robot, and files what it says.

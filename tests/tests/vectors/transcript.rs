@@ -76,7 +76,7 @@ impl Transcript {
     }
 
     /// The lines of a tick, or of what happened between two.
-    pub(super) fn add(&mut self, heard: Vec<Overheard>) {
+    pub(super) fn add(&mut self, heard: &[Overheard]) {
         let clock = heard.iter().find_map(|heard| self.clock(heard));
         let mut placed: Vec<(Place, Line)> = Vec::new();
         let mut states = Vec::new();
