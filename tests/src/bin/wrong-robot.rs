@@ -89,7 +89,7 @@ impl Shown {
 
     fn judge(&self, board: &mut Board, question: Question) {
         let number = |name: &str| question.parameter(name).map(str::parse::<u64>);
-        if matches!(number("tick"), Some(Err(_))) && self.wrong.is("query.unknown") {
+        if matches!(number("epoch"), Some(Err(_))) && self.wrong.is("query.unknown") {
             std::process::exit(1);
         }
         let (Ok(tick), Ok(epoch)) = (number("tick").transpose(), number("epoch").transpose()) else {

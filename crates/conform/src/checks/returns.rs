@@ -111,6 +111,10 @@ pub(super) fn numbers(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
 /// The stream that a welcome names decides, together with the seed, what is drawn. Returns whether the robot's moves show
 /// any chance at all. Each welcome is that of a further epoch, so that one process does for all.
 fn chance(kit: &Kit) -> Result<bool, Failure> {
+    // Of a robot that does not repeat itself nothing can be compared.
+    if kit.is_deterministic.get() == Some(&false) {
+        return Ok(false);
+    }
     let mut stage = seated(kit, Options::default())?;
     let mut welcome = stage.welcome();
     let (seed, stream) = (welcome.seed, welcome.stream.clone());
