@@ -59,18 +59,21 @@ fn failed(report: &Report) -> Vec<String> {
     report.failed().map(|(rule, failure)| format!("{}: {failure:?}", rule.name)).collect()
 }
 
+fn conforms(what: &str, more: &[&str], command: &[&str]) {
+    let output = cars(more, command);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{what}: {text}\n{}", String::from_utf8_lossy(&output.stderr));
+    let is_ok = |line: &&str| line.starts_with("ok ");
+    assert_eq!(text.lines().filter(is_ok).count(), RULES.len(), "{what}: {text}");
+}
+
 #[test]
 fn the_robots_of_the_project_conform() {
-    for (what, more, command) in ROBOTS {
-        let output = cars(more, command);
-        let text = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success(), "{what}: {text}\n{}", String::from_utf8_lossy(&output.stderr));
-        assert_eq!(
-            text.lines().filter(|line| line.starts_with("ok ")).count(),
-            RULES.len(),
-            "{what}: {text}"
-        );
-    }
+    std::thread::scope(|scope| {
+        for (what, more, command) in ROBOTS {
+            scope.spawn(move || conforms(what, more, command));
+        }
+    });
 }
 
 #[test]

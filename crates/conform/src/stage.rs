@@ -239,6 +239,11 @@ impl<'k> Stage<'k> {
         }
     }
 
+    /// Files what is here already.
+    pub(crate) fn drain(&mut self) {
+        while self.pump(Duration::ZERO) {}
+    }
+
     /// Files what comes within a time, for what must not come.
     pub(crate) fn settle(&mut self, time: Duration) {
         let deadline = Instant::now() + time;

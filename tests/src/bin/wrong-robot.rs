@@ -70,11 +70,11 @@ struct Board {
 }
 
 impl Shown {
-    fn show(&self, state: PublicState) {
+    /// Shows a further state, and forgets what nobody asks for any more.
+    fn show(&self, state: PublicState, kept: usize) {
         let mut board = self.board.lock().unwrap_or_else(PoisonError::into_inner);
         board.states.retain(|old| old.epoch == state.epoch && old.tick < state.tick);
         board.states.push(state);
-        let kept = if self.wrong.is("query.tick") { 1 } else { 2 };
         while board.states.len() > kept {
             board.states.remove(0);
         }
@@ -89,7 +89,7 @@ impl Shown {
 
     fn judge(&self, board: &mut Board, question: Question) {
         let number = |name: &str| question.parameter(name).map(str::parse::<u64>);
-        if matches!(number("tick"), Some(Err(_))) && self.wrong.is("query.unknown") {
+        if matches!(number("epoch"), Some(Err(_))) && self.wrong.is("query.unknown") {
             std::process::exit(1);
         }
         let (Ok(tick), Ok(epoch)) = (number("tick").transpose(), number("epoch").transpose()) else {
@@ -155,19 +155,24 @@ fn main() -> ExitCode {
         arguments.get(at + 1).cloned()
     };
     let wrong = Wrong(after("--wrong").unwrap_or_default());
-    let ended = Robot::join_run(&after("--name").unwrap_or_else(|| "Walker".to_owned()), wrong.clone())
-        .and_then(Robot::run);
-    match ended {
+    let name = after("--name").unwrap_or_else(|| "Walker".to_owned());
+    let robot = match Robot::join_run(&name, wrong.clone()) {
+        Ok(robot) => robot,
+        Err(_) if wrong.is("join.refused") => return ExitCode::SUCCESS,
+        Err(_) if wrong.is("join.refused:mute") => return ExitCode::FAILURE,
+        Err(error) => return failed(&error),
+    };
+    match robot.run() {
         Ok(()) if wrong.is("end.clock") => ExitCode::from(3),
         Ok(()) => ExitCode::SUCCESS,
-        Err(_) if wrong.is("join.refused") => ExitCode::SUCCESS,
-        Err(_) if wrong.is("join.refused:mute") => ExitCode::FAILURE,
         Err(_) if wrong.is("return.replaced:content") => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
+        Err(error) => failed(&error),
     }
+}
+
+fn failed(error: &Failure) -> ExitCode {
+    eprintln!("error: {error}");
+    ExitCode::FAILURE
 }
 
 fn variable(name: &str, default: &str) -> String {
@@ -245,7 +250,7 @@ impl Robot {
         }
         let welcome = join(&bus, &run, &name, patience, &wrong)?;
         let (random, clocks) = (stream(welcome.seed, &welcome.stream), Vec::new());
-        welcome.state_before.iter().chain(&welcome.last_state).for_each(|last| shown.show(last.clone()));
+        welcome.state_before.iter().chain(&welcome.last_state).for_each(|last| shown.show(last.clone(), 2));
         declared.push(bus.token(&keys.alive_robot(&name))?);
         if is_late {
             std::thread::sleep(Duration::from_millis(300));
@@ -427,8 +432,9 @@ impl Robot {
     /// First what others may learn, then the report.
     fn report(&mut self, report: &Report, state: PublicState) -> Result<(), Failure> {
         let is_late = self.wrong.is("tick.state-first");
+        let kept = if self.wrong.is("query.tick") { 1 } else { 2 };
         if !is_late {
-            self.shown.show(state.clone());
+            self.shown.show(state.clone(), kept);
             if !self.wrong.is("tick.state-first:unheard") {
                 self.bus.put(&self.keys.query(&self.name, STATE), encode(&state))?;
             }
@@ -441,7 +447,7 @@ impl Robot {
         if is_late {
             std::thread::sleep(Duration::from_millis(30));
             self.bus.put(&self.keys.query(&self.name, STATE), encode(&state))?;
-            self.shown.show(state);
+            self.shown.show(state, kept);
         }
         Ok(())
     }

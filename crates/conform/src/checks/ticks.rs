@@ -114,20 +114,25 @@ fn check_sent(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Finding
     if !has_sent && stage.seen.commands.is_empty() {
         return findings.skip("command.sent", "the robot sent no command in the usual ticks");
     }
-    findings.settle("command.sent", match_sent(stage, transcript, 0));
+    findings.settle("command.sent", check_seqs(transcript, 0).and_then(|()| match_sent(stage, transcript)));
 }
 
-/// Each command that a report lists was put, each that was put is listed, and the numbers go on from `last_seq`.
-pub(super) fn match_sent(stage: &Stage<'_>, transcript: &Transcript, last_seq: u64) -> Result<(), Failure> {
-    let mut last_seq = last_seq;
-    let mut listed = Vec::new();
-    for Entry { tick, sent } in transcript.iter().flat_map(Entry::of) {
-        if sent.seq != last_seq + 1 || sent.performative != Performative::Achieve {
-            let expected = format!("seq {}, performative achieve, in tick {tick}", last_seq + 1);
+/// What reports list is numbered from `last_seq` on, without a gap.
+pub(super) fn check_seqs(transcript: &Transcript, last_seq: u64) -> Result<(), Failure> {
+    for (seq, Entry { tick, sent }) in (last_seq + 1..).zip(transcript.iter().flat_map(Entry::of)) {
+        if sent.seq != seq || sent.performative != Performative::Achieve {
+            let expected = format!("seq {seq}, performative achieve, in tick {tick}");
             let came = format!("seq {}, performative {}", sent.seq, sent.performative);
             return Err(Failure::new(expected, came));
         }
-        last_seq = sent.seq;
+    }
+    Ok(())
+}
+
+/// Each command that a report lists was put, and each that was put is listed.
+fn match_sent(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure> {
+    let mut listed = Vec::new();
+    for Entry { tick, sent } in transcript.iter().flat_map(Entry::of) {
         let matches = |came: &&crate::stage::Sent| {
             came.command.as_ref().is_ok_and(|command| {
                 came.to == sent.to.as_str()
