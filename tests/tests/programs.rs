@@ -407,6 +407,32 @@ fn robots_over_stdin_and_stdout_keep_the_rules_of_the_protocol() {
     });
 }
 
+/// The robot that was written from `docs/protocol.md` alone.
+#[test]
+fn a_robot_in_perl_draws_and_keeps_the_rules() {
+    let is_there = succeeds(Command::new("perl").args(["-MJSON::PP", "-e1"]));
+    if lacks("Perl with JSON::PP", is_there, "`apt-get install perl`") {
+        return;
+    }
+    let wanderer = root().join("sdk/stdio/perl/wanderer.pl");
+    ok(Command::new(&wanderer).args(["--check", "docs/vectors/streams.json"]));
+    let lab = Lab::new();
+    let scenario = "[[robot]]\nname = \"Wanda\"\nat = [\"25 ft\", \"25 ft\"]\n[[robot]]\nname = \"Wim\"\nat = [\"9 ft\", \"9 ft\"]\n";
+    lab.write("stroll.toml", scenario);
+    let process = |name: &str| {
+        let program = wanderer.display();
+        format!("[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"{program}\"]\n")
+    };
+    let launch = format!("scenario = \"stroll.toml\"\n{}{}", process("Wanda"), process("Wim"));
+    let launch = lab.write("stroll-launch.toml", &launch);
+    for run in ["perl-first", "perl-second"] {
+        lab.ok(&["launch", launch.to_str().unwrap(), "--run", run, "--no-console", "--speed", "max"]);
+    }
+    assert_same(("the first launch", &lab.bytes("perl-first")), ("the second", &lab.bytes("perl-second")));
+    assert!(way_m(&lab, "perl-first", "Wanda") > 20.0);
+    assert_conforms(&launch, "Wanda");
+}
+
 /// How far a robot has gone in a run.
 fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
     let text = std::fs::read_to_string(lab.file(run, "recording.jsonl")).unwrap();
