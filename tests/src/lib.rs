@@ -28,7 +28,7 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ is in the project").to_owned()
 }
 
-/// The folder of the project's programs, built in the profile of this test.
+/// The folder of the project's programs, built in the profile of this test; examples are in `examples` there.
 #[must_use]
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
@@ -37,7 +37,9 @@ pub fn programs() -> &'static Path {
         let own = std::env::current_exe().unwrap();
         let folder = own.parent().and_then(Path::parent).unwrap().to_owned();
         let mut build = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        build.current_dir(root()).args(["build", "--workspace", "--bins", "--quiet"]);
+        // As `cargo test --workspace` has built them: with other targets, dependencies would get other features and be
+        // compiled again.
+        build.current_dir(root()).args(["build", "--workspace", "--tests", "--examples", "--quiet"]);
         // What cargo tells a test about its package would make build scripts that look at it run again, and with them
         // half of the tree be compiled again.
         let is_of_package =

@@ -360,7 +360,6 @@ fn the_page_does_in_a_browser_what_it_should() {
         return;
     }
     let programs = programs();
-    build_helper(programs);
     let mut pytest = Command::new("python3");
     pytest.current_dir(root()).args(["-m", "pytest", "-v", "-rP", "--tb=short", "-p", "no:cacheprovider"]);
     pytest.arg("tests/console").env("CARS_BIN", programs).env("PYTHONDONTWRITEBYTECODE", "1");
@@ -401,14 +400,4 @@ fn missing_tools() -> Option<String> {
         Ok(_) => Some("python3 has no pytest or no playwright; `pip install pytest playwright`".to_owned()),
         Err(error) => Some(format!("python3 does not run ({error}); install Python 3.11 or later")),
     }
-}
-
-/// The helper that says on the bus what no robot would.
-fn build_helper(programs: &Path) {
-    let mut build = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    build.current_dir(root()).args(["build", "--quiet", "-p", "system-tests", "--example", "put"]);
-    if programs.ends_with("release") {
-        build.arg("--release");
-    }
-    assert!(build.status().unwrap().success(), "the helper does not build");
 }

@@ -184,7 +184,7 @@ fn limits_times_and_version_are_those_of_the_code() {
         (
             "robot/src/link.rs",
             "COMMAND_PATIENCE: Duration = Duration::from_secs(10)",
-            "waited for, up to 10 s",
+            "waited for, each up to 10 s",
         ),
         ("robot/src/link.rs", "LOOK_AGAIN: Duration = Duration::from_millis(250)", "once, after 0.25 s"),
         ("robot/src/link.rs", "ASK_AGAIN: Duration = Duration::from_millis(500)", "ask again every 0.5 s"),

@@ -1,8 +1,6 @@
 //! Robots in Python: the tests of `sdk/python`, with the programs of this build; and the random streams of both languages,
 //! side by side.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
