@@ -48,12 +48,16 @@ impl Held {
     }
 
     fn make_room(&mut self) {
-        let most = self.by_sender.iter_mut().max_by_key(|(_, own)| own.len());
-        if let Some((from, own)) = most
-            && own.pop_first().is_some()
-        {
+        let most = self.by_sender.iter().max_by_key(|(_, own)| own.len());
+        let Some(from) = most.map(|(from, _)| from.clone()) else { return };
+        let Some(own) = self.by_sender.get_mut(&from) else { return };
+        if own.pop_first().is_some() {
             self.count -= 1;
             tracing::warn!(%from, "too many commands are waiting; the oldest one is dropped");
+        }
+        // Names are as easily made up as commands: nobody is remembered for nothing.
+        if own.is_empty() {
+            self.by_sender.remove(&from);
         }
     }
 }
@@ -83,6 +87,15 @@ mod tests {
         assert!(held.take(&id("Quiet", 1), 1).is_some());
         assert!(held.take(&id("Flood", 1), 1).is_none());
         assert!(held.take(&id("Flood", 2 * MAX_COMMANDS as u64), 1).is_some());
+    }
+
+    #[test]
+    fn who_floods_under_many_names_is_forgotten() {
+        let mut held = Held::default();
+        for sender in 0..MAX_COMMANDS + 500 {
+            held.hold(id(&format!("Flood{sender}"), 1).from, command(1, 1));
+        }
+        assert_eq!((held.count, held.by_sender.len()), (MAX_COMMANDS, MAX_COMMANDS));
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
@@ -32,6 +32,8 @@ enum Blow {
 /// The link of a robot: a proxy that obeys.
 struct Cable {
     proxy: Child,
+    /// What it says; kept, because a program that nobody listens to ends.
+    _said: BufReader<ChildStdout>,
     endpoint: String,
     /// When it is to be whole again.
     heals: Option<Instant>,
@@ -43,11 +45,11 @@ impl Cable {
         let mut command = Command::new(programs().join("cars"));
         command.args(["net", "proxy", "--listen", "tcp/127.0.0.1:0", "--to", &to]);
         let mut proxy = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
-        let mut line = String::new();
-        BufReader::new(proxy.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let (mut line, mut said) = (String::new(), BufReader::new(proxy.stdout.take().unwrap()));
+        said.read_line(&mut line).unwrap();
         let address = line.strip_prefix("listening at ").and_then(|rest| rest.split(',').next()).unwrap();
         let endpoint = format!("tcp/{address}");
-        Self { proxy, endpoint, heals: None }
+        Self { proxy, _said: said, endpoint, heals: None }
     }
 
     fn say(&mut self, order: &str) {
@@ -118,6 +120,8 @@ fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) ->
             Blow::Kill => {
                 kills[robot] += 1;
                 send(pid, Signal::SIGKILL);
+                // The next blow is not to strike the one that is dying.
+                eventually("it to be gone", || (named(run, &name) != Some(pid)).then_some(()));
             }
             Blow::Stop(lasting) => {
                 send(pid, Signal::SIGSTOP);
