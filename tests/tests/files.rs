@@ -174,6 +174,8 @@ fn the_program_survives_damaged_files() {
         assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
         let said =
             [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        // Long lines are broken for people.
+        let said = said.replace(|c: char| c.is_whitespace() || c == '│', "");
         for file in &files {
             let name = file.file_name().unwrap().to_str().unwrap();
             assert!(

@@ -40,7 +40,7 @@ fn describe(path: &Path) -> Result<String, FileError> {
         return Ok(content(&Scenario::load(path, &Changes::default())?));
     }
     let file = LaunchFile::load(path)?;
-    let scenario = Scenario::load(&file.scenario, &Changes::default())?;
+    let scenario = file.load_scenario(&Changes::default())?;
     file.check_robots(&scenario)?;
     Ok(format!("{}, {}", count(file.processes.len(), "process", "processes"), content(&scenario)))
 }

@@ -145,7 +145,7 @@ impl Launch {
             (LaunchFile::of_roster(path, source, &scenario), scenario)
         } else {
             let file = LaunchFile::load(path)?;
-            let scenario = Scenario::load(&file.scenario, &changes)?;
+            let scenario = file.load_scenario(&changes)?;
             (file, scenario)
         };
         file.check_robots(&scenario)?;

@@ -1,9 +1,14 @@
 //! Errors in files that people write: file, line, caret, and what to do.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+
+/// Longest file that is read: an endless one must not fill the memory.
+const MAX_FILE_BYTES: u64 = 16 << 20;
 
 /// A file that cannot be used, and where in it the reason stands.
 #[derive(Debug, thiserror::Error)]
@@ -67,6 +72,13 @@ impl FileError {
         format!("line {line}: {reason}")
     }
 
+    /// The same about a file that another one names.
+    #[must_use]
+    pub fn named_by(mut self, name: &str) -> Self {
+        self.message = format!("{}, named by {name}", self.message);
+        self
+    }
+
     /// What to do about it.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
@@ -88,9 +100,16 @@ impl Source {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read.
+    /// [`FileError`] if it cannot be read, or is longer than anybody writes.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|error| FileError::unreadable(path, &error))?;
+        let unreadable = |error: std::io::Error| FileError::unreadable(path, &error);
+        let mut text = String::new();
+        let file = File::open(path).map_err(unreadable)?;
+        file.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(unreadable)?;
+        if text.len() as u64 > MAX_FILE_BYTES {
+            let text = format!("cannot read {}: it is longer than {MAX_FILE_BYTES} bytes", path.display());
+            return Err(FileError::new(text));
+        }
         Ok(Self { name: path.display().to_string(), text })
     }
 

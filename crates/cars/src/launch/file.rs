@@ -10,7 +10,7 @@ use protocol::RobotName;
 use serde::Deserialize;
 use simulator::Scenario;
 use simulator::diagnostic::{FileError, Source};
-use simulator::scenario::parse_speed;
+use simulator::scenario::{Changes, parse_speed};
 use simulator::units::Time;
 use toml::Spanned;
 
@@ -187,6 +187,14 @@ impl LaunchFile {
             console: Some(console(RawConsole::default())),
             processes: scenario.robots.iter().map(process).collect(),
         }
+    }
+
+    /// The scenario, with changes.
+    ///
+    /// # Errors
+    /// [`FileError`] of the scenario file, which also names this one.
+    pub(crate) fn load_scenario(&self, changes: &Changes) -> Result<Scenario, FileError> {
+        Scenario::load(&self.scenario, changes).map_err(|error| error.named_by(&self.source.name))
     }
 
     /// Checks the file against its scenario: every robot is run by exactly one process.

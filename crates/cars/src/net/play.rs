@@ -17,8 +17,8 @@ use nix::unistd::Pid;
 use protocol::endpoint::is_tls;
 use protocol::{RobotName, RunName};
 use serde::Serialize;
+use simulator::RunFolder;
 use simulator::recorder::EVENTS;
-use simulator::{RunFolder, Scenario};
 
 use super::compose::Compose;
 use super::namespaces::Namespaces;
@@ -195,7 +195,7 @@ const WITHOUT_PARTITIONS: &str = "network.partition=[]";
 
 /// The partitions of the scenario, as faults of real links.
 fn partitions(file: &LaunchFile, execution: &ExecutionArgs) -> miette::Result<Plan> {
-    let scenario = Scenario::load(&file.scenario, &execution.changes())?;
+    let scenario = file.load_scenario(&execution.changes())?;
     let Some(speed) = execution.speed.or(file.speed).and_then(|speed| speed.0) else {
         let help = "say --speed 20, for example";
         return Err(miette!(help = help, "as fast as it goes, nobody knows when a partition would come"));

@@ -263,8 +263,8 @@ fn robots(
         }
         let mut parameters = Parameters::new();
         if let Some(file) = &robot.params_from {
-            let file = Source::read(&folder.join(file))?;
-            parameters.extend(to_parameters(&file.parse()?));
+            let read = Source::read(&folder.join(file)).and_then(|file| file.parse());
+            parameters.extend(to_parameters(&read.map_err(|error| error.named_by(&source.name))?));
         }
         parameters.extend(to_parameters(&robot.params));
         let class = robot.class.unwrap_or_else(|| robot.name.as_str().to_owned());
