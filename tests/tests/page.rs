@@ -186,7 +186,11 @@ fn limits_times_and_version_are_those_of_the_code() {
             "COMMAND_PATIENCE: Duration = Duration::from_secs(10)",
             "waited for, each up to 10 s",
         ),
-        ("robot/src/link.rs", "LOOK_AGAIN: Duration = Duration::from_millis(250)", "once, after 0.25 s"),
+        (
+            "robot/src/link.rs",
+            "LOOK_AGAIN: Duration = Duration::from_millis(250)",
+            "once for each wait, after 0.25 s",
+        ),
         ("robot/src/link.rs", "ASK_AGAIN: Duration = Duration::from_millis(500)", "ask again every 0.5 s"),
         ("robot/src/held.rs", "MAX_COMMANDS: usize = 16_384", "Keep 16384 at least"),
         ("robot/src/board.rs", "MAX_EARLY: usize = 1024", "at most 1024 are kept"),
