@@ -36,7 +36,10 @@ fn figure_6(seed: u64) -> Option<Hall> {
 
 fn draw(hall: &Hall) -> String {
     let world = hall.simulation.world();
-    let (width, height) = (world.field().size_m.0 * SCALE, world.field().size_m.1 * SCALE);
+    let (width, height) = (
+        world.field().size_m.0 * SCALE,
+        world.field().size_m.1 * SCALE,
+    );
     let side = world.field().body_m * SCALE;
     let y = |meters: f64| height - meters * SCALE;
     let mut svg = format!(
@@ -83,7 +86,11 @@ fn draw(hall: &Hall) -> String {
         put(line(1.0, 15, &format!("feels {}", hall.emotion(name))));
         put(line(2.0, 15, &format!("does {}", hall.behavior(name))));
         if name == "Butler" {
-            put(line(3.0, 15, &format!("{} treats left", hall.number(name, "treats"))));
+            put(line(
+                3.0,
+                15,
+                &format!("{} treats left", hall.number(name, "treats")),
+            ));
         }
     }
     svg + "</svg>\n"

@@ -10,10 +10,18 @@ use protocol::bus::{Bus, Role};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [connect, key] = arguments.as_slice() else { return Err("put ENDPOINT KEY < MESSAGE".into()) };
+    let [connect, key] = arguments.as_slice() else {
+        return Err("put ENDPOINT KEY < MESSAGE".into());
+    };
     let mut message = Vec::new();
     std::io::stdin().read_to_end(&mut message)?;
-    let bus = Bus::open(&Role::Client { connect: connect.clone(), patience: Duration::from_secs(5) }, None)?;
+    let bus = Bus::open(
+        &Role::Client {
+            connect: connect.clone(),
+            patience: Duration::from_secs(5),
+        },
+        None,
+    )?;
     bus.put(key, message)?;
     bus.close();
     Ok(())

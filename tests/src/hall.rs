@@ -22,16 +22,28 @@ struct Robots(LocalHost);
 impl Barrier for Robots {
     type Interrupt = RobotError;
     fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
-        let reports = self.0.exchange(&clock, &mut |name| simulation.percept(name))?;
-        Ok(Exchange { reports, membership: Vec::new() })
+        let reports = self
+            .0
+            .exchange(&clock, &mut |name| simulation.percept(name))?;
+        Ok(Exchange {
+            reports,
+            membership: Vec::new(),
+        })
     }
 }
 
 /// A shipped scenario with changes.
 #[must_use]
 pub fn scenario(file: &str, seed: u64, set: &[&str]) -> Scenario {
-    let set = set.iter().map(|change| change.parse().expect("a legal change")).collect();
-    let changes = Changes { seed: Some(seed), duration_s: None, set };
+    let set = set
+        .iter()
+        .map(|change| change.parse().expect("a legal change"))
+        .collect();
+    let changes = Changes {
+        seed: Some(seed),
+        duration_s: None,
+        set,
+    };
     let file = root().join(Path::new(file));
     Scenario::load(&file, &changes).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
 }
@@ -44,16 +56,26 @@ impl Hall {
         let mut simulation = Simulation::new(scenario, 1).expect("the hall can be placed");
         let seats = simulation.scenario().robots.iter().map(|(name, spec)| {
             let robot = robots::make(&spec.class).expect("a shipped class");
-            (robot, simulation.welcome(&run, name, 1).expect("it is of the roster"))
+            (
+                robot,
+                simulation
+                    .welcome(&run, name, 1)
+                    .expect("it is of the roster"),
+            )
         });
         let mut robots = Robots(LocalHost::new(seats.collect()));
-        simulation.init(&mut robots).expect("the parameters are good");
+        simulation
+            .init(&mut robots)
+            .expect("the parameters are good");
         Self { simulation, robots }
     }
 
     /// One tick; returns what happened.
     pub fn step(&mut self) -> Vec<Event> {
-        self.simulation.step(&mut self.robots).expect("only tick 0 can fail").events
+        self.simulation
+            .step(&mut self.robots)
+            .expect("only tick 0 can fail")
+            .events
     }
 
     /// Simulated time, seconds.
@@ -65,27 +87,42 @@ impl Hall {
     /// Where a robot is.
     #[must_use]
     pub fn at(&self, robot: &str) -> Point {
-        self.simulation.location(&name(robot)).expect("it is of the roster")
+        self.simulation
+            .location(&name(robot))
+            .expect("it is of the roster")
     }
 
     /// A robot's emotion.
     #[must_use]
     pub fn emotion(&self, robot: &str) -> String {
-        self.simulation.report(&name(robot)).map(|report| report.emotion_state.clone()).unwrap_or_default()
+        self.simulation
+            .report(&name(robot))
+            .map(|report| report.emotion_state.clone())
+            .unwrap_or_default()
     }
 
     /// A robot's behavior.
     #[must_use]
     pub fn behavior(&self, robot: &str) -> String {
-        self.simulation.report(&name(robot)).map(|report| report.behavior_state.clone()).unwrap_or_default()
+        self.simulation
+            .report(&name(robot))
+            .map(|report| report.behavior_state.clone())
+            .unwrap_or_default()
     }
 
     /// A number that a robot publishes.
     #[must_use]
     pub fn number(&self, robot: &str, variable: &str) -> f64 {
-        let variables = self.simulation.state_variables(&name(robot)).expect("it has reported");
-        let value = variables.get(variable).unwrap_or_else(|| panic!("{robot} does not publish {variable}"));
-        value.as_f64().unwrap_or_else(|| panic!("{variable} of {robot} is no number"))
+        let variables = self
+            .simulation
+            .state_variables(&name(robot))
+            .expect("it has reported");
+        let value = variables
+            .get(variable)
+            .unwrap_or_else(|| panic!("{robot} does not publish {variable}"));
+        value
+            .as_f64()
+            .unwrap_or_else(|| panic!("{variable} of {robot} is no number"))
     }
 }
 

@@ -25,7 +25,10 @@ pub const PATIENCE: Duration = Duration::from_secs(90);
 /// Root of the project.
 #[must_use]
 pub fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ is in the project").to_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("tests/ is in the project")
+        .to_owned()
 }
 
 /// The folder of the project's programs, built in the profile of this test; examples are in `examples` there.
@@ -39,7 +42,13 @@ pub fn programs() -> &'static Path {
         let mut build = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
         // As `cargo test --workspace` has built them: with other targets, dependencies would get other features and be
         // compiled again.
-        build.current_dir(root()).args(["build", "--workspace", "--tests", "--examples", "--quiet"]);
+        build.current_dir(root()).args([
+            "build",
+            "--workspace",
+            "--tests",
+            "--examples",
+            "--quiet",
+        ]);
         // What cargo tells a test about its package would make build scripts that look at it run again, and with them
         // half of the tree be compiled again.
         let is_of_package =
@@ -52,7 +61,10 @@ pub fn programs() -> &'static Path {
         if folder.ends_with("release") {
             build.arg("--release");
         }
-        assert!(build.status().unwrap().success(), "the programs do not build");
+        assert!(
+            build.status().unwrap().success(),
+            "the programs do not build"
+        );
         folder
     })
 }
@@ -72,7 +84,9 @@ impl Lab {
     /// An empty lab.
     #[must_use]
     pub fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+        }
     }
 
     /// Where its runs are kept.
@@ -92,33 +106,56 @@ impl Lab {
     #[must_use]
     pub fn cars(&self, args: &[&str]) -> Command {
         let mut command = Command::new(programs().join("cars"));
-        command.current_dir(root()).args(args).args(["--out".as_ref(), self.out().as_os_str()]);
-        command.stdin(Stdio::null()).env_remove("CARS_RUN").env_remove("CARS_CONNECT");
+        command
+            .current_dir(root())
+            .args(args)
+            .args(["--out".as_ref(), self.out().as_os_str()]);
+        command
+            .stdin(Stdio::null())
+            .env_remove("CARS_RUN")
+            .env_remove("CARS_CONNECT");
         command
     }
 
     /// Runs `cars` to its end and returns what it printed; it must succeed.
     pub fn ok(&self, args: &[&str]) -> String {
         let output = self.cars(args).output().unwrap();
-        let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-        assert!(output.status.success(), "cars {args:?}: {}\n{out}\n{err}", output.status);
+        let (out, err) = (
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr),
+        );
+        assert!(
+            output.status.success(),
+            "cars {args:?}: {}\n{out}\n{err}",
+            output.status
+        );
         out.into_owned()
     }
 
     /// Runs `cars` to its end and returns its exit status and all that it printed; it must fail.
     pub fn fails(&self, args: &[&str]) -> (i32, String) {
         let output = self.cars(args).output().unwrap();
-        let text =
-            format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let text = format!(
+            "{}{}",
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        );
         assert!(!output.status.success(), "cars {args:?} succeeded:\n{text}");
         (output.status.code().unwrap_or(-1), text)
     }
 
     /// Runs `cars` with exactly these arguments and returns its exit status and all that it printed.
     pub fn cars_without_out(&self, args: &[&str]) -> (i32, String) {
-        let output = Command::new(programs().join("cars")).current_dir(root()).args(args).output().unwrap();
-        let text =
-            format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let output = Command::new(programs().join("cars"))
+            .current_dir(root())
+            .args(args)
+            .output()
+            .unwrap();
+        let text = format!(
+            "{}{}",
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        );
         (output.status.code().unwrap_or(-1), text)
     }
 
@@ -146,7 +183,9 @@ impl Lab {
     #[must_use]
     pub fn events(&self, run: &str) -> Vec<serde_json::Value> {
         let text = String::from_utf8(self.bytes(run)).unwrap();
-        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+        text.lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
     }
 
     /// The summary of a run.
@@ -161,9 +200,18 @@ pub fn assert_same(a: (&str, &[u8]), b: (&str, &[u8])) {
     if a.1 == b.1 {
         return;
     }
-    let lines = |bytes: &[u8]| String::from_utf8_lossy(bytes).lines().map(str::to_owned).collect::<Vec<_>>();
+    let lines = |bytes: &[u8]| {
+        String::from_utf8_lossy(bytes)
+            .lines()
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
     let (left, right) = (lines(a.1), lines(b.1));
-    let at = left.iter().zip(&right).position(|(l, r)| l != r).unwrap_or(left.len().min(right.len()));
+    let at = left
+        .iter()
+        .zip(&right)
+        .position(|(l, r)| l != r)
+        .unwrap_or(left.len().min(right.len()));
     panic!(
         "{} and {} differ from line {} on:\n  {}\n  {}",
         a.0,

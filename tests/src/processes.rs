@@ -23,11 +23,20 @@ pub struct Running {
 impl Running {
     /// Starts a program.
     pub fn start(mut command: Command, run: &str, folder: PathBuf) -> Self {
-        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("cars starts");
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("cars starts");
         let printed = Arc::default();
         collect(child.stdout.take(), &printed);
         collect(child.stderr.take(), &printed);
-        Self { child, run: run.to_owned(), folder, printed }
+        Self {
+            child,
+            run: run.to_owned(),
+            folder,
+            printed,
+        }
     }
 
     /// All that it has printed.
@@ -73,7 +82,11 @@ impl Running {
             if let Some(status) = self.child.try_wait().expect("it is our child") {
                 return status;
             }
-            assert!(begun.elapsed() < PATIENCE, "it does not end; it printed\n{}", self.printed());
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "it does not end; it printed\n{}",
+                self.printed()
+            );
             std::thread::sleep(Duration::from_millis(10));
         }
     }
@@ -99,7 +112,10 @@ impl Running {
     #[must_use]
     pub fn process(&self, program: &str) -> u32 {
         eventually(program, || {
-            find(&self.run).into_iter().find(|(_, name)| name == program).map(|(pid, _)| pid)
+            find(&self.run)
+                .into_iter()
+                .find(|(_, name)| name == program)
+                .map(|(pid, _)| pid)
         })
     }
 
@@ -127,10 +143,14 @@ impl Drop for Running {
 }
 
 fn collect(from: Option<impl Read + Send + 'static>, into: &Arc<Mutex<Vec<(Instant, String)>>>) {
-    let (Some(from), into) = (from, into.clone()) else { return };
+    let (Some(from), into) = (from, into.clone()) else {
+        return;
+    };
     std::thread::spawn(move || {
         for line in BufReader::new(from).lines().map_while(Result::ok) {
-            into.lock().expect("no reader panics").push((Instant::now(), line));
+            into.lock()
+                .expect("no reader panics")
+                .push((Instant::now(), line));
         }
     });
 }
@@ -149,8 +169,11 @@ pub fn send(pid: u32, signal: Signal) {
 pub fn find(run: &str) -> Vec<(u32, String)> {
     let is_of_run = |pid: u32| {
         let read = |file: &str| std::fs::read(format!("/proc/{pid}/{file}")).unwrap_or_default();
-        let holds =
-            |bytes: Vec<u8>, text: String| bytes.windows(text.len()).any(|part| part == text.as_bytes());
+        let holds = |bytes: Vec<u8>, text: String| {
+            bytes
+                .windows(text.len())
+                .any(|part| part == text.as_bytes())
+        };
         let arguments = |separator| format!("--run{separator}{run}\0");
         holds(read("environ"), format!("CARS_RUN={run}\0"))
             || holds(read("cmdline"), arguments('='))
@@ -159,8 +182,11 @@ pub fn find(run: &str) -> Vec<(u32, String)> {
     let pids = std::fs::read_dir("/proc").expect("this is Linux").flatten();
     let pids = pids.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     let own = std::process::id();
-    let alive = |pid: &u32| stat(*pid).is_some_and(|stat| stat.first().is_some_and(|state| state != "Z"));
-    pids.filter(|pid| *pid != own && is_of_run(*pid) && alive(pid)).map(|pid| (pid, program(pid))).collect()
+    let alive =
+        |pid: &u32| stat(*pid).is_some_and(|stat| stat.first().is_some_and(|state| state != "Z"));
+    pids.filter(|pid| *pid != own && is_of_run(*pid) && alive(pid))
+        .map(|pid| (pid, program(pid)))
+        .collect()
 }
 
 /// The process of a run that runs the robot called `robot`, if it is there.
@@ -169,25 +195,42 @@ pub fn named(run: &str, robot: &str) -> Option<u32> {
     let argument = format!("--name\0{robot}\0");
     let is_robot = |pid: u32| {
         let arguments = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        arguments.windows(argument.len()).any(|part| part == argument.as_bytes())
+        arguments
+            .windows(argument.len())
+            .any(|part| part == argument.as_bytes())
     };
-    find(run).into_iter().find(|(pid, _)| is_robot(*pid)).map(|(pid, _)| pid)
+    find(run)
+        .into_iter()
+        .find(|(pid, _)| is_robot(*pid))
+        .map(|(pid, _)| pid)
 }
 
 fn program(pid: u32) -> String {
     let target = std::fs::read_link(format!("/proc/{pid}/exe")).unwrap_or_default();
-    target.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    target
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }
 
 /// The fields of `/proc/PID/stat` from the state on.
 fn stat(pid: u32) -> Option<Vec<String>> {
     let text = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    Some(text.rsplit_once(')')?.1.split_whitespace().map(str::to_owned).collect())
+    Some(
+        text.rsplit_once(')')?
+            .1
+            .split_whitespace()
+            .map(str::to_owned)
+            .collect(),
+    )
 }
 
 fn cpu_s(pid: u32) -> f64 {
     // proc(5): utime and stime are fields 14 and 15, in clock ticks of 10 ms.
-    let field =
-        |stat: &[String], i: usize| stat.get(i).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
+    let field = |stat: &[String], i: usize| {
+        stat.get(i)
+            .and_then(|text| text.parse::<f64>().ok())
+            .unwrap_or(0.0)
+    };
     stat(pid).map_or(0.0, |stat| (field(&stat, 11) + field(&stat, 12)) / 100.0)
 }

@@ -15,9 +15,21 @@ const ROBOTS: [(&str, &[&str], &[&str]); 7] = [
     ("Vonda", &[], &["cars-vonda"]),
     ("Butler, with default parameters", &[], &["cars-butler"]),
     ("Leguin, with default parameters", &[], &["cars-leguin"]),
-    ("Butler in the hall", &["--scenario", "configs/hors_doeuvres.toml"], &["cars-butler"]),
-    ("Leguin in the hall", &["--scenario", "launch/hors_doeuvres.toml"], &["cars-leguin"]),
-    ("Vonda in the hall", &["--scenario", "configs/three_robots.toml", "--name", "Vonda"], &["cars-vonda"]),
+    (
+        "Butler in the hall",
+        &["--scenario", "configs/hors_doeuvres.toml"],
+        &["cars-butler"],
+    ),
+    (
+        "Leguin in the hall",
+        &["--scenario", "launch/hors_doeuvres.toml"],
+        &["cars-leguin"],
+    ),
+    (
+        "Vonda in the hall",
+        &["--scenario", "configs/three_robots.toml", "--name", "Vonda"],
+        &["cars-vonda"],
+    ),
 ];
 
 /// Rules for which a robot must be started by somebody who ignores signals.
@@ -26,13 +38,22 @@ const DEAF: &str = "end.sigterm";
 /// A program of the project, or of the system.
 fn program(name: &str) -> String {
     let own = programs().join(name);
-    if own.exists() { own.to_str().unwrap().to_owned() } else { name.to_owned() }
+    if own.exists() {
+        own.to_str().unwrap().to_owned()
+    } else {
+        name.to_owned()
+    }
 }
 
 fn cars(more: &[&str], command: &[&str]) -> std::process::Output {
     let (name, arguments) = command.split_first().unwrap();
     let mut cars = Command::new(programs().join("cars"));
-    cars.current_dir(root()).arg("conform").args(more).arg("--").arg(program(name)).args(arguments);
+    cars.current_dir(root())
+        .arg("conform")
+        .args(more)
+        .arg("--")
+        .arg(program(name))
+        .args(arguments);
     cars.output().unwrap()
 }
 
@@ -51,20 +72,34 @@ fn wrong(rule: &str) -> Command {
 }
 
 fn setting() -> Setting {
-    Setting { ticks: 40, ..Setting::default() }
+    Setting {
+        ticks: 40,
+        ..Setting::default()
+    }
 }
 
 /// The rules that failed, with what came.
 fn failed(report: &Report) -> Vec<String> {
-    report.failed().map(|(rule, failure)| format!("{}: {failure:?}", rule.name)).collect()
+    report
+        .failed()
+        .map(|(rule, failure)| format!("{}: {failure:?}", rule.name))
+        .collect()
 }
 
 fn conforms(what: &str, more: &[&str], command: &[&str]) {
     let output = cars(more, command);
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{what}: {text}\n{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{what}: {text}\n{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let is_ok = |line: &&str| line.starts_with("ok ");
-    assert_eq!(text.lines().filter(is_ok).count(), RULES.len(), "{what}: {text}");
+    assert_eq!(
+        text.lines().filter(is_ok).count(),
+        RULES.len(),
+        "{what}: {text}"
+    );
 }
 
 #[test]
@@ -79,7 +114,11 @@ fn the_robots_of_the_project_conform() {
 #[test]
 fn a_robot_by_hand_gives_occasion_to_every_rule() {
     let report = conform::check(&wrong(""), &setting(), &[]).unwrap();
-    let passed = report.outcomes.iter().filter(|outcome| outcome.verdict == Verdict::Passed).count();
+    let passed = report
+        .outcomes
+        .iter()
+        .filter(|outcome| outcome.verdict == Verdict::Passed)
+        .count();
     assert_eq!(passed, RULES.len(), "{report}");
 }
 
@@ -93,7 +132,12 @@ fn wrong_robots_fail_by_their_rule(part: usize) {
             "a robot that breaks {} fails by {failed:#?}",
             rule.name
         );
-        assert!(report.to_tap().contains(&format!("see: \"{}\"", rule.reference())), "{report}");
+        assert!(
+            report
+                .to_tap()
+                .contains(&format!("see: \"{}\"", rule.reference())),
+            "{report}"
+        );
     }
 }
 
@@ -150,10 +194,26 @@ fn what_cannot_be_checked_is_said() {
     for (more, command, reason) in [
         (&[][..], &["/no/such/program"][..], "No such file"),
         (&[], &["true"], "a request to join: it never came"),
-        (&["--name", "Vonda"], &["wrong-robot"], "asks to be Walker, and Vonda is checked"),
-        (&["--scenario", "configs/hors_doeuvres.toml"], &["wrong-robot"], "its robots are Butler, Leguin"),
-        (&["--scenario", "configs/none.toml"], &["wrong-robot"], "none.toml"),
-        (&["--rule", "tick.tock"], &["wrong-robot"], "there is no such rule"),
+        (
+            &["--name", "Vonda"],
+            &["wrong-robot"],
+            "asks to be Walker, and Vonda is checked",
+        ),
+        (
+            &["--scenario", "configs/hors_doeuvres.toml"],
+            &["wrong-robot"],
+            "its robots are Butler, Leguin",
+        ),
+        (
+            &["--scenario", "configs/none.toml"],
+            &["wrong-robot"],
+            "none.toml",
+        ),
+        (
+            &["--rule", "tick.tock"],
+            &["wrong-robot"],
+            "there is no such rule",
+        ),
     ] {
         let output = cars(more, command);
         let error = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
@@ -164,15 +224,32 @@ fn what_cannot_be_checked_is_said() {
 
 #[test]
 fn one_rule_can_be_checked_and_reported_as_json() {
-    let output =
-        cars(&["--json", "--rule", "end.clock", "--ticks", "24"], &["wrong-robot", "--wrong", "end.clock"]);
+    let output = cars(
+        &["--json", "--rule", "end.clock", "--ticks", "24"],
+        &["wrong-robot", "--wrong", "end.clock"],
+    );
     assert_eq!(output.status.code(), Some(1));
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((&report["robot"], &report["failed"]), (&"Walker".into(), &1.into()), "{report}");
-    let [rule] = &report["rules"].as_array().unwrap()[..] else { panic!("one rule was asked for: {report}") };
-    assert_eq!((&rule["rule"], &rule["verdict"]), (&"end.clock".into(), &"failed".into()));
-    assert!(rule["expected"].as_str().unwrap().contains("exit status 0"), "{rule}");
-    assert!(rule["came"].as_str().unwrap().contains("exit status: 3"), "{rule}");
+    assert_eq!(
+        (&report["robot"], &report["failed"]),
+        (&"Walker".into(), &1.into()),
+        "{report}"
+    );
+    let [rule] = &report["rules"].as_array().unwrap()[..] else {
+        panic!("one rule was asked for: {report}")
+    };
+    assert_eq!(
+        (&rule["rule"], &rule["verdict"]),
+        (&"end.clock".into(), &"failed".into())
+    );
+    assert!(
+        rule["expected"].as_str().unwrap().contains("exit status 0"),
+        "{rule}"
+    );
+    assert!(
+        rule["came"].as_str().unwrap().contains("exit status: 3"),
+        "{rule}"
+    );
     assert_eq!(report["time.answer"]["ticks"], 25);
 }
 
@@ -180,8 +257,14 @@ fn one_rule_can_be_checked_and_reported_as_json() {
 fn anchors(page: &str) -> Vec<String> {
     let headings = page.lines().filter(|line| line.starts_with('#'));
     let anchor = |line: &str| {
-        let text = line.trim_start_matches('#').trim().to_lowercase().replace(' ', "-");
-        text.chars().filter(|c| c.is_alphanumeric() || *c == '-' || *c == '_').collect()
+        let text = line
+            .trim_start_matches('#')
+            .trim()
+            .to_lowercase()
+            .replace(' ', "-");
+        text.chars()
+            .filter(|c| c.is_alphanumeric() || *c == '-' || *c == '_')
+            .collect()
     };
     headings.map(anchor).collect()
 }
@@ -191,7 +274,15 @@ fn the_page_explains_every_rule_where_the_kit_says() {
     let page = std::fs::read_to_string(root().join(Path::new(PAGE))).unwrap();
     let anchors = anchors(&page);
     for rule in RULES {
-        assert!(anchors.iter().any(|anchor| anchor == rule.section), "{} has no heading", rule.reference());
-        assert!(page.contains(&format!("**`{}`**", rule.name)), "{PAGE} does not state {}", rule.name);
+        assert!(
+            anchors.iter().any(|anchor| anchor == rule.section),
+            "{} has no heading",
+            rule.reference()
+        );
+        assert!(
+            page.contains(&format!("**`{}`**", rule.name)),
+            "{PAGE} does not state {}",
+            rule.name
+        );
     }
 }

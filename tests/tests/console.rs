@@ -31,7 +31,15 @@ struct Run {
 impl Run {
     fn start(lab: &Lab, name: &str, more: &[&str]) -> Self {
         let file = "launch/hors_doeuvres.toml";
-        let mut args = vec!["launch", file, "--paused", "--speed", "max", "--duration", "10000000 s"];
+        let mut args = vec![
+            "launch",
+            file,
+            "--paused",
+            "--speed",
+            "max",
+            "--duration",
+            "10000000 s",
+        ];
         // The record of a free run would be gigabytes.
         args.extend(["--set", "record.frames=false"]);
         args.extend(more);
@@ -40,15 +48,32 @@ impl Run {
             let text = std::fs::read_to_string(lab.file(name, "endpoint")).ok()?;
             text.ends_with('\n').then(|| text.trim().to_owned())
         });
-        let role = Role::Client { connect: endpoint.clone(), patience: PATIENCE };
-        let (bus, keys) = (Bus::open(&role, None).unwrap(), Keys::new(&RunName::new(name).unwrap()));
-        let run = Self { name: name.to_owned(), endpoint, bus, keys, _launch: launch };
-        eventually("the robots", || (run.ask(&Control::Status)?.phase == Phase::Ready).then_some(()));
+        let role = Role::Client {
+            connect: endpoint.clone(),
+            patience: PATIENCE,
+        };
+        let (bus, keys) = (
+            Bus::open(&role, None).unwrap(),
+            Keys::new(&RunName::new(name).unwrap()),
+        );
+        let run = Self {
+            name: name.to_owned(),
+            endpoint,
+            bus,
+            keys,
+            _launch: launch,
+        };
+        eventually("the robots", || {
+            (run.ask(&Control::Status)?.phase == Phase::Ready).then_some(())
+        });
         run
     }
 
     fn ask(&self, control: &Control) -> Option<Status> {
-        let answer = self.bus.ask(&self.keys.control(), "", Some(encode(control))).unwrap()?;
+        let answer = self
+            .bus
+            .ask(&self.keys.control(), "", Some(encode(control)))
+            .unwrap()?;
         match decode("control", "simulator", &answer.result.unwrap()).unwrap() {
             ControlAnswer::Done(status) => Some(*status),
             other => panic!("{other:?}"),
@@ -66,11 +91,29 @@ impl Run {
 
     fn console(&self) -> Console {
         let mut command = Command::new(programs().join("cars-console"));
-        command.args(["--bind", "127.0.0.1:0", "--run", &self.name, "--connect", &self.endpoint]);
-        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn().unwrap();
+        command.args([
+            "--bind",
+            "127.0.0.1:0",
+            "--run",
+            &self.name,
+            "--connect",
+            &self.endpoint,
+        ]);
+        let mut child = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
         let mut line = String::new();
-        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
-        let address = line.trim().strip_prefix("console: http://").unwrap().trim_end_matches('/').to_owned();
+        BufReader::new(child.stdout.as_mut().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        let address = line
+            .trim()
+            .strip_prefix("console: http://")
+            .unwrap()
+            .trim_end_matches('/')
+            .to_owned();
         Console { child, address }
     }
 }
@@ -85,7 +128,10 @@ impl Console {
     /// Memory that it occupies, bytes.
     fn resident_bytes(&self) -> u64 {
         let text = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
-        let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+        let line = text
+            .lines()
+            .find_map(|line| line.strip_prefix("VmRSS:"))
+            .unwrap();
         1024 * line.trim().trim_end_matches(" kB").parse::<u64>().unwrap()
     }
 }
@@ -117,7 +163,9 @@ impl Page {
             console.address
         )
         .unwrap();
-        let mut page = Self { stream: BufReader::new(stream) };
+        let mut page = Self {
+            stream: BufReader::new(stream),
+        };
         let mut head = String::new();
         while !head.ends_with("\r\n\r\n") {
             assert!(page.stream.read_line(&mut head).unwrap() > 0, "{head}");
@@ -177,12 +225,19 @@ impl Page {
             if is_wanted(&message) {
                 return message;
             }
-            assert!(begun.elapsed() < PATIENCE, "waited in vain; last came {message}");
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "waited in vain; last came {message}"
+            );
         }
     }
 
     fn request(&mut self, control: &str) {
-        self.write(TEXT, format!(r#"{{"type":"control","id":1,"control":{control}}}"#).as_bytes()).unwrap();
+        self.write(
+            TEXT,
+            format!(r#"{{"type":"control","id":1,"control":{control}}}"#).as_bytes(),
+        )
+        .unwrap();
     }
 
     fn control(&mut self, control: &str) -> Value {
@@ -218,7 +273,10 @@ fn frames_and_panels_come_and_controls_go() {
     let mut page = Page::open(&console);
     assert_eq!(page.hear().unwrap()["mode"], "live");
     let first = page.until(is_frame);
-    assert_eq!((&first["frame"]["tick"], &first["frame"]["phase"]), (&0.into(), &"ready".into()));
+    assert_eq!(
+        (&first["frame"]["tick"], &first["frame"]["phase"]),
+        (&0.into(), &"ready".into())
+    );
     let answer = page.control(r#"{"do":"step","n":3}"#);
     assert_eq!(answer["answer"]["tick"], 3);
     assert_eq!(run.ask(&Control::Status).unwrap().tick, 3);
@@ -231,7 +289,10 @@ fn frames_and_panels_come_and_controls_go() {
     while begun.elapsed() < Duration::from_secs(2) {
         frames.push(page.until(is_frame)["frame"]["tick"].as_u64().unwrap());
     }
-    println!("{:.0} frames/s of a free run", frames.len() as f64 / begun.elapsed().as_secs_f64());
+    println!(
+        "{:.0} frames/s of a free run",
+        frames.len() as f64 / begun.elapsed().as_secs_f64()
+    );
     assert!(frames.len() > 20 && frames.is_sorted(), "{frames:?}");
     assert!(frames.last() > frames.first());
     let refused = page.control(r#"{"do":"step","n":1}"#);
@@ -239,7 +300,13 @@ fn frames_and_panels_come_and_controls_go() {
     page.request(r#"{"do":"stop"}"#);
     page.until(|message| message["type"] == "simulator" && message["present"] == false);
     let gone = page.control(r#"{"do":"start"}"#);
-    assert!(gone["error"].as_str().unwrap().contains("no simulator of run con-live"), "{gone}");
+    assert!(
+        gone["error"]
+            .as_str()
+            .unwrap()
+            .contains("no simulator of run con-live"),
+        "{gone}"
+    );
 }
 
 #[test]
@@ -257,11 +324,25 @@ fn a_simulator_that_hangs_gives_an_error_and_one_that_returns_is_found() {
     let is_gone = |message: &Value| message["type"] == "simulator" && message["present"] == false;
     let is_error = |message: &Value| message["type"] == "answer" && message["error"].is_string();
     let first = page.until(|message| is_gone(message) || is_error(message));
-    page.until(|message| if is_gone(&first) { is_error(message) } else { is_gone(message) });
-    assert!(begun.elapsed() < Duration::from_secs(8), "told after {:?}", begun.elapsed());
+    page.until(|message| {
+        if is_gone(&first) {
+            is_error(message)
+        } else {
+            is_gone(message)
+        }
+    });
+    assert!(
+        begun.elapsed() < Duration::from_secs(8),
+        "told after {:?}",
+        begun.elapsed()
+    );
     kill(simulator, Signal::SIGCONT).unwrap();
     page.until(|message| message["type"] == "simulator" && message["present"] == true);
-    eventually("an answer", || page.control(r#"{"do":"status"}"#)["answer"].is_object().then_some(()));
+    eventually("an answer", || {
+        page.control(r#"{"do":"status"}"#)["answer"]
+            .is_object()
+            .then_some(())
+    });
     page.request(r#"{"do":"status"}"#);
     page.until(is_frame);
 }
@@ -294,7 +375,9 @@ fn a_stuck_browser_costs_no_memory() {
     let _stuck = Page::open(&console);
     run.ask(&Control::Start).unwrap();
     // All there is room for is taken: the lines of the log that are kept.
-    eventually("2000 lines", || (run.ask(&Control::Status)?.tick > 20_000).then_some(()));
+    eventually("2000 lines", || {
+        (run.ask(&Control::Status)?.tick > 20_000).then_some(())
+    });
     let before = console.resident_bytes();
     std::thread::sleep(Duration::from_secs(15));
     let after = console.resident_bytes();
@@ -317,7 +400,10 @@ fn paired_ratio(pairs: usize, run: &Run, mut with: impl FnMut() -> Box<dyn std::
         } else {
             (measure_with(), run.rate(WINDOW))
         };
-        println!("  {without:.0} ticks/s without, {with:.0} with: {:.3}", with / without);
+        println!(
+            "  {without:.0} ticks/s without, {with:.0} with: {:.3}",
+            with / without
+        );
         ratios.push(with / without);
     }
     ratios.sort_by(f64::total_cmp);
@@ -342,8 +428,13 @@ fn a_console_hardly_slows_a_run() {
         page.until(is_frame);
         Box::new((page.keep_reading(), stuck, console))
     });
-    println!("a console with a browser and a stuck one: {watched:.3} of the rate without a console");
-    assert!(unwatched > LEAST_RATIO && watched > LEAST_RATIO, "{unwatched:.3}, {watched:.3}");
+    println!(
+        "a console with a browser and a stuck one: {watched:.3} of the rate without a console"
+    );
+    assert!(
+        unwatched > LEAST_RATIO && watched > LEAST_RATIO,
+        "{unwatched:.3}, {watched:.3}"
+    );
 }
 
 /// Longest that the tests in the browser may take, all together.
@@ -361,16 +452,36 @@ fn the_page_does_in_a_browser_what_it_should() {
     }
     let programs = programs();
     let mut pytest = Command::new("python3");
-    pytest.current_dir(root()).args(["-m", "pytest", "-v", "-rP", "--tb=short", "-p", "no:cacheprovider"]);
-    pytest.arg("tests/console").env("CARS_BIN", programs).env("PYTHONDONTWRITEBYTECODE", "1");
-    for variable in ["CARS_RUN", "CARS_CONNECT", "CARS_LISTEN", "CARS_CONSOLE_BIND"] {
+    pytest.current_dir(root()).args([
+        "-m",
+        "pytest",
+        "-v",
+        "-rP",
+        "--tb=short",
+        "-p",
+        "no:cacheprovider",
+    ]);
+    pytest
+        .arg("tests/console")
+        .env("CARS_BIN", programs)
+        .env("PYTHONDONTWRITEBYTECODE", "1");
+    for variable in [
+        "CARS_RUN",
+        "CARS_CONNECT",
+        "CARS_LISTEN",
+        "CARS_CONSOLE_BIND",
+    ] {
         pytest.env_remove(variable);
     }
     let lab = Lab::new();
     let printed = lab.out().join("pytest.txt");
     let file = std::fs::File::create(&printed).unwrap();
-    let mut pytest =
-        pytest.stdin(Stdio::null()).stdout(file.try_clone().unwrap()).stderr(file).spawn().unwrap();
+    let mut pytest = pytest
+        .stdin(Stdio::null())
+        .stdout(file.try_clone().unwrap())
+        .stderr(file)
+        .spawn()
+        .unwrap();
     let begun = Instant::now();
     let status = loop {
         if let Some(status) = pytest.try_wait().unwrap() {
@@ -378,7 +489,11 @@ fn the_page_does_in_a_browser_what_it_should() {
         }
         if begun.elapsed() > BROWSER_PATIENCE {
             // An interrupted pytest ends what its tests have started.
-            kill(Pid::from_raw(i32::try_from(pytest.id()).unwrap()), Signal::SIGINT).unwrap();
+            kill(
+                Pid::from_raw(i32::try_from(pytest.id()).unwrap()),
+                Signal::SIGINT,
+            )
+            .unwrap();
             pytest.wait().unwrap();
             break None;
         }
@@ -394,10 +509,16 @@ fn missing_tools() -> Option<String> {
     if !Path::new("/usr/bin/chromium").exists() {
         return Some("there is no /usr/bin/chromium; `apt-get install chromium`".to_owned());
     }
-    let python = Command::new("python3").args(["-c", "import pytest, playwright.sync_api"]).output();
+    let python = Command::new("python3")
+        .args(["-c", "import pytest, playwright.sync_api"])
+        .output();
     match python {
         Ok(output) if output.status.success() => None,
-        Ok(_) => Some("python3 has no pytest or no playwright; `pip install pytest playwright`".to_owned()),
-        Err(error) => Some(format!("python3 does not run ({error}); install Python 3.11 or later")),
+        Ok(_) => Some(
+            "python3 has no pytest or no playwright; `pip install pytest playwright`".to_owned(),
+        ),
+        Err(error) => Some(format!(
+            "python3 does not run ({error}); install Python 3.11 or later"
+        )),
     }
 }

@@ -84,8 +84,13 @@ impl Damage {
         let is_pair = |line: &&str| line.contains('=') && !line.starts_with('#');
         let pairs: Vec<usize> = (0..lines.len()).filter(|i| is_pair(&lines[*i])).collect();
         let with_line = |at: usize, change: &dyn Fn(&str) -> String| {
-            let changed =
-                |(i, line): (usize, &&str)| if i == at { change(line) } else { format!("{line}\n") };
+            let changed = |(i, line): (usize, &&str)| {
+                if i == at {
+                    change(line)
+                } else {
+                    format!("{line}\n")
+                }
+            };
             lines.iter().enumerate().map(changed).collect::<String>()
         };
         let in_pair = |at: &Index, change: &dyn Fn(&str, &str) -> String| match pairs.as_slice() {
@@ -98,7 +103,9 @@ impl Damage {
         match self {
             _ if lines.is_empty() => text.to_owned(),
             Self::DropLine(at) => with_line(at.index(lines.len()), &|_| String::new()),
-            Self::RepeatLine(at) => with_line(at.index(lines.len()), &|line| format!("{line}\n{line}\n")),
+            Self::RepeatLine(at) => {
+                with_line(at.index(lines.len()), &|line| format!("{line}\n{line}\n"))
+            }
             Self::Value(at, odd) => in_pair(at, &|key, _| format!("{key}= {odd}\n")),
             Self::Key(at, odd) => in_pair(at, &|_, value| format!("{odd} ={value}\n")),
             Self::Insert(at, with) => {
@@ -115,19 +122,28 @@ impl Damage {
 }
 
 fn shipped(folder: &str) -> Vec<PathBuf> {
-    let files = std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = files.filter(|file| file.extension().is_some_and(|end| end == "toml")).collect();
+    let files = std::fs::read_dir(root().join(folder))
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let mut files: Vec<_> = files
+        .filter(|file| file.extension().is_some_and(|end| end == "toml"))
+        .collect();
     files.sort();
     files
 }
 
 /// A shipped file of this folder, damaged: its text.
 fn damaged(folder: &str) -> impl Strategy<Value = String> + use<> {
-    let texts: Vec<String> =
-        shipped(folder).iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    let texts: Vec<String> = shipped(folder)
+        .iter()
+        .map(|file| std::fs::read_to_string(file).unwrap())
+        .collect();
     let damages = prop::collection::vec(damage(), 1..5);
-    (prop::sample::select(texts), damages)
-        .prop_map(|(text, damages)| damages.iter().fold(text, |text, damage| damage.apply(&text)))
+    (prop::sample::select(texts), damages).prop_map(|(text, damages)| {
+        damages
+            .iter()
+            .fold(text, |text, damage| damage.apply(&text))
+    })
 }
 
 proptest! {
@@ -160,7 +176,11 @@ fn the_program_survives_damaged_files() {
             std::fs::create_dir_all(folder.path().join(name)).unwrap();
         }
         for file in shipped(others).into_iter().chain(shipped("configs/robots")) {
-            std::fs::copy(&file, folder.path().join(file.strip_prefix(root()).unwrap())).unwrap();
+            std::fs::copy(
+                &file,
+                folder.path().join(file.strip_prefix(root()).unwrap()),
+            )
+            .unwrap();
         }
         let (mut runner, strategy) = (TestRunner::default(), damaged(kind));
         let files: Vec<PathBuf> = (0..FILES)
@@ -170,10 +190,20 @@ fn the_program_survives_damaged_files() {
                 file
             })
             .collect();
-        let output = Command::new(programs().join("cars")).arg("check").args(&files).output().unwrap();
-        assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
-        let said =
-            [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        let output = Command::new(programs().join("cars"))
+            .arg("check")
+            .args(&files)
+            .output()
+            .unwrap();
+        assert_eq!(
+            output.status.code(),
+            Some(1),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let said = [output.stdout, output.stderr]
+            .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+            .concat();
         // Long lines are broken for people.
         let said = said.replace(|c: char| c.is_whitespace() || c == '│', "");
         for file in &files {

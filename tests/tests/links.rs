@@ -1,7 +1,11 @@
 //! Real links that are really cut: through proxies, between network namespaces, between containers; and a run across
 //! three hosts.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot set up its subject fails"
+)]
 
 use std::path::Path;
 use std::process::Command;
@@ -22,19 +26,28 @@ const HEALED: Duration = Duration::from_secs(1);
 
 /// A plan that cuts the link of Leguin a second after the clock first ran.
 fn plan(lab: &Lab, cut_s: u64, what: &str) -> String {
-    let fault =
-        format!("[[link_fault]]\nrobot = \"Leguin\"\nat = \"1 s\"\nfor = \"{cut_s} s\"\ndo = {what}\n");
+    let fault = format!(
+        "[[link_fault]]\nrobot = \"Leguin\"\nat = \"1 s\"\nfor = \"{cut_s} s\"\ndo = {what}\n"
+    );
     lab.write("plan.toml", &fault).to_str().unwrap().to_owned()
 }
 
 fn play(lab: &Lab, run: &str, via: &str, plan: &str, more: &[&str]) -> Running {
-    let args = ["net", "play", FILE, "--plan", plan, "--via", via, "--speed", "10"];
+    let args = [
+        "net", "play", FILE, "--plan", plan, "--via", via, "--speed", "10",
+    ];
     lab.start(run, &[args.as_slice(), more].concat())
 }
 
 fn nothing_is_left(run: &str, player: &Running) {
-    eventually("the last process to be gone", || find(run).is_empty().then_some(()));
-    assert_eq!(namespaces_of(player.id()), Vec::<String>::new(), "namespaces are left");
+    eventually("the last process to be gone", || {
+        find(run).is_empty().then_some(())
+    });
+    assert_eq!(
+        namespaces_of(player.id()),
+        Vec::<String>::new(),
+        "namespaces are left"
+    );
 }
 
 /// `on_late = "wait"`: Leguin is named within the lease, the clock goes on soon after healing, the record is that of a run
@@ -49,23 +62,47 @@ fn a_cut_changes_nothing(via: &str, cut_s: u64) {
     let healed = player.prints_after("the link of Leguin is whole", Some(cut));
     let went_on = player.prints_after("the clock goes on", Some(healed));
     let (named, gone, went_on) = (named - cut, gone - cut, went_on - healed);
-    println!("{via}, {cut_s} s: named after {named:?}, gone after {gone:?}, on {went_on:?} after healing");
-    assert!(named < LEASE + ROOM && gone < LEASE + ROOM, "named after {named:?}, gone after {gone:?}");
-    assert!(went_on < HEALED + ROOM, "the clock went on {went_on:?} after healing");
+    println!(
+        "{via}, {cut_s} s: named after {named:?}, gone after {gone:?}, on {went_on:?} after healing"
+    );
+    assert!(
+        named < LEASE + ROOM && gone < LEASE + ROOM,
+        "named after {named:?}, gone after {gone:?}"
+    );
+    assert!(
+        went_on < HEALED + ROOM,
+        "the clock went on {went_on:?} after healing"
+    );
     player.finish();
 
     lab.ok(&["run", FILE, "--run", "uncut", "--duration", "60 s"]);
-    assert_same(("cut and healed", &lab.bytes(&run)), ("never cut", &lab.bytes("uncut")));
+    assert_same(
+        ("cut and healed", &lab.bytes(&run)),
+        ("never cut", &lab.bytes("uncut")),
+    );
     let record = std::fs::read_to_string(lab.file(&run, "links.jsonl")).unwrap();
-    let record: Vec<serde_json::Value> =
-        record.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert_eq!((record[0]["link"].as_str(), record[1]["link"].as_str()), (Some("cut"), Some("whole")));
+    let record: Vec<serde_json::Value> = record
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     assert_eq!(
-        record[0]["tick"].as_u64().zip(record[1]["tick"].as_u64()).map(|(a, b)| b - a <= 1),
+        (record[0]["link"].as_str(), record[1]["link"].as_str()),
+        (Some("cut"), Some("whole"))
+    );
+    assert_eq!(
+        record[0]["tick"]
+            .as_u64()
+            .zip(record[1]["tick"].as_u64())
+            .map(|(a, b)| b - a <= 1),
         Some(true)
     );
-    let held_s = lab.summary(&run)["wall"]["held_up_by"]["Leguin"]["longest_s"].as_f64().unwrap();
-    assert!(held_s > cut_s as f64 - 0.5, "the summary says who held up the run: {held_s}");
+    let held_s = lab.summary(&run)["wall"]["held_up_by"]["Leguin"]["longest_s"]
+        .as_f64()
+        .unwrap();
+    assert!(
+        held_s > cut_s as f64 - 0.5,
+        "the summary says who held up the run: {held_s}"
+    );
     nothing_is_left(&run, &player);
 }
 
@@ -75,24 +112,45 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
     let plan = plan(&lab, cut_s, "\"cut\"");
     // Twenty ticks a second: the run is still under way when the link has healed.
     let duration = format!("{} s", 10 * (cut_s + 6));
-    let set = ["--set", "on_late=continue", "--set", "deadline=0.5 s", "--duration", &duration];
+    let set = [
+        "--set",
+        "on_late=continue",
+        "--set",
+        "deadline=0.5 s",
+        "--duration",
+        &duration,
+    ];
     let mut player = play(&lab, &run, via, &plan, &set);
     let healed = player.prints("the link of Leguin is whole");
     let back = player.prints_after("Leguin       is back", Some(healed));
     println!("{via}, {cut_s} s: back {:?} after healing", back - healed);
-    assert!(back - healed < HEALED + ROOM, "back {:?} after healing", back - healed);
+    assert!(
+        back - healed < HEALED + ROOM,
+        "back {:?} after healing",
+        back - healed
+    );
     player.finish();
     let events = lab.events(&run);
     let tick_of = |what: &str| {
         let of = |event: &&serde_json::Value| event["event"] == what && event["robot"] == "Leguin";
-        events.iter().rfind(of).and_then(|event| event["tick"].as_u64()).expect("it is in the record")
+        events
+            .iter()
+            .rfind(of)
+            .and_then(|event| event["tick"].as_u64())
+            .expect("it is in the record")
     };
     let (lost, joined) = (tick_of("lost"), tick_of("joined"));
     println!("{via}, {cut_s} s: lost at tick {lost}, back at tick {joined}");
     assert!(lost > 0 && lost < joined);
     let missed = events.iter().filter(|event| event["event"] == "missed");
-    assert!(missed.clone().all(|event| event["robot"] == "Leguin"), "nobody else missed anything");
-    assert!(missed.count() as u64 >= joined - lost, "every tick without her is recorded");
+    assert!(
+        missed.clone().all(|event| event["robot"] == "Leguin"),
+        "nobody else missed anything"
+    );
+    assert!(
+        missed.count() as u64 >= joined - lost,
+        "every tick without her is recorded"
+    );
     assert_eq!(lab.summary(&run)["robots"]["Leguin"]["returns"], 1);
     nothing_is_left(&run, &player);
 }
@@ -119,14 +177,38 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
     let (lab, run) = (Lab::new(), "partition-on-links");
     let file = "launch/partition.toml";
     // From 120 s to 240 s at this speed: from 2 s to 4 s of the wall clock.
-    let mut player =
-        lab.start(run, &["net", "play", file, "--via", "proxy", "--speed", "60", "--duration", "300 s"]);
+    let mut player = lab.start(
+        run,
+        &[
+            "net",
+            "play",
+            file,
+            "--via",
+            "proxy",
+            "--speed",
+            "60",
+            "--duration",
+            "300 s",
+        ],
+    );
     let cut = player.prints("the link of Leguin is cut");
     player.prints_after("waiting for Leguin", Some(cut));
     player.prints_after("the link of Leguin is whole", Some(cut));
     player.finish();
-    lab.ok(&["run", file, "--run", "whole", "--duration", "300 s", "--set", "network.partition=[]"]);
-    assert_same(("cut on real links", &lab.bytes(run)), ("never cut", &lab.bytes("whole")));
+    lab.ok(&[
+        "run",
+        file,
+        "--run",
+        "whole",
+        "--duration",
+        "300 s",
+        "--set",
+        "network.partition=[]",
+    ]);
+    assert_same(
+        ("cut on real links", &lab.bytes(run)),
+        ("never cut", &lab.bytes("whole")),
+    );
     nothing_is_left(run, &player);
 }
 
@@ -170,22 +252,47 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
         return;
     }
     let (lab, run) = (Lab::new(), "several");
-    let fault =
-        |robot| format!("[[link_fault]]\nrobot = \"{robot}\"\nat = \"1 s\"\nfor = \"6 s\"\ndo = \"cut\"\n");
+    let fault = |robot| {
+        format!("[[link_fault]]\nrobot = \"{robot}\"\nat = \"1 s\"\nfor = \"6 s\"\ndo = \"cut\"\n")
+    };
     let plan = lab.write("plan.toml", &(fault("Leguin") + &fault("Vonda")));
-    let args = ["net", "play", "launch/three_robots.toml", "--via", "namespaces", "--speed", "10", "--plan"];
-    let set = ["--set", "on_late=continue", "--set", "deadline=0.5 s", "--duration", "120 s"];
-    let mut player = lab.start(run, &[&args, [plan.to_str().unwrap()].as_slice(), &set].concat());
+    let args = [
+        "net",
+        "play",
+        "launch/three_robots.toml",
+        "--via",
+        "namespaces",
+        "--speed",
+        "10",
+        "--plan",
+    ];
+    let set = [
+        "--set",
+        "on_late=continue",
+        "--set",
+        "deadline=0.5 s",
+        "--duration",
+        "120 s",
+    ];
+    let mut player = lab.start(
+        run,
+        &[&args, [plan.to_str().unwrap()].as_slice(), &set].concat(),
+    );
     let healed = player.prints("the link of Vonda is whole");
     for robot in ["Leguin       is back", "Vonda        is back"] {
-        let back = player.prints_after(robot, Some(healed - ROOM)).saturating_duration_since(healed);
+        let back = player
+            .prints_after(robot, Some(healed - ROOM))
+            .saturating_duration_since(healed);
         println!("{robot} {back:?} after healing");
         assert!(back < HEALED + ROOM, "{robot} {back:?} after healing");
     }
     player.finish();
     let events = lab.events(run);
     let missed = |robot: &str| {
-        events.iter().filter(|event| event["event"] == "missed" && event["robot"] == robot).count()
+        events
+            .iter()
+            .filter(|event| event["event"] == "missed" && event["robot"] == robot)
+            .count()
     };
     assert!(missed("Leguin") > 0 && missed("Vonda") > 0);
     assert_eq!(missed("Butler"), 0, "his link was whole");
@@ -212,14 +319,21 @@ fn a_slow_a_narrow_and_a_closed_link_change_nothing() {
 
 #[test]
 fn an_interrupted_play_leaves_nothing_behind() {
-    let vias: &[&str] = if has_namespaces("interrupt") { &["proxy", "namespaces"] } else { &["proxy"] };
+    let vias: &[&str] = if has_namespaces("interrupt") {
+        &["proxy", "namespaces"]
+    } else {
+        &["proxy"]
+    };
     for via in vias {
         let (lab, run) = (Lab::new(), format!("stop-{via}"));
         let plan = plan(&lab, 60, "\"cut\"");
         let mut player = play(&lab, &run, via, &plan, &[]);
         player.prints("the link of Leguin is cut");
         player.signal(Signal::SIGTERM);
-        assert!(!player.wait().success(), "a run that was interrupted did not finish");
+        assert!(
+            !player.wait().success(),
+            "a run that was interrupted did not finish"
+        );
         nothing_is_left(&run, &player);
     }
 }
@@ -228,9 +342,21 @@ fn an_interrupted_play_leaves_nothing_behind() {
 fn a_plan_that_cannot_be_played_is_refused_before_anything_starts() {
     let lab = Lab::new();
     let plan = plan(&lab, 1, "{ delay = \"20 ms\" }");
-    let (_, text) =
-        lab.fails(&["net", "play", FILE, "--plan", &plan, "--via", "namespaces", "--run", "never"]);
-    assert!(text.contains("delay 20ms") && text.contains("--via proxy"), "{text}");
+    let (_, text) = lab.fails(&[
+        "net",
+        "play",
+        FILE,
+        "--plan",
+        &plan,
+        "--via",
+        "namespaces",
+        "--run",
+        "never",
+    ]);
+    assert!(
+        text.contains("delay 20ms") && text.contains("--via proxy"),
+        "{text}"
+    );
     assert!(!lab.out().join("never").exists());
 }
 
@@ -243,23 +369,52 @@ fn across_three_hosts(test: &str, router: impl FnOnce(&Row, &Lab) -> Command) {
     assert!(text.contains("192.0.2.1"), "the file names the router");
     let config = lab.write("simulator.json5", &text.replace("192.0.2.1", "10.78.0.2"));
     let mut simulator = row.on(0, &programs().join("cars-sim"));
-    simulator.args(["configs/hors_doeuvres.toml", "--duration", "60 s", "--run", test, "--out"]);
-    simulator.arg(lab.out()).arg("--zenoh-config").arg(config).current_dir(root());
+    simulator.args([
+        "configs/hors_doeuvres.toml",
+        "--duration",
+        "60 s",
+        "--run",
+        test,
+        "--out",
+    ]);
+    simulator
+        .arg(lab.out())
+        .arg("--zenoh-config")
+        .arg(config)
+        .current_dir(root());
     let mut simulator = Running::start(simulator, test, lab.out().join(test));
     let mut robots: Vec<Running> = ["cars-butler", "cars-leguin"]
         .map(|program| {
             let mut robot = row.on(2, &programs().join(program));
-            robot.env("CARS_CONNECT", "tcp/10.78.1.1:7447").env("CARS_RUN", test);
-            robot.env("CARS_ZENOH_CONFIG", root().join("configs/zenoh/robot.json5"));
+            robot
+                .env("CARS_CONNECT", "tcp/10.78.1.1:7447")
+                .env("CARS_RUN", test);
+            robot.env(
+                "CARS_ZENOH_CONFIG",
+                root().join("configs/zenoh/robot.json5"),
+            );
             Running::start(robot, test, lab.out().join(program))
         })
         .into();
     let begun = Instant::now();
     simulator.finish();
     robots.iter_mut().for_each(Running::finish);
-    println!("{test}: 120 ticks across three hosts in {:?}, start and end included", begun.elapsed());
-    lab.ok(&["run", "configs/hors_doeuvres.toml", "--run", "here", "--duration", "60 s"]);
-    assert_same(("across three hosts", &lab.bytes(test)), ("in one process", &lab.bytes("here")));
+    println!(
+        "{test}: 120 ticks across three hosts in {:?}, start and end included",
+        begun.elapsed()
+    );
+    lab.ok(&[
+        "run",
+        "configs/hors_doeuvres.toml",
+        "--run",
+        "here",
+        "--duration",
+        "60 s",
+    ]);
+    assert_same(
+        ("across three hosts", &lab.bytes(test)),
+        ("in one process", &lab.bytes("here")),
+    );
     router.signal(Signal::SIGTERM);
     router.wait();
 }
@@ -271,7 +426,13 @@ fn a_run_across_three_hosts_gives_the_same_record() {
     }
     across_three_hosts("hosts", |row, _| {
         let mut router = row.on(1, &programs().join("cars"));
-        router.args(["router", "--insecure", "--listen", "tcp/0.0.0.0:7447", "--zenoh-config"]);
+        router.args([
+            "router",
+            "--insecure",
+            "--listen",
+            "tcp/0.0.0.0:7447",
+            "--zenoh-config",
+        ]);
         router.arg(root().join("configs/zenoh/router.json5"));
         router
     });
@@ -289,7 +450,10 @@ fn a_run_across_three_hosts_by_zenohd_gives_the_same_record() {
     if has_namespaces("zenohd") {
         across_three_hosts("zenohd", |row, _| {
             let mut router = row.on(1, Path::new("zenohd"));
-            router.arg("-c").arg(root().join("configs/zenoh/router.json5")).args(["-l", "tcp/0.0.0.0:7447"]);
+            router
+                .arg("-c")
+                .arg(root().join("configs/zenoh/router.json5"))
+                .args(["-l", "tcp/0.0.0.0:7447"]);
             router
         });
     }
@@ -298,32 +462,65 @@ fn a_run_across_three_hosts_by_zenohd_gives_the_same_record() {
 /// Makes the image `cars:local` from the programs of this build and docker/Dockerfile. `None` says why that cannot be.
 fn image() -> Result<(), String> {
     let docker = |args: &[&str]| {
-        let output =
-            Command::new("docker").args(args).output().map_err(|_| "there is no docker here".to_owned())?;
+        let output = Command::new("docker")
+            .args(args)
+            .output()
+            .map_err(|_| "there is no docker here".to_owned())?;
         let error = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        if output.status.success() { Ok(()) } else { Err(format!("docker {}: {error}", args.join(" "))) }
+        if output.status.success() {
+            Ok(())
+        } else {
+            Err(format!("docker {}: {error}", args.join(" ")))
+        }
     };
     docker(&["info"]).map_err(|error| format!("no docker engine answers: {error}"))?;
     let context = tempfile::tempdir().unwrap();
     std::fs::create_dir(context.path().join("bin")).unwrap();
-    std::fs::copy(root().join("docker/Dockerfile"), context.path().join("Dockerfile")).unwrap();
-    for program in ["cars", "cars-sim", "cars-butler", "cars-leguin", "cars-vonda", "cars-console"] {
-        std::fs::copy(programs().join(program), context.path().join("bin").join(program)).unwrap();
+    std::fs::copy(
+        root().join("docker/Dockerfile"),
+        context.path().join("Dockerfile"),
+    )
+    .unwrap();
+    for program in [
+        "cars",
+        "cars-sim",
+        "cars-butler",
+        "cars-leguin",
+        "cars-vonda",
+        "cars-console",
+    ] {
+        std::fs::copy(
+            programs().join(program),
+            context.path().join("bin").join(program),
+        )
+        .unwrap();
     }
-    docker(&["build", "-q", "-t", "cars:local", context.path().to_str().unwrap()])
-        .map_err(|error| format!("the image cannot be made (is its base image to be had?): {error}"))
+    docker(&[
+        "build",
+        "-q",
+        "-t",
+        "cars:local",
+        context.path().to_str().unwrap(),
+    ])
+    .map_err(|error| format!("the image cannot be made (is its base image to be had?): {error}"))
 }
 
 #[test]
 fn containers_cut_for_5_s_change_nothing() {
     const TEST: &str = "containers";
-    if Command::new("docker-compose").arg("version").output().is_err()
+    if Command::new("docker-compose")
+        .arg("version")
+        .output()
+        .is_err()
         && !Command::new("docker")
             .args(["compose", "version"])
             .output()
             .is_ok_and(|output| output.status.success())
     {
-        return skip(TEST, "there is no docker-compose here (Debian: apt install docker.io docker-compose)");
+        return skip(
+            TEST,
+            "there is no docker-compose here (Debian: apt install docker.io docker-compose)",
+        );
     }
     if let Err(reason) = image() {
         return skip(TEST, &reason);
@@ -332,28 +529,47 @@ fn containers_cut_for_5_s_change_nothing() {
     let lab = Lab::new();
     copy_folder(&root().join("configs"), &lab.out().join("configs"));
     let scenario = lab.out().join("configs/hors_doeuvres.toml");
-    let text = std::fs::read_to_string(&scenario).unwrap().replace("\"600 s\"", "\"60 s\"");
+    let text = std::fs::read_to_string(&scenario)
+        .unwrap()
+        .replace("\"600 s\"", "\"60 s\"");
     std::fs::write(&scenario, text).unwrap();
     let processes = ["Butler", "Leguin"].map(|name| {
-        format!("[[process]]\nname = \"{name}\"\ncommand = [\"cars-{}\"]\n", name.to_lowercase())
+        format!(
+            "[[process]]\nname = \"{name}\"\ncommand = [\"cars-{}\"]\n",
+            name.to_lowercase()
+        )
     });
-    let launch = "scenario = \"configs/hors_doeuvres.toml\"\n[console]\nenabled = false\n".to_owned();
+    let launch =
+        "scenario = \"configs/hors_doeuvres.toml\"\n[console]\nenabled = false\n".to_owned();
     lab.write("launch.toml", &(launch + &processes.concat()));
     plan(&lab, 5, "\"cut\"");
     let mut command = Command::new(programs().join("cars"));
-    command.current_dir(lab.out()).args(["net", "play", "launch.toml", "--plan", "plan.toml"]);
+    command
+        .current_dir(lab.out())
+        .args(["net", "play", "launch.toml", "--plan", "plan.toml"]);
     command.args(["--via", "compose", "--speed", "10", "--run", "boxes"]);
     let mut player = Running::start(command, "boxes", lab.out().join("runs/boxes"));
     let cut = player.prints("the link of Leguin is cut");
     let gone = player.prints_after("Leguin (is gone", Some(cut));
     let healed = player.prints_after("the link of Leguin is whole", Some(cut));
     let went_on = player.prints_after("the clock goes on", Some(healed));
-    println!("containers, 5 s: gone after {:?}, on {:?} after healing", gone - cut, went_on - healed);
-    assert!(went_on - healed < HEALED + ROOM, "the clock went on {:?} after healing", went_on - healed);
+    println!(
+        "containers, 5 s: gone after {:?}, on {:?} after healing",
+        gone - cut,
+        went_on - healed
+    );
+    assert!(
+        went_on - healed < HEALED + ROOM,
+        "the clock went on {:?} after healing",
+        went_on - healed
+    );
     player.finish();
     lab.ok(&["run", scenario.to_str().unwrap(), "--run", "uncut"]);
     let record = std::fs::read(lab.out().join("runs/boxes/events.jsonl")).unwrap();
-    assert_same(("cut and healed", &record), ("never cut", &lab.bytes("uncut")));
+    assert_same(
+        ("cut and healed", &record),
+        ("never cut", &lab.bytes("uncut")),
+    );
 }
 
 fn copy_folder(from: &Path, to: &Path) {
@@ -372,9 +588,27 @@ fn copy_folder(from: &Path, to: &Path) {
 fn the_compose_files_are_valid() {
     let file = root().join("docker-compose.yml");
     let tools: [&[&str]; 3] = [
-        &["docker-compose", "-f", file.to_str().unwrap(), "config", "-q"],
-        &["docker", "compose", "-f", file.to_str().unwrap(), "config", "-q"],
-        &["check-jsonschema", "--builtin-schema", "vendor.compose-spec", file.to_str().unwrap()],
+        &[
+            "docker-compose",
+            "-f",
+            file.to_str().unwrap(),
+            "config",
+            "-q",
+        ],
+        &[
+            "docker",
+            "compose",
+            "-f",
+            file.to_str().unwrap(),
+            "config",
+            "-q",
+        ],
+        &[
+            "check-jsonschema",
+            "--builtin-schema",
+            "vendor.compose-spec",
+            file.to_str().unwrap(),
+        ],
     ];
     for tool in tools {
         let is_there = match tool[1] {
@@ -383,7 +617,11 @@ fn the_compose_files_are_valid() {
         };
         if is_there.is_ok_and(|output| output.status.success()) {
             let output = Command::new(tool[0]).args(&tool[1..]).output().unwrap();
-            assert!(output.status.success(), "{tool:?}: {}", String::from_utf8_lossy(&output.stderr));
+            assert!(
+                output.status.success(),
+                "{tool:?}: {}",
+                String::from_utf8_lossy(&output.stderr)
+            );
             return;
         }
     }

@@ -1,6 +1,9 @@
 //! `docs/protocol.md` says what the code does: keys, limits, times, variables, examples, random streams, links.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot set up its subject fails")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot set up its subject fails"
+)]
 
 use std::collections::BTreeSet;
 
@@ -9,7 +12,8 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, Percept, PublicState, Report, Waiting, WorldFrame,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, Percept, PublicState, Report, Waiting,
+    WorldFrame,
 };
 use protocol::name::MAX_NAME_LEN;
 use protocol::random::{MAX_SEED, stream, unit};
@@ -25,9 +29,16 @@ fn page() -> String {
 /// The rows of the table whose header begins with this cell, cell by cell.
 fn table(page: &str, header: &str) -> Vec<Vec<String>> {
     let begin = format!("| {header} |");
-    let rows =
-        page.lines().skip_while(|line| !line.starts_with(&begin)).take_while(|line| line.starts_with('|'));
-    let cells = |row: &str| row.trim_matches('|').split(" | ").map(|cell| cell.trim().to_owned()).collect();
+    let rows = page
+        .lines()
+        .skip_while(|line| !line.starts_with(&begin))
+        .take_while(|line| line.starts_with('|'));
+    let cells = |row: &str| {
+        row.trim_matches('|')
+            .split(" | ")
+            .map(|cell| cell.trim().to_owned())
+            .collect()
+    };
     let rows: Vec<Vec<String>> = rows.skip(2).map(cells).collect();
     assert!(!rows.is_empty(), "there is no table with {header:?}");
     rows
@@ -35,26 +46,35 @@ fn table(page: &str, header: &str) -> Vec<Vec<String>> {
 
 /// What stands between single backticks.
 fn code(text: &str) -> &str {
-    text.split('`').nth(1).unwrap_or_else(|| panic!("no code in {text:?}"))
+    text.split('`')
+        .nth(1)
+        .unwrap_or_else(|| panic!("no code in {text:?}"))
 }
 
 /// Names of the schemas that a text links to.
 fn schemas(text: &str) -> Vec<&str> {
     let links = text.split("crates/protocol/schemas/").skip(1);
-    links.filter_map(|link| link.split_once(".json").map(|(name, _)| name)).collect()
+    links
+        .filter_map(|link| link.split_once(".json").map(|(name, _)| name))
+        .collect()
 }
 
 /// A heading as GitHub names it in links.
 fn anchor(heading: &str) -> String {
-    let kept = heading.chars().filter(|c| c.is_alphanumeric() || *c == ' ' || *c == '-' || *c == '_');
+    let kept = heading
+        .chars()
+        .filter(|c| c.is_alphanumeric() || *c == ' ' || *c == '-' || *c == '_');
     kept.collect::<String>().to_lowercase().replace(' ', "-")
 }
 
 #[test]
 fn the_sections_have_the_names_that_others_link_to() {
     let page = page();
-    let sections: Vec<String> =
-        page.lines().filter_map(|line| line.strip_prefix("## ")).map(anchor).collect();
+    let sections: Vec<String> = page
+        .lines()
+        .filter_map(|line| line.strip_prefix("## "))
+        .map(anchor)
+        .collect();
     let expected = [
         "words-and-transport",
         "keys",
@@ -109,8 +129,11 @@ fn the_rules_are_there_once_each() {
         "number.finite",
     ];
     let page: &'static str = page().leak();
-    let found: Vec<&str> =
-        page.split("**`").skip(1).filter_map(|rest| rest.split_once("`**").map(|(rule, _)| rule)).collect();
+    let found: Vec<&str> = page
+        .split("**`")
+        .skip(1)
+        .filter_map(|rest| rest.split_once("`**").map(|(rule, _)| rule))
+        .collect();
     let sorted = |mut rules: Vec<&'static str>| {
         rules.sort_unstable();
         rules
@@ -120,7 +143,9 @@ fn the_rules_are_there_once_each() {
 
 #[test]
 fn the_table_of_keys_is_that_of_the_code() {
-    let (run, name) = (RunName::new("RUN").unwrap(), |name| RobotName::new(name).unwrap());
+    let (run, name) = (RunName::new("RUN").unwrap(), |name| {
+        RobotName::new(name).unwrap()
+    });
     let (keys, robot, from) = (Keys::new(&run), name("NAME"), name("FROM"));
     let mut expected = vec![
         keys.clock(),
@@ -139,7 +164,11 @@ fn the_table_of_keys_is_that_of_the_code() {
         keys.faults(),
     ];
     expected.extend(QUERIES.map(|what| keys.query(&robot, what)));
-    let open = |key: String| key.replace("RUN", "{run}").replace("NAME", "{name}").replace("FROM", "{from}");
+    let open = |key: String| {
+        key.replace("RUN", "{run}")
+            .replace("NAME", "{name}")
+            .replace("FROM", "{from}")
+    };
     let expected: BTreeSet<String> = expected.into_iter().map(open).collect();
 
     let page = page();
@@ -151,9 +180,14 @@ fn the_table_of_keys_is_that_of_the_code() {
     // The same keys are in the AsyncAPI document, and all messages that travel are named.
     let document = protocol::asyncapi::document();
     let channels = document["channels"].as_object().unwrap().values();
-    let addresses: BTreeSet<String> = channels.map(|c| c["address"].as_str().unwrap().to_owned()).collect();
+    let addresses: BTreeSet<String> = channels
+        .map(|c| c["address"].as_str().unwrap().to_owned())
+        .collect();
     assert_eq!(addresses, found);
-    let named: BTreeSet<&str> = rows.iter().flat_map(|row| schemas(row.last().unwrap())).collect();
+    let named: BTreeSet<&str> = rows
+        .iter()
+        .flat_map(|row| schemas(row.last().unwrap()))
+        .collect();
     let mut travel: BTreeSet<&str> = schema::all().into_keys().collect();
     for file_only in ["event", "recorded_tick", "recording_header"] {
         assert!(travel.remove(file_only));
@@ -176,7 +210,9 @@ fn limits_times_and_version_are_those_of_the_code() {
         MAX_SEED.to_string(),
     ];
     assert_eq!(limits, expected);
-    assert!(page.contains(&format!("The version of the protocol is {PROTOCOL_VERSION}.")));
+    assert!(page.contains(&format!(
+        "The version of the protocol is {PROTOCOL_VERSION}."
+    )));
 
     // Constants that are nobody else's business stay private; the page names their values.
     let flat = page.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -191,16 +227,36 @@ fn limits_times_and_version_are_those_of_the_code() {
             "LOOK_AGAIN: Duration = Duration::from_millis(250)",
             "once for each wait, after 0.25 s",
         ),
-        ("robot/src/link.rs", "ASK_AGAIN: Duration = Duration::from_millis(500)", "ask again every 0.5 s"),
-        ("robot/src/held.rs", "MAX_COMMANDS: usize = 16_384", "Keep 16384 at least"),
-        ("robot/src/board.rs", "MAX_EARLY: usize = 1024", "at most 1024 are kept"),
-        ("robot/src/host.rs", "JOIN_AGAIN: Duration = Duration::from_millis(100)", "every 0.1 s or so"),
+        (
+            "robot/src/link.rs",
+            "ASK_AGAIN: Duration = Duration::from_millis(500)",
+            "ask again every 0.5 s",
+        ),
+        (
+            "robot/src/held.rs",
+            "MAX_COMMANDS: usize = 16_384",
+            "Keep 16384 at least",
+        ),
+        (
+            "robot/src/board.rs",
+            "MAX_EARLY: usize = 1024",
+            "at most 1024 are kept",
+        ),
+        (
+            "robot/src/host.rs",
+            "JOIN_AGAIN: Duration = Duration::from_millis(100)",
+            "every 0.1 s or so",
+        ),
         (
             "robot/src/host.rs",
             "PANEL_INTERVAL: Duration = Duration::from_millis(50)",
             "at most 20 times a second",
         ),
-        ("simulator/src/server.rs", "SAY_AFTER: Duration = Duration::from_millis(500)", "business for 0.5 s"),
+        (
+            "simulator/src/server.rs",
+            "SAY_AFTER: Duration = Duration::from_millis(500)",
+            "business for 0.5 s",
+        ),
         (
             "simulator/src/server.rs",
             "REPEAT_AFTER: Duration = Duration::from_secs(2)",
@@ -216,15 +272,26 @@ fn limits_times_and_version_are_those_of_the_code() {
             "SEQS_OF_A_GENERATION: Seq = 1_000_000_000",
             "1,000,000,001 for generation 2",
         ),
-        ("protocol/src/bus/mod.rs", "QUERY_TIMEOUT: Duration = Duration::from_secs(2)", "timeout 2 s"),
-        ("protocol/src/bus/settings.rs", "\"transport/link/tx/lease\",\n        \"2000\"", "lease: 2000"),
+        (
+            "protocol/src/bus/mod.rs",
+            "QUERY_TIMEOUT: Duration = Duration::from_secs(2)",
+            "timeout 2 s",
+        ),
+        (
+            "protocol/src/bus/settings.rs",
+            "\"transport/link/tx/lease\",\n        \"2000\"",
+            "lease: 2000",
+        ),
     ] {
         let source = std::fs::read_to_string(root().join("crates").join(file)).unwrap();
         assert!(
             source.contains(constant),
             "{file} does not say {constant} any more: mend the page and this list"
         );
-        assert!(flat.contains(sentence), "the page does not say {sentence:?} any more");
+        assert!(
+            flat.contains(sentence),
+            "the page does not say {sentence:?} any more"
+        );
     }
 }
 
@@ -235,12 +302,21 @@ fn the_variables_are_those_of_a_robot_program() {
     let command = robot::RobotArgs::command();
     let mut count = 0;
     for argument in command.get_arguments() {
-        let Some(variable) = argument.get_env() else { continue };
+        let Some(variable) = argument.get_env() else {
+            continue;
+        };
         let variable = variable.to_str().unwrap();
         let row = rows.iter().find(|row| code(&row[0]) == variable);
         let row = row.unwrap_or_else(|| panic!("{variable} is not in the page"));
-        let default = argument.get_default_values().first().map(|value| value.to_str().unwrap());
-        assert_eq!(row[1].trim_matches('`'), default.unwrap_or("none"), "{variable}");
+        let default = argument
+            .get_default_values()
+            .first()
+            .map(|value| value.to_str().unwrap());
+        assert_eq!(
+            row[1].trim_matches('`'),
+            default.unwrap_or("none"),
+            "{variable}"
+        );
         count += 1;
     }
     assert!(count >= 4, "{count}");
@@ -274,7 +350,9 @@ fn check_as(schema: &str, text: &str) -> Result<(), Malformed> {
 /// Whether a recorded message or answer is this.
 fn is_recorded(file: &str, example: &Value) -> bool {
     let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
-    let mut lines = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let mut lines = text
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap());
     lines.any(|line| line["message"] == *example || line["answer"] == *example)
 }
 
@@ -287,12 +365,17 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
     for block in blocks {
         let (example, rest) = block.split_once("\n```").unwrap();
         let caption = before.trim_end().lines().last().unwrap();
-        let [schema] = schemas(caption)[..] else { panic!("which message is this? {caption}") };
+        let [schema] = schemas(caption)[..] else {
+            panic!("which message is this? {caption}")
+        };
         check_as(schema, example).unwrap_or_else(|error| panic!("{error}\n{example}"));
         if let Some((_, link)) = caption.split_once("(vectors/") {
             let file = link.split(')').next().unwrap();
             let example: Value = serde_json::from_str(example).unwrap();
-            assert!(is_recorded(file, &example), "{file} has no such message: {example}");
+            assert!(
+                is_recorded(file, &example),
+                "{file} has no such message: {example}"
+            );
             recorded += 1;
         }
         shown.insert(schema);
@@ -300,7 +383,15 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
     }
     // Those that a robot says or hears come from runs.
     assert!(recorded >= 11, "{recorded}");
-    for schema in ["clock", "join_request", "join_answer", "report", "waiting", "command", "public_state"] {
+    for schema in [
+        "clock",
+        "join_request",
+        "join_answer",
+        "report",
+        "waiting",
+        "command",
+        "public_state",
+    ] {
         assert!(shown.contains(schema), "no example of {schema}");
     }
 }
@@ -311,8 +402,13 @@ fn the_transcripts_are_messages() {
     let mut count = 0;
     for file in ["leguin.jsonl", "echo.jsonl", "return.jsonl"] {
         let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
-        for line in text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()) {
-            let Some(key) = line["key"].as_str() else { continue };
+        for line in text
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap())
+        {
+            let Some(key) = line["key"].as_str() else {
+                continue;
+            };
             let (message, answer) = (line["message"].to_string(), line["answer"].to_string());
             let chunk = match Keys::last_chunk(key) {
                 _ if key.contains("/command/") => "command",
@@ -369,7 +465,11 @@ fn the_links_lead_somewhere() {
         .map(|line| anchor(line.trim_start_matches(['#', ' '])))
         .collect();
     let mut count = 0;
-    for link in page.split("](").skip(1).map(|rest| rest.split(')').next().unwrap()) {
+    for link in page
+        .split("](")
+        .skip(1)
+        .map(|rest| rest.split(')').next().unwrap())
+    {
         count += 1;
         match link.strip_prefix('#') {
             Some(to) => assert!(anchors.contains(to), "{link}"),

@@ -1,7 +1,10 @@
 //! Robots in other languages over their standard input and output (`sdk/stdio`): compiled as their pages say, and launched
 //! as they are shipped.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot set up its subject fails")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot set up its subject fails"
+)]
 
 use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
@@ -22,7 +25,8 @@ fn lacks(tool: &str, is_there: bool, remedy: &str) -> bool {
     if is_there {
         return false;
     }
-    let text = format!("a test of robots in other languages is skipped: there is no {tool}; {remedy}");
+    let text =
+        format!("a test of robots in other languages is skipped: there is no {tool}; {remedy}");
     assert!(std::env::var_os("CI").is_none(), "{text}");
     // Past the test harness, which keeps what a passing test prints to itself.
     let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
@@ -30,21 +34,33 @@ fn lacks(tool: &str, is_there: bool, remedy: &str) -> bool {
 }
 
 fn succeeds(command: &mut Command) -> bool {
-    command.stdin(Stdio::null()).output().is_ok_and(|output| output.status.success())
+    command
+        .stdin(Stdio::null())
+        .output()
+        .is_ok_and(|output| output.status.success())
 }
 
 fn lacks_compiler() -> bool {
-    lacks("C compiler", succeeds(Command::new("cc").arg("--version")), "`apt-get install gcc libc6-dev`")
+    lacks(
+        "C compiler",
+        succeeds(Command::new("cc").arg("--version")),
+        "`apt-get install gcc libc6-dev`",
+    )
 }
 
 fn lacks_node() -> bool {
-    let is_there =
-        succeeds(Command::new("node").args(["-e", "if (parseInt(process.versions.node) < 18) throw 0"]));
+    let is_there = succeeds(
+        Command::new("node").args(["-e", "if (parseInt(process.versions.node) < 18) throw 0"]),
+    );
     lacks("Node.js", is_there, "install version 18 or later")
 }
 
 fn lacks_typescript() -> bool {
-    lacks("TypeScript", tsc().exists(), "`npm --prefix crates/console/check install`")
+    lacks(
+        "TypeScript",
+        tsc().exists(),
+        "`npm --prefix crates/console/check install`",
+    )
 }
 
 fn tsc() -> PathBuf {
@@ -53,7 +69,11 @@ fn tsc() -> PathBuf {
 
 /// Runs a command from the project's root; it must succeed.
 fn ok(command: &mut Command) -> Output {
-    let output = command.current_dir(root()).stdin(Stdio::null()).output().unwrap();
+    let output = command
+        .current_dir(root())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{command:?}: {}", said(&output));
     output
 }
@@ -66,7 +86,10 @@ fn said(output: &Output) -> String {
 /// The commands that the head of a launch file tells to type before the first launch.
 fn commands_of(launch_file: &str) -> Vec<String> {
     let text = std::fs::read_to_string(root().join(launch_file)).unwrap();
-    let commands = text.lines().filter_map(|line| line.strip_prefix("#     ")).map(str::to_owned);
+    let commands = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("#     "))
+        .map(str::to_owned);
     commands.collect()
 }
 
@@ -74,7 +97,10 @@ fn commands_of(launch_file: &str) -> Vec<String> {
 fn compiled(lab: &Lab, options: &str) -> PathBuf {
     let program = lab.out().join("leguin");
     let mut cc = Command::new("cc");
-    cc.args(options.split_whitespace()).arg("-o").arg(&program).args([C, "-lm"]);
+    cc.args(options.split_whitespace())
+        .arg("-o")
+        .arg(&program)
+        .args([C, "-lm"]);
     ok(&mut cc);
     program
 }
@@ -90,23 +116,37 @@ struct Cast {
 impl Cast {
     fn new(lab: Lab, scenario: &str, has_vonda: bool, leguin: &str) -> Self {
         let scenario = root().join(scenario);
-        let head = format!("scenario = {:?}\n[console]\nenabled = false\n", scenario.display().to_string());
+        let head = format!(
+            "scenario = {:?}\n[console]\nenabled = false\n",
+            scenario.display().to_string()
+        );
         let process = |name: &str, command: &str| {
-            format!("[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n")
+            format!(
+                "[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n"
+            )
         };
         let mut text = head + &process("Butler", r#"["cars-butler"]"#) + &process("Leguin", leguin);
         if has_vonda {
             text += &process("Vonda", leguin);
         }
         let file = lab.write("launch.toml", &text).display().to_string();
-        Self { lab, scenario, file }
+        Self {
+            lab,
+            scenario,
+            file,
+        }
     }
 
     /// With Leguin in C, compiled with these options.
     fn in_c(scenario: &str, has_vonda: bool, options: &str) -> Self {
         let lab = Lab::new();
         compiled(&lab, options);
-        Self::new(lab, scenario, has_vonda, r#"["cars", "exec", "--", "./leguin"]"#)
+        Self::new(
+            lab,
+            scenario,
+            has_vonda,
+            r#"["cars", "exec", "--", "./leguin"]"#,
+        )
     }
 
     /// The launch is, byte for byte, the run in one process with the robots in Rust.
@@ -119,7 +159,10 @@ impl Cast {
         launch.extend(more);
         self.lab.ok(&launch);
         let (in_rust, in_c) = (self.lab.bytes("in-rust"), self.lab.bytes("in-c"));
-        assert_same((&format!("{scenario} {more:?} in Rust"), &in_rust), ("with C", &in_c));
+        assert_same(
+            (&format!("{scenario} {more:?} in Rust"), &in_rust),
+            ("with C", &in_c),
+        );
     }
 }
 
@@ -162,16 +205,29 @@ fn her_parameters_and_vonda_mean_the_same_in_c() {
     let shorter = ["--duration", "200 s", "--seed", "5"];
     for changes in [
         &["robot.Butler.params.refiller=Vonda"][..],
-        &["robot.Leguin.params.hurry_mult=1.3", "robot.Leguin.params.caution=0.9"],
-        &["robot.Leguin.params.affect=off", "robot.Vonda.params.schematic=off"],
+        &[
+            "robot.Leguin.params.hurry_mult=1.3",
+            "robot.Leguin.params.caution=0.9",
+        ],
+        &[
+            "robot.Leguin.params.affect=off",
+            "robot.Vonda.params.schematic=off",
+        ],
         // Of somebody who is not there nothing is known: she searches.
-        &["robot.Leguin.params.waiter=Nobody", "robot.Leguin.params.turn_mean_s=2.0"],
+        &[
+            "robot.Leguin.params.waiter=Nobody",
+            "robot.Leguin.params.turn_mean_s=2.0",
+        ],
         &[
             "robot.Leguin.params.sensory_motor=off",
             "robot.Leguin.params.dynamics.th_concerned=0.3",
             "tick=0.1s",
         ],
-        &["network.commands.loss=0.3", "network.queries.loss=0.3", "robot.Leguin.params.block_patience_s=10"],
+        &[
+            "network.commands.loss=0.3",
+            "network.queries.loss=0.3",
+            "robot.Leguin.params.block_patience_s=10",
+        ],
     ] {
         let sets = changes.iter().flat_map(|change| ["--set", change]);
         let more: Vec<&str> = shorter.into_iter().chain(sets).collect();
@@ -185,10 +241,19 @@ fn no_compiler_fuses_her_arithmetic() {
         return;
     }
     // Where the machine can fuse, this asks for it.
-    Cast::in_c("configs/hors_doeuvres.toml", false, "-O3 -march=native").is_the_run_in_rust(&["--seed", "3"]);
+    Cast::in_c("configs/hors_doeuvres.toml", false, "-O3 -march=native")
+        .is_the_run_in_rust(&["--seed", "3"]);
     let mut sloppy = Command::new("cc");
-    let output = sloppy.current_dir(root()).args(["-Ofast", "-c", "-o", "/dev/null", C]).output().unwrap();
-    assert!(said(&output).contains("doubles must be computed as doubles"), "{}", said(&output));
+    let output = sloppy
+        .current_dir(root())
+        .args(["-Ofast", "-c", "-o", "/dev/null", C])
+        .output()
+        .unwrap();
+    assert!(
+        said(&output).contains("doubles must be computed as doubles"),
+        "{}",
+        said(&output)
+    );
 }
 
 #[test]
@@ -196,19 +261,41 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
     if lacks_compiler() {
         return;
     }
-    let commands = [(r#"["cars-leguin"]"#, "rust"), (r#"["cars", "exec", "--", "./leguin"]"#, "c")];
+    let commands = [
+        (r#"["cars-leguin"]"#, "rust"),
+        (r#"["cars", "exec", "--", "./leguin"]"#, "c"),
+    ];
     let [in_rust, in_c] = commands.map(|(command, run)| {
         let lab = Lab::new();
         compiled(&lab, PLAIN);
         let cast = Cast::new(lab, "configs/hors_doeuvres.toml", false, command);
-        let fault = "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"60 s\", for = \"0.1 s\" }]";
-        let args = ["--set", fault, "--duration", "150 s", "--speed", "max", "--seed", "6", "--paused"];
+        let fault =
+            "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"60 s\", for = \"0.1 s\" }]";
+        let args = [
+            "--set",
+            fault,
+            "--duration",
+            "150 s",
+            "--speed",
+            "max",
+            "--seed",
+            "6",
+            "--paused",
+        ];
         let name = format!("over-{run}");
         let args: Vec<&str> = ["launch", &cast.file].into_iter().chain(args).collect();
         let mut launch = cast.lab.start(&name, &args);
         let ctl = |args: &[&str]| {
-            let args: Vec<&str> = ["ctl"].iter().chain(args).chain(&["--run", &name]).copied().collect();
-            cast.lab.cars(&args).output().is_ok_and(|output| output.status.success())
+            let args: Vec<&str> = ["ctl"]
+                .iter()
+                .chain(args)
+                .chain(&["--run", &name])
+                .copied()
+                .collect();
+            cast.lab
+                .cars(&args)
+                .output()
+                .is_ok_and(|output| output.status.success())
         };
         // Into the first epoch, back to the beginning, and through the second one with its crash.
         eventually("the first ticks", || ctl(&["step", "50"]).then_some(()));
@@ -219,7 +306,10 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
     });
     assert_same(("in Rust", &in_rust), ("in C", &in_c));
     let text = String::from_utf8(in_c).unwrap();
-    for part in ["is back, and takes over where the last one was lost", r#""generation":2"#] {
+    for part in [
+        "is back, and takes over where the last one was lost",
+        r#""generation":2"#,
+    ] {
         assert!(text.contains(part), "no {part}");
     }
 }
@@ -272,8 +362,13 @@ fn damaged(chance: &mut Stream) -> Vec<u8> {
 /// What becomes of a program that is told all of this at once.
 fn told(program: &Path, session: &[u8]) -> Output {
     let mut command = Command::new(program);
-    command.env("ASAN_OPTIONS", "exitcode=99").env("UBSAN_OPTIONS", "halt_on_error=1:exitcode=99");
-    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+        .env("ASAN_OPTIONS", "exitcode=99")
+        .env("UBSAN_OPTIONS", "halt_on_error=1:exitcode=99");
+    command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     let session = session.to_vec();
@@ -294,9 +389,16 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
     let lab = Lab::new();
     let empty = lab.write("empty.c", "int main(void) { return 0; }\n");
     let program = lab.out().join("empty");
-    let sanitizes =
-        succeeds(Command::new("cc").args(["-fsanitize=address,undefined", "-o"]).args([&program, &empty]));
-    if lacks("C compiler with sanitizers", sanitizes, "`apt-get install gcc`") {
+    let sanitizes = succeeds(
+        Command::new("cc")
+            .args(["-fsanitize=address,undefined", "-o"])
+            .args([&program, &empty]),
+    );
+    if lacks(
+        "C compiler with sanitizers",
+        sanitizes,
+        "`apt-get install gcc`",
+    ) {
         return;
     }
     let cast = Cast::in_c("configs/three_robots.toml", true, STRICT);
@@ -305,14 +407,25 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
     let program = cast.lab.out().join("leguin");
     let whole = told(&program, TOLD.join("\n").as_bytes());
     assert!(whole.status.success(), "{}", said(&whole));
-    assert_eq!(String::from_utf8_lossy(&whole.stdout).matches("\"done\"").count(), 4, "{}", said(&whole));
+    assert_eq!(
+        String::from_utf8_lossy(&whole.stdout)
+            .matches("\"done\"")
+            .count(),
+        4,
+        "{}",
+        said(&whole)
+    );
     let mut chance = stream(1, "damage");
     let mut refused = 0;
     for _ in 0..300 {
         let session = damaged(&mut chance);
         let output = told(&program, &session);
-        let (status, text) = (output.status.code(), String::from_utf8_lossy(&output.stderr));
-        let is_refusal = status == Some(1) && text.starts_with("leguin: ") && text.lines().count() == 1;
+        let (status, text) = (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr),
+        );
+        let is_refusal =
+            status == Some(1) && text.starts_with("leguin: ") && text.lines().count() == 1;
         assert!(
             status == Some(0) || is_refusal,
             "{}\nafter\n{}",
@@ -321,12 +434,19 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
         );
         refused += usize::from(is_refusal);
     }
-    assert!(refused > 100, "only {refused} of 300 damaged sessions were refused");
+    assert!(
+        refused > 100,
+        "only {refused} of 300 damaged sessions were refused"
+    );
 }
 
 #[test]
 fn the_page_makes_a_robot_from_nothing() {
-    if lacks("Python", succeeds(Command::new("python3").arg("--version")), "`apt-get install python3`") {
+    if lacks(
+        "Python",
+        succeeds(Command::new("python3").arg("--version")),
+        "`apt-get install python3`",
+    ) {
         return;
     }
     let page = std::fs::read_to_string(root().join("sdk/stdio/README.md")).unwrap();
@@ -340,11 +460,28 @@ fn the_page_makes_a_robot_from_nothing() {
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
     lab.write("walk.toml", scenario);
     let launch = lab.write("walk-launch.toml", launch).display().to_string();
-    lab.ok(&["launch", &launch, "--no-console", "--speed", "max", "--duration", "60 s", "--run", "page"]);
+    lab.ok(&[
+        "launch",
+        &launch,
+        "--no-console",
+        "--speed",
+        "max",
+        "--duration",
+        "60 s",
+        "--run",
+        "page",
+    ]);
     // Half a meter a second, but where a guest is in the way.
     let way_m = way_m(&lab, "page", "Walker");
-    assert!((10.0..=30.0).contains(&way_m), "it walked {way_m} m in a minute");
-    assert!(String::from_utf8(lab.bytes("page")).unwrap().contains("\"to\":\"CALM\""));
+    assert!(
+        (10.0..=30.0).contains(&way_m),
+        "it walked {way_m} m in a minute"
+    );
+    assert!(
+        String::from_utf8(lab.bytes("page"))
+            .unwrap()
+            .contains("\"to\":\"CALM\"")
+    );
 }
 
 /// Compiles the robot in TypeScript as the launch file says; `npx` would fetch the compiler that the console's check has.
@@ -365,7 +502,11 @@ fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
     companion_is_compiled();
     let lab = Lab::new();
     for run in ["any-first", "any-second"] {
-        lab.start(run, &["launch", ANY_LANGUAGE, "--no-console", "--speed", "max"]).finish();
+        lab.start(
+            run,
+            &["launch", ANY_LANGUAGE, "--no-console", "--speed", "max"],
+        )
+        .finish();
     }
     let [first, second] = ["any-first", "any-second"].map(|run| lab.bytes(run));
     assert_same(("the first launch", &first), ("the second launch", &second));
@@ -373,18 +514,30 @@ fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
     let events = lab.events("any-first");
     for (robot, felt) in [("Nora", "LONELY"), ("Tove", "WORRIED"), ("Bruno", "GRUMPY")] {
         let changes = |kind: &str| {
-            let own = events.iter().filter(|event| event["event"] == kind && event["robot"] == robot);
+            let own = events
+                .iter()
+                .filter(|event| event["event"] == kind && event["robot"] == robot);
             own.filter(|event| event["from"].is_string())
                 .map(|event| event["to"].as_str().unwrap())
                 .collect::<Vec<_>>()
         };
-        assert!(changes("emotion").contains(&felt), "{robot} never was {felt}: {:?}", changes("emotion"));
-        assert!(!changes("behavior").is_empty(), "{robot} did the same all the time");
+        assert!(
+            changes("emotion").contains(&felt),
+            "{robot} never was {felt}: {:?}",
+            changes("emotion")
+        );
+        assert!(
+            !changes("behavior").is_empty(),
+            "{robot} did the same all the time"
+        );
         let way_m = way_m(&lab, "any-first", robot);
         assert!(way_m > 20.0, "{robot} moved by {way_m} m in 300 s");
     }
     // They speak with one another.
-    for part in [r#""command_sent","from":"Nora","to":"Tove""#, "nods to Nora"] {
+    for part in [
+        r#""command_sent","from":"Nora","to":"Tove""#,
+        "nods to Nora",
+    ] {
         assert!(String::from_utf8_lossy(&first).contains(part), "no {part}");
     }
 }
@@ -421,14 +574,31 @@ fn a_robot_in_perl_draws_and_keeps_the_rules() {
     lab.write("stroll.toml", scenario);
     let process = |name: &str| {
         let program = wanderer.display();
-        format!("[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"{program}\"]\n")
+        format!(
+            "[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"{program}\"]\n"
+        )
     };
-    let launch = format!("scenario = \"stroll.toml\"\n{}{}", process("Wanda"), process("Wim"));
+    let launch = format!(
+        "scenario = \"stroll.toml\"\n{}{}",
+        process("Wanda"),
+        process("Wim")
+    );
     let launch = lab.write("stroll-launch.toml", &launch);
     for run in ["perl-first", "perl-second"] {
-        lab.ok(&["launch", launch.to_str().unwrap(), "--run", run, "--no-console", "--speed", "max"]);
+        lab.ok(&[
+            "launch",
+            launch.to_str().unwrap(),
+            "--run",
+            run,
+            "--no-console",
+            "--speed",
+            "max",
+        ]);
     }
-    assert_same(("the first launch", &lab.bytes("perl-first")), ("the second", &lab.bytes("perl-second")));
+    assert_same(
+        ("the first launch", &lab.bytes("perl-first")),
+        ("the second", &lab.bytes("perl-second")),
+    );
     assert!(way_m(&lab, "perl-first", "Wanda") > 20.0);
     assert_conforms(&launch, "Wanda");
 }
@@ -440,11 +610,20 @@ fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
         .lines()
         .filter_map(|line| {
             let tick: serde_json::Value = serde_json::from_str(line).unwrap();
-            let own = tick["robots"].as_array()?.iter().find(|other| other["name"] == robot)?;
-            Some((own["location"]["x"].as_f64()?, own["location"]["y"].as_f64()?))
+            let own = tick["robots"]
+                .as_array()?
+                .iter()
+                .find(|other| other["name"] == robot)?;
+            Some((
+                own["location"]["x"].as_f64()?,
+                own["location"]["y"].as_f64()?,
+            ))
         })
         .collect();
-    places.windows(2).map(|pair| (pair[1].0 - pair[0].0).abs() + (pair[1].1 - pair[0].1).abs()).sum()
+    places
+        .windows(2)
+        .map(|pair| (pair[1].0 - pair[0].0).abs() + (pair[1].1 - pair[0].1).abs())
+        .sum()
 }
 
 #[test]
@@ -463,7 +642,12 @@ fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
     ];
     for program in programs {
         let end = told(&program, b"{\"type\":\"end\",\"reason\":\"finished\"}\n");
-        assert!(end.status.success() && end.stdout.is_empty(), "{}: {}", program.display(), said(&end));
+        assert!(
+            end.status.success() && end.stdout.is_empty(),
+            "{}: {}",
+            program.display(),
+            said(&end)
+        );
         let silence = told(&program, b"");
         assert!(
             silence.status.success() && silence.stdout.is_empty(),
@@ -472,34 +656,74 @@ fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
             said(&silence)
         );
         let rubbish = told(&program, b"rubbish\n");
-        assert_eq!(rubbish.status.code(), Some(1), "{}: {}", program.display(), said(&rubbish));
-        assert!(!rubbish.stderr.is_empty(), "{} says nothing about rubbish", program.display());
+        assert_eq!(
+            rubbish.status.code(),
+            Some(1),
+            "{}: {}",
+            program.display(),
+            said(&rubbish)
+        );
+        assert!(
+            !rubbish.stderr.is_empty(),
+            "{} says nothing about rubbish",
+            program.display()
+        );
     }
 }
 
 #[test]
 fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
-    let python = Command::new("python3").args(["-c", "import zenoh"]).output();
+    let python = Command::new("python3")
+        .args(["-c", "import zenoh"])
+        .output();
     let has_zenoh = python.is_ok_and(|output| output.status.success());
     if lacks_compiler() || lacks("Python with zenoh", has_zenoh, "`pip install ./sdk/python`") {
         return;
     }
-    let compile = commands_of(MIXED).into_iter().find(|command| command.starts_with("cc "));
+    let compile = commands_of(MIXED)
+        .into_iter()
+        .find(|command| command.starts_with("cc "));
     ok(Command::new("sh").args(["-c", &compile.unwrap()]));
     let lab = Lab::new();
-    for (run, more) in [("mixed", &[][..]), ("mixed-vonda", &["--set", "robot.Butler.params.refiller=Vonda"])]
-    {
+    for (run, more) in [
+        ("mixed", &[][..]),
+        (
+            "mixed-vonda",
+            &["--set", "robot.Butler.params.refiller=Vonda"],
+        ),
+    ] {
         let alone = format!("{run}-rust");
-        let local: Vec<&str> = ["run", MIXED, "--run", &alone].iter().chain(more).copied().collect();
+        let local: Vec<&str> = ["run", MIXED, "--run", &alone]
+            .iter()
+            .chain(more)
+            .copied()
+            .collect();
         lab.ok(&local);
-        let launch = ["launch", MIXED, "--run", run, "--no-console", "--speed", "max"];
+        let launch = [
+            "launch",
+            MIXED,
+            "--run",
+            run,
+            "--no-console",
+            "--speed",
+            "max",
+        ];
         let mut launch = lab.cars(&launch.iter().chain(more).copied().collect::<Vec<_>>());
         // As it is here, installed or not.
-        launch.env("PYTHONPATH", root().join("sdk/python/src")).env("PYTHONDONTWRITEBYTECODE", "1");
+        launch
+            .env("PYTHONPATH", root().join("sdk/python/src"))
+            .env("PYTHONDONTWRITEBYTECODE", "1");
         ok(&mut launch);
-        assert_same(("all in Rust", &lab.bytes(&alone)), ("in three languages", &lab.bytes(run)));
+        assert_same(
+            ("all in Rust", &lab.bytes(&alone)),
+            ("in three languages", &lab.bytes(run)),
+        );
         let end = &lab.events(run).pop().unwrap();
-        assert_eq!((&end["event"], &end["tick"]), (&"end".into(), &1200.into()), "{end}");
+        assert_eq!(
+            (&end["event"], &end["tick"]),
+            (&"end".into(), &1200.into()),
+            "{end}"
+        );
     }
     assert_conforms(&root().join(MIXED), "Leguin");
 }

@@ -18,7 +18,10 @@ const PATIENCE: Duration = Duration::from_secs(540);
 /// A Python that knows the package of this checkout.
 fn python() -> Command {
     let mut python = Command::new("python3");
-    python.current_dir(root()).env("PYTHONPATH", package()).env("PYTHONDONTWRITEBYTECODE", "1");
+    python
+        .current_dir(root())
+        .env("PYTHONPATH", package())
+        .env("PYTHONDONTWRITEBYTECODE", "1");
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARS_")) {
         python.env_remove(name);
     }
@@ -35,7 +38,8 @@ fn package() -> PathBuf {
 fn is_equipped() -> bool {
     let missing = match python().args(["-c", "import zenoh, pytest, mypy"]).output() {
         Ok(output) if output.status.success() => return true,
-        Ok(_) => "python3 lacks eclipse-zenoh, pytest or mypy; `pip install './sdk/python[test]'`".to_owned(),
+        Ok(_) => "python3 lacks eclipse-zenoh, pytest or mypy; `pip install './sdk/python[test]'`"
+            .to_owned(),
         Err(error) => format!("python3 does not run ({error}); install Python 3.10 or later"),
     };
     let text = format!("the tests of the SDK in Python are skipped: {missing}");
@@ -53,11 +57,26 @@ fn the_package_passes_its_tests() {
     let printed = lab.out().join("pytest.txt");
     let file = std::fs::File::create(&printed).unwrap();
     let mut pytest = python();
-    pytest.current_dir(root().join("sdk/python")).env("CARS_BIN_DIR", programs());
-    pytest.args(["-m", "pytest", "-v", "-ra", "--tb=short", "-p", "no:cacheprovider"]);
+    pytest
+        .current_dir(root().join("sdk/python"))
+        .env("CARS_BIN_DIR", programs());
+    pytest.args([
+        "-m",
+        "pytest",
+        "-v",
+        "-ra",
+        "--tb=short",
+        "-p",
+        "no:cacheprovider",
+    ]);
     pytest.arg("--basetemp").arg(lab.out().join("pytest"));
     // A group of its own, so that nothing that its tests have started outlives it.
-    let mut pytest = pytest.process_group(0).stdout(file.try_clone().unwrap()).stderr(file).spawn().unwrap();
+    let mut pytest = pytest
+        .process_group(0)
+        .stdout(file.try_clone().unwrap())
+        .stderr(file)
+        .spawn()
+        .unwrap();
     let group = Pid::from_raw(i32::try_from(pytest.id()).unwrap());
     let begun = Instant::now();
     let status = loop {
@@ -93,11 +112,21 @@ fn streams_draw_the_same_numbers() {
     }
     let names = ["guests", "robot/Butler", "robot/Leguin#2", "", "caf\u{e9}"];
     let seeds = [0, 1, 42, 2002, MAX_SEED, u64::MAX];
-    let streams: Vec<(u64, &str)> =
-        seeds.into_iter().flat_map(|seed| names.map(|name| (seed, name))).collect();
+    let streams: Vec<(u64, &str)> = seeds
+        .into_iter()
+        .flat_map(|seed| names.map(|name| (seed, name)))
+        .collect();
     let arguments = streams.iter().map(|(seed, name)| format!("{seed} {name}"));
-    let output = python().args(["-c", DRAWS]).args(arguments).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = python()
+        .args(["-c", DRAWS])
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let printed = String::from_utf8(output.stdout).unwrap();
     assert_eq!(printed.lines().count(), streams.len());
     for ((seed, name), line) in streams.into_iter().zip(printed.lines()) {

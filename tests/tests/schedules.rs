@@ -3,7 +3,11 @@
 //!
 //! `CARS_SCHEDULES=5000` executes more of them, `CARS_SCHEDULE_SEED=17` one alone.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot set up its subject fails"
+)]
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -55,7 +59,11 @@ fn faults(seed: u64) -> Faults {
     let mut draws = stream(seed, "faults");
     let mut up_to = |most: f64| most * unit(&mut draws);
     Faults {
-        pause: Duration::from_micros(if seed.is_multiple_of(2) { 0 } else { up_to(60.0) as u64 }),
+        pause: Duration::from_micros(if seed.is_multiple_of(2) {
+            0
+        } else {
+            up_to(60.0) as u64
+        }),
         nap: up_to(0.02),
         cut: up_to(0.004),
         loss: up_to(0.01),
@@ -158,7 +166,11 @@ type Ended = Result<End, String>;
 
 impl Schedule {
     fn new(seed: u64, faults: Faults, scenario: Scenario, harm: Harm) -> Self {
-        Self { network: Arc::new(MemoryNetwork::new(seed, faults)), scenario, harm }
+        Self {
+            network: Arc::new(MemoryNetwork::new(seed, faults)),
+            scenario,
+            harm,
+        }
     }
 
     /// Executes it, and says how it ended and what the network did.
@@ -167,10 +179,20 @@ impl Schedule {
         let out = tempfile::tempdir().unwrap();
         let folder = RunFolder::new(out.path(), &run);
         let _lock = folder.create(&self.scenario).unwrap();
-        let options = Options { run: run.clone(), speed: None, is_paused: false, repeat_after: REPEAT_AFTER };
+        let options = Options {
+            run: run.clone(),
+            speed: None,
+            is_paused: false,
+            repeat_after: REPEAT_AFTER,
+        };
         let server = Server::open(self.network.router(), &self.scenario, options).unwrap();
         let queue = server.queue();
-        let hosts: Vec<_> = self.scenario.roster().into_iter().map(|name| self.host(&run, name)).collect();
+        let hosts: Vec<_> = self
+            .scenario
+            .roster()
+            .into_iter()
+            .map(|name| self.host(&run, name))
+            .collect();
 
         let (sender, ended) = channel();
         let scenario = self.scenario.clone();
@@ -184,7 +206,10 @@ impl Schedule {
                 let held = self.awaited(&run);
                 let _ = queue.send(Event::Terminate);
                 let summary = ended.recv_timeout(PATIENCE);
-                let tick = summary.ok().and_then(Result::ok).map(|summary| summary.ticks);
+                let tick = summary
+                    .ok()
+                    .and_then(Result::ok)
+                    .map(|summary| summary.ticks);
                 Err(format!("it hangs after tick {tick:?}, {held}"))
             }
         };
@@ -202,13 +227,19 @@ impl Schedule {
         }
         let traffic = self.network.traffic();
         // A robot whose link breaks under the last message of the run cannot know that it was the last.
-        let (deaf, failed): (Vec<_>, Vec<_>) =
-            failed.into_iter().partition(|error| traffic.cuts > 0 && error.contains("has been gone"));
+        let (deaf, failed): (Vec<_>, Vec<_>) = failed
+            .into_iter()
+            .partition(|error| traffic.cuts > 0 && error.contains("has been gone"));
         let outcome = match outcome {
             Ok(_) if !failed.is_empty() => Err(failed.join("; ")),
-            Err(reason) => {
-                Err(format!("{reason}; {}", failed.into_iter().chain(deaf).collect::<Vec<_>>().join("; ")))
-            }
+            Err(reason) => Err(format!(
+                "{reason}; {}",
+                failed
+                    .into_iter()
+                    .chain(deaf)
+                    .collect::<Vec<_>>()
+                    .join("; ")
+            )),
             ok => ok,
         };
         (outcome, traffic)
@@ -217,9 +248,18 @@ impl Schedule {
     /// For whom the clock waits, in the simulator's words.
     fn awaited(&self, run: &RunName) -> String {
         let bus = self.network.router();
-        let answer = bus.ask(&Keys::new(run).control(), "", Some(encode(&Control::Status)));
-        match answer.unwrap().map(|answer| decode("control", "simulator", &answer.result.unwrap())) {
-            Some(Ok(ControlAnswer::Done(status))) => format!("{:?}, {:?}", status.awaiting, status.robots),
+        let answer = bus.ask(
+            &Keys::new(run).control(),
+            "",
+            Some(encode(&Control::Status)),
+        );
+        match answer
+            .unwrap()
+            .map(|answer| decode("control", "simulator", &answer.result.unwrap()))
+        {
+            Some(Ok(ControlAnswer::Done(status))) => {
+                format!("{:?}, {:?}", status.awaiting, status.robots)
+            }
             other => format!("{other:?}"),
         }
     }
@@ -247,8 +287,12 @@ impl Schedule {
             match harm {
                 Harm::KilledIn(victim, tick, phase) if victim == name => {
                     let (network, dies) = (network.clone(), (tick, phase));
-                    let mortal =
-                        Mortal { robot: make(&class), network: network.clone(), bus: bus.clone(), dies };
+                    let mortal = Mortal {
+                        robot: make(&class),
+                        network: network.clone(),
+                        bus: bus.clone(),
+                        dies,
+                    };
                     let mortal: Box<dyn Robot> = Box::new(mortal);
                     let life = std::panic::AssertUnwindSafe(|| live(bus, mortal));
                     std::panic::catch_unwind(life).expect_err("it is killed");
@@ -271,12 +315,20 @@ impl Schedule {
 
 /// Who comes when all is over has missed nothing.
 fn after_the_end(error: String) -> Ended {
-    if error.contains("is over") || error.contains("no simulator") { Ok(End::Finished) } else { Err(error) }
+    if error.contains("is over") || error.contains("no simulator") {
+        Ok(End::Finished)
+    } else {
+        Err(error)
+    }
 }
 
 /// How many schedules, or the only one that is wanted.
 fn seeds(default: u64) -> std::ops::Range<u64> {
-    let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().expect("a number"));
+    let number = |name: &str| {
+        std::env::var(name)
+            .ok()
+            .map(|text| text.parse::<u64>().expect("a number"))
+    };
     match number("CARS_SCHEDULE_SEED") {
         Some(seed) => seed..seed + 1,
         None => 0..number("CARS_SCHEDULES").unwrap_or(default),
@@ -308,7 +360,11 @@ fn explore<T: Send>(
                     match outcome.and_then(|summary| judge(seed, summary)) {
                         Ok(one) => found.lock().unwrap().push(one),
                         Err(reason) => {
-                            failed.lock().unwrap().push((seed, format!("{harm:?}: {reason}"), traffic));
+                            failed.lock().unwrap().push((
+                                seed,
+                                format!("{harm:?}: {reason}"),
+                                traffic,
+                            ));
                         }
                     }
                 }
@@ -316,8 +372,11 @@ fn explore<T: Send>(
         }
     });
     let (count, took_s) = (seeds.end - first, begun.elapsed().as_secs_f64());
-    let (found, mut failed, total) =
-        (found.into_inner().unwrap(), failed.into_inner().unwrap(), total.into_inner().unwrap());
+    let (found, mut failed, total) = (
+        found.into_inner().unwrap(),
+        failed.into_inner().unwrap(),
+        total.into_inner().unwrap(),
+    );
     let rate = count as f64 / took_s * 60.0;
     println!("{test}: {count} schedules in {took_s:.1} s, {rate:.0} a minute; {total:?}");
     failed.sort_by_key(|(seed, ..)| *seed);
@@ -327,7 +386,11 @@ fn explore<T: Send>(
             "  again: CARS_SCHEDULE_SEED={seed} cargo test --release -p system-tests --test schedules {test} -- --nocapture"
         );
     }
-    assert!(failed.is_empty(), "{} of {count} schedules failed", failed.len());
+    assert!(
+        failed.is_empty(),
+        "{} of {count} schedules failed",
+        failed.len()
+    );
     (found, total)
 }
 
@@ -353,15 +416,25 @@ fn digest_without_network(scenario: Scenario) -> String {
     for _ in 0..TICKS {
         let is_delivered =
             |event: &simulator::Event| matches!(event, simulator::Event::CommandDelivered { .. });
-        delivered += hall.step().iter().filter(|event| is_delivered(event)).count();
+        delivered += hall
+            .step()
+            .iter()
+            .filter(|event| is_delivered(event))
+            .count();
     }
-    assert!(delivered > 0, "nothing would be shown by a run without commands");
+    assert!(
+        delivered > 0,
+        "nothing would be shown by a run without commands"
+    );
     hall.simulation.digest()
 }
 
 fn same(expected: &str, summary: &Summary) -> Result<(), String> {
     if summary.ticks != TICKS || summary.end != Some(End::Finished) {
-        return Err(format!("it ended after {} ticks, {:?}", summary.ticks, summary.end));
+        return Err(format!(
+            "it ended after {} ticks, {:?}",
+            summary.ticks, summary.end
+        ));
     }
     if summary.digest != expected {
         return Err(format!("digest {} instead of {expected}", summary.digest));
@@ -381,7 +454,10 @@ fn every_schedule_is_the_same_run() {
         |seed, summary| same(&expected[of(seed)], &summary),
     );
     let happened = [traffic.lost, traffic.duplicated, traffic.cuts, traffic.naps];
-    assert!(seeds(400).count() < 100 || happened.iter().all(|count| *count > 0), "{traffic:?}");
+    assert!(
+        seeds(400).count() < 100 || happened.iter().all(|count| *count > 0),
+        "{traffic:?}"
+    );
 }
 
 /// Who is killed, and when, by seed: few ways, so that several schedules share each.
@@ -410,10 +486,17 @@ fn a_robot_that_is_killed_and_comes_back_changes_the_run_in_one_way() {
     );
     let mut runs: BTreeMap<_, BTreeMap<String, Vec<u64>>> = BTreeMap::new();
     for (way, (digest, seed)) in found {
-        runs.entry(way).or_default().entry(digest).or_default().push(seed);
+        runs.entry(way)
+            .or_default()
+            .entry(digest)
+            .or_default()
+            .push(seed);
     }
     runs.retain(|_, digests| digests.len() > 1);
-    assert!(runs.is_empty(), "the same harm gave different runs (digest, then seeds): {runs:#?}");
+    assert!(
+        runs.is_empty(),
+        "the same harm gave different runs (digest, then seeds): {runs:#?}"
+    );
 }
 
 #[test]
@@ -428,7 +511,12 @@ fn a_robot_that_is_killed_at_any_moment_comes_back() {
             let mut draws = stream(seed, "moment");
             let victim = scenario.roster()[(unit(&mut draws) * 2.0) as usize].clone();
             let after_us = (unit(&mut draws) * 25_000.0) as u64;
-            Schedule::new(seed, faults(seed), scenario, Harm::KilledAfter(victim, after_us))
+            Schedule::new(
+                seed,
+                faults(seed),
+                scenario,
+                Harm::KilledAfter(victim, after_us),
+            )
         },
         |_, summary| same(&summary.digest, &summary),
     );

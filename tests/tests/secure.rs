@@ -43,11 +43,17 @@ fn config(folder: &Path, participant: &str) -> PathBuf {
 
 /// A printed message without its line breaks and its frame.
 fn flat(text: &str) -> String {
-    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+    text.split_whitespace()
+        .filter(|word| *word != "│")
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 fn open(endpoint: &str, config: Option<&PathBuf>) -> Result<Bus, String> {
-    let role = Role::Client { connect: endpoint.to_owned(), patience: Duration::from_millis(500) };
+    let role = Role::Client {
+        connect: endpoint.to_owned(),
+        patience: Duration::from_millis(500),
+    };
     Bus::open(&role, config).map_err(|error| error.to_string())
 }
 
@@ -83,14 +89,26 @@ impl Castle {
             ],
         );
         let endpoint = eventually("the endpoint", || {
-            std::fs::read_to_string(lab.file(run, "endpoint")).ok().map(|text| text.trim().to_owned())
+            std::fs::read_to_string(lab.file(run, "endpoint"))
+                .ok()
+                .map(|text| text.trim().to_owned())
         });
         assert!(endpoint.starts_with("tls/127.0.0.1:"), "{endpoint}");
         let operator = open(&endpoint, Some(&config(&folder, "operator"))).unwrap();
         let run = RunName::new(run).unwrap();
         let keys = Keys::new(&run);
-        let castle = Self { lab, launch, folder, endpoint, run, keys, operator };
-        eventually("tick 0", || (castle.status().phase == protocol::messages::Phase::Ready).then_some(()));
+        let castle = Self {
+            lab,
+            launch,
+            folder,
+            endpoint,
+            run,
+            keys,
+            operator,
+        };
+        eventually("tick 0", || {
+            (castle.status().phase == protocol::messages::Phase::Ready).then_some(())
+        });
         castle
     }
 
@@ -100,8 +118,10 @@ impl Castle {
     }
 
     fn control(&self, control: &Control) -> Status {
-        let answer =
-            self.operator.ask_within(&self.keys.control(), "", Some(encode(control)), PATIENCE).unwrap();
+        let answer = self
+            .operator
+            .ask_within(&self.keys.control(), "", Some(encode(control)), PATIENCE)
+            .unwrap();
         let bytes = answer.expect("an operator is answered").result.unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Done(status) => *status,
@@ -127,10 +147,15 @@ impl Castle {
     fn finish_unharmed(mut self) {
         self.control(&Control::Start);
         self.launch.finish();
-        let undisturbed = self.lab.ok(&["run", HALL, "--duration", "60 s", "--run", "undisturbed"]);
+        let undisturbed = self
+            .lab
+            .ok(&["run", HALL, "--duration", "60 s", "--run", "undisturbed"]);
         assert!(!undisturbed.is_empty());
         let run = self.run.as_str();
-        assert_same(("secured", &self.lab.bytes(run)), ("undisturbed", &self.lab.bytes("undisturbed")));
+        assert_same(
+            ("secured", &self.lab.bytes(run)),
+            ("undisturbed", &self.lab.bytes("undisturbed")),
+        );
     }
 }
 
@@ -141,7 +166,10 @@ struct Heard(Arc<Mutex<Vec<String>>>);
 impl Heard {
     fn on(&self, bus: &Bus, keys: &str) -> Declared {
         let heard = self.0.clone();
-        bus.subscribe(keys, move |key, _| heard.lock().expect("no panic").push(key.to_owned())).unwrap()
+        bus.subscribe(keys, move |key, _| {
+            heard.lock().expect("no panic").push(key.to_owned())
+        })
+        .unwrap()
     }
 
     fn keys(&self) -> Vec<String> {
@@ -155,18 +183,42 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
     let lab = &castle.lab;
     // Whoever launched it needs to say nothing more: the run's folder tells where and how.
     lab.ok(&["ctl", "step", "30", "--run", "secure-same"]);
-    assert!(lab.ok(&["ctl", "status", "--run", "secure-same"]).contains("tick 30"));
-    assert_eq!(lab.ok(&["query", "Leguin", "behavior_state", "--run", "secure-same"]).trim(), "WAIT");
+    assert!(
+        lab.ok(&["ctl", "status", "--run", "secure-same"])
+            .contains("tick 30")
+    );
+    assert_eq!(
+        lab.ok(&["query", "Leguin", "behavior_state", "--run", "secure-same"])
+            .trim(),
+        "WAIT"
+    );
     // By its address alone nobody gets in, and is told what is missing.
-    let (_, text) = lab.fails(&["ctl", "stop", "--run", "secure-same", "--connect", &castle.endpoint]);
+    let (_, text) = lab.fails(&[
+        "ctl",
+        "stop",
+        "--run",
+        "secure-same",
+        "--connect",
+        &castle.endpoint,
+    ]);
     assert!(flat(&text).contains("wants a certificate"), "{text}");
     // A robot is no operator.
     let leguin = config(&castle.folder, "Leguin").display().to_string();
-    lab.fails(&["ctl", "stop", "--run", "secure-same", "--zenoh-config", &leguin]);
+    lab.fails(&[
+        "ctl",
+        "stop",
+        "--run",
+        "secure-same",
+        "--zenoh-config",
+        &leguin,
+    ]);
     let (folder, run) = (castle.launch.folder.clone(), castle.run.clone());
     castle.finish_unharmed();
     for file in ["endpoint", "operator_config"] {
-        assert!(!folder.join(file).exists(), "{file} of {run} is still there");
+        assert!(
+            !folder.join(file).exists(),
+            "{file} of {run} is still there"
+        );
     }
 }
 
@@ -175,8 +227,10 @@ fn nobody_enters_without_a_certificate_of_this_authority() {
     let castle = Castle::new("secure-door");
     let others = certificates(&castle.lab, "others");
     let plain = castle.endpoint.replace("tls/", "tcp/");
-    let no_certificate =
-        castle.lab.write("none.json5", "{transport: {link: {tls: {verify_name_on_connect: false}}}}");
+    let no_certificate = castle.lab.write(
+        "none.json5",
+        "{transport: {link: {tls: {verify_name_on_connect: false}}}}",
+    );
     let anonymous = castle.lab.write(
         "anonymous.json5",
         // It believes the simulator, and shows nothing itself.
@@ -193,7 +247,10 @@ fn nobody_enters_without_a_certificate_of_this_authority() {
         (&plain, None),
     ] {
         let opened = open(endpoint, config.as_ref());
-        assert!(opened.is_err(), "{endpoint} let somebody in with {config:?}");
+        assert!(
+            opened.is_err(),
+            "{endpoint} let somebody in with {config:?}"
+        );
     }
     castle.finish_unharmed();
 }
@@ -205,12 +262,22 @@ fn no_robot_passes_for_the_simulator() {
     // Leguin's certificate, where the simulator's should be.
     let own = std::fs::read_to_string(config(&folder, "Leguin")).unwrap();
     let forged = lab.write("forged.json5", &own.replace("connect_", "listen_"));
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let port = std::net::TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
     let endpoint = format!("tls/127.0.0.1:{port}");
-    let role = Role::Router { listen: endpoint.clone(), trusts_network: false };
+    let role = Role::Router {
+        listen: endpoint.clone(),
+        trusts_network: false,
+    };
     let _listening = Bus::open(&role, Some(&forged)).unwrap();
     let error = open(&endpoint, Some(&config(&folder, "Butler"))).map(|bus| bus.id());
-    assert!(error.is_err(), "Butler believed Leguin to be the simulator: {error:?}");
+    assert!(
+        error.is_err(),
+        "Butler believed Leguin to be the simulator: {error:?}"
+    );
 }
 
 #[test]
@@ -235,11 +302,20 @@ fn a_participant_says_nothing_in_anothers_name() {
     .map(|key| heard.on(&castle.operator, &key));
 
     // An answer on the same link comes after what was declared there: from here on they hear.
-    assert!(witness.ask(&keys.percept(&butler), "", None).unwrap().is_some());
+    assert!(
+        witness
+            .ask(&keys.percept(&butler), "", None)
+            .unwrap()
+            .is_some()
+    );
     castle.status();
 
     let rubbish = || b"rubbish".to_vec();
-    let clock = Clock { epoch: 1, tick: 99_999, ..Clock::default() };
+    let clock = Clock {
+        epoch: 1,
+        tick: 99_999,
+        ..Clock::default()
+    };
     for (key, message) in [
         (keys.clock(), encode(&clock)),
         (keys.report(&butler), rubbish()),
@@ -260,18 +336,30 @@ fn a_participant_says_nothing_in_anothers_name() {
             intruder.put(&key, message.clone()).unwrap();
         }
     }
-    let forged_tokens = [&butler, &vonda].map(|robot| thief.token(&keys.alive_robot(robot)).unwrap());
+    let forged_tokens =
+        [&butler, &vonda].map(|robot| thief.token(&keys.alive_robot(robot)).unwrap());
     drop(forged_tokens);
 
     // What it may say arrives, after all that it may not.
     thief.put(&keys.report(&leguin), rubbish()).unwrap();
     thief.put(&keys.panel(&leguin), rubbish()).unwrap();
-    thief.put(&keys.command(&butler, &leguin), rubbish()).unwrap();
+    thief
+        .put(&keys.command(&butler, &leguin), rubbish())
+        .unwrap();
     let status = castle.ignored("malformed", 1);
     assert_eq!(status.ignored.len(), 1, "{:?}", status.ignored);
     let expected = [keys.query(&leguin, "panel"), keys.command(&butler, &leguin)];
-    eventually("what is allowed", || expected.iter().all(|key| heard.keys().contains(key)).then_some(()));
-    let unexpected: Vec<String> = heard.keys().into_iter().filter(|key| !expected.contains(key)).collect();
+    eventually("what is allowed", || {
+        expected
+            .iter()
+            .all(|key| heard.keys().contains(key))
+            .then_some(())
+    });
+    let unexpected: Vec<String> = heard
+        .keys()
+        .into_iter()
+        .filter(|key| !expected.contains(key))
+        .collect();
     assert!(unexpected.is_empty(), "forged: {unexpected:?}");
     drop(at_operator);
     castle.finish_unharmed();
@@ -298,15 +386,34 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
         (keys.join_as(&butler), join("Butler")),
         (keys.all(), Vec::new()),
     ] {
-        let answer = thief.ask_within(&key, "", Some(body), Duration::from_millis(300)).unwrap();
+        let answer = thief
+            .ask_within(&key, "", Some(body), Duration::from_millis(300))
+            .unwrap();
         assert!(answer.is_none(), "{key}: {answer:?}");
     }
     // In its own name for another one: it is let through, and seen through.
-    let answer =
-        thief.ask(&keys.join_as(&leguin), "", Some(join("Butler"))).unwrap().unwrap().result.unwrap();
-    assert!(String::from_utf8_lossy(&answer).contains("Leguin cannot join as Butler"), "{answer:?}");
-    assert!(thief.ask(&keys.percept(&leguin), "", None).unwrap().is_some());
-    assert!(thief.ask(&keys.query(&butler, STATE), "", None).unwrap().is_some());
+    let answer = thief
+        .ask(&keys.join_as(&leguin), "", Some(join("Butler")))
+        .unwrap()
+        .unwrap()
+        .result
+        .unwrap();
+    assert!(
+        String::from_utf8_lossy(&answer).contains("Leguin cannot join as Butler"),
+        "{answer:?}"
+    );
+    assert!(
+        thief
+            .ask(&keys.percept(&leguin), "", None)
+            .unwrap()
+            .is_some()
+    );
+    assert!(
+        thief
+            .ask(&keys.query(&butler, STATE), "", None)
+            .unwrap()
+            .is_some()
+    );
 
     // It listens at doors.
     let (secrets, clocks) = (Heard::default(), Heard::default());
@@ -327,7 +434,13 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     let _clock = clocks.on(&listener, &keys.clock());
     // It answers for others.
     let questions = Arc::new(AtomicUsize::new(0));
-    let answering = [keys.query(&butler, STATE), keys.control(), keys.joins(), keys.percepts()].map(|key| {
+    let answering = [
+        keys.query(&butler, STATE),
+        keys.control(),
+        keys.joins(),
+        keys.percepts(),
+    ]
+    .map(|key| {
         let questions = questions.clone();
         thief
             .serve(&key, move |_| {
@@ -335,12 +448,26 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
             })
             .unwrap()
     });
-    assert!(listener.ask(&keys.percept(&leguin), "", None).unwrap().is_some());
+    assert!(
+        listener
+            .ask(&keys.percept(&leguin), "", None)
+            .unwrap()
+            .is_some()
+    );
     castle.control(&Control::Step { n: 80 });
     eventually("clocks", || (clocks.keys().len() >= 80).then_some(()));
-    let state = castle.operator.ask(&keys.query(&butler, STATE), "", None).unwrap().unwrap().result.unwrap();
+    let state = castle
+        .operator
+        .ask(&keys.query(&butler, STATE), "", None)
+        .unwrap()
+        .unwrap()
+        .result
+        .unwrap();
     assert!(String::from_utf8_lossy(&state).contains("\"tick\":80"));
-    assert_eq!((secrets.keys(), questions.load(Ordering::Relaxed)), (Vec::<String>::new(), 0));
+    assert_eq!(
+        (secrets.keys(), questions.load(Ordering::Relaxed)),
+        (Vec::<String>::new(), 0)
+    );
     drop((listening, answering));
     castle.finish_unharmed();
 }
@@ -363,11 +490,20 @@ fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
     // Where the simulator does not keep up, it is the flooder that loses its connection, and some of its messages.
     let counted = eventually("the count", || {
         let ignored = castle.status().ignored;
-        assert!(ignored.keys().all(|reason| reason == "malformed"), "{ignored:?}");
-        ignored.get("malformed").copied().filter(|count| *count >= FLOOD / 10)
+        assert!(
+            ignored.keys().all(|reason| reason == "malformed"),
+            "{ignored:?}"
+        );
+        ignored
+            .get("malformed")
+            .copied()
+            .filter(|count| *count >= FLOOD / 10)
     });
     assert!(counted <= FLOOD);
-    println!("{counted} of {FLOOD} messages counted after {:.1} s", begun.elapsed().as_secs_f64());
+    println!(
+        "{counted} of {FLOOD} messages counted after {:.1} s",
+        begun.elapsed().as_secs_f64()
+    );
     castle.finish_unharmed();
 }
 
@@ -388,33 +524,61 @@ fn silent_connections_keep_no_robot_out() {
     let run = "secure-silent";
     let mut launch = lab.start(run, &["launch", &file, "--duration", "60 s"]);
     let endpoint = eventually("the endpoint", || {
-        std::fs::read_to_string(lab.file(run, "endpoint")).ok().map(|text| text.trim().to_owned())
+        std::fs::read_to_string(lab.file(run, "endpoint"))
+            .ok()
+            .map(|text| text.trim().to_owned())
     });
     let address = endpoint.trim_start_matches("tls/");
-    let silent: Vec<TcpStream> = (0..SILENT).map(|_| TcpStream::connect(address).unwrap()).collect();
+    let silent: Vec<TcpStream> = (0..SILENT)
+        .map(|_| TcpStream::connect(address).unwrap())
+        .collect();
     // At the worst moment: now all of them are being given up.
     std::thread::sleep(Duration::from_millis(2050));
     let begun = Instant::now();
     let mut leguin = Command::new(programs().join("cars-leguin"));
-    leguin.args(["--run", run, "--connect", &endpoint]).env("CARS_ZENOH_CONFIG", config(&folder, "Leguin"));
+    leguin
+        .args(["--run", run, "--connect", &endpoint])
+        .env("CARS_ZENOH_CONFIG", config(&folder, "Leguin"));
     let mut leguin = Running::start(leguin, run, lab.out().join(run));
-    let took = launch.prints("Leguin       takes part").duration_since(begun);
-    println!("with {SILENT} silent connections Leguin took part after {:.2} s", took.as_secs_f64());
+    let took = launch
+        .prints("Leguin       takes part")
+        .duration_since(begun);
+    println!(
+        "with {SILENT} silent connections Leguin took part after {:.2} s",
+        took.as_secs_f64()
+    );
     assert!(took < Duration::from_secs(10), "it took {took:?} to join");
     leguin.finish();
     launch.finish();
     drop(silent);
     lab.ok(&["run", HALL, "--duration", "60 s", "--run", "undisturbed"]);
-    assert_same(("secured", &lab.bytes(run)), ("undisturbed", &lab.bytes("undisturbed")));
+    assert_same(
+        ("secured", &lab.bytes(run)),
+        ("undisturbed", &lab.bytes("undisturbed")),
+    );
 }
 
 #[test]
 fn nothing_listens_for_strangers_unless_that_is_said() {
     let lab = Lab::new();
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let port = std::net::TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
     let listen = format!("--listen=tcp/0.0.0.0:{port}");
-    let args =
-        ["launch", HALL, "--speed", "max", "--duration", "10 s", "--no-console", &listen, "--run", "exposed"];
+    let args = [
+        "launch",
+        HALL,
+        "--speed",
+        "max",
+        "--duration",
+        "10 s",
+        "--no-console",
+        &listen,
+        "--run",
+        "exposed",
+    ];
     let (_, text) = lab.fails(&args);
     for word in ["other machines", "cars secure init", "--insecure"] {
         assert!(flat(&text).contains(word), "{text}");
@@ -427,15 +591,25 @@ fn nothing_listens_for_strangers_unless_that_is_said() {
         .arg(lab.out());
     let refused = simulator.output().unwrap();
     assert!(!refused.status.success());
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("--insecure"), "{refused:?}");
+    assert!(
+        String::from_utf8_lossy(&refused.stderr).contains("--insecure"),
+        "{refused:?}"
+    );
     assert_eq!(std::fs::read_dir(lab.out()).unwrap().count(), 0);
 
     lab.ok(&[&args[..], &["--insecure"]].concat());
     let folder = certificates(&lab, "certificates").display().to_string();
     let listen = format!("--listen=tls/0.0.0.0:{port}");
-    let args = [&args[..7], &[&listen, "--run", "guarded", "--secure", &folder]].concat();
+    let args = [
+        &args[..7],
+        &[&listen, "--run", "guarded", "--secure", &folder],
+    ]
+    .concat();
     lab.ok(&args);
-    assert_same(("secured", &lab.bytes("guarded")), ("insecure", &lab.bytes("exposed")));
+    assert_same(
+        ("secured", &lab.bytes("guarded")),
+        ("insecure", &lab.bytes("exposed")),
+    );
 }
 
 #[test]
@@ -450,17 +624,27 @@ fn a_launch_that_cannot_be_secured_says_why() {
     let together = lab.write("together.toml", &together).display().to_string();
     let (_, text) = lab.fails(&["launch", &together]);
     assert!(
-        flat(&text).contains("several robots in one process") && flat(&text).contains("process of its own"),
+        flat(&text).contains("several robots in one process")
+            && flat(&text).contains("process of its own"),
         "{text}"
     );
 
     std::fs::remove_dir_all(Path::new(&folder).join("Leguin")).unwrap();
     let (_, text) = lab.fails(&["launch", HALL, "--secure", &folder]);
     assert!(
-        flat(&text).contains("Leguin has no certificate") && flat(&text).contains("cars secure init"),
+        flat(&text).contains("Leguin has no certificate")
+            && flat(&text).contains("cars secure init"),
         "{text}"
     );
 
-    let (_, text) = lab.fails(&["launch", HALL, "--secure", &folder.replace("certificates", "nowhere")]);
-    assert!(flat(&text).contains("simulator has no certificate"), "{text}");
+    let (_, text) = lab.fails(&[
+        "launch",
+        HALL,
+        "--secure",
+        &folder.replace("certificates", "nowhere"),
+    ]);
+    assert!(
+        flat(&text).contains("simulator has no certificate"),
+        "{text}"
+    );
 }

@@ -89,7 +89,11 @@ pub fn decide<S: Clone + PartialEq, C, A: Clone>(
     state: &S,
     context: &C,
 ) -> Decision<S, A> {
-    let mut decision = Decision { actions: Vec::new(), next: None, rows: Vec::new() };
+    let mut decision = Decision {
+        actions: Vec::new(),
+        next: None,
+        rows: Vec::new(),
+    };
     for (index, row) in rows.iter().enumerate() {
         if !(row.from.contains(state) && (row.when)(context)) {
             continue;
@@ -121,7 +125,13 @@ pub struct BehaviorGenerator<S: 'static, C: 'static, A: 'static> {
 impl<S: Clone + PartialEq, C, A: Clone> BehaviorGenerator<S, C, A> {
     /// A generator in the state `start`.
     pub fn new(rows: &'static [Row<S, C, A>], start: S) -> Self {
-        Self { rows, state: BehaviorState { current: start, lasting_s: 0.0 } }
+        Self {
+            rows,
+            state: BehaviorState {
+                current: start,
+                lasting_s: 0.0,
+            },
+        }
     }
 
     /// The current behavior.
@@ -150,7 +160,10 @@ impl<S: Clone + PartialEq, C, A: Clone> BehaviorGenerator<S, C, A> {
     pub fn update(&mut self, context: &C) -> Decision<S, A> {
         let decision = decide(self.rows, &self.state.current, context);
         if let Some(next) = &decision.next {
-            self.state = BehaviorState { current: next.clone(), lasting_s: 0.0 };
+            self.state = BehaviorState {
+                current: next.clone(),
+                lasting_s: 0.0,
+            };
         }
         decision
     }
@@ -170,13 +183,18 @@ impl<S: Clone + PartialEq, C, A: Clone> BehaviorGenerator<S, C, A> {
 
 impl<S: Clone, C, A> Clone for BehaviorGenerator<S, C, A> {
     fn clone(&self) -> Self {
-        Self { rows: self.rows, state: self.state.clone() }
+        Self {
+            rows: self.rows,
+            state: self.state.clone(),
+        }
     }
 }
 
 impl<S: fmt::Debug, C, A> fmt::Debug for BehaviorGenerator<S, C, A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BehaviorGenerator").field("state", &self.state).finish_non_exhaustive()
+        f.debug_struct("BehaviorGenerator")
+            .field("state", &self.state)
+            .finish_non_exhaustive()
     }
 }
 
@@ -198,24 +216,62 @@ mod tests {
     }
 
     const ROWS: &[Row<State, Context, &str>] = &[
-        Row { from: &[A, B], when: |c| c.need, act: &["note need"], then: Stay },
-        Row { from: &[A], when: |c| c.near, act: &["greet", "give"], then: Go(B) },
-        Row { from: &[A], when: |c| c.near, act: &["never read"], then: Go(A) },
-        Row { from: &[A], when: |c| c.need, act: &["call"], then: Stay },
-        Row { from: &[B], when: |c| !c.near, act: &[], then: Go(A) },
+        Row {
+            from: &[A, B],
+            when: |c| c.need,
+            act: &["note need"],
+            then: Stay,
+        },
+        Row {
+            from: &[A],
+            when: |c| c.near,
+            act: &["greet", "give"],
+            then: Go(B),
+        },
+        Row {
+            from: &[A],
+            when: |c| c.near,
+            act: &["never read"],
+            then: Go(A),
+        },
+        Row {
+            from: &[A],
+            when: |c| c.need,
+            act: &["call"],
+            then: Stay,
+        },
+        Row {
+            from: &[B],
+            when: |c| !c.near,
+            act: &[],
+            then: Go(A),
+        },
     ];
 
-    fn decided(state: State, need: bool, near: bool) -> (Vec<&'static str>, Option<State>, Vec<usize>) {
+    fn decided(
+        state: State,
+        need: bool,
+        near: bool,
+    ) -> (Vec<&'static str>, Option<State>, Vec<usize>) {
         let decision = decide(ROWS, &state, &Context { need, near });
         (decision.actions, decision.next, decision.rows)
     }
 
     #[test]
     fn rows_that_stay_fall_through_and_the_first_that_goes_wins() {
-        assert_eq!(decided(A, true, true), (vec!["note need", "greet", "give"], Some(B), vec![0, 1]));
-        assert_eq!(decided(A, true, false), (vec!["note need", "call"], None, vec![0, 3]));
+        assert_eq!(
+            decided(A, true, true),
+            (vec!["note need", "greet", "give"], Some(B), vec![0, 1])
+        );
+        assert_eq!(
+            decided(A, true, false),
+            (vec!["note need", "call"], None, vec![0, 3])
+        );
         assert_eq!(decided(B, false, true), (vec![], None, vec![]));
-        assert_eq!(decided(B, true, false), (vec!["note need"], Some(A), vec![0, 4]));
+        assert_eq!(
+            decided(B, true, false),
+            (vec!["note need"], Some(A), vec![0, 4])
+        );
     }
 
     #[test]
@@ -224,8 +280,15 @@ mod tests {
         for _ in 0..20 {
             bsg.advance(0.1);
         }
-        assert!(bsg.has_lasted(2.0) && !bsg.has_lasted(2.01), "{}", bsg.lasting_s());
-        bsg.update(&Context { need: false, near: true });
+        assert!(
+            bsg.has_lasted(2.0) && !bsg.has_lasted(2.01),
+            "{}",
+            bsg.lasting_s()
+        );
+        bsg.update(&Context {
+            need: false,
+            near: true,
+        });
         assert_eq!((bsg.current(), bsg.lasting_s()), (&B, 0.0));
     }
 

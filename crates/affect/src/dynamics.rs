@@ -78,7 +78,12 @@ pub struct Stimulus {
 impl Stimulus {
     /// Only a continuous input.
     pub fn new(drive: Drive) -> Self {
-        Self { drive, event: None, belief: None, blames_other: false }
+        Self {
+            drive,
+            event: None,
+            belief: None,
+            blames_other: false,
+        }
     }
 
     /// A need ratio (dimensionless).
@@ -100,13 +105,19 @@ impl Stimulus {
     /// The same, with a belief.
     #[must_use]
     pub fn with_belief(self, belief: Belief) -> Self {
-        Self { belief: Some(belief), ..self }
+        Self {
+            belief: Some(belief),
+            ..self
+        }
     }
 
     /// The same, saying whether somebody else is to blame.
     #[must_use]
     pub fn with_blame(self, blames_other: bool) -> Self {
-        Self { blames_other, ..self }
+        Self {
+            blames_other,
+            ..self
+        }
     }
 }
 
@@ -126,7 +137,10 @@ pub struct EmotionState<E> {
 impl<E: EmotionLabel> EmotionState<E> {
     /// What is felt.
     pub fn feeling(&self) -> Feeling<E> {
-        Feeling { emotion: self.emotion, intensity: self.intensity }
+        Feeling {
+            emotion: self.emotion,
+            intensity: self.intensity,
+        }
     }
 
     /// For how long, in seconds, this emotion has been felt.
@@ -162,7 +176,10 @@ pub struct Dynamics<E> {
 
 impl Dynamics<StandardEmotion> {
     /// The dynamics of the documented robots.
-    pub fn standard(parameters: &DynamicsParameters, caution: Caution) -> Result<Self, ParameterError> {
+    pub fn standard(
+        parameters: &DynamicsParameters,
+        caution: Caution,
+    ) -> Result<Self, ParameterError> {
         Self::new(Ladder::standard(parameters)?, parameters, caution)
     }
 }
@@ -176,7 +193,11 @@ impl<E: EmotionLabel> Dynamics<E> {
         caution: Caution,
     ) -> Result<Self, ParameterError> {
         parameters.check()?;
-        Ok(Self { ladder, gain: parameters.gain(caution), parameters: parameters.clone() })
+        Ok(Self {
+            ladder,
+            gain: parameters.gain(caution),
+            parameters: parameters.clone(),
+        })
     }
 
     /// The emotions and their thresholds.
@@ -219,7 +240,9 @@ impl<E: EmotionLabel> Dynamics<E> {
     pub fn target(&self, drive: Drive) -> Option<Intensity> {
         match drive {
             Drive::Need(ratio) if ratio.is_nan() => None,
-            Drive::Need(ratio) => Some(Intensity::saturating(self.gain * ratio / self.parameters.rho_max)),
+            Drive::Need(ratio) => Some(Intensity::saturating(
+                self.gain * ratio / self.parameters.rho_max,
+            )),
             Drive::Rest => Some(Intensity::MIN),
             Drive::Hold => None,
         }
@@ -260,25 +283,40 @@ impl<E: EmotionLabel> Dynamics<E> {
         let mut intensity = state.intensity.value();
         if let Some(target) = self.target(stimulus.drive).map(Intensity::value) {
             let rises = target > intensity;
-            let tau_s = if rises { self.parameters.tau_up_s / self.gain } else { self.parameters.tau_down_s };
+            let tau_s = if rises {
+                self.parameters.tau_up_s / self.gain
+            } else {
+                self.parameters.tau_down_s
+            };
             intensity += (target - intensity) * (1.0 - libm::exp(-dt_s / tau_s));
         }
         match stimulus.event {
             Some(ProgressEvent::Positive(importance)) => intensity -= importance.value(),
-            Some(ProgressEvent::Negative(importance)) => intensity += self.gain * importance.value(),
+            Some(ProgressEvent::Negative(importance)) => {
+                intensity += self.gain * importance.value()
+            }
             Some(ProgressEvent::GoalAchieved) | None => {}
         }
         state.intensity = Intensity::saturating(intensity);
     }
 
     /// Up by one rung, or down by as many as intensity has fallen below; neither before the dwell time.
-    fn next_from_rung(&self, index: usize, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) -> E {
+    fn next_from_rung(
+        &self,
+        index: usize,
+        state: &mut EmotionState<E>,
+        stimulus: &Stimulus,
+        dt_s: f64,
+    ) -> E {
         let may_climb = self.may_climb(index, state, stimulus, dt_s);
         if !state.has_lasted(self.parameters.dwell_s) {
             return state.emotion;
         }
         if let Some(beliefs) = self.ladder.beliefs() {
-            let is_low_enough = self.ladder.discouraging_rung().is_some_and(|from| index >= from);
+            let is_low_enough = self
+                .ladder
+                .discouraging_rung()
+                .is_some_and(|from| index >= from);
             if state.belief == Belief::Cannot && is_low_enough {
                 return beliefs.discouraged;
             }
@@ -288,22 +326,35 @@ impl<E: EmotionLabel> Dynamics<E> {
             return rungs[index + 1].emotion;
         }
         let mut lower = index;
-        while lower > 0 && state.intensity.value() < rungs[lower].enter - self.parameters.hysteresis {
+        while lower > 0 && state.intensity.value() < rungs[lower].enter - self.parameters.hysteresis
+        {
             lower -= 1;
         }
         rungs[lower].emotion
     }
 
     /// Whether the next rung's condition holds, and has held as long as it asks. Keeps the time.
-    fn may_climb(&self, index: usize, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) -> bool {
-        let Some(next) = self.ladder.rungs().get(index + 1) else { return false };
+    fn may_climb(
+        &self,
+        index: usize,
+        state: &mut EmotionState<E>,
+        stimulus: &Stimulus,
+        dt_s: f64,
+    ) -> bool {
+        let Some(next) = self.ladder.rungs().get(index + 1) else {
+            return false;
+        };
         let intensity = state.intensity.value();
         let is_blamed = stimulus.blames_other || !next.needs_blame;
         if next.hold_s == 0.0 {
             return is_blamed && intensity >= next.enter;
         }
         let is_pressing = is_blamed && intensity > next.enter;
-        state.pressing_s = if is_pressing { state.pressing_s + dt_s } else { 0.0 };
+        state.pressing_s = if is_pressing {
+            state.pressing_s + dt_s
+        } else {
+            0.0
+        };
         is_pressing && has_elapsed(state.pressing_s, next.hold_s)
     }
 
@@ -318,14 +369,19 @@ impl<E: EmotionLabel> Dynamics<E> {
     /// Hope ends with the belief or with time; the rung below the discouraging one is the worst it
     /// falls to \[I\].
     fn next_from_hopeful(&self, state: &EmotionState<E>) -> E {
-        let Some(beliefs) = self.ladder.beliefs() else { return state.emotion };
+        let Some(beliefs) = self.ladder.beliefs() else {
+            return state.emotion;
+        };
         if state.belief == Belief::Cannot && state.has_lasted(self.parameters.dwell_s) {
             return beliefs.discouraged;
         }
         if !state.has_lasted(self.parameters.hope_s.max(self.parameters.dwell_s)) {
             return state.emotion;
         }
-        let limit = self.ladder.discouraging_rung().map_or(0, |from| from.saturating_sub(1));
+        let limit = self
+            .ladder
+            .discouraging_rung()
+            .map_or(0, |from| from.saturating_sub(1));
         self.rung_by_intensity(state, limit)
     }
 

@@ -83,7 +83,11 @@ impl<M, B, E: EmotionLabel> DynamicGenerator<M, B, E> {
     /// A generator at the start of its dynamics. `appraise` says what the measures mean to the robot.
     pub fn new(dynamics: Dynamics<E>, appraise: fn(&M, &B) -> Stimulus) -> Self {
         let state = dynamics.start();
-        Self { dynamics, appraise, state }
+        Self {
+            dynamics,
+            appraise,
+            state,
+        }
     }
 
     /// The rule that this generator follows.
@@ -139,8 +143,19 @@ pub struct RuleGenerator<M: 'static, B: 'static, E: 'static> {
 
 impl<M, B: PartialEq, E: EmotionLabel> RuleGenerator<M, B, E> {
     /// A generator that starts with `start` at intensity 0.
-    pub fn new(rows: &'static [EmotionRow<M, B, E>], intensity: fn(&M, &B) -> Intensity, start: E) -> Self {
-        Self { rows, intensity, feeling: Feeling { emotion: start, intensity: Intensity::MIN } }
+    pub fn new(
+        rows: &'static [EmotionRow<M, B, E>],
+        intensity: fn(&M, &B) -> Intensity,
+        start: E,
+    ) -> Self {
+        Self {
+            rows,
+            intensity,
+            feeling: Feeling {
+                emotion: start,
+                intensity: Intensity::MIN,
+            },
+        }
     }
 
     /// Continues from a saved feeling.
@@ -155,7 +170,10 @@ impl<M, B: PartialEq, E: EmotionLabel> EmotionGenerator for RuleGenerator<M, B, 
     type Emotion = E;
 
     fn update(&mut self, measures: &M, behavior: &B, _dt_s: f64) -> Feeling<E> {
-        let row = self.rows.iter().find(|row| row.during.contains(behavior) && (row.when)(measures));
+        let row = self
+            .rows
+            .iter()
+            .find(|row| row.during.contains(behavior) && (row.when)(measures));
         self.feeling = Feeling {
             emotion: row.map_or(self.feeling.emotion, |row| row.feel),
             intensity: (self.intensity)(measures, behavior),
@@ -178,8 +196,14 @@ pub struct SteadyGenerator<M, B, E> {
 impl<M, B, E: EmotionLabel> SteadyGenerator<M, B, E> {
     /// A generator that feels `emotion` at intensity 0.
     pub fn new(emotion: E) -> Self {
-        let feeling = Feeling { emotion, intensity: Intensity::MIN };
-        Self { feeling, stands_in: std::marker::PhantomData }
+        let feeling = Feeling {
+            emotion,
+            intensity: Intensity::MIN,
+        };
+        Self {
+            feeling,
+            stands_in: std::marker::PhantomData,
+        }
     }
 }
 
@@ -201,37 +225,54 @@ impl<M, B, E: EmotionLabel> EmotionGenerator for SteadyGenerator<M, B, E> {
 
 impl<M, B, E: Clone> Clone for DynamicGenerator<M, B, E> {
     fn clone(&self) -> Self {
-        Self { dynamics: self.dynamics.clone(), appraise: self.appraise, state: self.state.clone() }
+        Self {
+            dynamics: self.dynamics.clone(),
+            appraise: self.appraise,
+            state: self.state.clone(),
+        }
     }
 }
 
 impl<M, B, E: fmt::Debug> fmt::Debug for DynamicGenerator<M, B, E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("DynamicGenerator").field("state", &self.state).finish_non_exhaustive()
+        f.debug_struct("DynamicGenerator")
+            .field("state", &self.state)
+            .finish_non_exhaustive()
     }
 }
 
 impl<M, B, E: Clone> Clone for RuleGenerator<M, B, E> {
     fn clone(&self) -> Self {
-        Self { rows: self.rows, intensity: self.intensity, feeling: self.feeling.clone() }
+        Self {
+            rows: self.rows,
+            intensity: self.intensity,
+            feeling: self.feeling.clone(),
+        }
     }
 }
 
 impl<M, B, E: fmt::Debug> fmt::Debug for RuleGenerator<M, B, E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("RuleGenerator").field("feeling", &self.feeling).finish_non_exhaustive()
+        f.debug_struct("RuleGenerator")
+            .field("feeling", &self.feeling)
+            .finish_non_exhaustive()
     }
 }
 
 impl<M, B, E: Clone> Clone for SteadyGenerator<M, B, E> {
     fn clone(&self) -> Self {
-        Self { feeling: self.feeling.clone(), stands_in: std::marker::PhantomData }
+        Self {
+            feeling: self.feeling.clone(),
+            stands_in: std::marker::PhantomData,
+        }
     }
 }
 
 impl<M, B, E: fmt::Debug> fmt::Debug for SteadyGenerator<M, B, E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SteadyGenerator").field("feeling", &self.feeling).finish()
+        f.debug_struct("SteadyGenerator")
+            .field("feeling", &self.feeling)
+            .finish()
     }
 }
 
@@ -253,10 +294,26 @@ mod tests {
     }
 
     const ROWS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
-        EmotionRow { during: &[Behavior::Wait], when: |_| true, feel: Happy },
-        EmotionRow { during: &[Behavior::Go], when: |m| m.blocked >= 1.0, feel: Frustrated },
-        EmotionRow { during: &[Behavior::Go], when: |m| m.is_hurried, feel: Concerned },
-        EmotionRow { during: &[Behavior::Go], when: |_| true, feel: Confident },
+        EmotionRow {
+            during: &[Behavior::Wait],
+            when: |_| true,
+            feel: Happy,
+        },
+        EmotionRow {
+            during: &[Behavior::Go],
+            when: |m| m.blocked >= 1.0,
+            feel: Frustrated,
+        },
+        EmotionRow {
+            during: &[Behavior::Go],
+            when: |m| m.is_hurried,
+            feel: Concerned,
+        },
+        EmotionRow {
+            during: &[Behavior::Go],
+            when: |_| true,
+            feel: Confident,
+        },
     ];
 
     fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
@@ -267,7 +324,14 @@ mod tests {
     fn the_first_matching_row_says_what_is_felt() {
         let mut esg = RuleGenerator::new(ROWS, intensity, Happy);
         let mut feel = |is_hurried, blocked, behavior| {
-            let feeling = esg.update(&Measures { is_hurried, blocked }, &behavior, 0.5);
+            let feeling = esg.update(
+                &Measures {
+                    is_hurried,
+                    blocked,
+                },
+                &behavior,
+                0.5,
+            );
             (feeling.emotion, feeling.intensity.value())
         };
         assert_eq!(feel(true, 0.5, Behavior::Wait), (Happy, 0.5));
@@ -280,7 +344,17 @@ mod tests {
     #[test]
     fn the_baseline_feels_nothing() {
         let mut esg = SteadyGenerator::<Measures, Behavior, _>::new(Happy);
-        let feeling = esg.update(&Measures { is_hurried: true, blocked: 9.0 }, &Behavior::Go, 0.5);
-        assert_eq!((feeling.emotion, feeling.intensity), (Happy, Intensity::MIN));
+        let feeling = esg.update(
+            &Measures {
+                is_hurried: true,
+                blocked: 9.0,
+            },
+            &Behavior::Go,
+            0.5,
+        );
+        assert_eq!(
+            (feeling.emotion, feeling.intensity),
+            (Happy, Intensity::MIN)
+        );
     }
 }

@@ -94,7 +94,9 @@ impl EmotionLabel for StandardEmotion {
     fn valence(self) -> Valence {
         match self {
             Self::Happy | Self::Confident | Self::Hopeful => Valence::Positive,
-            Self::Concerned | Self::Frustrated | Self::Angry | Self::Discouraged => Valence::Negative,
+            Self::Concerned | Self::Frustrated | Self::Angry | Self::Discouraged => {
+                Valence::Negative
+            }
         }
     }
 }
@@ -114,7 +116,10 @@ pub struct Feeling<E> {
 impl<E: EmotionLabel> Feeling<E> {
     /// The coarse part of it, valence and intensity.
     pub fn affect(&self) -> Affect {
-        Affect { valence: self.emotion.valence(), intensity: self.intensity }
+        Affect {
+            valence: self.emotion.valence(),
+            intensity: self.intensity,
+        }
     }
 }
 

@@ -23,7 +23,12 @@ pub struct Rung<E> {
 impl<E> Rung<E> {
     /// A rung that is entered as soon as intensity reaches `enter`.
     pub fn new(emotion: E, enter: f64) -> Self {
-        Self { emotion, enter, hold_s: 0.0, needs_blame: false }
+        Self {
+            emotion,
+            enter,
+            hold_s: 0.0,
+            needs_blame: false,
+        }
     }
 }
 
@@ -60,12 +65,17 @@ impl<E: EmotionLabel> Ladder<E> {
     /// Refused are an empty ladder, thresholds that do not ascend within `(0, 1]` (the first rung has
     /// none), and an emotion that occurs twice.
     pub fn new(rungs: Vec<Rung<E>>) -> Result<Self, ParameterError> {
-        let Some((_, above)) = rungs.split_first() else { return Err(ParameterError::NoRungs) };
+        let Some((_, above)) = rungs.split_first() else {
+            return Err(ParameterError::NoRungs);
+        };
         ascending(&above.iter().map(|rung| rung.enter).collect::<Vec<_>>())?;
         for rung in above {
             not_negative("hold_s", rung.hold_s)?;
         }
-        let ladder = Self { rungs, beliefs: None };
+        let ladder = Self {
+            rungs,
+            beliefs: None,
+        };
         ladder.distinct()?;
         Ok(ladder)
     }
@@ -97,8 +107,14 @@ impl<E: EmotionLabel> Ladder<E> {
 
     /// The highest rung, not above rung `limit`, that `intensity` alone reaches.
     pub(crate) fn rung_for(&self, intensity: f64, limit: usize) -> usize {
-        let is_reached = |rung: &&Rung<E>| intensity >= rung.enter && rung.hold_s == 0.0 && !rung.needs_blame;
-        self.rungs.iter().skip(1).take_while(is_reached).count().min(limit)
+        let is_reached =
+            |rung: &&Rung<E>| intensity >= rung.enter && rung.hold_s == 0.0 && !rung.needs_blame;
+        self.rungs
+            .iter()
+            .skip(1)
+            .take_while(is_reached)
+            .count()
+            .min(limit)
     }
 
     pub(crate) fn place(&self, emotion: E) -> Place {
@@ -154,7 +170,11 @@ impl Ladder<StandardEmotion> {
             StateSet::Murphy4 => vec![happy, confident, concerned, frustrated],
             StateSet::Akr4 => vec![happy, concerned, frustrated, angry],
         };
-        let beliefs = BeliefEmotions { discouraged: Discouraged, hopeful: Hopeful, from: Frustrated };
+        let beliefs = BeliefEmotions {
+            discouraged: Discouraged,
+            hopeful: Hopeful,
+            from: Frustrated,
+        };
         Self::new(rungs)?.with_beliefs(beliefs)
     }
 }
@@ -169,9 +189,19 @@ mod tests {
             (StateSet::Murphy4, [Happy, Confident, Concerned, Frustrated]),
             (StateSet::Akr4, [Happy, Concerned, Frustrated, Angry]),
         ] {
-            let parameters = DynamicsParameters { state_set, ..Default::default() };
+            let parameters = DynamicsParameters {
+                state_set,
+                ..Default::default()
+            };
             let ladder = Ladder::standard(&parameters).unwrap();
-            assert_eq!(ladder.rungs().iter().map(|rung| rung.emotion).collect::<Vec<_>>(), emotions);
+            assert_eq!(
+                ladder
+                    .rungs()
+                    .iter()
+                    .map(|rung| rung.emotion)
+                    .collect::<Vec<_>>(),
+                emotions
+            );
             assert_eq!(ladder.start(), Happy);
         }
     }
@@ -181,15 +211,30 @@ mod tests {
         let refusal = |rungs| Ladder::new(rungs).unwrap_err();
         assert_eq!(refusal(vec![]), ParameterError::NoRungs);
         assert_eq!(
-            refusal(vec![Rung::new(Happy, 0.0), Rung::new(Concerned, 0.5), Rung::new(Happy, 0.6)]),
+            refusal(vec![
+                Rung::new(Happy, 0.0),
+                Rung::new(Concerned, 0.5),
+                Rung::new(Happy, 0.6)
+            ]),
             ParameterError::Repeated("HAPPY")
         );
         assert!(matches!(
-            refusal(vec![Rung::new(Happy, 0.0), Rung::new(Concerned, 0.5), Rung::new(Angry, 0.5)]),
+            refusal(vec![
+                Rung::new(Happy, 0.0),
+                Rung::new(Concerned, 0.5),
+                Rung::new(Angry, 0.5)
+            ]),
             ParameterError::NotAscending { .. }
         ));
-        let beliefs = BeliefEmotions { discouraged: Discouraged, hopeful: Hopeful, from: Angry };
+        let beliefs = BeliefEmotions {
+            discouraged: Discouraged,
+            hopeful: Hopeful,
+            from: Angry,
+        };
         let ladder = Ladder::new(vec![Rung::new(Happy, 0.0)]).unwrap();
-        assert_eq!(ladder.with_beliefs(beliefs), Err(ParameterError::NotOnLadder("ANGRY")));
+        assert_eq!(
+            ladder.with_beliefs(beliefs),
+            Err(ParameterError::NotOnLadder("ANGRY"))
+        );
     }
 }

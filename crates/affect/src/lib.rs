@@ -148,7 +148,9 @@ mod scalar;
 mod schema;
 
 pub use dynamics::{Belief, Drive, Dynamics, EmotionState, ProgressEvent, Stimulus, Trend};
-pub use generator::{DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator, SteadyGenerator};
+pub use generator::{
+    DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator, SteadyGenerator,
+};
 pub use label::{EmotionLabel, Feeling, StandardEmotion};
 pub use ladder::{BeliefEmotions, Ladder, Rung};
 pub use parameters::{DynamicsParameters, ParameterError, StateSet};

@@ -163,11 +163,19 @@ impl DynamicsParameters {
 }
 
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), ParameterError> {
-    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(ParameterError::NotPositive { name, value }) }
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(ParameterError::NotPositive { name, value })
+    }
 }
 
 pub(crate) fn not_negative(name: &'static str, value: f64) -> Result<(), ParameterError> {
-    if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(ParameterError::Negative { name, value }) }
+    if value >= 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(ParameterError::Negative { name, value })
+    }
 }
 
 /// Strictly ascending, above 0 and not above 1.
@@ -193,14 +201,26 @@ mod tests {
 
     #[test]
     fn an_empty_file_gives_the_defaults() {
-        assert_eq!(DynamicsParameters::from_toml(""), Ok(DynamicsParameters::default()));
+        assert_eq!(
+            DynamicsParameters::from_toml(""),
+            Ok(DynamicsParameters::default())
+        );
     }
 
     #[test]
     fn senseless_values_are_refused_with_a_reason() {
-        assert_eq!(refusal("tau_up_s = 0.0"), "tau_up_s must be a number above 0, not 0");
-        assert_eq!(refusal("dwell_s = -1.0"), "dwell_s must be a number of at least 0, not -1");
-        assert_eq!(refusal("rho_max = nan"), "rho_max must be a number above 0, not NaN");
+        assert_eq!(
+            refusal("tau_up_s = 0.0"),
+            "tau_up_s must be a number above 0, not 0"
+        );
+        assert_eq!(
+            refusal("dwell_s = -1.0"),
+            "dwell_s must be a number of at least 0, not -1"
+        );
+        assert_eq!(
+            refusal("rho_max = nan"),
+            "rho_max must be a number above 0, not NaN"
+        );
         assert!(refusal("th_confident = 0.5").contains("0.5 is followed by 0.45"));
         assert!(refusal("th_angry = 1.5").contains("must ascend"));
         assert!(refusal("caution = 0.5").contains("unknown field"));

@@ -22,7 +22,11 @@ pub struct RateParameters {
 
 impl Default for RateParameters {
     fn default() -> Self {
-        Self { window_s: 15.0, prior_n: 5.0, prior_interval_s: 1.0 }
+        Self {
+            window_s: 15.0,
+            prior_n: 5.0,
+            prior_interval_s: 1.0,
+        }
     }
 }
 
@@ -56,7 +60,11 @@ impl RateEstimator {
         positive("window_s", parameters.window_s)?;
         positive("prior_n", parameters.prior_n)?;
         positive("prior_interval_s", parameters.prior_interval_s)?;
-        Ok(Self { parameters, observed_s: 0.0, recent_s: VecDeque::new() })
+        Ok(Self {
+            parameters,
+            observed_s: 0.0,
+            recent_s: VecDeque::new(),
+        })
     }
 
     /// `dt_s` seconds were observed, at the end of which `events` had happened.
@@ -71,7 +79,11 @@ impl RateEstimator {
 
     /// Events for each second of observed time; always above zero.
     pub fn per_second(&self) -> f64 {
-        let RateParameters { window_s, prior_n, prior_interval_s } = self.parameters;
+        let RateParameters {
+            window_s,
+            prior_n,
+            prior_interval_s,
+        } = self.parameters;
         // The window holds at most a few thousand events, which f64 represents exactly.
         let seen = self.recent_s.len() as f64;
         (prior_n + seen) / (prior_n * prior_interval_s + self.observed_s.min(window_s))
@@ -97,7 +109,11 @@ pub struct ApproachParameters {
 
 impl Default for ApproachParameters {
     fn default() -> Self {
-        Self { expected_mps: 0.9144, floor_mps: 0.09144, tau_s: 3.0 }
+        Self {
+            expected_mps: 0.9144,
+            floor_mps: 0.09144,
+            tau_s: 3.0,
+        }
     }
 }
 
@@ -115,7 +131,11 @@ impl ApproachEstimator {
         positive("floor_mps", parameters.floor_mps)?;
         positive("tau_s", parameters.tau_s)?;
         not_negative("expected_mps", parameters.expected_mps)?;
-        Ok(Self { parameters, speed_mps: parameters.expected_mps, distance_m: None })
+        Ok(Self {
+            parameters,
+            speed_mps: parameters.expected_mps,
+            distance_m: None,
+        })
     }
 
     /// The peer was at `distance_m` metres at the end of the last `dt_s` seconds. The speed is learned only
@@ -156,7 +176,8 @@ impl ApproachEstimator {
     /// Seconds until the peer is within `reach_m` metres; none before it was ever seen.
     pub fn arrival_s(&self, reach_m: f64) -> Option<f64> {
         let speed_mps = self.speed_mps.max(self.parameters.floor_mps);
-        self.distance_m.map(|distance_m| time_to_arrive_s(distance_m - reach_m, speed_mps))
+        self.distance_m
+            .map(|distance_m| time_to_arrive_s(distance_m - reach_m, speed_mps))
     }
 
     fn learn(&mut self, closing_mps: f64, dt_s: f64) {
@@ -177,7 +198,12 @@ pub fn time_to_arrive_s(distance_m: f64, speed_mps: f64) -> f64 {
 
 /// Seconds until a peer arrives that first goes `to_depot_m` metres to a depot, reloads there for
 /// `reload_s` seconds, and comes `from_depot_m` metres.
-pub fn time_to_arrive_by_depot_s(to_depot_m: f64, reload_s: f64, from_depot_m: f64, speed_mps: f64) -> f64 {
+pub fn time_to_arrive_by_depot_s(
+    to_depot_m: f64,
+    reload_s: f64,
+    from_depot_m: f64,
+    speed_mps: f64,
+) -> f64 {
     time_to_arrive_s(to_depot_m + from_depot_m, speed_mps) + reload_s
 }
 
@@ -195,7 +221,11 @@ mod tests {
 
     #[test]
     fn an_event_counts_until_it_is_a_window_old() {
-        let parameters = RateParameters { window_s: 2.0, prior_n: 1.0, prior_interval_s: 1.0 };
+        let parameters = RateParameters {
+            window_s: 2.0,
+            prior_n: 1.0,
+            prior_interval_s: 1.0,
+        };
         let mut rate = RateEstimator::new(parameters).unwrap();
         rate.advance(1.0, 1);
         assert_eq!(rate.per_second(), 2.0 / 2.0);
@@ -208,15 +238,25 @@ mod tests {
 
     #[test]
     fn senseless_constants_are_refused() {
-        let rate = RateParameters { prior_n: 0.0, ..Default::default() };
+        let rate = RateParameters {
+            prior_n: 0.0,
+            ..Default::default()
+        };
         assert!(RateEstimator::new(rate).is_err());
-        let approach = ApproachParameters { floor_mps: 0.0, ..Default::default() };
+        let approach = ApproachParameters {
+            floor_mps: 0.0,
+            ..Default::default()
+        };
         assert!(ApproachEstimator::new(approach).is_err());
     }
 
     #[test]
     fn the_speed_is_learned_only_from_a_peer_that_comes() {
-        let parameters = ApproachParameters { expected_mps: 1.0, floor_mps: 0.1, tau_s: 2.0 };
+        let parameters = ApproachParameters {
+            expected_mps: 1.0,
+            floor_mps: 0.1,
+            tau_s: 2.0,
+        };
         let mut approach = ApproachEstimator::new(parameters).unwrap();
         assert_eq!(approach.arrival_s(1.0), None);
         approach.observe(10.0, true, 1.0); // first sight: no speed to be had
@@ -226,7 +266,10 @@ mod tests {
         approach.observe(10.0, true, 1.0); // it should come, and stands
         assert_eq!(approach.speed_mps(), 0.5);
         approach.expect_again();
-        assert_eq!((approach.speed_mps(), approach.distance_m()), (1.0, Some(10.0)));
+        assert_eq!(
+            (approach.speed_mps(), approach.distance_m()),
+            (1.0, Some(10.0))
+        );
     }
 
     #[test]

@@ -133,7 +133,13 @@ impl IntensityLabel {
     pub const CUTS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
     /// Every label, weakest first.
-    pub const ALL: [Self; 5] = [Self::VeryLow, Self::Low, Self::Medium, Self::High, Self::VeryHigh];
+    pub const ALL: [Self; 5] = [
+        Self::VeryLow,
+        Self::Low,
+        Self::Medium,
+        Self::High,
+        Self::VeryHigh,
+    ];
 
     /// The label in words.
     pub fn name(self) -> &'static str {
@@ -155,7 +161,10 @@ mod tests {
     fn numbers_outside_the_interval_are_refused_or_saturated() {
         assert!(Intensity::new(1.0).is_ok() && Intensity::new(0.0).is_ok());
         for wrong in [-0.1, 1.1, f64::NAN, f64::INFINITY] {
-            assert!(Intensity::new(wrong).is_err() && Caution::new(wrong).is_err(), "{wrong}");
+            assert!(
+                Intensity::new(wrong).is_err() && Caution::new(wrong).is_err(),
+                "{wrong}"
+            );
         }
         assert_eq!(Intensity::saturating(7.0), Intensity::MAX);
         assert_eq!(Intensity::saturating(-7.0), Intensity::MIN);

@@ -8,8 +8,8 @@
 //! [`StandardEmotion`]: crate::StandardEmotion
 
 use crate::akr::{
-    Account, ActionTendency, Agency, Certainty, Clause, Compatibility, Components, Degree, Duration, Emotion,
-    FacialExpression, Focality, GoalStatus, Novelty, Refusal, Valence,
+    Account, ActionTendency, Agency, Certainty, Clause, Compatibility, Components, Degree,
+    Duration, Emotion, FacialExpression, Focality, GoalStatus, Novelty, Refusal, Valence,
 };
 use crate::scalar::Intensity;
 use serde::Deserialize;
@@ -157,7 +157,9 @@ impl Schema {
         let valence = match self.valence {
             SchemaValence::Positive => Valence::Positive,
             SchemaValence::Negative => Valence::Negative,
-            SchemaValence::Either => circumstances.valence.ok_or(Refusal::ValenceOpen { name: own() })?,
+            SchemaValence::Either => circumstances
+                .valence
+                .ok_or(Refusal::ValenceOpen { name: own() })?,
         };
         Emotion::new(Components {
             name: own(),
@@ -182,9 +184,15 @@ impl Schema {
     pub fn account(&self, circumstances: &Circumstances<'_>) -> Account {
         let told = |clause: &Clause| {
             let text = fill(&clause.text, circumstances)?;
-            Some(Clause { kind: clause.kind, text })
+            Some(Clause {
+                kind: clause.kind,
+                text,
+            })
         };
-        Account { goal: self.goal, clauses: self.causal_chain.iter().filter_map(told).collect() }
+        Account {
+            goal: self.goal,
+            clauses: self.causal_chain.iter().filter_map(told).collect(),
+        }
     }
 
     /// Refuses what no instance could ever be, so that a file is found wrong when it is read.
@@ -192,11 +200,19 @@ impl Schema {
         for clause in &self.causal_chain {
             check_slots(name, &clause.text)?;
         }
-        if self.valence == SchemaValence::Either && self.facial_expression != FacialExpression::Surprised {
-            return Err(Refusal::ValenceOpen { name: name.to_owned() }.into());
+        if self.valence == SchemaValence::Either
+            && self.facial_expression != FacialExpression::Surprised
+        {
+            return Err(Refusal::ValenceOpen {
+                name: name.to_owned(),
+            }
+            .into());
         }
-        let anybody =
-            Circumstances { other: Some("-"), valence: Some(Valence::Positive), ..Default::default() };
+        let anybody = Circumstances {
+            other: Some("-"),
+            valence: Some(Valence::Positive),
+            ..Default::default()
+        };
         self.emotion(name, Intensity::MIN, &anybody)?;
         Ok(())
     }
@@ -217,7 +233,10 @@ fn fill(template: &str, circumstances: &Circumstances<'_>) -> Option<String> {
 }
 
 fn check_slots(name: &str, text: &str) -> Result<(), SchemaError> {
-    let open_brace = || SchemaError::OpenBrace { name: name.to_owned(), text: text.to_owned() };
+    let open_brace = || SchemaError::OpenBrace {
+        name: name.to_owned(),
+        text: text.to_owned(),
+    };
     let mut pieces = text.split('{');
     if pieces.next().is_some_and(|before| before.contains('}')) {
         return Err(open_brace());
@@ -228,7 +247,10 @@ fn check_slots(name: &str, text: &str) -> Result<(), SchemaError> {
             return Err(open_brace());
         }
         if !SLOTS.contains(&slot) {
-            return Err(SchemaError::UnknownSlot { name: name.to_owned(), slot: slot.to_owned() });
+            return Err(SchemaError::UnknownSlot {
+                name: name.to_owned(),
+                slot: slot.to_owned(),
+            });
         }
     }
     Ok(())
@@ -264,7 +286,9 @@ impl Schemata {
         SCHEMATA.get_or_init(|| match Self::from_toml(STANDARD) {
             Ok(schemata) => schemata,
             Err(error) => {
-                unreachable!("the crate's own schemata.toml, which its tests read, is wrong: {error}")
+                unreachable!(
+                    "the crate's own schemata.toml, which its tests read, is wrong: {error}"
+                )
             }
         })
     }
@@ -303,7 +327,9 @@ impl Schemata {
         intensity: Intensity,
         circumstances: &Circumstances<'_>,
     ) -> Result<Emotion, SchemaError> {
-        let schema = self.get(name).ok_or_else(|| SchemaError::Unknown(name.to_owned()))?;
+        let schema = self
+            .get(name)
+            .ok_or_else(|| SchemaError::Unknown(name.to_owned()))?;
         Ok(schema.emotion(name, intensity, circumstances)?)
     }
 }

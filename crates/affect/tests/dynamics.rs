@@ -1,18 +1,26 @@
 //! The rules of the dynamics, one by one, and what must hold under any input.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the failure")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests, where a panic is the failure"
+)]
 
-use affect::StandardEmotion::{Angry, Concerned, Confident, Discouraged, Frustrated, Happy, Hopeful};
+use affect::StandardEmotion::{
+    Angry, Concerned, Confident, Discouraged, Frustrated, Happy, Hopeful,
+};
 use affect::{
-    Belief, Caution, Drive, Dynamics, DynamicsParameters, EmotionState, Intensity, Ladder, ProgressEvent,
-    StandardEmotion, StateSet, Stimulus, Trend,
+    Belief, Caution, Drive, Dynamics, DynamicsParameters, EmotionState, Intensity, Ladder,
+    ProgressEvent, StandardEmotion, StateSet, Stimulus, Trend,
 };
 use proptest::prelude::*;
 
 const DT_S: f64 = 0.5;
 
 fn dynamics(state_set: StateSet) -> Dynamics<StandardEmotion> {
-    let parameters = DynamicsParameters { state_set, ..Default::default() };
+    let parameters = DynamicsParameters {
+        state_set,
+        ..Default::default()
+    };
     Dynamics::standard(&parameters, Caution::default()).unwrap()
 }
 
@@ -58,8 +66,14 @@ fn importance(value: f64) -> Intensity {
 fn positive_input_keeps_happy_and_negative_leads_to_frustrated() {
     let mut robot = Robot::new(StateSet::Murphy4);
     assert_eq!(robot.entered(Stimulus::need(0.1), 60.0), []);
-    assert_eq!(robot.entered(Stimulus::need(9.0), 60.0), [Confident, Concerned, Frustrated]);
-    assert_eq!(robot.entered(Stimulus::rest(), 60.0), [Concerned, Confident, Happy]);
+    assert_eq!(
+        robot.entered(Stimulus::need(9.0), 60.0),
+        [Confident, Concerned, Frustrated]
+    );
+    assert_eq!(
+        robot.entered(Stimulus::rest(), 60.0),
+        [Concerned, Confident, Happy]
+    );
 }
 
 #[test]
@@ -92,12 +106,22 @@ fn without_a_measure_intensity_stays() {
 
 #[test]
 fn t18_a_positive_input_leads_back_as_far_as_it_is_important() {
-    for (value, expected) in [(0.1, Frustrated), (0.4, Concerned), (0.7, Confident), (0.9, Happy)] {
+    for (value, expected) in [
+        (0.1, Frustrated),
+        (0.4, Concerned),
+        (0.7, Confident),
+        (0.9, Happy),
+    ] {
         let mut robot = Robot::new(StateSet::Murphy4);
         robot.entered(Stimulus::need(9.0), 60.0);
         let event = ProgressEvent::Positive(importance(value));
         let emotion = robot.step(Stimulus::new(Drive::Hold).with_event(Some(event)));
-        assert_eq!(emotion, expected, "importance {value}, intensity {}", robot.intensity());
+        assert_eq!(
+            emotion,
+            expected,
+            "importance {value}, intensity {}",
+            robot.intensity()
+        );
     }
 }
 
@@ -123,14 +147,24 @@ fn an_achieved_goal_makes_happy_at_once() {
 fn anger_needs_extreme_intensity_for_long_and_somebody_to_blame() {
     let blaming = Stimulus::need(9.0).with_blame(true);
     let mut robot = Robot::new(StateSet::Akr4);
-    assert_eq!(robot.entered(Stimulus::need(9.0), 120.0), [Concerned, Frustrated]);
+    assert_eq!(
+        robot.entered(Stimulus::need(9.0), 120.0),
+        [Concerned, Frustrated]
+    );
     assert_eq!(robot.entered(blaming, 14.5), []);
     assert_eq!(robot.entered(Stimulus::need(9.0), 0.5), []); // the blame ends: time starts anew
     assert_eq!(robot.entered(blaming, 14.5), []);
     assert_eq!(robot.entered(blaming, 0.5), [Angry]);
-    assert_eq!(robot.entered(Stimulus::rest(), 120.0), [Frustrated, Concerned, Happy]);
+    assert_eq!(
+        robot.entered(Stimulus::rest(), 120.0),
+        [Frustrated, Concerned, Happy]
+    );
     // murphy4 has no anger at all.
-    assert!(!Robot::new(StateSet::Murphy4).entered(blaming, 600.0).contains(&Angry));
+    assert!(
+        !Robot::new(StateSet::Murphy4)
+            .entered(blaming, 600.0)
+            .contains(&Angry)
+    );
 }
 
 #[test]
@@ -139,7 +173,10 @@ fn anger_begins_anew_after_another_emotion() {
     let mut robot = Robot::new(StateSet::Akr4);
     while robot.step(blaming) != Frustrated {}
     robot.entered(blaming, 14.0);
-    assert_eq!(robot.entered(blaming.with_belief(Belief::Cannot), 1.0), [Discouraged]);
+    assert_eq!(
+        robot.entered(blaming.with_belief(Belief::Cannot), 1.0),
+        [Discouraged]
+    );
     assert_eq!(robot.step(blaming.with_belief(Belief::Can)), Hopeful);
     while robot.step(blaming) != Frustrated {}
     assert_eq!(robot.entered(blaming, 14.5), []);
@@ -151,13 +188,22 @@ fn t19_cannot_keeps_discouraged_and_can_gives_hope() {
     for state_set in [StateSet::Murphy4, StateSet::Akr4] {
         let mut robot = Robot::new(state_set);
         robot.entered(Stimulus::need(9.0), 60.0);
-        assert_eq!(robot.entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 5.0), [Discouraged]);
+        assert_eq!(
+            robot.entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 5.0),
+            [Discouraged]
+        );
         // For ever, whatever happens outside.
         let achieved = Stimulus::rest().with_event(Some(ProgressEvent::GoalAchieved));
         assert_eq!(robot.entered(achieved, 3600.0), []);
         assert_eq!(robot.entered(Stimulus::need(9.0), 3600.0), []);
-        assert_eq!(robot.entered(Stimulus::rest().with_belief(Belief::Unstated), 60.0), []);
-        assert_eq!(robot.step(Stimulus::rest().with_belief(Belief::Can)), Hopeful);
+        assert_eq!(
+            robot.entered(Stimulus::rest().with_belief(Belief::Unstated), 60.0),
+            []
+        );
+        assert_eq!(
+            robot.step(Stimulus::rest().with_belief(Belief::Can)),
+            Hopeful
+        );
         assert_eq!(robot.state.belief(), Belief::Can);
     }
 }
@@ -165,8 +211,14 @@ fn t19_cannot_keeps_discouraged_and_can_gives_hope() {
 #[test]
 fn cannot_discourages_only_who_is_frustrated() {
     let mut robot = Robot::new(StateSet::Murphy4);
-    assert_eq!(robot.entered(Stimulus::need(1.2).with_belief(Belief::Cannot), 60.0), [Confident, Concerned]);
-    assert_eq!(robot.entered(Stimulus::need(9.0), 60.0), [Frustrated, Discouraged]);
+    assert_eq!(
+        robot.entered(Stimulus::need(1.2).with_belief(Belief::Cannot), 60.0),
+        [Confident, Concerned]
+    );
+    assert_eq!(
+        robot.entered(Stimulus::need(9.0), 60.0),
+        [Frustrated, Discouraged]
+    );
 }
 
 #[test]
@@ -180,7 +232,10 @@ fn hope_ends_with_success_with_doubt_or_with_time() {
     };
     let achieved = Stimulus::need(9.0).with_event(Some(ProgressEvent::GoalAchieved));
     assert_eq!(hopeful().step(achieved), Happy);
-    assert_eq!(hopeful().entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 5.0), [Discouraged]);
+    assert_eq!(
+        hopeful().entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 5.0),
+        [Discouraged]
+    );
     let mut robot = hopeful();
     assert_eq!(robot.entered(Stimulus::need(9.0), 14.5), []);
     assert_eq!(robot.entered(Stimulus::need(9.0), 0.5), [Concerned]);
@@ -194,8 +249,7 @@ fn a_state_of_another_ladder_finds_its_place() {
     let mut robot = Robot::new(StateSet::Akr4);
     robot.state = other.state;
     robot.entered(Stimulus::need(9.0), 2.0);
-    let json =
-        r#"{"emotion":"CONFIDENT","intensity":0.5,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
+    let json = r#"{"emotion":"CONFIDENT","intensity":0.5,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
     robot.state = serde_json::from_str(json).unwrap();
     assert!(!robot.dynamics.accepts(&robot.state));
     assert_eq!(robot.step(Stimulus::new(Drive::Hold)), Concerned);
@@ -206,15 +260,31 @@ fn a_state_of_another_ladder_finds_its_place() {
 #[test]
 fn progress_is_positive_or_negative_by_what_is_felt() {
     let mut robot = Robot::new(StateSet::Murphy4);
-    assert_eq!(robot.dynamics.trend(&robot.state, Drive::Need(1.0)), Trend::Negative);
-    assert_eq!(robot.dynamics.trend(&robot.state, Drive::Rest), Trend::Level);
+    assert_eq!(
+        robot.dynamics.trend(&robot.state, Drive::Need(1.0)),
+        Trend::Negative
+    );
+    assert_eq!(
+        robot.dynamics.trend(&robot.state, Drive::Rest),
+        Trend::Level
+    );
     robot.entered(Stimulus::need(1.0), 5.0);
-    assert_eq!(robot.dynamics.trend(&robot.state, Drive::Need(0.1)), Trend::Positive);
-    assert_eq!(robot.dynamics.trend(&robot.state, Drive::Hold), Trend::Level);
+    assert_eq!(
+        robot.dynamics.trend(&robot.state, Drive::Need(0.1)),
+        Trend::Positive
+    );
+    assert_eq!(
+        robot.dynamics.trend(&robot.state, Drive::Hold),
+        Trend::Level
+    );
 }
 
 fn rung(ladder: &Ladder<StandardEmotion>, emotion: StandardEmotion) -> usize {
-    ladder.rungs().iter().position(|rung| rung.emotion == emotion).unwrap()
+    ladder
+        .rungs()
+        .iter()
+        .position(|rung| rung.emotion == emotion)
+        .unwrap()
 }
 
 /// Any course of needs, rests and events, with somebody to blame now and then.
@@ -229,7 +299,10 @@ fn any_course() -> impl Strategy<Value = Vec<Stimulus>> {
         .prop_map(|(need, event, blame)| Stimulus::need(need).with_event(event).with_blame(blame));
     // Each stimulus lasts for a while, so that the filter gets somewhere.
     prop::collection::vec((stimulus, 1_usize..12), 1..60).prop_map(|spans| {
-        spans.into_iter().flat_map(|(stimulus, n)| std::iter::repeat_n(stimulus, n)).collect()
+        spans
+            .into_iter()
+            .flat_map(|(stimulus, n)| std::iter::repeat_n(stimulus, n))
+            .collect()
     })
 }
 

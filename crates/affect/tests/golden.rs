@@ -3,7 +3,10 @@
 //! The times were published nowhere; they come from an independent model of the same rules [I]. They hold
 //! the order of evaluation as much as the formulas.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the failure")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests, where a panic is the failure"
+)]
 
 mod waiter;
 
@@ -15,8 +18,14 @@ fn assert_within_a_tick(got: &[Change], expected: &[Change], what: &str) {
     let emotions = |changes: &[Change]| changes.iter().map(|change| change.1).collect::<Vec<_>>();
     assert_eq!(emotions(got), emotions(expected), "{what}: {got:?}");
     for (got, expected) in got.iter().zip(expected) {
-        assert!((got.0 - expected.0).abs() <= DT_S, "{what}: {got:?} is not {expected:?}");
-        assert!(got.2.abs_diff(expected.2) <= 1, "{what}: {got:?} is not {expected:?}");
+        assert!(
+            (got.0 - expected.0).abs() <= DT_S,
+            "{what}: {got:?} is not {expected:?}"
+        );
+        assert!(
+            got.2.abs_diff(expected.2) <= 1,
+            "{what}: {got:?} is not {expected:?}"
+        );
     }
 }
 
@@ -54,12 +63,26 @@ fn t03_the_refiller_never_moves() {
 #[test]
 fn t03_the_refiller_comes_as_soon_as_it_is_called() {
     let waiter = run(0.5, 3.0, 60.0);
-    assert_within_a_tick(&waiter.changes, &[(14.5, Confident, 16), (22.0, Happy, 8)], "caution 0.5");
-    assert_eq!((waiter.time_s(), waiter.treats(), waiter.has_met()), (23.5, 7, true));
+    assert_within_a_tick(
+        &waiter.changes,
+        &[(14.5, Confident, 16), (22.0, Happy, 8)],
+        "caution 0.5",
+    );
+    assert_eq!(
+        (waiter.time_s(), waiter.treats(), waiter.has_met()),
+        (23.5, 7, true)
+    );
 
     let waiter = run(0.0, 3.0, 60.0);
-    assert_within_a_tick(&waiter.changes, &[(24.0, Confident, 6), (29.0, Concerned, 1)], "caution 0");
-    assert_eq!((waiter.time_s(), waiter.treats(), waiter.has_met()), (33.0, 0, true));
+    assert_within_a_tick(
+        &waiter.changes,
+        &[(24.0, Confident, 6), (29.0, Concerned, 1)],
+        "caution 0",
+    );
+    assert_eq!(
+        (waiter.time_s(), waiter.treats(), waiter.has_met()),
+        (33.0, 0, true)
+    );
 }
 
 #[test]
@@ -74,12 +97,24 @@ fn t02_emotions_come_in_order_and_each_message_once() {
 
 #[test]
 fn t04_more_caution_is_never_later() {
-    let time_s =
-        |waiter: &Waiter, emotion| waiter.changes.iter().find(|change| change.1 == emotion).unwrap().0;
-    let runs: Vec<Waiter> = (0..=50).map(|step| run(f64::from(step) / 50.0, 0.0, 120.0)).collect();
+    let time_s = |waiter: &Waiter, emotion| {
+        waiter
+            .changes
+            .iter()
+            .find(|change| change.1 == emotion)
+            .unwrap()
+            .0
+    };
+    let runs: Vec<Waiter> = (0..=50)
+        .map(|step| run(f64::from(step) / 50.0, 0.0, 120.0))
+        .collect();
     for pair in runs.windows(2) {
         for emotion in [Confident, Concerned, Frustrated] {
-            assert!(time_s(&pair[1], emotion) <= time_s(&pair[0], emotion), "{:?}", pair[1].changes);
+            assert!(
+                time_s(&pair[1], emotion) <= time_s(&pair[0], emotion),
+                "{:?}",
+                pair[1].changes
+            );
         }
     }
 }
@@ -98,8 +133,15 @@ fn t23_saved_at_any_tick_it_continues_identically() {
                     waiter.tick(closing_ft_s * FT_M);
                 }
             }
-            assert_eq!(waiter.changes, straight.changes, "saved at tick {save_tick}");
-            assert_eq!(waiter.esg.state(), straight.esg.state(), "saved at tick {save_tick}");
+            assert_eq!(
+                waiter.changes, straight.changes,
+                "saved at tick {save_tick}"
+            );
+            assert_eq!(
+                waiter.esg.state(),
+                straight.esg.state(),
+                "saved at tick {save_tick}"
+            );
         }
     }
 }

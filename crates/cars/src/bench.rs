@@ -60,7 +60,13 @@ pub(crate) fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
 
 fn measure(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Subject>> {
     let mut subjects = Vec::new();
-    let mut add = |name: String, floor: usize| subjects.push(Subject { name, results: Vec::new(), floor });
+    let mut add = |name: String, floor: usize| {
+        subjects.push(Subject {
+            name,
+            results: Vec::new(),
+            floor,
+        })
+    };
     for (index, n) in args.robots.iter().enumerate() {
         add(format!("raw TCP barrier, {n} processes (floor)"), 2 * index);
         add(format!("bare lock-step, {n} processes"), 2 * index);
@@ -91,10 +97,18 @@ fn print_table(subjects: &[Subject]) {
         sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
     };
     let mut table = Builder::default();
-    table.push_record(["ticks per second", "median", "best", "worst", "of its floor"]);
+    table.push_record([
+        "ticks per second",
+        "median",
+        "best",
+        "worst",
+        "of its floor",
+    ]);
     for subject in subjects {
-        let (best, worst) =
-            subject.results.iter().fold((0.0_f64, f64::MAX), |(b, w), r| (b.max(*r), w.min(*r)));
+        let (best, worst) = subject
+            .results
+            .iter()
+            .fold((0.0_f64, f64::MAX), |(b, w), r| (b.max(*r), w.min(*r)));
         // Pair by pair: the machine's speed drifts, and both drift with it.
         let pairs = subject.results.iter().zip(&subjects[subject.floor].results);
         let ratios: Vec<f64> = pairs.map(|(own, floor)| own / floor).collect();
@@ -107,7 +121,12 @@ fn print_table(subjects: &[Subject]) {
         ]);
     }
     let mut table = table.build();
-    println!("{}", table.with(Style::rounded()).modify(Columns::new(1..), Alignment::right()));
+    println!(
+        "{}",
+        table
+            .with(Style::rounded())
+            .modify(Columns::new(1..), Alignment::right())
+    );
     println!("Floor of the hall: the raw barrier with {} processes.", 2);
 }
 
@@ -117,7 +136,10 @@ fn raw_barrier(n: usize, ticks: u64) -> miette::Result<f64> {
     let address = listener.local_addr().into_diagnostic()?.to_string();
     let me = std::env::current_exe().into_diagnostic()?;
     let start = |_| Command::new(&me).args(["bench-echo", &address]).spawn();
-    let mut children: Vec<Child> = (0..n).map(start).collect::<Result<_, _>>().into_diagnostic()?;
+    let mut children: Vec<Child> = (0..n)
+        .map(start)
+        .collect::<Result<_, _>>()
+        .into_diagnostic()?;
     let mut streams = Vec::new();
     for _ in 0..n {
         let (stream, _) = listener.accept().into_diagnostic()?;
@@ -136,7 +158,10 @@ fn raw_barrier(n: usize, ticks: u64) -> miette::Result<f64> {
     }
     let rate = ticks as f64 / begun.elapsed().as_secs_f64();
     drop(streams);
-    children.iter_mut().try_for_each(|child| child.wait().map(drop)).into_diagnostic()?;
+    children
+        .iter_mut()
+        .try_for_each(|child| child.wait().map(drop))
+        .into_diagnostic()?;
     Ok(rate)
 }
 
@@ -165,7 +190,10 @@ fn bare(n: usize, ticks: u64, scratch: &Path) -> miette::Result<f64> {
         command.args(["bench-robot", "--name", &format!("r{i}")]);
         Ok::<Command, std::io::Error>(command)
     };
-    let robots: Vec<Command> = (0..n).map(robot).collect::<Result<_, _>>().into_diagnostic()?;
+    let robots: Vec<Command> = (0..n)
+        .map(robot)
+        .collect::<Result<_, _>>()
+        .into_diagnostic()?;
     processes(&scenario, ticks as f64, robots, scratch)
 }
 
@@ -176,21 +204,42 @@ fn hall_processes(scenario: &Path, ticks: u64, scratch: &Path) -> miette::Result
         command.args(["--name", name.as_str()]);
         Ok(command)
     };
-    let robots: Vec<Command> = loaded.robots.iter().map(robot).collect::<miette::Result<_>>()?;
+    let robots: Vec<Command> = loaded
+        .robots
+        .iter()
+        .map(robot)
+        .collect::<miette::Result<_>>()?;
     processes(scenario, ticks as f64 * loaded.tick_s, robots, scratch)
 }
 
 /// Starts a simulator and robots as processes and returns the rate that the simulator measured.
-fn processes(scenario: &Path, duration_s: f64, robots: Vec<Command>, scratch: &Path) -> miette::Result<f64> {
-    let port =
-        TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).into_diagnostic()?.port();
+fn processes(
+    scenario: &Path,
+    duration_s: f64,
+    robots: Vec<Command>,
+    scratch: &Path,
+) -> miette::Result<f64> {
+    let port = TcpListener::bind("127.0.0.1:0")
+        .and_then(|listener| listener.local_addr())
+        .into_diagnostic()?
+        .port();
     let endpoint = format!("tcp/127.0.0.1:{port}");
     let mut simulator = Command::new(beside("cars-sim")?);
     simulator.arg(scenario).arg("--out").arg(scratch);
-    simulator.args(["--run", "bench", "--listen", &endpoint, "--duration", &format!("{duration_s} s")]);
+    simulator.args([
+        "--run",
+        "bench",
+        "--listen",
+        &endpoint,
+        "--duration",
+        &format!("{duration_s} s"),
+    ]);
     let mut children = Vec::new();
     for mut command in std::iter::once(simulator).chain(robots) {
-        command.env("CARS_RUN", "bench").env("CARS_CONNECT", &endpoint).env(RUNTIME_VARIABLE, ONE_THREAD);
+        command
+            .env("CARS_RUN", "bench")
+            .env("CARS_CONNECT", &endpoint)
+            .env(RUNTIME_VARIABLE, ONE_THREAD);
         children.push(command.stdin(Stdio::null()).spawn().into_diagnostic()?);
     }
     for child in &mut children {
@@ -216,16 +265,25 @@ fn hall_local(scenario: &Path, ticks: u64, scratch: &Path) -> miette::Result<f64
 
 /// A program of this project, beside this one.
 fn beside(program: &str) -> miette::Result<PathBuf> {
-    let path = std::env::current_exe().into_diagnostic()?.with_file_name(program);
+    let path = std::env::current_exe()
+        .into_diagnostic()?
+        .with_file_name(program);
     if path.exists() {
         return Ok(path);
     }
-    Err(miette!(help = "build all programs first: `cargo build --release`", "there is no {}", path.display()))
+    Err(miette!(
+        help = "build all programs first: `cargo build --release`",
+        "there is no {}",
+        path.display()
+    ))
 }
 
 /// A robot that only answers.
 pub(crate) fn robot(args: &RobotArgs) -> miette::Result<ExitCode> {
-    let names = args.names.iter().map(|name| (name.clone(), Box::<Idle>::default() as Box<dyn Robot>));
+    let names = args
+        .names
+        .iter()
+        .map(|name| (name.clone(), Box::<Idle>::default() as Box<dyn Robot>));
     let host = robot::Host::connect(names.collect(), args.options()).into_diagnostic()?;
     host.run().into_diagnostic()?;
     Ok(ExitCode::SUCCESS)

@@ -31,7 +31,11 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
             }
         }
     }
-    Ok(if are_all_good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if are_all_good {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
 /// What a file says, in one line.
@@ -42,7 +46,11 @@ fn describe(path: &Path) -> Result<String, FileError> {
     let file = LaunchFile::load(path)?;
     let scenario = file.load_scenario(&Changes::default())?;
     file.check_robots(&scenario)?;
-    Ok(format!("{}, {}", count(file.processes.len(), "process", "processes"), content(&scenario)))
+    Ok(format!(
+        "{}, {}",
+        count(file.processes.len(), "process", "processes"),
+        content(&scenario)
+    ))
 }
 
 fn content(scenario: &Scenario) -> String {

@@ -67,9 +67,15 @@ impl ExecutionArgs {
 
     /// The same options as arguments of another `cars launch`.
     pub(crate) fn to_args(&self, run: &RunName) -> Vec<String> {
-        let mut args = vec![format!("--run={run}"), format!("--out={}", self.out.display())];
+        let mut args = vec![
+            format!("--run={run}"),
+            format!("--out={}", self.out.display()),
+        ];
         args.extend(self.seed.map(|seed| format!("--seed={seed}")));
-        args.extend(self.duration.map(|duration| format!("--duration={} s", duration.0)));
+        args.extend(
+            self.duration
+                .map(|duration| format!("--duration={} s", duration.0)),
+        );
         args.extend(self.speed.map(|speed| match speed.0 {
             Some(factor) => format!("--speed={factor}"),
             None => "--speed=max".to_owned(),
@@ -80,13 +86,26 @@ impl ExecutionArgs {
 
     /// Name of the run: as given, or as the file is called.
     pub(crate) fn run_name(&self, file: &Path) -> miette::Result<RunName> {
-        let from_file = || RunName::new(file.file_stem().and_then(|stem| stem.to_str()).unwrap_or("run"));
-        self.run.clone().map_or_else(from_file, Ok).into_diagnostic()
+        let from_file = || {
+            RunName::new(
+                file.file_stem()
+                    .and_then(|stem| stem.to_str())
+                    .unwrap_or("run"),
+            )
+        };
+        self.run
+            .clone()
+            .map_or_else(from_file, Ok)
+            .into_diagnostic()
     }
 
     /// Makes the folder of the run, with the resolved scenario in it, and points `latest` at it. Whoever writes the
     /// record keeps the lock.
-    pub(crate) fn folder(&self, run: &RunName, scenario: &Scenario) -> miette::Result<(RunFolder, RunLock)> {
+    pub(crate) fn folder(
+        &self,
+        run: &RunName,
+        scenario: &Scenario,
+    ) -> miette::Result<(RunFolder, RunLock)> {
         let folder = RunFolder::new(&self.out, run);
         let lock = folder.create(scenario)?;
         point_latest(&self.out, run);

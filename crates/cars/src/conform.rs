@@ -60,7 +60,11 @@ pub(crate) fn conform(args: &ConformArgs) -> ExitCode {
             } else {
                 print!("{}", report.to_tap());
             }
-            if report.is_passed() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+            if report.is_passed() {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
+            }
         }
         Err(error) => {
             eprintln!("{error:?}");
@@ -70,7 +74,10 @@ pub(crate) fn conform(args: &ConformArgs) -> ExitCode {
 }
 
 fn check(args: &ConformArgs) -> miette::Result<Report> {
-    let mut setting = Setting { name: args.name.clone(), ..Setting::default() };
+    let mut setting = Setting {
+        name: args.name.clone(),
+        ..Setting::default()
+    };
     if let Some(ticks) = args.ticks {
         setting.ticks = ticks;
     }
@@ -82,7 +89,10 @@ fn check(args: &ConformArgs) -> miette::Result<Report> {
         role.hears.splice(0..0, args.says.iter().cloned());
     }
     setting.commands.splice(0..0, args.says.iter().cloned());
-    let (program, arguments) = args.command.split_first().ok_or_else(|| miette!("no command is given"))?;
+    let (program, arguments) = args
+        .command
+        .split_first()
+        .ok_or_else(|| miette!("no command is given"))?;
     let mut command = Command::new(program);
     command.args(arguments);
     conform::check(&command, &setting, &args.rules).map_err(|error| miette!("{program}: {error}"))
@@ -97,10 +107,21 @@ fn stage(setting: &mut Setting, file: &Path) -> miette::Result<()> {
     setting.sensing_range_m = scenario.sensing_range_m;
     let role = |(name, spec): (&RobotName, &simulator::scenario::RobotSpec)| {
         let (location, parameters) = (spec.at, spec.parameters.clone());
-        (name.clone(), Role { location, parameters, ..Role::default() })
+        (
+            name.clone(),
+            Role {
+                location,
+                parameters,
+                ..Role::default()
+            },
+        )
     };
     setting.cast = scenario.robots.iter().map(role).collect();
-    if scenario.robots.values().all(|spec| robots::make(&spec.class).is_some()) {
+    if scenario
+        .robots
+        .values()
+        .all(|spec| robots::make(&spec.class).is_some())
+    {
         let run = RunName::new("conform").into_diagnostic()?;
         run::play(scenario, &run, |simulation, record| {
             watch(&mut setting.cast, setting.ticks, simulation, record);
@@ -111,16 +132,24 @@ fn stage(setting: &mut Setting, file: &Path) -> miette::Result<()> {
 }
 
 /// Keeps what a tick told of the robots.
-fn watch(cast: &mut BTreeMap<RobotName, Role>, ticks: Tick, simulation: &Simulation, record: &TickRecord) {
+fn watch(
+    cast: &mut BTreeMap<RobotName, Role>,
+    ticks: Tick,
+    simulation: &Simulation,
+    record: &TickRecord,
+) {
     for event in &record.events {
         if let Event::CommandSent { to, command, .. } = event
-            && let Some(role) = cast.get_mut(to).filter(|role| !role.hears.contains(command))
+            && let Some(role) = cast
+                .get_mut(to)
+                .filter(|role| !role.hears.contains(command))
         {
             role.hears.push(command.clone());
         }
     }
     for (name, role) in cast.iter_mut().filter(|_| record.tick <= ticks) {
-        let (Some(report), Some(location)) = (simulation.report(name), simulation.location(name)) else {
+        let (Some(report), Some(location)) = (simulation.report(name), simulation.location(name))
+        else {
             continue;
         };
         role.states.push(PublicState {

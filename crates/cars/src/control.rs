@@ -68,8 +68,13 @@ impl RunRef {
         }
         let (run, file) = (self.run()?, self.folder()?.file(ENDPOINT));
         let text = std::fs::read_to_string(&file).map_err(|_| {
-            let help = "start one with `cars launch`, or say where its simulator listens with --connect";
-            miette!(help = help, "run {run} is not in progress: there is no {}", file.display())
+            let help =
+                "start one with `cars launch`, or say where its simulator listens with --connect";
+            miette!(
+                help = help,
+                "run {run} is not in progress: there is no {}",
+                file.display()
+            )
         })?;
         Ok(text.trim().to_owned())
     }
@@ -85,8 +90,14 @@ impl RunRef {
 
     fn open(&self) -> miette::Result<(Bus, Keys)> {
         let (connect, config) = (self.endpoint()?, self.config()?);
-        let role = Role::Client { connect, patience: PATIENCE };
-        Ok((Bus::open(&role, config.as_ref()).into_diagnostic()?, Keys::new(&self.run()?)))
+        let role = Role::Client {
+            connect,
+            patience: PATIENCE,
+        };
+        Ok((
+            Bus::open(&role, config.as_ref()).into_diagnostic()?,
+            Keys::new(&self.run()?),
+        ))
     }
 }
 
@@ -165,13 +176,20 @@ enum LateMode {
 impl Button {
     fn control(&self) -> miette::Result<Control> {
         Ok(match self {
-            Self::Init { seed } => Control::Init { seed: *seed, setup: None },
+            Self::Init { seed } => Control::Init {
+                seed: *seed,
+                setup: None,
+            },
             Self::Start => Control::Start,
             Self::Pause => Control::Pause,
             Self::Step { n } => Control::Step { n: *n },
             Self::Stop => Control::Stop,
             Self::Speed { factor } => Control::Speed { factor: factor.0 },
-            Self::Late { on_late, robot, deadline } => Control::Late {
+            Self::Late {
+                on_late,
+                robot,
+                deadline,
+            } => Control::Late {
                 robot: robot.clone(),
                 on_late: on_late.map(|mode| match mode {
                     LateMode::Wait => OnLate::Wait,
@@ -182,9 +200,9 @@ impl Button {
             },
             Self::Status => Control::Status,
             // Resolved here, where the files are that it names.
-            Self::Load { file } => {
-                Control::Load { scenario: Scenario::load(file, &Changes::default())?.to_toml()? }
-            }
+            Self::Load { file } => Control::Load {
+                scenario: Scenario::load(file, &Changes::default())?.to_toml()?,
+            },
             Self::Scenario => Control::Setup,
         })
     }
@@ -219,10 +237,19 @@ fn refused(answer: &ControlAnswer) -> miette::Report {
 /// Asks the simulator for something.
 fn ask(run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
     let (bus, keys) = run.open()?;
-    let patience = if matches!(control, Control::Step { .. }) { STEP_PATIENCE } else { PATIENCE };
-    let answer = bus.ask_within(&keys.control(), "", Some(encode(control)), patience).into_diagnostic()?;
+    let patience = if matches!(control, Control::Step { .. }) {
+        STEP_PATIENCE
+    } else {
+        PATIENCE
+    };
+    let answer = bus
+        .ask_within(&keys.control(), "", Some(encode(control)), patience)
+        .into_diagnostic()?;
     bus.close();
-    let bytes = bytes_of(answer, &format!("no simulator of run {} answers", run.run()?))?;
+    let bytes = bytes_of(
+        answer,
+        &format!("no simulator of run {} answers", run.run()?),
+    )?;
     decode(&keys.control(), "simulator", &bytes).into_diagnostic()
 }
 
@@ -232,17 +259,27 @@ fn bytes_of(answer: Option<AnswerOf>, nobody: &str) -> miette::Result<Vec<u8>> {
 }
 
 fn describe(status: &Status) -> String {
-    let speed = status.speed.map_or("max".to_owned(), |speed| format!("{speed}x"));
+    let speed = status
+        .speed
+        .map_or("max".to_owned(), |speed| format!("{speed}x"));
     let mut text = format!(
         "{} {}  tick {}  {:.1} of {:.1} s  speed {speed}  seed {}  epoch {}\n",
-        status.run, status.phase, status.tick, status.time_s, status.duration_s, status.seed, status.epoch
+        status.run,
+        status.phase,
+        status.tick,
+        status.time_s,
+        status.duration_s,
+        status.seed,
+        status.epoch
     );
     if status.pending_steps > 0 {
         text += &format!("{} steps are pending\n", status.pending_steps);
     }
     for awaited in &status.awaiting {
-        text +=
-            &format!("waiting for {} since {:.1} s: it {}\n", awaited.name, awaited.since_s, awaited.because);
+        text += &format!(
+            "waiting for {} since {:.1} s: it {}\n",
+            awaited.name, awaited.since_s, awaited.because
+        );
     }
     for robot in &status.robots {
         let presence = match robot.presence {
@@ -250,7 +287,10 @@ fn describe(status: &Status) -> String {
             Presence::Gone => "absent",
             Presence::Lost => "lost",
         };
-        text += &format!("  {:<12} {presence}, incarnation {}\n", robot.name, robot.generation);
+        text += &format!(
+            "  {:<12} {presence}, incarnation {}\n",
+            robot.name, robot.generation
+        );
     }
     for (reason, count) in &status.ignored {
         text += &format!("ignored {count} messages: {reason}\n");
@@ -274,10 +314,18 @@ pub(crate) struct QueryArgs {
 pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     let (bus, keys) = args.run.open()?;
     let what = args.what.as_deref().unwrap_or(STATE);
-    let answer = bus.ask(&keys.query(&args.robot, what), "", None).into_diagnostic()?;
+    let answer = bus
+        .ask(&keys.query(&args.robot, what), "", None)
+        .into_diagnostic()?;
     bus.close();
-    let bytes =
-        bytes_of(answer, &format!("no robot called {} answers in run {}", args.robot, args.run.run()?))?;
+    let bytes = bytes_of(
+        answer,
+        &format!(
+            "no robot called {} answers in run {}",
+            args.robot,
+            args.run.run()?
+        ),
+    )?;
     let answer: serde_json::Value = serde_json::from_slice(&bytes).into_diagnostic()?;
     // The value is what was asked for; the tick around it is for programs.
     let value = answer.get("value").unwrap_or(&answer);
@@ -301,10 +349,16 @@ pub(crate) struct CommandArgs {
 
 /// Sends a command from outside the roster; it takes effect at the next tick boundary and is part of the record.
 pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
-    let control = Control::Command { to: args.robot.clone(), command: args.command.clone() };
+    let control = Control::Command {
+        to: args.robot.clone(),
+        command: args.command.clone(),
+    };
     match ask(&args.run, &control)? {
         ControlAnswer::Done(status) => {
-            println!("{} receives {:?} at the tick after {}", args.robot, args.command, status.tick);
+            println!(
+                "{} receives {:?} at the tick after {}",
+                args.robot, args.command, status.tick
+            );
             Ok(ExitCode::SUCCESS)
         }
         other => Err(refused(&other)),
@@ -324,8 +378,8 @@ pub(crate) struct LogArgs {
 /// Shows the log of a run.
 pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
     let file = args.run.folder()?.log();
-    let past =
-        std::fs::read_to_string(&file).map_err(|error| miette!("cannot read {}: {error}", file.display()));
+    let past = std::fs::read_to_string(&file)
+        .map_err(|error| miette!("cannot read {}: {error}", file.display()));
     if !args.follow {
         print!("{}", past?);
         return Ok(ExitCode::SUCCESS);
@@ -347,7 +401,9 @@ pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
     let _declared = (subscribed.into_diagnostic()?, watched.into_diagnostic()?);
     let past = past.unwrap_or_default();
     let all: Vec<&str> = past.lines().collect();
-    all.iter().skip(all.len().saturating_sub(TAIL)).for_each(|line| println!("{line}"));
+    all.iter()
+        .skip(all.len().saturating_sub(TAIL))
+        .for_each(|line| println!("{line}"));
     while let Ok(Some(line)) = received.recv() {
         println!("{}", log_line(&line));
     }

@@ -54,11 +54,15 @@ pub(crate) struct EmotionmlArgs {
 pub(crate) fn emotionml(args: &EmotionmlArgs) -> miette::Result<ExitCode> {
     let folder = find(args)?;
     let mut source = Source::open(&folder)?;
-    let first = source.next()?.ok_or_else(|| miette!("{} holds no tick yet", source.path().display()))?;
+    let first = source
+        .next()?
+        .ok_or_else(|| miette!("{} holds no tick yet", source.path().display()))?;
     check_robot(args.robot.as_ref(), &first)?;
     match export(args, source, first) {
         // Whoever reads the document has seen enough of it.
-        Err(Failure::Write(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
+        Err(Failure::Write(error)) if error.kind() == ErrorKind::BrokenPipe => {
+            Ok(ExitCode::SUCCESS)
+        }
         Err(Failure::Write(error)) => Err(miette!("the document cannot be written: {error}")),
         Err(Failure::Read(report)) => Err(report),
         Ok(()) => Ok(ExitCode::SUCCESS),
@@ -85,7 +89,11 @@ impl From<std::io::Error> for Failure {
 
 fn export(args: &EmotionmlArgs, mut source: Source, first: Moment) -> Result<(), Failure> {
     let mut out = open_output(args.output.as_deref(), source.path())?;
-    let roster = first.robots.iter().map(|robot| robot.name.clone()).collect();
+    let roster = first
+        .robots
+        .iter()
+        .map(|robot| robot.name.clone())
+        .collect();
     let mut document = Document::begin(&mut out, source.facts().clone(), roster, args.standard)?;
     let mut episodes = Episodes::default();
     let mut moment = Some(first);
@@ -107,11 +115,16 @@ fn export(args: &EmotionmlArgs, mut source: Source, first: Moment) -> Result<(),
 
 /// The folder of the run: under `--out` by its name, or where it is said to be.
 fn find(args: &EmotionmlArgs) -> miette::Result<RunFolder> {
-    let folder = [args.out.join(&args.run), args.run.clone()].into_iter().find(|path| path.is_dir());
+    let folder = [args.out.join(&args.run), args.run.clone()]
+        .into_iter()
+        .find(|path| path.is_dir());
     folder.map(RunFolder::at).ok_or_else(|| {
         let (run, out) = (args.run.display(), args.out.display());
         if args.run == Path::new(LATEST) {
-            return miette!(help = "name one, or start one with `cars run`", "no run is known in {out}");
+            return miette!(
+                help = "name one, or start one with `cars run`",
+                "no run is known in {out}"
+            );
         }
         miette!(
             help = "give a run's name, with --out where its folder is elsewhere, or its folder",
@@ -121,23 +134,35 @@ fn find(args: &EmotionmlArgs) -> miette::Result<RunFolder> {
 }
 
 fn check_robot(only: Option<&RobotName>, first: &Moment) -> miette::Result<()> {
-    let names: Vec<&str> = first.robots.iter().map(|robot| robot.name.as_str()).collect();
+    let names: Vec<&str> = first
+        .robots
+        .iter()
+        .map(|robot| robot.name.as_str())
+        .collect();
     match only {
-        Some(only) if !names.contains(&only.as_str()) => {
-            Err(miette!("no robot of this run is called {only}; there are {}", names.join(", ")))
-        }
+        Some(only) if !names.contains(&only.as_str()) => Err(miette!(
+            "no robot of this run is called {only}; there are {}",
+            names.join(", ")
+        )),
         _ => Ok(()),
     }
 }
 
 fn open_output(output: Option<&Path>, source: &Path) -> miette::Result<Box<dyn Write>> {
-    let Some(output) = output else { return Ok(Box::new(BufWriter::new(std::io::stdout()))) };
-    let is_source =
-        output.canonicalize().is_ok_and(|path| source.canonicalize().is_ok_and(|own| own == path));
+    let Some(output) = output else {
+        return Ok(Box::new(BufWriter::new(std::io::stdout())));
+    };
+    let is_source = output
+        .canonicalize()
+        .is_ok_and(|path| source.canonicalize().is_ok_and(|own| own == path));
     if is_source {
-        return Err(miette!("{} is what is to be exported; choose another --output", output.display()));
+        return Err(miette!(
+            "{} is what is to be exported; choose another --output",
+            output.display()
+        ));
     }
-    let file = File::create(output).map_err(|error| miette!("cannot write {}: {error}", output.display()))?;
+    let file = File::create(output)
+        .map_err(|error| miette!("cannot write {}: {error}", output.display()))?;
     Ok(Box::new(BufWriter::new(file)))
 }
 

@@ -43,7 +43,10 @@ pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
     protocol::runtime::use_one_thread();
     let [name] = args.robot.names.as_slice() else {
         let help = "for example: cars exec --name Leguin -- ./leguin.sh";
-        return Err(miette!(help = help, "a program is one robot: give one --name"));
+        return Err(miette!(
+            help = help,
+            "a program is one robot: give one --name"
+        ));
     };
     // Before any other thread is there, so that these signals come to the thread that waits for them. The program does
     // not inherit this.
@@ -54,15 +57,20 @@ pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
     let (program, heard) = Program::start(name, &args.command, stopper.clone())?;
     let asked = listen(asking, &program, stopper.clone());
     let proxy = Box::new(Proxy::new(program.clone(), heard));
-    let outcome = Host::connect(vec![(name.clone(), proxy)], args.robot.options()).and_then(|host| {
-        let stopper = stopper.get_or_init(|| host.stopper());
-        if program.status().is_some() {
-            stopper.stop(); // It was over before anybody could be told.
-        }
-        host.run()
-    });
+    let outcome =
+        Host::connect(vec![(name.clone(), proxy)], args.robot.options()).and_then(|host| {
+            let stopper = stopper.get_or_init(|| host.stopper());
+            if program.status().is_some() {
+                stopper.stop(); // It was over before anybody could be told.
+            }
+            host.run()
+        });
 
-    let patience = if program.was_asked_to_end() { SAME_SIGNAL } else { Duration::ZERO };
+    let patience = if program.was_asked_to_end() {
+        SAME_SIGNAL
+    } else {
+        Duration::ZERO
+    };
     if let Ok(signal) = asked.recv_timeout(patience) {
         program.end(EndReason::Interrupted);
         return Ok(ExitCode::from(code_of(signal)));
@@ -72,7 +80,10 @@ pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
             program.end(end.into());
             return Ok(ExitCode::SUCCESS);
         }
-        Err(HostError::Stopped) => format!("{name} gives up: {}", program.account_or("its program is over")),
+        Err(HostError::Stopped) => format!(
+            "{name} gives up: {}",
+            program.account_or("its program is over")
+        ),
         Err(error) => error.to_string(),
     };
     program.end(EndReason::Failed);
@@ -81,7 +92,11 @@ pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
 }
 
 /// Waits for a signal that asks to end, in a thread of its own: the robot leaves the run, and then the program ends.
-fn listen(asking: SigSet, program: &Arc<Program>, stopper: Arc<OnceLock<Stopper>>) -> Receiver<Signal> {
+fn listen(
+    asking: SigSet,
+    program: &Arc<Program>,
+    stopper: Arc<OnceLock<Stopper>>,
+) -> Receiver<Signal> {
     let (tell, asked): (SyncSender<Signal>, _) = std::sync::mpsc::sync_channel(1);
     let program = program.clone();
     std::thread::spawn(move || {

@@ -41,7 +41,11 @@ enum Experiment {
 #[derive(Debug, Args)]
 struct Common {
     /// Scenario with a Butler and a Leguin.
-    #[arg(long, default_value = "configs/hors_doeuvres.toml", value_name = "FILE")]
+    #[arg(
+        long,
+        default_value = "configs/hors_doeuvres.toml",
+        value_name = "FILE"
+    )]
     scenario: PathBuf,
     /// Runs of each arm and condition, with the seeds 1, 2, 3 and so on.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u64).range(MIN_SAMPLE..=100_000))]
@@ -77,7 +81,12 @@ pub(crate) struct PartitionArgs {
     #[arg(long, default_value = "120 s", value_name = "TIME")]
     from: Time,
     /// For how long.
-    #[arg(long, value_delimiter = ',', default_value = "0 s,60 s,120 s,240 s", value_name = "TIMES")]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "0 s,60 s,120 s,240 s",
+        value_name = "TIMES"
+    )]
     lasting: Vec<Time>,
     #[command(flatten)]
     common: Common,
@@ -131,8 +140,16 @@ impl PartitionArgs {
             let cut = format!(
                 "network.partition=[{{ groups = [[\"Butler\"], [\"Leguin\"]], from = \"{from_s} s\", until = \"{until_s} s\" }}]"
             );
-            let change = if lasting.0 > 0.0 { cut } else { "network.partition=[]".to_owned() };
-            Condition { name: format!("{} s", lasting.0), change, time_s: (from_s, until_s) }
+            let change = if lasting.0 > 0.0 {
+                cut
+            } else {
+                "network.partition=[]".to_owned()
+            };
+            Condition {
+                name: format!("{} s", lasting.0),
+                change,
+                time_s: (from_s, until_s),
+            }
         };
         Plan {
             common: &self.common,
@@ -147,7 +164,10 @@ impl PartitionArgs {
 }
 
 fn probability(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
+    let value = text
+        .parse()
+        .ok()
+        .filter(|value| (0.0..=1.0).contains(value));
     value.ok_or_else(|| format!("{text:?} is not a probability, a number from 0 to 1"))
 }
 
@@ -162,7 +182,10 @@ const ARMS: [Arm; 4] = [
     Arm {
         name: "affectless",
         what: "no emotions; Butler calls once when the same need presses, nothing is repeated",
-        changes: &["robot.Butler.params.affect=off", "robot.Leguin.params.affect=off"],
+        changes: &[
+            "robot.Butler.params.affect=off",
+            "robot.Leguin.params.affect=off",
+        ],
     },
     Arm {
         name: "timer repeat",
@@ -178,7 +201,11 @@ const ARMS: [Arm; 4] = [
         what: "emotions escalate from refill to hurry to intercepting, and send Leguin home when she has waited too long; nothing is repeated",
         changes: &[],
     },
-    Arm { name: "both", what: "emotions, and the timer", changes: &["robot.Butler.params.resend=on"] },
+    Arm {
+        name: "both",
+        what: "emotions, and the timer",
+        changes: &["robot.Butler.params.resend=on"],
+    },
 ];
 
 /// What came of one run.
@@ -241,23 +268,31 @@ impl Plan<'_> {
         units.first().map(|unit| self.load(unit)).transpose()?;
         let bar = ProgressBar::new(units.len() as u64);
         bar.set_style(
-            ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?,
+            ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left")
+                .into_diagnostic()?,
         );
         let available = || std::thread::available_parallelism().map_or(1, usize::from);
-        let jobs = self.common.jobs.map_or_else(available, |jobs| jobs as usize);
+        let jobs = self
+            .common
+            .jobs
+            .map_or_else(available, |jobs| jobs as usize);
         let next = AtomicUsize::new(0);
         let work = || {
             let mut done = Vec::new();
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(unit) = units.get(index) else { return done };
+                let Some(unit) = units.get(index) else {
+                    return done;
+                };
                 done.push((index, self.one(unit)));
                 bar.inc(1);
             }
         };
         let mut done = std::thread::scope(|scope| {
             let workers: Vec<_> = (0..jobs).map(|_| scope.spawn(work)).collect();
-            let joined = workers.into_iter().map(|worker| worker.join().map_err(|_| broken()));
+            let joined = workers
+                .into_iter()
+                .map(|worker| worker.join().map_err(|_| broken()));
             joined.collect::<miette::Result<Vec<_>>>()
         })?;
         bar.finish_and_clear();
@@ -267,12 +302,24 @@ impl Plan<'_> {
     }
 
     fn load(&self, (condition, arm, seed): &Unit<'_>) -> miette::Result<Scenario> {
-        let own = arm.changes.iter().copied().chain([condition.change.as_str(), "record.frames=false"]);
+        let own = arm
+            .changes
+            .iter()
+            .copied()
+            .chain([condition.change.as_str(), "record.frames=false"]);
         let mut set = self.common.set.clone();
         for change in own {
-            set.push(change.parse().map_err(|reason| miette!("{change}: {reason}"))?);
+            set.push(
+                change
+                    .parse()
+                    .map_err(|reason| miette!("{change}: {reason}"))?,
+            );
         }
-        let changes = Changes { seed: Some(*seed), duration_s: Some(self.common.duration.0), set };
+        let changes = Changes {
+            seed: Some(*seed),
+            duration_s: Some(self.common.duration.0),
+            set,
+        };
         Ok(Scenario::load(&self.common.scenario, &changes)?)
     }
 
@@ -282,9 +329,17 @@ impl Plan<'_> {
         let (mut summary, mut begun_s) = (None, Vec::new());
         let simulation = play(self.load(unit)?, &run, |simulation, record| {
             let summary = summary.get_or_insert_with(|| Summary::begin(&run, simulation));
-            record.lines().for_each(|line| summary.count(simulation, &line));
+            record
+                .lines()
+                .for_each(|line| summary.count(simulation, &line));
             let begins = |event: &&Event| matches!(event, Event::Behavior { robot, to, .. } if robot.as_str() == "Butler" && to == "EXCHANGE");
-            begun_s.extend(record.events.iter().filter(begins).map(|_| simulation.time_s(record.tick)));
+            begun_s.extend(
+                record
+                    .events
+                    .iter()
+                    .filter(begins)
+                    .map(|_| simulation.time_s(record.tick)),
+            );
             Ok(())
         })?;
         let mut summary = summary.ok_or_else(|| miette!("the run has not begun"))?;
@@ -301,18 +356,27 @@ impl Plan<'_> {
             during: count(&|begun_s| (from_s..until_s).contains(&begun_s)),
             after: count(&|begun_s| begun_s >= until_s),
             empty_s: self.of_butler(&summary, "empty_s")?,
-            messages: summary.robots.values().flat_map(|robot| robot.sent.values()).sum::<u64>() as f64,
+            messages: summary
+                .robots
+                .values()
+                .flat_map(|robot| robot.sent.values())
+                .sum::<u64>() as f64,
             digest: summary.digest.clone(),
         })
     }
 
     /// A number that Butler published last.
     fn of_butler(&self, summary: &Summary, variable: &str) -> miette::Result<f64> {
-        let robot = summary.robots.iter().find(|(name, _)| name.as_str() == "Butler");
+        let robot = summary
+            .robots
+            .iter()
+            .find(|(name, _)| name.as_str() == "Butler");
         let value = robot.and_then(|(_, robot)| robot.state_variables.get(variable)?.as_f64());
         value.ok_or_else(|| {
             let file = self.common.scenario.display();
-            miette!("{file}: it needs a robot called Butler that publishes {variable:?} as a number")
+            miette!(
+                "{file}: it needs a robot called Butler that publishes {variable:?} as a number"
+            )
         })
     }
 
@@ -320,8 +384,10 @@ impl Plan<'_> {
         let mut cells = Vec::new();
         for condition in self.conditions.iter().map(|condition| &condition.name) {
             for arm in ARMS.iter().map(|arm| arm.name) {
-                let runs: Vec<&Outcome> =
-                    outcomes.iter().filter(|run| run.condition == *condition && run.arm == arm).collect();
+                let runs: Vec<&Outcome> = outcomes
+                    .iter()
+                    .filter(|run| run.condition == *condition && run.arm == arm)
+                    .collect();
                 let of = |value: fn(&Outcome) -> f64| {
                     Estimate::of(&runs.iter().map(|run| value(run)).collect::<Vec<_>>())
                 };
@@ -341,7 +407,12 @@ impl Plan<'_> {
 
     /// What is compared with what, in words.
     fn compared(&self) -> String {
-        let Common { scenario, seeds, duration, .. } = self.common;
+        let Common {
+            scenario,
+            seeds,
+            duration,
+            ..
+        } = self.common;
         let mut text = format!(
             "{}: {seeds} runs of {} s for each line, seeds 1 to {seeds}. Runs with the same seed begin alike\nand have the same chance, whatever the arm. {}\nMean and 95 % confidence interval over the seeds.\n\n",
             scenario.display(),
@@ -364,15 +435,29 @@ impl Plan<'_> {
         let mut above = None;
         for cell in cells {
             let is_new = above.replace(&cell.condition) != Some(&cell.condition);
-            let mut row =
-                vec![if is_new { cell.condition.clone() } else { String::new() }, cell.arm.to_owned()];
+            let mut row = vec![
+                if is_new {
+                    cell.condition.clone()
+                } else {
+                    String::new()
+                },
+                cell.arm.to_owned(),
+            ];
             let times = self.tells_times.then_some([cell.during, cell.after]);
-            let values = [cell.exchanges].into_iter().chain(times.into_iter().flatten());
-            row.extend(values.chain([cell.empty_s, cell.messages]).map(|estimate| estimate.to_string()));
+            let values = [cell.exchanges]
+                .into_iter()
+                .chain(times.into_iter().flatten());
+            row.extend(
+                values
+                    .chain([cell.empty_s, cell.messages])
+                    .map(|estimate| estimate.to_string()),
+            );
             table.push_record(row);
         }
         let mut table = table.build();
-        table.with(Style::rounded()).modify(Columns::new(2..), Alignment::right());
+        table
+            .with(Style::rounded())
+            .modify(Columns::new(2..), Alignment::right());
         format!("{}\n{table}\n", self.compared())
     }
 }

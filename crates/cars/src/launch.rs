@@ -117,12 +117,18 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
 
 /// The scenario that a file is about: that of a launch file, or the file itself.
 pub(crate) fn scenario_file(path: &Path) -> miette::Result<PathBuf> {
-    Ok(if is_launch_file(path)? { LaunchFile::load(path)?.scenario } else { path.to_owned() })
+    Ok(if is_launch_file(path)? {
+        LaunchFile::load(path)?.scenario
+    } else {
+        path.to_owned()
+    })
 }
 
 /// Whether this is a launch file: it names its scenario, and a scenario file does not.
 pub(crate) fn is_launch_file(path: &Path) -> Result<bool, FileError> {
-    Ok(Source::read(path)?.parse::<toml::Table>()?.contains_key("scenario"))
+    Ok(Source::read(path)?
+        .parse::<toml::Table>()?
+        .contains_key("scenario"))
 }
 
 /// What is launched.
@@ -137,7 +143,11 @@ struct Launch {
 
 impl Launch {
     fn load(args: LaunchArgs) -> miette::Result<Self> {
-        let path = args.roster.as_ref().or(args.file.as_ref()).ok_or_else(|| miette!("no file is given"))?;
+        let path = args
+            .roster
+            .as_ref()
+            .or(args.file.as_ref())
+            .ok_or_else(|| miette!("no file is given"))?;
         let changes = args.execution.changes();
         let (file, scenario) = if args.roster.is_some() {
             let source = Source::read(path)?;
@@ -151,13 +161,23 @@ impl Launch {
         file.check_robots(&scenario)?;
         let run = args.execution.run_name(path)?;
         let secured = secured(&args, &file)?;
-        Ok(Self { args, file, scenario, run, secured })
+        Ok(Self {
+            args,
+            file,
+            scenario,
+            run,
+            secured,
+        })
     }
 
     fn export(&self) -> miette::Result<ExitCode> {
         if let Some(roster) = &self.args.roster {
             let help = "write a launch file, with a scenario that the containers can read";
-            return Err(miette!(help = help, "{} cannot be exported", roster.display()));
+            return Err(miette!(
+                help = help,
+                "{} cannot be exported",
+                roster.display()
+            ));
         }
         if self.secured.is_some() {
             let help = "export it without `secure`: the containers have a network of their own";
@@ -168,8 +188,18 @@ impl Launch {
     }
 
     fn print_plan(&self) -> miette::Result<ExitCode> {
-        for Planned { name, command, is_extern, .. } in self.plan(&self.endpoint()?)? {
-            let note = if is_extern { " (to be started by you)" } else { "" };
+        for Planned {
+            name,
+            command,
+            is_extern,
+            ..
+        } in self.plan(&self.endpoint()?)?
+        {
+            let note = if is_extern {
+                " (to be started by you)"
+            } else {
+                ""
+            };
             println!("# {name}{note}\n{command}");
         }
         Ok(ExitCode::SUCCESS)
@@ -189,12 +219,19 @@ impl Launch {
             opens_browser: self.args.open,
         };
         let mut planned = plan::plan(&self.file, &execution)?;
-        self.args.links.iter().try_for_each(|link| link.lay(&mut planned))?;
+        self.args
+            .links
+            .iter()
+            .try_for_each(|link| link.lay(&mut planned))?;
         Ok(planned)
     }
 
     fn speed(&self) -> Speed {
-        self.args.execution.speed.or(self.file.speed).unwrap_or(Speed(None))
+        self.args
+            .execution
+            .speed
+            .or(self.file.speed)
+            .unwrap_or(Speed(None))
     }
 
     /// Where the simulator is to listen.
@@ -204,23 +241,38 @@ impl Launch {
             check_exposure(endpoint, config.as_ref(), self.args.insecure).into_diagnostic()?;
             return Ok(endpoint.clone());
         }
-        let free =
-            || endpoint::free_port().into_diagnostic().wrap_err("no free port of the loopback interface");
+        let free = || {
+            endpoint::free_port()
+                .into_diagnostic()
+                .wrap_err("no free port of the loopback interface")
+        };
         let port = self.args.connect_port.map_or_else(free, Ok)?;
         Ok(endpoint::loopback(port, self.secured.is_some()))
     }
 
     /// The configuration file that the simulator gets: that of a secured run, or what the environment says.
     fn simulator_config(&self) -> Option<PathBuf> {
-        let secured = self.secured.as_ref().map(|secured| secured.config_of(file::SIMULATOR));
+        let secured = self
+            .secured
+            .as_ref()
+            .map(|secured| secured.config_of(file::SIMULATOR));
         secured
-            .or_else(|| self.file.simulator.env.get(plan::ZENOH_CONFIG).map(PathBuf::from))
+            .or_else(|| {
+                self.file
+                    .simulator
+                    .env
+                    .get(plan::ZENOH_CONFIG)
+                    .map(PathBuf::from)
+            })
             .or_else(inherited)
     }
 
     /// The configuration file that the launcher itself uses to watch.
     fn observer_config(&self) -> Option<PathBuf> {
-        self.secured.as_ref().map(Secured::operator).or_else(inherited)
+        self.secured
+            .as_ref()
+            .map(Secured::operator)
+            .or_else(inherited)
     }
 
     /// Plays the run, and says what came of it.
@@ -250,11 +302,21 @@ impl Launch {
             return;
         }
         if let Some(roster) = &self.args.roster {
-            let robot = |process: &file::Process| format!("{} ({})", process.name, process.command.join(" "));
+            let robot = |process: &file::Process| {
+                format!("{} ({})", process.name, process.command.join(" "))
+            };
             let robots: Vec<String> = self.file.processes.iter().map(robot).collect();
-            eprintln!("{}: {}, in the hall of the first experiment", roster.display(), robots.join(", "));
+            eprintln!(
+                "{}: {}, in the hall of the first experiment",
+                roster.display(),
+                robots.join(", ")
+            );
         }
-        eprintln!("run {} at {endpoint}, recorded in {}", self.run, folder.path().display());
+        eprintln!(
+            "run {} at {endpoint}, recorded in {}",
+            self.run,
+            folder.path().display()
+        );
     }
 
     /// Runs the processes to their end, with an observer beside them.
@@ -264,17 +326,32 @@ impl Launch {
         endpoint: &str,
         folder: &RunFolder,
     ) -> miette::Result<Outcome> {
-        let grace = Duration::try_from_secs_f64(self.args.grace.0).into_diagnostic().wrap_err("--grace")?;
-        let look = Look::here(planned.iter().map(|planned| planned.name.clone()).collect(), self.args.quiet);
+        let grace = Duration::try_from_secs_f64(self.args.grace.0)
+            .into_diagnostic()
+            .wrap_err("--grace")?;
+        let look = Look::here(
+            planned.iter().map(|planned| planned.name.clone()).collect(),
+            self.args.quiet,
+        );
         let wants_world = look.has_bar;
         let screen = Screen::open(look);
         let (run, tell) = (self.run.clone(), screen.tell());
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .into_diagnostic()?;
         let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.tell());
         let faults = (!self.scenario.faults.is_empty()).then(|| supervisor.queue());
         let is_needed = !self.args.quiet || faults.is_some();
         let (endpoint, config) = (connectable(endpoint), self.observer_config());
-        let watch = || Watch { run, endpoint, config, wants_world, tell, faults };
+        let watch = || Watch {
+            run,
+            endpoint,
+            config,
+            wants_world,
+            tell,
+            faults,
+        };
         let observer = is_needed.then(|| Observer::start(watch()));
         let running = async {
             signals::listen(&supervisor.queue())?;
@@ -291,9 +368,14 @@ impl Launch {
 
 /// The certificates with which a launch is secured, if it is: those of the command line, or of the file.
 fn secured(args: &LaunchArgs, file: &LaunchFile) -> miette::Result<Option<Secured>> {
-    let Some(folder) = args.secure.as_ref().or(file.secure.as_ref()) else { return Ok(None) };
+    let Some(folder) = args.secure.as_ref().or(file.secure.as_ref()) else {
+        return Ok(None);
+    };
     file.check_certificates()?;
-    let robots = file.processes.iter().flat_map(|process| process.robots.iter().map(RobotName::as_str));
+    let robots = file
+        .processes
+        .iter()
+        .flat_map(|process| process.robots.iter().map(RobotName::as_str));
     let console = file.console.iter().map(|_| file::CONSOLE);
     Secured::find(folder, robots.chain(console)).map(Some)
 }
@@ -316,7 +398,11 @@ fn roster_scenario(text: &Source, changes: &Changes) -> miette::Result<Scenario>
 
 /// Logs of an earlier run with this name; a log that cannot be removed is added to.
 fn clear_logs(folder: &RunFolder) {
-    for log in std::fs::read_dir(folder.file(LOGS)).into_iter().flatten().flatten() {
+    for log in std::fs::read_dir(folder.file(LOGS))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
         let _kept = std::fs::remove_file(log.path());
     }
 }
@@ -330,7 +416,9 @@ fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> miette::Re
         eprintln!("{failure}");
         return Ok(ExitCode::from(failure.code));
     }
-    Ok(outcome.asked.map_or(ExitCode::SUCCESS, |signal| ExitCode::from(ending::code_of(signal))))
+    Ok(outcome.asked.map_or(ExitCode::SUCCESS, |signal| {
+        ExitCode::from(ending::code_of(signal))
+    }))
 }
 
 /// The summary, if the simulator came to write one.
@@ -339,7 +427,10 @@ fn read_summary(folder: &RunFolder) -> miette::Result<Option<Summary>> {
     if !path.exists() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|error| FileError::unreadable(&path, &error))?;
     let summary = serde_json::from_str(&text).into_diagnostic();
-    summary.map(Some).wrap_err_with(|| format!("{} is not what the simulator writes", path.display()))
+    summary
+        .map(Some)
+        .wrap_err_with(|| format!("{} is not what the simulator writes", path.display()))
 }

@@ -135,7 +135,11 @@ impl Language {
 pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
     let What::Robot(args) = &args.what;
     let folder = args.out.join(args.name.as_str());
-    let cars = if args.lang.needs_sdk() { project(args.cars.as_deref())? } else { PathBuf::new() };
+    let cars = if args.lang.needs_sdk() {
+        project(args.cars.as_deref())?
+    } else {
+        PathBuf::new()
+    };
     let skeleton = args.lang.skeleton();
     std::fs::create_dir_all(&args.out)
         .into_diagnostic()
@@ -148,11 +152,20 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
         _ => miette!("{} cannot be made: {error}", folder.display()),
     })?;
 
-    let place = args.out.canonicalize().into_diagnostic()?.join(args.name.as_str());
-    let package = format!("cars-{}", args.name.as_str().to_lowercase().replace('.', "-"));
+    let place = args
+        .out
+        .canonicalize()
+        .into_diagnostic()?
+        .join(args.name.as_str());
+    let package = format!(
+        "cars-{}",
+        args.name.as_str().to_lowercase().replace('.', "-")
+    );
     let launch = format!("cars launch {}/launch.toml", shown(&folder));
-    let steps: Vec<&str> =
-        [skeleton.build, launch.as_str()].into_iter().filter(|step| !step.is_empty()).collect();
+    let steps: Vec<&str> = [skeleton.build, launch.as_str()]
+        .into_iter()
+        .filter(|step| !step.is_empty())
+        .collect();
     let steps = steps.join("\n");
     let fill = |text: &str| {
         let command_and_steps = text.replace("@COMMAND@", skeleton.command);
@@ -162,12 +175,23 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
             .replace("@HINT@", skeleton.hint)
             .replace("@FOLDER@", &shown(&folder))
             .replace("@PACKAGE@", &package)
-            .replace("@ROBOT_CRATE@", &format!("{:?}", cars.join("crates/robot").display().to_string()))
+            .replace(
+                "@ROBOT_CRATE@",
+                &format!("{:?}", cars.join("crates/robot").display().to_string()),
+            )
             .replace("@CARS@", &cars.display().to_string())
             .replace("@NAME@", args.name.as_str())
     };
-    let common = [("launch.toml", LAUNCH), ("scenario.toml", SCENARIO), ("README.md", README)];
-    for (name, text) in [skeleton.program].iter().chain(skeleton.more).chain(&common) {
+    let common = [
+        ("launch.toml", LAUNCH),
+        ("scenario.toml", SCENARIO),
+        ("README.md", README),
+    ];
+    for (name, text) in [skeleton.program]
+        .iter()
+        .chain(skeleton.more)
+        .chain(&common)
+    {
         write(&place.join(name), &fill(text))?;
     }
     if args.lang == Language::Rust {
@@ -177,26 +201,51 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
             .wrap_err("the project's Cargo.lock")?;
         write(&place.join("Cargo.lock"), &lock)?;
     }
-    println!("{} is a robot in {}. Next:\n", folder.display(), skeleton.language);
-    println!("{}\n\nand read {}", fill(&steps), folder.join("README.md").display());
+    println!(
+        "{} is a robot in {}. Next:\n",
+        folder.display(),
+        skeleton.language
+    );
+    println!(
+        "{}\n\nand read {}",
+        fill(&steps),
+        folder.join("README.md").display()
+    );
     Ok(ExitCode::SUCCESS)
 }
 
 /// A folder as a shell reads it.
 fn shown(folder: &Path) -> String {
-    let text = folder.strip_prefix(".").unwrap_or(folder).display().to_string();
-    let is_plain = text.chars().all(|c| c.is_ascii_alphanumeric() || "-_./".contains(c));
-    if is_plain { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    let text = folder
+        .strip_prefix(".")
+        .unwrap_or(folder)
+        .display()
+        .to_string();
+    let is_plain = text
+        .chars()
+        .all(|c| c.is_ascii_alphanumeric() || "-_./".contains(c));
+    if is_plain {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
 }
 
 /// The folder of the CARS project.
 fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
     let built_from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let folder = given.unwrap_or(&built_from);
-    let found = folder.canonicalize().ok().filter(|folder| folder.join("crates/robot/Cargo.toml").is_file());
+    let found = folder
+        .canonicalize()
+        .ok()
+        .filter(|folder| folder.join("crates/robot/Cargo.toml").is_file());
     found.ok_or_else(|| {
         let help = "give the folder that you have cloned: --cars DIR";
-        miette!(help = help, "the CARS project, whose SDK this robot uses, is not at {}", folder.display())
+        miette!(
+            help = help,
+            "the CARS project, whose SDK this robot uses, is not at {}",
+            folder.display()
+        )
     })
 }
 
@@ -212,5 +261,7 @@ fn write(file: &Path, text: &str) -> miette::Result<()> {
         }
         Ok(())
     };
-    writing().into_diagnostic().wrap_err_with(|| format!("writing {}", file.display()))
+    writing()
+        .into_diagnostic()
+        .wrap_err_with(|| format!("writing {}", file.display()))
 }

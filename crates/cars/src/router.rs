@@ -12,7 +12,11 @@ use protocol::bus::{Bus, Role};
 #[derive(Debug, Args)]
 pub(crate) struct RouterArgs {
     /// Where the simulator, robots and other routers reach this one, for example `tcp/192.0.2.1:7447`.
-    #[arg(long, value_name = "ENDPOINT", required_unless_present = "zenoh_config")]
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        required_unless_present = "zenoh_config"
+    )]
     listen: Vec<String>,
     /// Another router that this one reaches.
     #[arg(long, value_name = "ENDPOINT")]
@@ -43,7 +47,11 @@ pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
     println!(
         "forwarding at {}",
-        if args.listen.is_empty() { "what the file says".to_owned() } else { args.listen.join(", ") }
+        if args.listen.is_empty() {
+            "what the file says".to_owned()
+        } else {
+            args.listen.join(", ")
+        }
     );
     ended.recv().into_diagnostic()?;
     bus.close();

@@ -10,7 +10,9 @@ use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
 use protocol::messages::{Clock, End};
 use robot::{LocalHost, Robot, RobotError, Welcome};
-use simulator::{Barrier, Exchange, Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
+use simulator::{
+    Barrier, Exchange, Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord,
+};
 
 use crate::common::ExecutionArgs;
 use crate::launch;
@@ -34,7 +36,10 @@ pub(crate) fn run(args: &RunArgs) -> miette::Result<ExitCode> {
     let scenario = Scenario::load(&file, &args.execution.changes())?;
     if !scenario.faults.is_empty() {
         let help = "play it with `cars launch`, or leave them out with --set 'fault=[]'";
-        return Err(miette!(help = help, "the scenario has faults of processes, and here are none"));
+        return Err(miette!(
+            help = help,
+            "the scenario has faults of processes, and here are none"
+        ));
     }
     let run = args.execution.run_name(&args.file)?;
     let (folder, _lock) = args.execution.folder(&run, &scenario)?;
@@ -53,8 +58,13 @@ impl Barrier for InProcess {
     type Interrupt = RobotError;
 
     fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
-        let reports = self.0.exchange(&clock, &mut |name| simulation.percept(name))?;
-        Ok(Exchange { reports, membership: Vec::new() })
+        let reports = self
+            .0
+            .exchange(&clock, &mut |name| simulation.percept(name))?;
+        Ok(Exchange {
+            reports,
+            membership: Vec::new(),
+        })
     }
 }
 
@@ -91,8 +101,9 @@ pub(crate) fn play(
 ) -> miette::Result<Simulation> {
     let robots = make_robots(&scenario, Path::new("the scenario"))?;
     let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
-    let seated =
-        robots.into_iter().filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
+    let seated = robots
+        .into_iter()
+        .filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
     let mut barrier = InProcess(LocalHost::new(seated.collect()));
     let record = simulation.init(&mut barrier).into_diagnostic()?;
     each(&simulation, &record)?;

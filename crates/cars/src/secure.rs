@@ -18,8 +18,8 @@ use protocol::name::OPERATOR;
 use protocol::secure::{Credentials, client_config, simulator_config};
 use protocol::{RobotName, RunName};
 use rcgen::{
-    BasicConstraints, CertificateParams, CertifiedIssuer, DnType, ExtendedKeyUsagePurpose, IsCa, KeyPair,
-    KeyUsagePurpose,
+    BasicConstraints, CertificateParams, CertifiedIssuer, DnType, ExtendedKeyUsagePurpose, IsCa,
+    KeyPair, KeyUsagePurpose,
 };
 
 /// The certificate of the authority, in the folder itself.
@@ -82,7 +82,11 @@ impl InitArgs {
         // A folder is called after each, and some file systems do not tell `Butler` from `butler`.
         let mut taken: BTreeSet<String> = RESERVED.iter().map(|name| (*name).to_owned()).collect();
         taken.insert(CA.to_owned());
-        match self.robots.iter().find(|robot| !taken.insert(robot.as_str().to_lowercase())) {
+        match self
+            .robots
+            .iter()
+            .find(|robot| !taken.insert(robot.as_str().to_lowercase()))
+        {
             None => Ok(()),
             Some(robot) => {
                 let help = "each participant has a folder called after it, and some are not robots";
@@ -94,8 +98,12 @@ impl InitArgs {
     /// Makes the folder, readable by its owner alone.
     fn make_folder(&self) -> miette::Result<()> {
         let folder = &self.folder;
-        let is_ours = [folder.join(CA), folder.join(SIMULATOR).join(CONFIG)].iter().any(|file| file.exists());
-        let is_empty = !folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+        let is_ours = [folder.join(CA), folder.join(SIMULATOR).join(CONFIG)]
+            .iter()
+            .any(|file| file.exists());
+        let is_empty = !folder
+            .read_dir()
+            .is_ok_and(|mut entries| entries.next().is_some());
         let is_free = is_empty || (self.force && is_ours);
         if !is_free {
             let help = if is_ours {
@@ -103,7 +111,11 @@ impl InitArgs {
             } else {
                 "it holds something else: choose another folder"
             };
-            return Err(miette!(help = help, "{} is there already", folder.display()));
+            return Err(miette!(
+                help = help,
+                "{} is there already",
+                folder.display()
+            ));
         }
         make_private_folder(folder)?;
         forget_participants(folder)
@@ -113,14 +125,18 @@ impl InitArgs {
     fn make_files(&self) -> miette::Result<String> {
         let authority = Authority::new(self.days)?;
         let keys = self.run.as_ref().map_or_else(Keys::of_any_run, Keys::new);
-        let hosts: Vec<String> =
-            LOCAL_HOSTS.iter().map(|host| (*host).to_owned()).chain(self.host.iter().cloned()).collect();
+        let hosts: Vec<String> = LOCAL_HOSTS
+            .iter()
+            .map(|host| (*host).to_owned())
+            .chain(self.host.iter().cloned())
+            .collect();
         authority.equip(&self.folder, SIMULATOR, hosts, |credentials| {
             simulator_config(&keys, &self.robots, credentials)
         })?;
         for name in self.clients() {
-            authority
-                .equip(&self.folder, name, Vec::new(), |credentials| client_config(name, credentials))?;
+            authority.equip(&self.folder, name, Vec::new(), |credentials| {
+                client_config(name, credentials)
+            })?;
         }
         // Last: a folder with it is complete.
         write_file(&self.folder.join(CA), &authority.issuer.pem(), 0o644)?;
@@ -128,13 +144,19 @@ impl InitArgs {
     }
 
     fn clients(&self) -> impl Iterator<Item = &str> {
-        self.robots.iter().map(RobotName::as_str).chain([OPERATOR, CONSOLE])
+        self.robots
+            .iter()
+            .map(RobotName::as_str)
+            .chain([OPERATOR, CONSOLE])
     }
 
     fn explain(&self, validity: &str) {
         let folder = self.folder.display();
         let clients: Vec<&str> = self.clients().collect();
-        let runs = self.run.as_ref().map_or("any run".to_owned(), |run| format!("run {run}"));
+        let runs = self
+            .run
+            .as_ref()
+            .map_or("any run".to_owned(), |run| format!("run {run}"));
         println!(
             "made {folder}, for {runs}, valid until {validity}:\n\
              \x20 ca.pem                 whose certificates are believed; its key is not kept, so there will be no more\n\
@@ -168,7 +190,12 @@ impl Authority {
         let validity = format!("{} (UTC)", params.not_after.date());
         let key = KeyPair::generate().into_diagnostic()?;
         let issuer = CertifiedIssuer::self_signed(params, key).into_diagnostic()?;
-        Ok(Self { issuer, from, until, validity })
+        Ok(Self {
+            issuer,
+            from,
+            until,
+            validity,
+        })
     }
 
     /// Makes the folder of a participant. One with hosts is a server, and one without a client: nobody but the
@@ -182,7 +209,9 @@ impl Authority {
     ) -> miette::Result<()> {
         let is_server = !hosts.is_empty();
         let mut params = named(name, self.from, self.until);
-        params.subject_alt_names = CertificateParams::new(hosts).into_diagnostic()?.subject_alt_names;
+        params.subject_alt_names = CertificateParams::new(hosts)
+            .into_diagnostic()?
+            .subject_alt_names;
         params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
         params.extended_key_usages = vec![if is_server {
             ExtendedKeyUsagePurpose::ServerAuth
@@ -192,8 +221,12 @@ impl Authority {
         let key = KeyPair::generate().into_diagnostic()?;
         let certificate = params.signed_by(&key, &self.issuer).into_diagnostic()?;
         let (ca, certificate, key) = (self.issuer.pem(), certificate.pem(), key.serialize_pem());
-        let credentials =
-            Credentials { ca: &ca, certificate: &certificate, key: &key, validity: &self.validity };
+        let credentials = Credentials {
+            ca: &ca,
+            certificate: &certificate,
+            key: &key,
+            validity: &self.validity,
+        };
         let folder = folder.join(name);
         make_private_folder(&folder)?;
         write_file(&folder.join(CERTIFICATE), &certificate, 0o644)?;
@@ -211,7 +244,10 @@ fn named(name: &str, from: SystemTime, until: SystemTime) -> CertificateParams {
 
 fn make_private_folder(folder: &Path) -> miette::Result<()> {
     let failed = || format!("cannot make the folder {}", folder.display());
-    let made = std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder);
+    let made = std::fs::DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(folder);
     made.into_diagnostic().wrap_err_with(failed)?;
     // It may have been there, open to all.
     let closed = std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o700));
@@ -220,19 +256,32 @@ fn make_private_folder(folder: &Path) -> miette::Result<()> {
 
 /// Writes a new file that at no moment more people can read than may.
 fn write_file(path: &Path, text: &str, mode: u32) -> miette::Result<()> {
-    let file = std::fs::OpenOptions::new().write(true).create_new(true).mode(mode).open(path);
+    let file = std::fs::OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .mode(mode)
+        .open(path);
     let written = file.and_then(|mut file| file.write_all(text.as_bytes()));
-    written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+    written
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot write {}", path.display()))
 }
 
 /// Removes what an earlier call made, and nothing else.
 fn forget_participants(folder: &Path) -> miette::Result<()> {
-    for entry in folder.read_dir().into_diagnostic()?.flatten().map(|entry| entry.path()) {
+    for entry in folder
+        .read_dir()
+        .into_diagnostic()?
+        .flatten()
+        .map(|entry| entry.path())
+    {
         if !entry.join(CONFIG).exists() {
             continue;
         }
-        for file in
-            [CERTIFICATE, KEY, CONFIG].map(|name| entry.join(name)).iter().filter(|file| file.exists())
+        for file in [CERTIFICATE, KEY, CONFIG]
+            .map(|name| entry.join(name))
+            .iter()
+            .filter(|file| file.exists())
         {
             remove(file)?;
         }
@@ -257,7 +306,10 @@ pub(crate) struct Secured {
 
 impl Secured {
     /// Finds the folder, which must have something for each of these participants, and for the simulator.
-    pub(crate) fn find<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> miette::Result<Self> {
+    pub(crate) fn find<'a>(
+        folder: &Path,
+        names: impl Iterator<Item = &'a str>,
+    ) -> miette::Result<Self> {
         let folder = std::path::absolute(folder).into_diagnostic()?;
         let secured = Self { folder };
         let mut wanted = [SIMULATOR, OPERATOR].into_iter().chain(names);
@@ -266,7 +318,11 @@ impl Secured {
             Some(name) => {
                 let help = "`cars secure init FOLDER --robots NAME,NAME…` makes one for every robot it names";
                 let file = secured.config_of(name);
-                Err(miette!(help = help, "{name} has no certificate: there is no {}", file.display()))
+                Err(miette!(
+                    help = help,
+                    "{name} has no certificate: there is no {}",
+                    file.display()
+                ))
             }
         }
     }
@@ -289,13 +345,19 @@ mod tests {
     fn init(folder: &Path, robots: &[&str], force: bool) -> miette::Result<()> {
         let args = InitArgs {
             folder: folder.to_owned(),
-            robots: robots.iter().map(|name| RobotName::new(name).unwrap()).collect(),
+            robots: robots
+                .iter()
+                .map(|name| RobotName::new(name).unwrap())
+                .collect(),
             host: vec!["hall.example".to_owned(), "192.0.2.7".to_owned()],
             days: 30,
             run: None,
             force,
         };
-        secure(&SecureArgs { task: Task::Init(args) }).map(drop)
+        secure(&SecureArgs {
+            task: Task::Init(args),
+        })
+        .map(drop)
     }
 
     fn mode(path: &Path) -> u32 {
@@ -311,12 +373,19 @@ mod tests {
         for name in ["simulator", "operator", "console", "Butler", "Leguin"] {
             assert_eq!(mode(&folder.join(name)), 0o700, "{name}");
             for secret in [KEY, CONFIG] {
-                assert_eq!(mode(&folder.join(name).join(secret)), 0o600, "{name}/{secret}");
+                assert_eq!(
+                    mode(&folder.join(name).join(secret)),
+                    0o600,
+                    "{name}/{secret}"
+                );
             }
             assert!(folder.join(name).join(CERTIFICATE).is_file());
         }
         let files = std::fs::read_dir(&folder).unwrap().count();
-        assert_eq!(files, 6, "five participants and ca.pem: the key of the authority is not kept");
+        assert_eq!(
+            files, 6,
+            "five participants and ca.pem: the key of the authority is not kept"
+        );
     }
 
     #[test]
@@ -326,11 +395,19 @@ mod tests {
         init(&folder, &["Butler", "Vonda"], false).unwrap();
         let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
         let before = read("Butler/key.pem");
-        assert!(init(&folder, &["Butler"], false).unwrap_err().to_string().contains("is there already"));
+        assert!(
+            init(&folder, &["Butler"], false)
+                .unwrap_err()
+                .to_string()
+                .contains("is there already")
+        );
         assert_eq!(read("Butler/key.pem"), before);
         init(&folder, &["Butler", "Leguin"], true).unwrap();
         assert_ne!(read("Butler/key.pem"), before);
-        assert!(!folder.join("Vonda").exists(), "what is of no use any more is gone");
+        assert!(
+            !folder.join("Vonda").exists(),
+            "what is of no use any more is gone"
+        );
 
         let other = lab.path().join("other");
         std::fs::create_dir_all(&other).unwrap();
@@ -343,8 +420,20 @@ mod tests {
     fn names_that_would_pass_for_others_are_refused() {
         let lab = tempfile::tempdir().unwrap();
         let folder = lab.path().join("certificates");
-        for robots in [&["operator"][..], &["Simulator"], &["console"], &["A", "a"], &["ca.pem"]] {
-            assert!(init(&folder, robots, false).unwrap_err().to_string().contains("is taken"), "{robots:?}");
+        for robots in [
+            &["operator"][..],
+            &["Simulator"],
+            &["console"],
+            &["A", "a"],
+            &["ca.pem"],
+        ] {
+            assert!(
+                init(&folder, robots, false)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("is taken"),
+                "{robots:?}"
+            );
         }
         assert!(!folder.exists());
     }
@@ -356,7 +445,9 @@ mod tests {
         init(&folder, &["Butler"], false).unwrap();
         let secured = Secured::find(&folder, ["Butler"].into_iter()).unwrap();
         assert!(secured.config_of("Butler").is_absolute() && secured.operator().is_file());
-        let error = Secured::find(&folder, ["Butler", "Leguin"].into_iter()).unwrap_err().to_string();
+        let error = Secured::find(&folder, ["Butler", "Leguin"].into_iter())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("Leguin has no certificate"), "{error}");
     }
 }

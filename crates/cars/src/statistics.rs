@@ -17,8 +17,15 @@ impl Estimate {
     pub(crate) fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0);
-        Self { mean, half_width: student_975(n - 1.0) * (variance / n).sqrt() }
+        let variance = values
+            .iter()
+            .map(|value| (value - mean) * (value - mean))
+            .sum::<f64>()
+            / (n - 1.0);
+        Self {
+            mean,
+            half_width: student_975(n - 1.0) * (variance / n).sqrt(),
+        }
     }
 }
 
@@ -48,8 +55,18 @@ mod tests {
     #[test]
     fn quantiles_are_those_of_the_published_tables() {
         // NIST/SEMATECH e-Handbook of Statistical Methods, table of critical values of Student's t.
-        for (df, t) in [(7.0, 2.365), (10.0, 2.228), (15.0, 2.131), (31.0, 2.040), (100.0, 1.984)] {
-            assert!((student_975(df) - t).abs() < 1e-3, "{df}: {}", student_975(df));
+        for (df, t) in [
+            (7.0, 2.365),
+            (10.0, 2.228),
+            (15.0, 2.131),
+            (31.0, 2.040),
+            (100.0, 1.984),
+        ] {
+            assert!(
+                (student_975(df) - t).abs() < 1e-3,
+                "{df}: {}",
+                student_975(df)
+            );
         }
     }
 
@@ -58,7 +75,11 @@ mod tests {
         let mut stream = protocol::random::stream(1, "statistics");
         let covers = (0..4000).filter(|_| {
             // A sum of twelve is near enough to normal; its mean is 6.
-            let mut draw = || (0..12).map(|_| protocol::random::unit(&mut stream)).sum::<f64>();
+            let mut draw = || {
+                (0..12)
+                    .map(|_| protocol::random::unit(&mut stream))
+                    .sum::<f64>()
+            };
             let estimate = Estimate::of(&(0..8).map(|_| draw()).collect::<Vec<_>>());
             (estimate.mean - 6.0).abs() <= estimate.half_width
         });
@@ -68,6 +89,12 @@ mod tests {
 
     #[test]
     fn equal_values_leave_no_doubt() {
-        assert_eq!(Estimate::of(&[3.0; 32]), Estimate { mean: 3.0, half_width: 0.0 });
+        assert_eq!(
+            Estimate::of(&[3.0; 32]),
+            Estimate {
+                mean: 3.0,
+                half_width: 0.0
+            }
+        );
     }
 }

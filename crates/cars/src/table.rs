@@ -25,11 +25,20 @@ fn render(summary: &Summary, folder: &Path) -> String {
         None => "unfinished",
     };
     let (elapsed_s, time_s) = (summary.wall.elapsed_s, summary.time_s);
-    let mut text = format!("\n{} {end} after {time_s:.1} s ({} ticks)", summary.run, summary.ticks);
+    let mut text = format!(
+        "\n{} {end} after {time_s:.1} s ({} ticks)",
+        summary.run, summary.ticks
+    );
     if elapsed_s > 0.0 {
-        text += &format!(" in {elapsed_s:.1} s, {:.0} times real time", time_s / elapsed_s);
+        text += &format!(
+            " in {elapsed_s:.1} s, {:.0} times real time",
+            time_s / elapsed_s
+        );
     }
-    text += &format!("\nseed {}  guests {}  digest {}\n\n", summary.seed, summary.guests, summary.digest);
+    text += &format!(
+        "\nseed {}  guests {}  digest {}\n\n",
+        summary.seed, summary.guests, summary.digest
+    );
     let mut table = Builder::default();
     table.push_record(["robot", "emotion", "behavior", "commands", "moves"]);
     for (name, robot) in &summary.robots {
@@ -49,13 +58,27 @@ fn render(summary: &Summary, folder: &Path) -> String {
 /// Shares of the time, the largest first: a bar, per cent, and how often it was entered.
 fn shares(times_s: &BTreeMap<String, f64>, entered: Option<&BTreeMap<String, u64>>) -> String {
     let total_s: f64 = times_s.values().sum();
-    let mut sorted: Vec<(&String, f64)> = times_s.iter().map(|(state, time_s)| (state, *time_s)).collect();
+    let mut sorted: Vec<(&String, f64)> = times_s
+        .iter()
+        .map(|(state, time_s)| (state, *time_s))
+        .collect();
     sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let width = sorted.iter().map(|(state, _)| state.len()).max().unwrap_or(0);
+    let width = sorted
+        .iter()
+        .map(|(state, _)| state.len())
+        .max()
+        .unwrap_or(0);
     let line = |(state, time_s): &(&String, f64)| {
         let share = if total_s > 0.0 { time_s / total_s } else { 0.0 };
-        let count = entered.and_then(|entered| entered.get(*state)).map(|count| format!(" {count:>4}x"));
-        format!("{state:<width$} {} {:>3.0} %{}", bar(share), share * 100.0, count.unwrap_or_default())
+        let count = entered
+            .and_then(|entered| entered.get(*state))
+            .map(|count| format!(" {count:>4}x"));
+        format!(
+            "{state:<width$} {} {:>3.0} %{}",
+            bar(share),
+            share * 100.0,
+            count.unwrap_or_default()
+        )
     };
     sorted.iter().map(line).collect::<Vec<_>>().join("\n")
 }
@@ -73,10 +96,16 @@ fn bar(share: f64) -> String {
 }
 
 fn commands(robot: &RobotSummary) -> String {
-    let mut lines: Vec<String> =
-        robot.sent.iter().map(|(command, count)| format!("{count} {command}")).collect();
+    let mut lines: Vec<String> = robot
+        .sent
+        .iter()
+        .map(|(command, count)| format!("{count} {command}"))
+        .collect();
     lines.push(format!("{} received", robot.received));
-    for (count, what) in [(robot.dropped, "lost on the way"), (robot.missing, "missing")] {
+    for (count, what) in [
+        (robot.dropped, "lost on the way"),
+        (robot.missing, "missing"),
+    ] {
         if count > 0 {
             lines.push(format!("{count} {what}"));
         }
@@ -96,7 +125,11 @@ fn moves(robot: &RobotSummary) -> String {
 
 /// Who held up the run, if somebody did so long enough for a person to notice.
 fn held_up(summary: &Summary) -> String {
-    let noticed = summary.wall.held_up_by.iter().filter(|(_, held)| held.longest_s >= 0.5);
+    let noticed = summary
+        .wall
+        .held_up_by
+        .iter()
+        .filter(|(_, held)| held.longest_s >= 0.5);
     let line = |(name, held): (&protocol::RobotName, &simulator::summary::HeldUp)| {
         format!(
             "\nthe clock waited {:.1} s for {name}, at most {:.1} s at a time",

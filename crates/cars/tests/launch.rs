@@ -1,7 +1,11 @@
 //! `cars launch` as a process: what it prints, how it ends, and that it leaves nobody behind. Shells play simulator
 //! and robots; nothing here needs the bus.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on has failed")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot go on has failed"
+)]
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -37,8 +41,15 @@ impl Folder {
 
     fn cars(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_cars"));
-        command.current_dir(self.0.path()).env("DIR", self.0.path()).env_remove("NO_COLOR");
-        command.arg("launch").arg("launch.toml").arg("--quiet").args(args);
+        command
+            .current_dir(self.0.path())
+            .env("DIR", self.0.path())
+            .env_remove("NO_COLOR");
+        command
+            .arg("launch")
+            .arg("launch.toml")
+            .arg("--quiet")
+            .args(args);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
@@ -81,9 +92,23 @@ fn end(mut child: Child) -> Output {
         std::thread::sleep(Duration::from_millis(5));
     };
     let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
-    child.stdout.take().unwrap().read_to_end(&mut stdout).unwrap();
-    child.stderr.take().unwrap().read_to_end(&mut stderr).unwrap();
-    Output { status, stdout, stderr }
+    child
+        .stdout
+        .take()
+        .unwrap()
+        .read_to_end(&mut stdout)
+        .unwrap();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_end(&mut stderr)
+        .unwrap();
+    Output {
+        status,
+        stdout,
+        stderr,
+    }
 }
 
 #[track_caller]
@@ -96,7 +121,8 @@ fn assert_gone(pid: &str) {
     }
 }
 
-const IN_ORDER: &str = "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
+const IN_ORDER: &str =
+    "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
 const DEAF: &str = "trap '' TERM; (sleep 600; true) & echo $! > $DIR/child; touch $DIR/deaf; wait";
 
 #[test]
@@ -112,8 +138,11 @@ fn a_run_that_finishes_exits_with_0_and_leaves_logs() {
 
 #[test]
 fn the_exit_status_is_that_of_the_first_required_failure() {
-    let folder =
-        Folder::new(IN_ORDER, "until [ -e $DIR/up ]; do sleep 0.01; done; echo broken >&2; exit 3", "");
+    let folder = Folder::new(
+        IN_ORDER,
+        "until [ -e $DIR/up ]; do sleep 0.01; done; echo broken >&2; exit 3",
+        "",
+    );
     let output = folder.cars(&[]).output().unwrap();
     assert_eq!(output.status.code(), Some(3));
     let stderr = text(&output.stderr);
@@ -125,7 +154,11 @@ fn the_exit_status_is_that_of_the_first_required_failure() {
 
 #[test]
 fn ctrl_c_once_ends_all_in_good_order() {
-    for (asking, code) in [(Signal::SIGINT, 130), (Signal::SIGTERM, 143), (Signal::SIGHUP, 129)] {
+    for (asking, code) in [
+        (Signal::SIGINT, 130),
+        (Signal::SIGTERM, 143),
+        (Signal::SIGHUP, 129),
+    ] {
         let folder = Folder::new(IN_ORDER, "touch $DIR/robot; sleep 600", "");
         let launch = folder.cars(&[]).spawn().unwrap();
         folder.wait_for("up");
@@ -144,7 +177,10 @@ fn ctrl_c_twice_kills_all_at_once() {
     folder.wait_for("deaf");
     signal(&launch, Signal::SIGINT);
     folder.wait_for("record");
-    assert!(launch.try_wait().unwrap().is_none(), "one is still there, and has time");
+    assert!(
+        launch.try_wait().unwrap().is_none(),
+        "one is still there, and has time"
+    );
     signal(&launch, Signal::SIGINT);
     assert_eq!(end(launch).status.code(), Some(130));
     assert_gone(&folder.read("child"));
@@ -152,12 +188,18 @@ fn ctrl_c_twice_kills_all_at_once() {
 
 #[test]
 fn what_is_started_by_somebody_else_is_printed_and_not_started() {
-    let folder =
-        Folder::new("sleep 0.2", "touch $DIR/started", "extern = true\nenv = { LEVEL = \"two words\" }");
+    let folder = Folder::new(
+        "sleep 0.2",
+        "touch $DIR/started",
+        "extern = true\nenv = { LEVEL = \"two words\" }",
+    );
     let output = folder.cars(&["--connect-port", "7999"]).output().unwrap();
     let stderr = text(&output.stderr);
     assert!(stderr.contains("Butler is yours to start"), "{stderr}");
-    assert!(stderr.contains("CARS_CONNECT=tcp/127.0.0.1:7999 CARS_RUN=launch LEVEL='two words'"), "{stderr}");
+    assert!(
+        stderr.contains("CARS_CONNECT=tcp/127.0.0.1:7999 CARS_RUN=launch LEVEL='two words'"),
+        "{stderr}"
+    );
     assert!(stderr.contains("--name Butler\n"), "{stderr}");
     assert!(!folder.path("started").exists());
 }
@@ -165,7 +207,16 @@ fn what_is_started_by_somebody_else_is_printed_and_not_started() {
 #[test]
 fn a_dry_run_prints_everything_and_starts_nothing() {
     let folder = Folder::new("touch $DIR/started", "touch $DIR/started", "");
-    let args = ["--dry-run", "--connect-port", "7999", "--run", "demo", "--speed", "2", "--paused"];
+    let args = [
+        "--dry-run",
+        "--connect-port",
+        "7999",
+        "--run",
+        "demo",
+        "--speed",
+        "2",
+        "--paused",
+    ];
     let output = folder.cars(&args).output().unwrap();
     let stdout = text(&output.stdout);
     for part in [
@@ -206,13 +257,19 @@ fn where_somebody_else_is_faster_another_port_is_tried() {
 #[test]
 fn a_program_that_is_nowhere_is_said_before_anything_starts() {
     let folder = Folder::new("touch $DIR/started", "true", "");
-    let text_of = folder
-        .read("launch.toml")
-        .replace("command = [\"sh\", \"-c\", '''true''']", "command = [\"cars-nobody\"]");
+    let text_of = folder.read("launch.toml").replace(
+        "command = [\"sh\", \"-c\", '''true''']",
+        "command = [\"cars-nobody\"]",
+    );
     std::fs::write(folder.path("launch.toml"), text_of).unwrap();
     let output = folder.cars(&[]).output().unwrap();
     let stderr = text(&output.stderr);
-    for part in ["launch.toml:8:", "there is no program cars-nobody", "PATH", "cargo build --release"] {
+    for part in [
+        "launch.toml:8:",
+        "there is no program cars-nobody",
+        "PATH",
+        "cargo build --release",
+    ] {
         assert!(stderr.contains(part), "{part:?} is not in:\n{stderr}");
     }
     assert_eq!(output.status.code(), Some(1));
@@ -225,7 +282,12 @@ fn check_says_what_a_file_is_or_what_is_wrong_with_it() {
     std::fs::write(folder.path("bad.toml"), "sede = 1\n").unwrap();
     let check = |files: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_cars"));
-        command.current_dir(folder.0.path()).arg("check").args(files).output().unwrap()
+        command
+            .current_dir(folder.0.path())
+            .arg("check")
+            .args(files)
+            .output()
+            .unwrap()
     };
     let output = check(&["launch.toml", "hall.toml"]);
     let good = "ok launch.toml: 1 process, 1 robot, 0 guests, 1200 ticks\nok hall.toml: 1 robot, 0 guests, 1200 ticks\n";
@@ -237,7 +299,13 @@ fn check_says_what_a_file_is_or_what_is_wrong_with_it() {
     );
     let output = check(&["bad.toml", "hall.toml"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output.stdout).contains("ok hall.toml"), "the others are checked, too");
+    assert!(
+        text(&output.stdout).contains("ok hall.toml"),
+        "the others are checked, too"
+    );
     let stderr = text(&output.stderr);
-    assert!(stderr.contains("bad.toml:1:1") && stderr.contains("unknown field `sede`"), "{stderr}");
+    assert!(
+        stderr.contains("bad.toml:1:1") && stderr.contains("unknown field `sede`"),
+        "{stderr}"
+    );
 }

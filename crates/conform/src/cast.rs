@@ -22,7 +22,11 @@ pub(crate) struct Cast {
 
 impl Cast {
     pub(crate) fn new(others: BTreeMap<RobotName, Role>, has_extras: bool) -> Self {
-        Self { others: Arc::new(others), now: Arc::default(), has_extras }
+        Self {
+            others: Arc::new(others),
+            now: Arc::default(),
+            has_extras,
+        }
     }
 
     /// Their names.
@@ -42,7 +46,9 @@ impl Cast {
     /// What `robot` reported for a tick.
     fn state(&self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Option<PublicState> {
         let role = self.others.get(robot)?;
-        let index = usize::try_from(tick).unwrap_or(usize::MAX).min(role.states.len().saturating_sub(1));
+        let index = usize::try_from(tick)
+            .unwrap_or(usize::MAX)
+            .min(role.states.len().saturating_sub(1));
         let state = role.states.get(index).cloned();
         let state = state.unwrap_or_else(|| PublicState {
             epoch,
@@ -50,11 +56,19 @@ impl Cast {
             location: role.location,
             speed_mps: 0.0,
             direction_rad: 0.0,
-            state_variables: [("ticks".to_owned(), protocol::messages::Variable::Number(tick as f64))].into(),
+            state_variables: [(
+                "ticks".to_owned(),
+                protocol::messages::Variable::Number(tick as f64),
+            )]
+            .into(),
             emotion_state: "CALM".to_owned(),
             behavior_state: "STAND".to_owned(),
         });
-        Some(PublicState { epoch, tick, ..state })
+        Some(PublicState {
+            epoch,
+            tick,
+            ..state
+        })
     }
 
     /// The first of them, as it is sensed in a tick.
@@ -67,9 +81,17 @@ impl Cast {
     fn percept(&self) -> Percept {
         let (epoch, tick) = self.now();
         let sensed = self.sensed(epoch, tick);
-        let bodies =
-            sensed.map(|robot| SensedBody { kind: SensedKind::Robot, location: robot.location }).into_iter();
-        Percept { epoch, tick, bodies: bodies.collect() }
+        let bodies = sensed
+            .map(|robot| SensedBody {
+                kind: SensedKind::Robot,
+                location: robot.location,
+            })
+            .into_iter();
+        Percept {
+            epoch,
+            tick,
+            bodies: bodies.collect(),
+        }
     }
 
     /// A message as it is put on the wire.
@@ -91,8 +113,9 @@ impl Cast {
         subject: &RobotName,
     ) -> Result<Vec<Declared>, BusError> {
         let mut declared = Vec::new();
-        for (name, what) in
-            self.names().flat_map(|name| QUERIES.iter().chain([&STATE]).map(move |what| (name, what)))
+        for (name, what) in self
+            .names()
+            .flat_map(|name| QUERIES.iter().chain([&STATE]).map(move |what| (name, what)))
         {
             let (cast, name, key) = (self.clone(), name.clone(), keys.query(name, what));
             declared.push(bus.serve(&key, move |question| cast.answer(&name, what, &question))?);
@@ -112,7 +135,10 @@ impl Cast {
         let number = |parameter: &str| question.parameter(parameter)?.parse::<Tick>().ok();
         let (epoch, now) = self.now();
         let tick = number("tick").unwrap_or(now);
-        let Some(state) = tick.checked_sub(1).and_then(|tick| self.state(name, epoch, tick)) else {
+        let Some(state) = tick
+            .checked_sub(1)
+            .and_then(|tick| self.state(name, epoch, tick))
+        else {
             return question.refuse("nothing is known before tick 1");
         };
         match state.answer(what) {
@@ -122,10 +148,18 @@ impl Cast {
     }
 
     /// Sends what followers have without asking, before the clock of the tick.
-    pub(crate) fn tell_followers(&self, bus: &Bus, keys: &Keys, subject: &RobotName) -> Result<(), BusError> {
+    pub(crate) fn tell_followers(
+        &self,
+        bus: &Bus,
+        keys: &Keys,
+        subject: &RobotName,
+    ) -> Result<(), BusError> {
         let (epoch, tick) = self.now();
         for name in self.names() {
-            if let Some(state) = tick.checked_sub(1).and_then(|tick| self.state(name, epoch, tick)) {
+            if let Some(state) = tick
+                .checked_sub(1)
+                .and_then(|tick| self.state(name, epoch, tick))
+            {
                 bus.put(&keys.query(name, STATE), self.dress(&state))?;
             }
         }
@@ -142,12 +176,19 @@ fn add_extras(value: &mut Value) {
                 match name.as_str() {
                     "parameters" | "state_variables" | "value" => {}
                     "news" => {
-                        field.as_object_mut().into_iter().flatten().for_each(|(_, news)| add_extras(news));
+                        field
+                            .as_object_mut()
+                            .into_iter()
+                            .flatten()
+                            .for_each(|(_, news)| add_extras(news));
                     }
                     _ => add_extras(field),
                 }
             }
-            fields.insert("added_later".to_owned(), json!({ "by": ["somebody", 1, null] }));
+            fields.insert(
+                "added_later".to_owned(),
+                json!({ "by": ["somebody", 1, null] }),
+            );
         }
         _ => {}
     }
@@ -165,11 +206,22 @@ mod tests {
             "parameters": { "speed": { "mean": 1 } },
         });
         add_extras(&mut clock);
-        for path in ["", "/news/A", "/news/A/correction/location", "/news/A/commands/0"] {
-            assert!(clock.pointer(path).unwrap().get("added_later").is_some(), "{path}");
+        for path in [
+            "",
+            "/news/A",
+            "/news/A/correction/location",
+            "/news/A/commands/0",
+        ] {
+            assert!(
+                clock.pointer(path).unwrap().get("added_later").is_some(),
+                "{path}"
+            );
         }
         for path in ["/news", "/parameters", "/parameters/speed"] {
-            assert!(clock.pointer(path).unwrap().get("added_later").is_none(), "{path}");
+            assert!(
+                clock.pointer(path).unwrap().get("added_later").is_none(),
+                "{path}"
+            );
         }
     }
 }

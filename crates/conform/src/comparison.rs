@@ -18,8 +18,15 @@ pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<(String, 
         let tick = one.clock.tick;
         let (one, two) = (serde_json::json!(one.report), serde_json::json!(two.report));
         let of = |value: &Value, field: &str| value.get(field).cloned().unwrap_or(Value::Null);
-        let fields = one.as_object().into_iter().chain(two.as_object()).flat_map(|fields| fields.keys());
-        let field = fields.into_iter().find(|field| of(&one, field) != of(&two, field)).cloned();
+        let fields = one
+            .as_object()
+            .into_iter()
+            .chain(two.as_object())
+            .flat_map(|fields| fields.keys());
+        let field = fields
+            .into_iter()
+            .find(|field| of(&one, field) != of(&two, field))
+            .cloned();
         let field = field.unwrap_or_default();
         let shown = |value: &Value| {
             let text: String = of(value, &field).to_string().chars().take(SHOWN).collect();
@@ -27,7 +34,12 @@ pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<(String, 
         };
         return Some((shown(&one), shown(&two)));
     }
-    (one.len() != two.len()).then(|| (format!("{} ticks", one.len()), format!("{} ticks", two.len())))
+    (one.len() != two.len()).then(|| {
+        (
+            format!("{} ticks", one.len()),
+            format!("{} ticks", two.len()),
+        )
+    })
 }
 
 /// Whether two plays gave the same reports.
@@ -48,6 +60,9 @@ pub(crate) fn demand_same(
     }
     match difference(usual, other) {
         None => Ok(()),
-        Some((usual, other)) => Err(Failure::new(format!("{what} makes no difference: {usual}"), other)),
+        Some((usual, other)) => Err(Failure::new(
+            format!("{what} makes no difference: {usual}"),
+            other,
+        )),
     }
 }

@@ -60,14 +60,25 @@ pub fn check(command: &Command, setting: &Setting, rules: &[Rule]) -> Result<Rep
     let kit = Kit::open(command, setting)?;
     let (mut verdicts, times) = checks::all(&kit, rules, WORKERS)?;
     let is_wanted = |rule: &Rule| rules.is_empty() || rules.contains(rule);
-    let unchecked = || Verdict::Skipped { reason: "no check of it was run".to_owned() };
-    let outcomes = RULES
-        .into_iter()
-        .filter(is_wanted)
-        .map(|rule| Outcome { rule, verdict: verdicts.remove(rule.name).unwrap_or_else(unchecked) });
+    let unchecked = || Verdict::Skipped {
+        reason: "no check of it was run".to_owned(),
+    };
+    let outcomes = RULES.into_iter().filter(is_wanted).map(|rule| Outcome {
+        rule,
+        verdict: verdicts.remove(rule.name).unwrap_or_else(unchecked),
+    });
     let outcomes = outcomes.collect();
-    let sdk = kit.learned.get().map(|learned| learned.request.sdk.clone()).unwrap_or_default();
-    Ok(Report { name: kit.subject(), sdk, outcomes, answers: times })
+    let sdk = kit
+        .learned
+        .get()
+        .map(|learned| learned.request.sdk.clone())
+        .unwrap_or_default();
+    Ok(Report {
+        name: kit.subject(),
+        sdk,
+        outcomes,
+        answers: times,
+    })
 }
 
 impl Kit {
@@ -78,7 +89,16 @@ impl Kit {
         own.env_remove("CARS_ZENOH_CONFIG");
         let (runs, learned, usual) = (AtomicUsize::new(0), OnceLock::new(), OnceLock::new());
         let (setting, is_deterministic) = (setting.clone(), OnceLock::new());
-        Ok(Self { bus, endpoint, command: own, setting, runs, learned, usual, is_deterministic })
+        Ok(Self {
+            bus,
+            endpoint,
+            command: own,
+            setting,
+            runs,
+            learned,
+            usual,
+            is_deterministic,
+        })
     }
 
     /// A name for a run that no other has.
@@ -90,14 +110,24 @@ impl Kit {
 
     /// The first request to join tells who the robot is.
     pub(crate) fn learn(&self, request: &JoinRequest) -> Result<(), CannotRun> {
-        let cast = self.setting.cast_for(&request.name).map_err(CannotRun::Robot)?;
-        let learned = Learned { request: request.clone(), cast };
-        self.learned.set(learned).unwrap_or_else(|_| unreachable!("a kit learns once"));
+        let cast = self
+            .setting
+            .cast_for(&request.name)
+            .map_err(CannotRun::Robot)?;
+        let learned = Learned {
+            request: request.clone(),
+            cast,
+        };
+        self.learned
+            .set(learned)
+            .unwrap_or_else(|_| unreachable!("a kit learns once"));
         Ok(())
     }
 
     fn learned(&self) -> &Learned {
-        self.learned.get().unwrap_or_else(|| unreachable!("the robot is known from its first request on"))
+        self.learned
+            .get()
+            .unwrap_or_else(|| unreachable!("the robot is known from its first request on"))
     }
 
     /// The instance that its first process claimed.
@@ -114,12 +144,20 @@ impl Kit {
     pub(crate) fn others(&self) -> BTreeMap<RobotName, Role> {
         let learned = self.learned();
         let is_other = |(name, _): &(&RobotName, &Role)| **name != learned.request.name;
-        learned.cast.iter().filter(is_other).map(|(name, role)| (name.clone(), role.clone())).collect()
+        learned
+            .cast
+            .iter()
+            .filter(is_other)
+            .map(|(name, role)| (name.clone(), role.clone()))
+            .collect()
     }
 
     /// Who sends the robot commands: the first of the others, or whoever sits at the shell.
     pub(crate) fn sender(&self) -> RobotName {
-        self.others().into_keys().next().unwrap_or_else(RobotName::operator)
+        self.others()
+            .into_keys()
+            .next()
+            .unwrap_or_else(RobotName::operator)
     }
 
     /// Pairs of different commands: first those that the robot understands, as far as is known, then others. A robot that
@@ -133,7 +171,10 @@ impl Kit {
             let other = texts.iter().find(|text| *text != one).cloned();
             Some([one.clone(), other.unwrap_or_else(|| format!("{one} again"))])
         };
-        [&hears[..], &self.setting.commands, &unknown].into_iter().filter_map(pair).collect()
+        [&hears[..], &self.setting.commands, &unknown]
+            .into_iter()
+            .filter_map(pair)
+            .collect()
     }
 
     /// The first of these pairs.
@@ -179,7 +220,13 @@ fn open_router() -> Result<(Bus, String), CannotRun> {
             .map_err(|error| CannotRun::Robot(format!("no free port on this machine: {error}")))?
             .port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
-        match Bus::open(&BusRole::Router { listen: endpoint.clone(), trusts_network: false }, None) {
+        match Bus::open(
+            &BusRole::Router {
+                listen: endpoint.clone(),
+                trusts_network: false,
+            },
+            None,
+        ) {
             Ok(bus) => return Ok((bus, endpoint)),
             Err(error) if attempt == ATTEMPTS => return Err(error.into()),
             Err(_) => attempt += 1,

@@ -38,14 +38,25 @@ pub(crate) struct Process {
 
 impl Process {
     /// Starts the command as it is, with more in its environment.
-    pub(crate) fn start(command: &Command, environment: &[(&str, String)]) -> std::io::Result<Self> {
+    pub(crate) fn start(
+        command: &Command,
+        environment: &[(&str, String)],
+    ) -> std::io::Result<Self> {
         let (output, errors) = (tempfile::tempfile()?, tempfile::tempfile()?);
         let mut own = copy(command);
         own.envs(environment.iter().map(|(name, value)| (name, value)));
-        own.stdin(Stdio::null()).stdout(output.try_clone()?).stderr(errors.try_clone()?);
+        own.stdin(Stdio::null())
+            .stdout(output.try_clone()?)
+            .stderr(errors.try_clone()?);
         let child = own.process_group(0).spawn()?;
         let group = Pid::from_raw(i32::try_from(child.id()).map_err(std::io::Error::other)?);
-        Ok(Self { child, group, output, errors, ended: None })
+        Ok(Self {
+            child,
+            group,
+            output,
+            errors,
+            ended: None,
+        })
     }
 
     /// How it ended, if it has.
@@ -74,7 +85,10 @@ impl Process {
             None => "it runs".to_owned(),
             Some(status) => format!("its process has ended ({status})"),
         };
-        let printed = [tail(&self.output), self.errors()].join("\n").trim().to_owned();
+        let printed = [tail(&self.output), self.errors()]
+            .join("\n")
+            .trim()
+            .to_owned();
         if printed.is_empty() {
             return format!("{fate} and has printed nothing");
         }
@@ -91,7 +105,9 @@ fn tail(file: &File) -> String {
         file.read_exact_at(&mut bytes, from)?;
         Ok(bytes)
     };
-    String::from_utf8_lossy(&read().unwrap_or_default()).trim().to_owned()
+    String::from_utf8_lossy(&read().unwrap_or_default())
+        .trim()
+        .to_owned()
 }
 
 impl Drop for Process {

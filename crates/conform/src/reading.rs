@@ -16,7 +16,10 @@ pub(crate) struct Reading {
 /// Reads a report.
 pub(crate) fn read(key: &str, robot: &str, bytes: &[u8]) -> Result<Reading, Malformed> {
     match decode(key, robot, bytes) {
-        Ok(report) => Ok(Reading { report, not_numbers: Vec::new() }),
+        Ok(report) => Ok(Reading {
+            report,
+            not_numbers: Vec::new(),
+        }),
         Err(malformed) => repair(key, robot, bytes).ok_or(malformed),
     }
 }
@@ -25,7 +28,9 @@ pub(crate) fn read(key: &str, robot: &str, bytes: &[u8]) -> Result<Reading, Malf
 fn repair(key: &str, robot: &str, bytes: &[u8]) -> Option<Reading> {
     let mut text = String::from_utf8(bytes.to_vec()).ok()?;
     for written in ["-Infinity", "Infinity", "NaN"] {
-        text = text.replace(&format!(":{written}"), ":null").replace(&format!(": {written}"), ":null");
+        text = text
+            .replace(&format!(":{written}"), ":null")
+            .replace(&format!(": {written}"), ":null");
     }
     let mut value: Value = serde_json::from_str(&text).ok()?;
     let mut not_numbers = Vec::new();
@@ -45,7 +50,10 @@ fn repair(key: &str, robot: &str, bytes: &[u8]) -> Option<Reading> {
         });
     }
     let report = decode(key, robot, value.to_string().as_bytes()).ok()?;
-    (!not_numbers.is_empty()).then_some(Reading { report, not_numbers })
+    (!not_numbers.is_empty()).then_some(Reading {
+        report,
+        not_numbers,
+    })
 }
 
 #[cfg(test)]
@@ -64,9 +72,16 @@ mod tests {
         let read = |text: &str| read("key", "A", text.as_bytes());
         assert!(read(&report("0.5", "1")).unwrap().not_numbers.is_empty());
         for written in ["null", "NaN", " Infinity", "-Infinity"] {
-            assert_eq!(read(&report(written, "1")).unwrap().not_numbers, ["speed_mps"], "{written}");
+            assert_eq!(
+                read(&report(written, "1")).unwrap().not_numbers,
+                ["speed_mps"],
+                "{written}"
+            );
         }
-        assert_eq!(read(&report("1", "NaN")).unwrap().not_numbers, ["state_variables.a"]);
+        assert_eq!(
+            read(&report("1", "NaN")).unwrap().not_numbers,
+            ["state_variables.a"]
+        );
         assert!(read(&report("\"fast\"", "1")).is_err());
         assert!(read("{}").is_err());
     }

@@ -18,7 +18,10 @@ pub struct Failure {
 
 impl Failure {
     pub(crate) fn new(expected: impl Into<String>, came: impl Into<String>) -> Self {
-        Self { expected: expected.into(), came: came.into() }
+        Self {
+            expected: expected.into(),
+            came: came.into(),
+        }
     }
 }
 
@@ -66,12 +69,22 @@ impl AnswerTimes {
     /// The distribution of these times, if there are any.
     pub(crate) fn of(mut times_ms: Vec<f64>) -> Option<Self> {
         times_ms.sort_by(f64::total_cmp);
-        let at = |share: f64| times_ms.get(((times_ms.len() - 1) as f64 * share).round() as usize).copied();
+        let at = |share: f64| {
+            times_ms
+                .get(((times_ms.len() - 1) as f64 * share).round() as usize)
+                .copied()
+        };
         let ticks = times_ms.len();
         if ticks == 0 {
             return None;
         }
-        Some(Self { ticks, min_ms: at(0.0)?, median_ms: at(0.5)?, p99_ms: at(0.99)?, max_ms: at(1.0)? })
+        Some(Self {
+            ticks,
+            min_ms: at(0.0)?,
+            median_ms: at(0.5)?,
+            p99_ms: at(0.99)?,
+            max_ms: at(1.0)?,
+        })
     }
 }
 
@@ -97,14 +110,19 @@ impl Report {
 
     /// The rules that failed, and why.
     pub fn failed(&self) -> impl Iterator<Item = (Rule, &Failure)> {
-        self.outcomes.iter().filter_map(|outcome| match &outcome.verdict {
-            Verdict::Failed(failure) => Some((outcome.rule, failure)),
-            _ => None,
-        })
+        self.outcomes
+            .iter()
+            .filter_map(|outcome| match &outcome.verdict {
+                Verdict::Failed(failure) => Some((outcome.rule, failure)),
+                _ => None,
+            })
     }
 
     fn count(&self, is_meant: impl Fn(&Verdict) -> bool) -> usize {
-        self.outcomes.iter().filter(|outcome| is_meant(&outcome.verdict)).count()
+        self.outcomes
+            .iter()
+            .filter(|outcome| is_meant(&outcome.verdict))
+            .count()
     }
 
     /// The report in the Test Anything Protocol, version 14, with a summary as its last lines.
@@ -162,14 +180,27 @@ impl fmt::Display for Report {
             }
         }
         if let Some(times) = self.answers {
-            let AnswerTimes { ticks, min_ms, median_ms, p99_ms, max_ms } = times;
+            let AnswerTimes {
+                ticks,
+                min_ms,
+                median_ms,
+                p99_ms,
+                max_ms,
+            } = times;
             writeln!(
                 f,
                 "# time.answer over {ticks} ticks: min {min_ms:.2} ms, median {median_ms:.2} ms, p99 {p99_ms:.2} ms, max {max_ms:.2} ms"
             )?;
         }
-        let (passed, failed) = (self.count(|verdict| *verdict == Verdict::Passed), self.failed().count());
+        let (passed, failed) = (
+            self.count(|verdict| *verdict == Verdict::Passed),
+            self.failed().count(),
+        );
         let skipped = self.outcomes.len() - passed - failed;
-        writeln!(f, "# {}: {passed} passed, {failed} failed, {skipped} skipped", self.name)
+        writeln!(
+            f,
+            "# {}: {passed} passed, {failed} failed, {skipped} skipped",
+            self.name
+        )
     }
 }

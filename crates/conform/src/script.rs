@@ -83,7 +83,14 @@ impl Script {
         let ([one, two], from, operator) = (kit.texts(), kit.sender(), RobotName::operator());
         let sent = |from: &RobotName, seq, text: &String, named: Tick| {
             let (from, text) = (from.clone(), text.clone());
-            Delivery { from, seq, text, sent: named.checked_sub(1), named, times: 1 }
+            Delivery {
+                from,
+                seq,
+                text,
+                sent: named.checked_sub(1),
+                named,
+                times: 1,
+            }
         };
         let base = if from == operator { 10 } else { 0 };
         let deliveries = vec![
@@ -92,12 +99,18 @@ impl Script {
             sent(&operator, base + 1, &one, 7),
             sent(&from, 3, &one, 20),
         ];
-        Self { ticks: kit.setting.ticks, deliveries }
+        Self {
+            ticks: kit.setting.ticks,
+            deliveries,
+        }
     }
 
     /// A few quiet ticks.
     pub(crate) fn quiet(ticks: Tick) -> Self {
-        Self { ticks, deliveries: Vec::new() }
+        Self {
+            ticks,
+            deliveries: Vec::new(),
+        }
     }
 
     /// A few ticks with these commands.
@@ -106,10 +119,16 @@ impl Script {
     }
 
     fn named(&self, tick: Tick) -> Vec<CommandId> {
-        let due = self.deliveries.iter().filter(|delivery| delivery.named == tick);
+        let due = self
+            .deliveries
+            .iter()
+            .filter(|delivery| delivery.named == tick);
         let mut named: Vec<CommandId> = due
             .flat_map(|delivery| {
-                let id = CommandId { from: delivery.from.clone(), seq: delivery.seq };
+                let id = CommandId {
+                    from: delivery.from.clone(),
+                    seq: delivery.seq,
+                };
                 std::iter::repeat_n(id, delivery.times)
             })
             .collect();
@@ -133,13 +152,27 @@ impl Body {
             within(at.x, welcome.field_m[0]) && within(at.y, welcome.field_m[1])
         };
         if tick % ROUND == PLACED {
-            let shifted =
-                |sign: f64| Point::new(self.stands.x + sign * SHIFT.0, self.stands.y + sign * SHIFT.1);
-            self.stands = if is_free(shifted(1.0)) { shifted(1.0) } else { shifted(-1.0) };
-            return Some(Correction { location: self.stands, blocked: false });
+            let shifted = |sign: f64| {
+                Point::new(
+                    self.stands.x + sign * SHIFT.0,
+                    self.stands.y + sign * SHIFT.1,
+                )
+            };
+            self.stands = if is_free(shifted(1.0)) {
+                shifted(1.0)
+            } else {
+                shifted(-1.0)
+            };
+            return Some(Correction {
+                location: self.stands,
+                blocked: false,
+            });
         }
         if tick % ROUND == REFUSED || !is_free(self.proposal) {
-            return Some(Correction { location: self.stands, blocked: true });
+            return Some(Correction {
+                location: self.stands,
+                blocked: true,
+            });
         }
         self.stands = self.proposal;
         None
@@ -156,13 +189,21 @@ pub(crate) fn play(
     let mut transcript = Transcript::new();
     let is_newcomer = welcome.generation > 1;
     let first = if is_newcomer { welcome.tick + 1 } else { 0 };
-    let mut body = Body { stands: welcome.location, proposal: welcome.location };
+    let mut body = Body {
+        stands: welcome.location,
+        proposal: welcome.location,
+    };
     for tick in first..=first + script.ticks {
-        let mut news = News { commands: script.named(tick), ..News::default() };
+        let mut news = News {
+            commands: script.named(tick),
+            ..News::default()
+        };
         if tick == first {
             news.joined = is_newcomer.then_some(welcome.generation);
-            news.correction =
-                is_newcomer.then_some(Correction { location: welcome.location, blocked: false });
+            news.correction = is_newcomer.then_some(Correction {
+                location: welcome.location,
+                blocked: false,
+            });
         } else {
             news.correction = body.advance(tick, welcome);
             surround(&mut news, stage, welcome, tick);
@@ -175,15 +216,32 @@ pub(crate) fn play(
             news: if is_quiet { BTreeMap::new() } else { named },
             end: None,
         };
-        for due in script.deliveries.iter().filter(|delivery| delivery.sent == Some(tick)) {
-            stage.put_command(&due.from, due.seq, (welcome.epoch, tick.saturating_sub(1)), &due.text)?;
+        for due in script
+            .deliveries
+            .iter()
+            .filter(|delivery| delivery.sent == Some(tick))
+        {
+            stage.put_command(
+                &due.from,
+                due.seq,
+                (welcome.epoch, tick.saturating_sub(1)),
+                &due.text,
+            )?;
         }
         twist.before(stage, &clock)?;
         let (index, took) = stage.tick(&clock)?;
-        let Some(answer) = stage.seen.answers.get(index) else { break };
+        let Some(answer) = stage.seen.answers.get(index) else {
+            break;
+        };
         let report = answer.reading.report.clone();
         body.proposal = report.proposal;
-        let entry = Entry { clock, location: body.stands, report, index, took };
+        let entry = Entry {
+            clock,
+            location: body.stands,
+            report,
+            index,
+            took,
+        };
         twist.after(stage, &entry)?;
         transcript.push(entry);
     }

@@ -70,14 +70,26 @@ impl Setting {
     /// The roster for a robot that asks to be `name`, or why it is not of the roster.
     pub(crate) fn cast_for(&self, name: &RobotName) -> Result<BTreeMap<RobotName, Role>, String> {
         if let Some(wanted) = self.name.as_ref().filter(|wanted| *wanted != name) {
-            return Err(format!("the robot asks to be {name}, and {wanted} is checked"));
+            return Err(format!(
+                "the robot asks to be {name}, and {wanted} is checked"
+            ));
         }
         if self.cast.is_empty() {
             let others = OTHERS.iter().filter_map(|other| RobotName::new(other).ok());
             let other = others.into_iter().find(|other| other != name);
-            let beside = Role { location: BESIDE, ..Role::default() };
-            let own = Role { location: CENTER, ..Role::default() };
-            return Ok(other.map(|other| (other, beside)).into_iter().chain([(name.clone(), own)]).collect());
+            let beside = Role {
+                location: BESIDE,
+                ..Role::default()
+            };
+            let own = Role {
+                location: CENTER,
+                ..Role::default()
+            };
+            return Ok(other
+                .map(|other| (other, beside))
+                .into_iter()
+                .chain([(name.clone(), own)])
+                .collect());
         }
         if !self.cast.contains_key(name) {
             let roster: Vec<&str> = self.cast.keys().map(RobotName::as_str).collect();

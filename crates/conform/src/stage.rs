@@ -34,9 +34,16 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 /// All that a robot can say.
 enum Event {
     Join(Question),
-    Report { key: String, bytes: Vec<u8>, at: Instant },
+    Report {
+        key: String,
+        bytes: Vec<u8>,
+        at: Instant,
+    },
     State(Vec<u8>),
-    Command { key: String, bytes: Vec<u8> },
+    Command {
+        key: String,
+        bytes: Vec<u8>,
+    },
     Token(String, bool),
 }
 
@@ -90,7 +97,11 @@ pub(crate) struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { patience_s: 20, has_extras: false, is_followed: false }
+        Self {
+            patience_s: 20,
+            has_extras: false,
+            is_followed: false,
+        }
     }
 }
 
@@ -131,7 +142,11 @@ impl<'k> Stage<'k> {
         let events_of = || queue.clone();
         let sender = events_of();
         declared.push(bus.subscribe(&keys.reports(), move |key, bytes| {
-            let _ = sender.send(Event::Report { key: key.into(), bytes: bytes.into(), at: Instant::now() });
+            let _ = sender.send(Event::Report {
+                key: key.into(),
+                bytes: bytes.into(),
+                at: Instant::now(),
+            });
         })?);
         let sender = events_of();
         declared.push(bus.serve(&keys.joins(), move |question| {
@@ -174,7 +189,9 @@ impl<'k> Stage<'k> {
 
     /// Waits for one event and files it. Returns whether there was one.
     fn pump(&mut self, patience: Duration) -> bool {
-        let Ok(event) = self.events.recv_timeout(patience) else { return false };
+        let Ok(event) = self.events.recv_timeout(patience) else {
+            return false;
+        };
         let order = self.seen.count;
         self.seen.count += 1;
         match event {
@@ -189,7 +206,12 @@ impl<'k> Stage<'k> {
             }
             Event::Report { key, bytes, at } => {
                 match reading::read(&key, Keys::robot_of(&key).unwrap_or_default(), &bytes) {
-                    Ok(reading) => self.seen.answers.push(Answer { reading, bytes, at, order }),
+                    Ok(reading) => self.seen.answers.push(Answer {
+                        reading,
+                        bytes,
+                        at,
+                        order,
+                    }),
                     Err(error) => self.seen.unreadable.push(error.to_string()),
                 }
             }
@@ -234,7 +256,10 @@ impl<'k> Stage<'k> {
             }
             let is_over = last_words.is_some_and(|since| since.elapsed() > LAST_WORDS);
             if is_over || Instant::now() > deadline {
-                return Err(Failure::new(expected, format!("it never came; {}", self.process.fate())));
+                return Err(Failure::new(
+                    expected,
+                    format!("it never came; {}", self.process.fate()),
+                ));
             }
         }
     }
@@ -254,7 +279,9 @@ impl<'k> Stage<'k> {
 
     /// The next request to join.
     pub(crate) fn next_join(&mut self, patience: Duration) -> Result<Joining, Failure> {
-        self.until("a request to join", patience, |stage| stage.joins.pop_front())
+        self.until("a request to join", patience, |stage| {
+            stage.joins.pop_front()
+        })
     }
 
     /// Whether the robot's token is there.
@@ -272,21 +299,29 @@ impl<'k> Stage<'k> {
         let kit = self.kit;
         let subject = kit.subject();
         self.cast = Cast::new(kit.others(), self.options.has_extras);
-        self.declared.extend(self.cast.serve(&kit.bus, &self.keys, &subject)?);
+        self.declared
+            .extend(self.cast.serve(&kit.bus, &self.keys, &subject)?);
         // To everybody from the robot: also to those whom it may have made up.
         let everybody = self
             .keys
             .command(&subject, &subject)
             .replace(&format!("/robot/{subject}/command/"), "/robot/*/command/");
         let sender = self.queue.clone();
-        self.declared.push(kit.bus.subscribe(&everybody, move |key, bytes| {
-            let _ = sender.send(Event::Command { key: key.into(), bytes: bytes.into() });
-        })?);
+        self.declared
+            .push(kit.bus.subscribe(&everybody, move |key, bytes| {
+                let _ = sender.send(Event::Command {
+                    key: key.into(),
+                    bytes: bytes.into(),
+                });
+            })?);
         if self.options.is_followed {
             let sender = self.queue.clone();
-            self.declared.push(kit.bus.subscribe(&self.keys.query(&subject, STATE), move |_, bytes| {
-                let _ = sender.send(Event::State(bytes.into()));
-            })?);
+            self.declared.push(kit.bus.subscribe(
+                &self.keys.query(&subject, STATE),
+                move |_, bytes| {
+                    let _ = sender.send(Event::State(bytes.into()));
+                },
+            )?);
         }
         Ok(())
     }
@@ -302,19 +337,29 @@ impl<'k> Stage<'k> {
 
     /// Answers a request to join.
     pub(crate) fn answer_join(&self, joining: &Joining, answer: &JoinAnswer) {
-        joining.question.answer(&joining.key, self.cast.dress(answer));
+        joining
+            .question
+            .answer(&joining.key, self.cast.dress(answer));
     }
 
     /// Refuses a request to join.
     pub(crate) fn refuse_join(&self, joining: &Joining, reason: Refusal, explanation: &str) {
         let explanation = explanation.to_owned();
-        self.answer_join(joining, &JoinAnswer::Refused { reason, explanation });
+        self.answer_join(
+            joining,
+            &JoinAnswer::Refused {
+                reason,
+                explanation,
+            },
+        );
     }
 
     pub(crate) fn until_ready(&mut self) -> Result<(), Failure> {
-        self.until("its liveliness token after the welcome", PATIENCE, |stage| {
-            stage.is_present().then_some(())
-        })
+        self.until(
+            "its liveliness token after the welcome",
+            PATIENCE,
+            |stage| stage.is_present().then_some(()),
+        )
     }
 
     /// Puts a clock.
@@ -339,11 +384,16 @@ impl<'k> Stage<'k> {
         patience: Duration,
     ) -> Result<(usize, Duration), Failure> {
         self.cast.begin(clock.epoch, clock.tick);
-        self.cast.tell_followers(&self.kit.bus, &self.keys, &self.kit.subject())?;
+        self.cast
+            .tell_followers(&self.kit.bus, &self.keys, &self.kit.subject())?;
         let begun = Instant::now();
         self.put_clock(clock)?;
         let index = self.report(clock, patience)?;
-        let took = self.seen.answers.get(index).map(|answer| answer.at.saturating_duration_since(begun));
+        let took = self
+            .seen
+            .answers
+            .get(index)
+            .map(|answer| answer.at.saturating_duration_since(begun));
         Ok((index, took.unwrap_or_default()))
     }
 
@@ -388,14 +438,24 @@ impl<'k> Stage<'k> {
         text: &str,
     ) -> Result<(), Failure> {
         let (performative, command) = (Performative::Achieve, text.to_owned());
-        let message = Command { epoch, tick, seq, performative, command };
+        let message = Command {
+            epoch,
+            tick,
+            seq,
+            performative,
+            command,
+        };
         let key = self.keys.command(&self.kit.subject(), from);
         Ok(self.kit.bus.put(&key, self.cast.dress(&message))?)
     }
 
     /// Asks the robot something; `None` if nobody answers.
     pub(crate) fn ask(&self, what: &str, parameters: &str) -> Result<Option<AnswerOf>, Failure> {
-        Ok(self.kit.bus.ask(&self.keys.query(&self.kit.subject(), what), parameters, None)?)
+        Ok(self.kit.bus.ask(
+            &self.keys.query(&self.kit.subject(), what),
+            parameters,
+            None,
+        )?)
     }
 
     /// The state that the robot shows in a tick: the one of the tick before.
@@ -404,7 +464,11 @@ impl<'k> Stage<'k> {
     }
 
     /// Waits for the end of the process.
-    pub(crate) fn until_ended(&mut self, expected: &str, patience: Duration) -> Result<ExitStatus, Failure> {
+    pub(crate) fn until_ended(
+        &mut self,
+        expected: &str,
+        patience: Duration,
+    ) -> Result<ExitStatus, Failure> {
         let deadline = Instant::now() + patience;
         loop {
             if let Some(status) = self.process.ended() {
@@ -422,7 +486,10 @@ impl<'k> Stage<'k> {
         let deadline = Instant::now() + PATIENCE;
         while self.is_present() {
             if Instant::now() > deadline {
-                return Err(Failure::new("its liveliness token is gone", "it is still there"));
+                return Err(Failure::new(
+                    "its liveliness token is gone",
+                    "it is still there",
+                ));
             }
             self.pump(LOOK_AGAIN);
         }
@@ -439,6 +506,10 @@ impl Joining {
     fn new(question: Question) -> Self {
         let (key, body) = (question.key().to_owned(), question.body());
         let request = decode(&key, "a robot", &body).map_err(|error| error.to_string());
-        Self { question, key, request }
+        Self {
+            question,
+            key,
+            request,
+        }
     }
 }

@@ -64,7 +64,10 @@ pub(crate) struct Cursor {
 impl Board {
     /// An empty board.
     pub(crate) fn new() -> Self {
-        Self { inner: Mutex::default(), changed: watch::Sender::new(()) }
+        Self {
+            inner: Mutex::default(),
+            changed: watch::Sender::new(()),
+        }
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -102,15 +105,26 @@ impl Board {
         let text = ToPage::Frame { frame: &frame }.text();
         self.change(|inner| {
             inner.pictures += 1;
-            if inner.picture.as_ref().is_some_and(|picture| picture.frame.epoch != frame.epoch) {
+            if inner
+                .picture
+                .as_ref()
+                .is_some_and(|picture| picture.frame.epoch != frame.epoch)
+            {
                 inner.flights.clear();
             }
             let number = inner.pictures;
-            inner.flights.extend(frame.flights.iter().map(|flight| (number, flight.clone())));
+            inner
+                .flights
+                .extend(frame.flights.iter().map(|flight| (number, flight.clone())));
             let surplus = inner.flights.len().saturating_sub(MAX_FLIGHTS);
             inner.flights.drain(..surplus);
-            inner.panels.retain(|name, _| frame.robots.iter().any(|robot| robot.name == *name));
-            inner.picture = Some(Picture { frame: Arc::new(frame), text });
+            inner
+                .panels
+                .retain(|name, _| frame.robots.iter().any(|robot| robot.name == *name));
+            inner.picture = Some(Picture {
+                frame: Arc::new(frame),
+                text,
+            });
         });
     }
 
@@ -124,7 +138,9 @@ impl Board {
             let others = inner.panels.iter().filter(|(name, _)| *name != robot);
             let bytes: usize = others.map(|(_, (_, text))| text.len()).sum();
             if bytes + text.len() > MAX_PANEL_BYTES {
-                return Err(format!("panels are larger than the {MAX_PANEL_BYTES} bytes allowed together"));
+                return Err(format!(
+                    "panels are larger than the {MAX_PANEL_BYTES} bytes allowed together"
+                ));
             }
             inner.painted += 1;
             inner.panels.insert(robot.clone(), (inner.painted, text));
@@ -150,10 +166,19 @@ impl Board {
         let inner = self.lock();
         if cursor.present != Some(inner.is_present) {
             cursor.present = Some(inner.is_present);
-            news.push(ToPage::Simulator { present: inner.is_present }.text());
+            news.push(
+                ToPage::Simulator {
+                    present: inner.is_present,
+                }
+                .text(),
+            );
         }
         let skipped = inner.skipped(cursor);
-        for (_, text) in inner.panels.values().filter(|(number, _)| *number > cursor.panel) {
+        for (_, text) in inner
+            .panels
+            .values()
+            .filter(|(number, _)| *number > cursor.panel)
+        {
             news.push(text.clone());
         }
         cursor.panel = inner.painted;
@@ -161,7 +186,13 @@ impl Board {
         drop(inner);
         // Nobody waits for the lock while a browser's own messages are written.
         if !lines.is_empty() {
-            news.push(ToPage::Log { lines: &lines, dropped }.text());
+            news.push(
+                ToPage::Log {
+                    lines: &lines,
+                    dropped,
+                }
+                .text(),
+            );
         }
         news.extend(skipped.map(|(picture, flights)| picture.with(flights)));
         news
@@ -171,9 +202,15 @@ impl Board {
 impl Inner {
     /// The newest picture if it is new for somebody, and what the pictures in between told of commands.
     fn skipped(&self, cursor: &mut Cursor) -> Option<(Picture, Vec<Flight>)> {
-        let picture = self.picture.clone().filter(|_| self.pictures > cursor.picture)?;
+        let picture = self
+            .picture
+            .clone()
+            .filter(|_| self.pictures > cursor.picture)?;
         let is_next = cursor.picture + 1 == self.pictures || cursor.picture == 0;
-        let told = self.flights.iter().filter(|(number, _)| !is_next && *number > cursor.picture);
+        let told = self
+            .flights
+            .iter()
+            .filter(|(number, _)| !is_next && *number > cursor.picture);
         let flights = told.map(|(_, flight)| flight.clone()).collect();
         cursor.picture = self.pictures;
         Some((picture, flights))
@@ -181,11 +218,16 @@ impl Inner {
 
     /// The next lines for somebody, and how many are missing before them.
     fn lines_from(&self, cursor: &mut Cursor) -> (Vec<LogRecord>, u64) {
-        let oldest = self.lines.front().map_or(self.next_line, |(number, _)| *number);
+        let oldest = self
+            .lines
+            .front()
+            .map_or(self.next_line, |(number, _)| *number);
         let wanted = cursor.line.unwrap_or(oldest);
         let from = self.lines.partition_point(|(number, _)| *number < wanted);
         let taken = self.lines.range(from..).take(LINES_AT_ONCE);
-        let Some((last, _)) = taken.clone().next_back() else { return (Vec::new(), 0) };
+        let Some((last, _)) = taken.clone().next_back() else {
+            return (Vec::new(), 0);
+        };
         let lines: Vec<LogRecord> = taken.map(|(_, line)| line.clone()).collect();
         let dropped = last + 1 - wanted - lines.len() as u64;
         cursor.line = Some(last + 1);
@@ -199,7 +241,10 @@ impl Picture {
         if flights.len() <= self.frame.flights.len() {
             return self.text;
         }
-        let frame = WorldFrame { flights, ..(*self.frame).clone() };
+        let frame = WorldFrame {
+            flights,
+            ..(*self.frame).clone()
+        };
         ToPage::Frame { frame: &frame }.text()
     }
 }
@@ -244,7 +289,14 @@ mod tests {
 
     fn line(tick: u64) -> LogRecord {
         let (source, text) = ("simulator".to_owned(), format!("line {tick}"));
-        LogRecord { epoch: 1, tick, time_s: 0.0, source, kind: LogKind::Run, text }
+        LogRecord {
+            epoch: 1,
+            tick,
+            time_s: 0.0,
+            source,
+            kind: LogKind::Run,
+            text,
+        }
     }
 
     /// What is new, by type of message.
@@ -264,10 +316,20 @@ mod tests {
         board.set_present(true);
         board.show(frame(1));
         board.log(line(1), 0);
-        let kinds = |news: &[(String, Value)]| news.iter().map(|(kind, _)| kind.clone()).collect::<Vec<_>>();
-        assert_eq!(kinds(&news(&board, &mut cursor)), ["simulator", "log", "frame"]);
+        let kinds = |news: &[(String, Value)]| {
+            news.iter()
+                .map(|(kind, _)| kind.clone())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            kinds(&news(&board, &mut cursor)),
+            ["simulator", "log", "frame"]
+        );
         assert!(news(&board, &mut cursor).is_empty());
-        assert_eq!(kinds(&news(&board, &mut Cursor::default())), ["simulator", "log", "frame"]);
+        assert_eq!(
+            kinds(&news(&board, &mut Cursor::default())),
+            ["simulator", "log", "frame"]
+        );
     }
 
     #[test]
@@ -279,17 +341,35 @@ mod tests {
             board.show(frame(tick));
         }
         let all = news(&board, &mut cursor);
-        let [(_, shown)] = all.as_slice() else { panic!("{all:?}") };
+        let [(_, shown)] = all.as_slice() else {
+            panic!("{all:?}")
+        };
         assert_eq!(shown["frame"]["tick"], 400);
         let flights = shown["frame"]["flights"].as_array().unwrap();
         assert_eq!(flights.len(), MAX_FLIGHTS);
-        assert_eq!((&flights[0]["tick"], &flights[MAX_FLIGHTS - 1]["tick"]), (&145.into(), &400.into()));
+        assert_eq!(
+            (&flights[0]["tick"], &flights[MAX_FLIGHTS - 1]["tick"]),
+            (&145.into(), &400.into())
+        );
         board.show(frame(401));
-        assert_eq!(news(&board, &mut cursor)[0].1["frame"]["flights"].as_array().unwrap().len(), 1);
+        assert_eq!(
+            news(&board, &mut cursor)[0].1["frame"]["flights"]
+                .as_array()
+                .unwrap()
+                .len(),
+            1
+        );
         board.show(frame(402));
-        board.show(WorldFrame { epoch: 2, ..frame(0) });
+        board.show(WorldFrame {
+            epoch: 2,
+            ..frame(0)
+        });
         let flights = &news(&board, &mut cursor)[0].1["frame"]["flights"];
-        assert_eq!(flights.as_array().unwrap().len(), 1, "those of an epoch before are over");
+        assert_eq!(
+            flights.as_array().unwrap().len(),
+            1,
+            "those of an epoch before are over"
+        );
     }
 
     #[test]
@@ -304,12 +384,22 @@ mod tests {
         let mut dropped = Vec::new();
         while let Some((_, log)) = news(&board, &mut cursor).pop() {
             dropped.push(log["dropped"].as_u64().unwrap());
-            seen.extend(log["lines"].as_array().unwrap().iter().map(|line| line["tick"].as_u64().unwrap()));
+            seen.extend(
+                log["lines"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|line| line["tick"].as_u64().unwrap()),
+            );
         }
         assert_eq!(seen, (101..=2100).collect::<Vec<_>>());
         assert_eq!(dropped, [100, 0, 0, 0]);
         board.log(line(2101), 7);
-        assert_eq!(news(&board, &mut cursor)[0].1["dropped"], 7, "lost before they came here");
+        assert_eq!(
+            news(&board, &mut cursor)[0].1["dropped"],
+            7,
+            "lost before they came here"
+        );
         let late = news(&board, &mut Cursor::default()).pop().unwrap().1;
         assert_eq!(late["dropped"], 0, "who comes late has missed nothing");
     }
@@ -319,15 +409,28 @@ mod tests {
         let board = Board::new();
         let name = |i: usize| RobotName::new(&format!("r{i}")).unwrap();
         let svg = |bytes: usize| Panel {
-            widgets: vec![protocol::messages::Widget::Svg { label: String::new(), svg: "x".repeat(bytes) }],
+            widgets: vec![protocol::messages::Widget::Svg {
+                label: String::new(),
+                svg: "x".repeat(bytes),
+            }],
         };
         let mut cursor = Cursor::default();
         board.paint(&name(1), &svg(1)).unwrap();
         board.paint(&name(1), &svg(2)).unwrap();
-        assert_eq!(news(&board, &mut cursor)[1].1["panel"]["widgets"][0]["svg"], "xx");
+        assert_eq!(
+            news(&board, &mut cursor)[1].1["panel"]["widgets"][0]["svg"],
+            "xx"
+        );
         let refused = (0..100).find(|i| board.paint(&name(*i), &svg(1 << 20)).is_err());
-        assert!((25..40).contains(&refused.expect("there is a limit")), "{refused:?}");
+        assert!(
+            (25..40).contains(&refused.expect("there is a limit")),
+            "{refused:?}"
+        );
         board.show(frame(1));
-        assert_eq!(news(&board, &mut Cursor::default()).len(), 2, "nobody of them is in the picture");
+        assert_eq!(
+            news(&board, &mut Cursor::default()).len(),
+            2,
+            "nobody of them is in the picture"
+        );
     }
 }

@@ -48,7 +48,9 @@ pub(crate) async fn serve(mut socket: WebSocket, app: Arc<App>) {
     let mut browser = Browser::new(socket, app);
     match browser.converse().await {
         Farewell::Gone => {}
-        Farewell::Stuck => tracing::info!("a browser has taken nothing for {PATIENCE:?} and is let go"),
+        Farewell::Stuck => {
+            tracing::info!("a browser has taken nothing for {PATIENCE:?} and is let go")
+        }
         Farewell::Dismissed(code, why) => say_goodbye(&mut browser.socket, code, &why).await,
     }
 }
@@ -92,7 +94,12 @@ impl Sight {
     fn new(live: &Arc<Live>) -> Self {
         let mut changes = live.board().changes();
         changes.mark_changed();
-        Self { live: live.clone(), cursor: Cursor::default(), changes, _viewer: live.viewer() }
+        Self {
+            live: live.clone(),
+            cursor: Cursor::default(),
+            changes,
+            _viewer: live.viewer(),
+        }
     }
 
     /// Waits until there may be something new to see.
@@ -144,7 +151,12 @@ impl Browser {
             Mode::Live(live) => ("live", live.run()),
             Mode::Recording(recording) => ("recording", recording.run()),
         };
-        let hello = ToPage::Hello { mode, run, version: env!("CARGO_PKG_VERSION") }.text();
+        let hello = ToPage::Hello {
+            mode,
+            run,
+            version: env!("CARGO_PKG_VERSION"),
+        }
+        .text();
         self.send(Message::Text(hello)).await
     }
 
@@ -172,7 +184,9 @@ impl Browser {
     }
 
     async fn send_news(&mut self) -> Result<(), Farewell> {
-        let Some(sight) = &mut self.sight else { return Ok(()) };
+        let Some(sight) = &mut self.sight else {
+            return Ok(());
+        };
         let news = sight.live.board().news(&mut sight.cursor);
         if news.is_empty() {
             return Ok(());
@@ -189,15 +203,25 @@ impl Browser {
 
     async fn ping(&mut self) -> Result<(), Farewell> {
         self.next_ping = Instant::now() + PING_INTERVAL;
-        self.send(Message::Ping(Bytes::copy_from_slice(&self.portions.0.to_be_bytes()))).await
+        self.send(Message::Ping(Bytes::copy_from_slice(
+            &self.portions.0.to_be_bytes(),
+        )))
+        .await
     }
 
     /// Nothing was sent for a while: is it still there?
     async fn look_after(&mut self) -> Result<(), Farewell> {
-        if self.heard.elapsed() > PATIENCE { Err(Farewell::Stuck) } else { self.ping().await }
+        if self.heard.elapsed() > PATIENCE {
+            Err(Farewell::Stuck)
+        } else {
+            self.ping().await
+        }
     }
 
-    async fn on_message(&mut self, message: Option<Result<Message, axum::Error>>) -> Result<(), Farewell> {
+    async fn on_message(
+        &mut self,
+        message: Option<Result<Message, axum::Error>>,
+    ) -> Result<(), Farewell> {
         self.heard = Instant::now();
         match message {
             Some(Ok(Message::Text(text))) => {
@@ -210,9 +234,10 @@ impl Browser {
                 Ok(())
             }
             Some(Ok(Message::Ping(_))) => Ok(()), // It has been answered.
-            Some(Ok(Message::Binary(_))) => {
-                Err(Farewell::Dismissed(close_code::UNSUPPORTED, "messages are text here".to_owned()))
-            }
+            Some(Ok(Message::Binary(_))) => Err(Farewell::Dismissed(
+                close_code::UNSUPPORTED,
+                "messages are text here".to_owned(),
+            )),
             Some(Err(error)) => Err(Farewell::Dismissed(close_code::POLICY, error.to_string())),
             Some(Ok(Message::Close(_))) | None => Err(Farewell::Gone),
         }
@@ -222,33 +247,63 @@ impl Browser {
         let (id, control) = match serde_json::from_str(text) {
             Ok(FromPage::Control { id, control }) => (id, control),
             Err(error) => {
-                let id = serde_json::from_str::<Numbered>(text).unwrap_or_default().id;
-                return self.decline(id, format!("malformed request: {error}")).await;
+                let id = serde_json::from_str::<Numbered>(text)
+                    .unwrap_or_default()
+                    .id;
+                return self
+                    .decline(id, format!("malformed request: {error}"))
+                    .await;
             }
         };
-        if text.len() > MAX_PLAIN_BYTES && !matches!(control, Control::Load { .. } | Control::Init { .. }) {
-            let why = format!("{} bytes, more than the {MAX_PLAIN_BYTES} allowed", text.len());
+        if text.len() > MAX_PLAIN_BYTES
+            && !matches!(control, Control::Load { .. } | Control::Init { .. })
+        {
+            let why = format!(
+                "{} bytes, more than the {MAX_PLAIN_BYTES} allowed",
+                text.len()
+            );
             return Err(Farewell::Dismissed(close_code::SIZE, why));
         }
         if let Err((field, reason)) = control.check() {
-            return self.decline(Some(id), format!("malformed request: {field}: {reason}")).await;
+            return self
+                .decline(Some(id), format!("malformed request: {field}: {reason}"))
+                .await;
         }
         let Some(sight) = &self.sight else {
             return self
-                .decline(Some(id), "this is a recording: it can be played, not changed".to_owned())
+                .decline(
+                    Some(id),
+                    "this is a recording: it can be played, not changed".to_owned(),
+                )
                 .await;
         };
-        match (self.requests.clone().try_acquire_owned(), self.app.request()) {
+        match (
+            self.requests.clone().try_acquire_owned(),
+            self.app.request(),
+        ) {
             (Ok(own), Some(all)) => {
-                tokio::spawn(request(sight.live.clone(), id, control, self.answers.0.clone(), (own, all)));
+                tokio::spawn(request(
+                    sight.live.clone(),
+                    id,
+                    control,
+                    self.answers.0.clone(),
+                    (own, all),
+                ));
                 Ok(())
             }
-            _ => self.decline(Some(id), "too many requests wait for an answer already".to_owned()).await,
+            _ => {
+                self.decline(
+                    Some(id),
+                    "too many requests wait for an answer already".to_owned(),
+                )
+                .await
+            }
         }
     }
 
     async fn decline(&mut self, id: Option<u64>, why: String) -> Result<(), Farewell> {
-        self.send(Message::Text(ToPage::answer(id, Err(why)).text())).await
+        self.send(Message::Text(ToPage::answer(id, Err(why)).text()))
+            .await
     }
 }
 
@@ -267,8 +322,13 @@ async fn request(
     _places: (OwnedSemaphorePermit, OwnedSemaphorePermit),
 ) {
     let asked = tokio::task::spawn_blocking(move || live.control(&control)).await;
-    let outcome: Result<ControlAnswer, String> = asked.unwrap_or_else(|error| Err(error.to_string()));
-    if answers.send(ToPage::answer(Some(id), outcome).text()).await.is_err() {
+    let outcome: Result<ControlAnswer, String> =
+        asked.unwrap_or_else(|error| Err(error.to_string()));
+    if answers
+        .send(ToPage::answer(Some(id), outcome).text())
+        .await
+        .is_err()
+    {
         tracing::debug!("a browser left before its answer came");
     }
 }
@@ -276,7 +336,10 @@ async fn request(
 async fn say_goodbye(socket: &mut WebSocket, code: u16, why: &str) {
     // A control frame has room for 125 bytes, two of them for the code.
     let reason: String = why.chars().filter(char::is_ascii).take(120).collect();
-    let goodbye = Message::Close(Some(CloseFrame { code, reason: reason.into() }));
+    let goodbye = Message::Close(Some(CloseFrame {
+        code,
+        reason: reason.into(),
+    }));
     let both = async {
         socket.send(goodbye).await?;
         while socket.recv().await.transpose()?.is_some() {}

@@ -19,8 +19,14 @@ pub(crate) const HEADERS: [(HeaderName, HeaderValue); 5] = [
     (CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
     (X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
     (REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
-    (HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin")),
-    (HeaderName::from_static("cross-origin-opener-policy"), HeaderValue::from_static("same-origin")),
+    (
+        HeaderName::from_static("cross-origin-resource-policy"),
+        HeaderValue::from_static("same-origin"),
+    ),
+    (
+        HeaderName::from_static("cross-origin-opener-policy"),
+        HeaderValue::from_static("same-origin"),
+    ),
 ];
 
 /// Bytes of chance in a token.
@@ -37,7 +43,11 @@ pub(crate) struct Guard {
 impl Guard {
     /// A guard of what is served at `address`; a new token where that is not loopback.
     pub(crate) fn new(address: SocketAddr) -> Result<Self, getrandom::Error> {
-        let token = if address.ip().is_loopback() { None } else { Some(draw_token()?) };
+        let token = if address.ip().is_loopback() {
+            None
+        } else {
+            Some(draw_token()?)
+        };
         Ok(Self { address, token })
     }
 
@@ -45,8 +55,13 @@ impl Guard {
     pub(crate) fn url(&self) -> String {
         let mut address = self.address;
         if address.ip().is_unspecified() {
-            let loopback: (IpAddr, IpAddr) = ([127, 0, 0, 1].into(), [0, 0, 0, 0, 0, 0, 0, 1].into());
-            address.set_ip(if address.is_ipv4() { loopback.0 } else { loopback.1 });
+            let loopback: (IpAddr, IpAddr) =
+                ([127, 0, 0, 1].into(), [0, 0, 0, 0, 0, 0, 0, 1].into());
+            address.set_ip(if address.is_ipv4() {
+                loopback.0
+            } else {
+                loopback.1
+            });
         }
         match &self.token {
             Some(token) => format!("http://{address}/?token={token}"),
@@ -55,7 +70,12 @@ impl Guard {
     }
 
     /// Why a request is refused; `None` if it may pass.
-    pub(crate) fn refuse(&self, headers: &HeaderMap, path: &str, query: Option<&str>) -> Option<String> {
+    pub(crate) fn refuse(
+        &self,
+        headers: &HeaderMap,
+        path: &str,
+        query: Option<&str>,
+    ) -> Option<String> {
         let Some(host) = only(headers, &HOST).filter(|host| self.is_own(host)) else {
             return Some(format!(
                 "This console is at {}: a request must name that address, or localhost, with its port.\n",
@@ -71,17 +91,24 @@ impl Guard {
             return None;
         }
         Some(
-            "This console is open to the network: use the address with ?token= that it printed.\n".to_owned(),
+            "This console is open to the network: use the address with ?token= that it printed.\n"
+                .to_owned(),
         )
     }
 
     /// Whether a `Host` means this console. A literal address cannot be made to mean another machine, a name can.
     fn is_own(&self, host: &str) -> bool {
-        let (name, port) = match host.rsplit_once(':').filter(|(_, port)| !port.ends_with(']')) {
+        let (name, port) = match host
+            .rsplit_once(':')
+            .filter(|(_, port)| !port.ends_with(']'))
+        {
             Some((name, port)) => (name, port.parse().ok()),
             None => (host, Some(80)),
         };
-        let ip = name.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(name);
+        let ip = name
+            .strip_prefix('[')
+            .and_then(|rest| rest.strip_suffix(']'))
+            .unwrap_or(name);
         let is_ours = |ip: IpAddr| {
             ip == self.address.ip() || self.address.ip().is_unspecified() || is_usual_loopback(ip)
         };
@@ -90,9 +117,13 @@ impl Guard {
     }
 
     fn knows_token(&self, query: Option<&str>) -> bool {
-        let Some(token) = &self.token else { return true };
+        let Some(token) = &self.token else {
+            return true;
+        };
         let mut parameters = query.unwrap_or_default().split('&');
-        let given = parameters.find_map(|parameter| parameter.strip_prefix("token=")).unwrap_or_default();
+        let given = parameters
+            .find_map(|parameter| parameter.strip_prefix("token="))
+            .unwrap_or_default();
         given.as_bytes().ct_eq(token.as_bytes()).into()
     }
 }
@@ -134,7 +165,12 @@ mod tests {
     #[test]
     fn only_the_own_address_with_its_port_is_served() {
         let guard = Guard::new("127.0.0.1:7007".parse().unwrap()).unwrap();
-        for own in ["127.0.0.1:7007", "localhost:7007", "LOCALHOST:7007", "[::1]:7007"] {
+        for own in [
+            "127.0.0.1:7007",
+            "localhost:7007",
+            "LOCALHOST:7007",
+            "[::1]:7007",
+        ] {
             assert!(passes(&guard, own, None), "{own} was refused");
         }
         for foreign in [
@@ -161,10 +197,22 @@ mod tests {
     #[test]
     fn a_page_from_elsewhere_is_refused() {
         let guard = Guard::new("127.0.0.1:7007".parse().unwrap()).unwrap();
-        assert!(passes(&guard, "localhost:7007", Some("http://localhost:7007")));
-        for foreign in ["http://evil.example", "null", "http://localhost:8080", "https://localhost:7007", ""]
-        {
-            assert!(!passes(&guard, "localhost:7007", Some(foreign)), "{foreign} was served");
+        assert!(passes(
+            &guard,
+            "localhost:7007",
+            Some("http://localhost:7007")
+        ));
+        for foreign in [
+            "http://evil.example",
+            "null",
+            "http://localhost:8080",
+            "https://localhost:7007",
+            "",
+        ] {
+            assert!(
+                !passes(&guard, "localhost:7007", Some(foreign)),
+                "{foreign} was served"
+            );
         }
     }
 
@@ -174,15 +222,34 @@ mod tests {
         let token = guard.token.clone().unwrap();
         assert_eq!(token.len(), 2 * TOKEN_BYTES);
         assert_eq!(guard.url(), format!("http://127.0.0.1:7007/?token={token}"));
-        let ask = |host, path, query: &str| guard.refuse(&headers(host, None), path, Some(query)).is_none();
+        let ask = |host, path, query: &str| {
+            guard
+                .refuse(&headers(host, None), path, Some(query))
+                .is_none()
+        };
         assert!(ask("10.0.0.1:7007", "/ws", &format!("token={token}")));
-        assert!(ask("10.0.0.1:7007", "/recording/ticks", &format!("from=1&token={token}")));
+        assert!(ask(
+            "10.0.0.1:7007",
+            "/recording/ticks",
+            &format!("from=1&token={token}")
+        ));
         assert!(ask("10.0.0.1:7007", "/assets/app.js", ""));
-        for wrong in ["", "token=", "token=0", &format!("token={token}0"), &format!("token={}", &token[1..])]
-        {
+        for wrong in [
+            "",
+            "token=",
+            "token=0",
+            &format!("token={token}0"),
+            &format!("token={}", &token[1..]),
+        ] {
             assert!(!ask("10.0.0.1:7007", "/", wrong), "{wrong} was let in");
         }
         assert!(!ask("evil.example:7007", "/", &format!("token={token}")));
-        assert_ne!(token, Guard::new("0.0.0.0:7007".parse().unwrap()).unwrap().token.unwrap());
+        assert_ne!(
+            token,
+            Guard::new("0.0.0.0:7007".parse().unwrap())
+                .unwrap()
+                .token
+                .unwrap()
+        );
     }
 }

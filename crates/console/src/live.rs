@@ -87,7 +87,11 @@ impl Live {
     ///
     /// # Errors
     /// Why it cannot begin.
-    pub(crate) fn start(run: RunName, connect: String, config: Option<PathBuf>) -> Result<Arc<Self>, String> {
+    pub(crate) fn start(
+        run: RunName,
+        connect: String,
+        config: Option<PathBuf>,
+    ) -> Result<Arc<Self>, String> {
         if let Some(file) = &config {
             std::fs::metadata(file).map_err(|error| format!("{}: {error}", file.display()))?;
         }
@@ -107,7 +111,9 @@ impl Live {
         });
         let (reader, keeper) = (live.clone(), live.clone());
         let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
-            let thread = std::thread::Builder::new().name(name.to_owned()).spawn(work);
+            let thread = std::thread::Builder::new()
+                .name(name.to_owned())
+                .spawn(work);
             thread.map_err(|error| format!("cannot start a thread: {error}"))
         };
         spawn("reader", Box::new(move || reader.read(&received)))?;
@@ -156,7 +162,11 @@ impl Live {
     /// # Errors
     /// Why there is none.
     pub(crate) fn control(&self, control: &Control) -> Result<ControlAnswer, String> {
-        let patience = if matches!(control, Control::Step { .. }) { STEP_PATIENCE } else { PATIENCE };
+        let patience = if matches!(control, Control::Step { .. }) {
+            STEP_PATIENCE
+        } else {
+            PATIENCE
+        };
         self.ask(control, patience)
     }
 
@@ -170,12 +180,18 @@ impl Live {
         let bus = self.bus.get().ok_or_else(nobody)?;
         let (key, asked) = (self.keys.control(), Instant::now());
         let answer = bus.ask_within(&key, "", Some(encode(control)), patience);
-        let answer = answer.map_err(|error| error.to_string())?.ok_or_else(|| match asked.elapsed() {
-            elapsed if elapsed < patience => nobody(),
-            elapsed => {
-                format!("no answer for {:.0} s; the simulator may still be at it", elapsed.as_secs_f64())
-            }
-        })?;
+        let answer =
+            answer
+                .map_err(|error| error.to_string())?
+                .ok_or_else(|| match asked.elapsed() {
+                    elapsed if elapsed < patience => nobody(),
+                    elapsed => {
+                        format!(
+                            "no answer for {:.0} s; the simulator may still be at it",
+                            elapsed.as_secs_f64()
+                        )
+                    }
+                })?;
         decode(&key, "simulator", &answer.result?).map_err(|error| error.to_string())
     }
 
@@ -199,9 +215,12 @@ impl Live {
             return;
         }
         self.waiting_bytes.fetch_sub(len, Ordering::Relaxed);
-        self.lost_lines.fetch_add(u64::from(is_line), Ordering::Relaxed);
+        self.lost_lines
+            .fetch_add(u64::from(is_line), Ordering::Relaxed);
         if is_too_long {
-            self.ignore(&format!("{len} bytes, more than the {MAX_MESSAGE_BYTES} allowed"));
+            self.ignore(&format!(
+                "{len} bytes, more than the {MAX_MESSAGE_BYTES} allowed"
+            ));
         }
     }
 
@@ -213,7 +232,8 @@ impl Live {
                 Raw::Log(bytes) => self.read_line(bytes),
                 Raw::Panel(robot, bytes) => self.read_panel(robot, bytes),
             };
-            self.waiting_bytes.fetch_sub(raw.bytes().len(), Ordering::Relaxed);
+            self.waiting_bytes
+                .fetch_sub(raw.bytes().len(), Ordering::Relaxed);
             if let Err(why) = outcome {
                 self.ignore(&why);
             }
@@ -221,21 +241,25 @@ impl Live {
     }
 
     fn read_world(&self, bytes: &[u8]) -> Result<(), String> {
-        let frame = decode(&self.keys.world(), "simulator", bytes).map_err(|error| error.to_string())?;
+        let frame =
+            decode(&self.keys.world(), "simulator", bytes).map_err(|error| error.to_string())?;
         self.board.show(frame);
         self.nudge();
         Ok(())
     }
 
     fn read_line(&self, bytes: &[u8]) -> Result<(), String> {
-        let line = decode(&self.keys.log(), "simulator", bytes).map_err(|error| error.to_string())?;
-        self.board.log(line, self.lost_lines.swap(0, Ordering::Relaxed));
+        let line =
+            decode(&self.keys.log(), "simulator", bytes).map_err(|error| error.to_string())?;
+        self.board
+            .log(line, self.lost_lines.swap(0, Ordering::Relaxed));
         Ok(())
     }
 
     fn read_panel(&self, robot: &str, bytes: &[u8]) -> Result<(), String> {
         let name = RobotName::new(robot).map_err(|error| error.to_string())?;
-        let panel = decode(&self.keys.panel(&name), robot, bytes).map_err(|error| error.to_string())?;
+        let panel =
+            decode(&self.keys.panel(&name), robot, bytes).map_err(|error| error.to_string())?;
         self.board.paint(&name, &panel)
     }
 }
@@ -243,7 +267,9 @@ impl Live {
 /// The keeper.
 impl Live {
     fn keep(self: Arc<Self>, config: Option<&PathBuf>) {
-        let Some(bus) = self.reach(config) else { return };
+        let Some(bus) = self.reach(config) else {
+            return;
+        };
         match self.listen(&bus) {
             // Held to the end of the process.
             Ok(_declared) => self.follow_viewers(&bus),
@@ -253,7 +279,10 @@ impl Live {
 
     /// Tries until the simulator is reached; `None` if it is all over before.
     fn reach(&self, config: Option<&PathBuf>) -> Option<Bus> {
-        let role = Role::Client { connect: self.connect.clone(), patience: ATTEMPT };
+        let role = Role::Client {
+            connect: self.connect.clone(),
+            patience: ATTEMPT,
+        };
         let mut attempts: u64 = 0;
         loop {
             match Bus::open(&role, config) {
@@ -281,7 +310,9 @@ impl Live {
                 alive.board.set_present(is_there);
                 alive.nudge();
             })?,
-            bus.subscribe(&self.keys.log(), move |_, bytes| log.receive(Raw::Log(bytes.to_vec())))?,
+            bus.subscribe(&self.keys.log(), move |_, bytes| {
+                log.receive(Raw::Log(bytes.to_vec()))
+            })?,
         ])
     }
 
@@ -289,7 +320,9 @@ impl Live {
     fn watch(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
         let (world, panels) = (self.clone(), self.clone());
         Ok([
-            bus.subscribe(&self.keys.world(), move |_, bytes| world.receive(Raw::World(bytes.to_vec())))?,
+            bus.subscribe(&self.keys.world(), move |_, bytes| {
+                world.receive(Raw::World(bytes.to_vec()))
+            })?,
             bus.subscribe(&panels_of(&self.run), move |key, bytes| {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
                 panels.receive(Raw::Panel(robot, bytes.to_vec()));
@@ -319,7 +352,9 @@ impl Live {
     /// it is asked how things stand, for then it shows it, too.
     fn follow_simulator(&self) {
         let is_wanted = |wanted: &Wanted| wanted.viewers > 0 && !wanted.is_over;
-        while self.wait(|wanted| !is_wanted(wanted) || self.board.is_present()) && is_wanted(&self.lock()) {
+        while self.wait(|wanted| !is_wanted(wanted) || self.board.is_present())
+            && is_wanted(&self.lock())
+        {
             self.ask_for_picture(is_wanted);
             self.wait(|wanted| !is_wanted(wanted) || !self.board.is_present());
         }
@@ -327,13 +362,16 @@ impl Live {
 
     fn ask_for_picture(&self, is_wanted: impl Fn(&Wanted) -> bool) {
         let (seen, mut patience) = (self.board.pictures(), ASK_AGAIN.0);
-        let is_settled =
-            |wanted: &Wanted| !is_wanted(wanted) || !self.board.is_present() || self.board.pictures() > seen;
+        let is_settled = |wanted: &Wanted| {
+            !is_wanted(wanted) || !self.board.is_present() || self.board.pictures() > seen
+        };
         while !is_settled(&self.lock()) {
             if let Err(error) = self.ask(&Control::Status, PATIENCE) {
                 tracing::debug!("asked for a picture: {error}");
             }
-            let timed = self.wake.wait_timeout_while(self.lock(), patience, |wanted| !is_settled(wanted));
+            let timed = self
+                .wake
+                .wait_timeout_while(self.lock(), patience, |wanted| !is_settled(wanted));
             drop(timed);
             patience = (2 * patience).min(ASK_AGAIN.1);
         }
@@ -341,7 +379,9 @@ impl Live {
 
     /// Waits until `is_met`; `false` if it is all over.
     fn wait(&self, is_met: impl Fn(&Wanted) -> bool) -> bool {
-        let wait = self.wake.wait_while(self.lock(), |wanted| !wanted.is_over && !is_met(wanted));
+        let wait = self
+            .wake
+            .wait_while(self.lock(), |wanted| !wanted.is_over && !is_met(wanted));
         !wait.unwrap_or_else(PoisonError::into_inner).is_over
     }
 }

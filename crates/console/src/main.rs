@@ -61,8 +61,8 @@ struct Args {
 fn main() -> ExitCode {
     protocol::runtime::use_one_thread();
     let args = Args::parse();
-    let filter =
-        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn,zenoh=error".into());
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| "warn,zenoh=error".into());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
@@ -97,13 +97,20 @@ fn run(args: Args) -> Result<(), String> {
 /// Serves until it is told to end.
 async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), String> {
     let listener = listen(bind).await?;
-    let address = listener.local_addr().map_err(|error| format!("cannot serve: {error}"))?;
+    let address = listener
+        .local_addr()
+        .map_err(|error| format!("cannot serve: {error}"))?;
     let guard = Guard::new(address).map_err(|error| format!("cannot draw a token: {error}"))?;
     let url = guard.url();
     let app = Arc::new(App::new(guard, mode));
-    let mut ended = (termination(SignalKind::terminate())?, termination(SignalKind::interrupt())?);
+    let mut ended = (
+        termination(SignalKind::terminate())?,
+        termination(SignalKind::interrupt())?,
+    );
     if !address.ip().is_loopback() {
-        eprintln!("the console is open to the network at {address}; whoever has the token controls the run");
+        eprintln!(
+            "the console is open to the network at {address}; whoever has the token controls the run"
+        );
     }
     println!("console: {url}");
     if opens {
@@ -125,10 +132,18 @@ async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), 
 /// Opens the page with what the system, or the variable `BROWSER`, opens pages with. Without one the address is printed all
 /// the same.
 fn open_browser(url: &str) {
-    let system = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    let system = if cfg!(target_os = "macos") {
+        "open"
+    } else {
+        "xdg-open"
+    };
     let program = std::env::var("BROWSER").unwrap_or_else(|_| system.to_owned());
     let quiet = std::process::Stdio::null;
-    let started = std::process::Command::new(&program).arg(url).stdout(quiet()).stderr(quiet()).spawn();
+    let started = std::process::Command::new(&program)
+        .arg(url)
+        .stdout(quiet())
+        .stderr(quiet())
+        .spawn();
     if let Err(error) = started {
         eprintln!("{program} cannot be started ({error}): open the address above yourself");
     }
@@ -141,15 +156,23 @@ fn termination(kind: SignalKind) -> Result<tokio::signal::unix::Signal, String> 
 /// An address that was asked for is that one or none; the default gives way.
 async fn listen(bind: Option<SocketAddr>) -> Result<TcpListener, String> {
     let failed = |at: &str, error: std::io::Error| {
-        format!("cannot serve at {at}: {error}; choose another address with --bind, port 0 takes a free one")
+        format!(
+            "cannot serve at {at}: {error}; choose another address with --bind, port 0 takes a free one"
+        )
     };
     if let Some(address) = bind {
-        return TcpListener::bind(address).await.map_err(|error| failed(&address.to_string(), error));
+        return TcpListener::bind(address)
+            .await
+            .map_err(|error| failed(&address.to_string(), error));
     }
     match TcpListener::bind(DEFAULT_BIND).await {
         Err(error) if error.kind() == std::io::ErrorKind::AddrInUse => {
-            eprintln!("{DEFAULT_BIND} is taken, perhaps by another console; this one takes a free port");
-            TcpListener::bind("127.0.0.1:0").await.map_err(|error| failed("127.0.0.1:0", error))
+            eprintln!(
+                "{DEFAULT_BIND} is taken, perhaps by another console; this one takes a free port"
+            );
+            TcpListener::bind("127.0.0.1:0")
+                .await
+                .map_err(|error| failed("127.0.0.1:0", error))
         }
         outcome => outcome.map_err(|error| failed(DEFAULT_BIND, error)),
     }

@@ -59,8 +59,16 @@ impl ToPage<'_> {
     /// The answer to request `id`.
     pub(crate) fn answer(id: Option<u64>, outcome: Result<ControlAnswer, String>) -> Self {
         match outcome {
-            Ok(answer) => Self::Answer { id, answer: Some(answer), error: None },
-            Err(error) => Self::Answer { id, answer: None, error: Some(error) },
+            Ok(answer) => Self::Answer {
+                id,
+                answer: Some(answer),
+                error: None,
+            },
+            Err(error) => Self::Answer {
+                id,
+                answer: None,
+                error: Some(error),
+            },
         }
     }
 

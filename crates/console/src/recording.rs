@@ -79,14 +79,24 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`] names the file, and the line where there is one.
     pub(crate) fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = if path.is_dir() { path.join(RECORDING) } else { path.to_owned() };
+        let file = if path.is_dir() {
+            path.join(RECORDING)
+        } else {
+            path.to_owned()
+        };
         let events = events_beside(&file);
         let mut lines = Lines::open(&file)?;
-        let first = lines.read()?.ok_or_else(|| lines.malformed("there is no header".to_owned()))?;
+        let first = lines
+            .read()?
+            .ok_or_else(|| lines.malformed("there is no header".to_owned()))?;
         let header = lines.parse(&first.text)?;
         let ticks = Ranges::of_ticks(lines, first.end)?;
         let events = Ranges::of_events(Lines::open(&events)?, ticks.len())?;
-        Ok(Self { header, ticks, events })
+        Ok(Self {
+            header,
+            ticks,
+            events,
+        })
     }
 
     /// Name of the run.
@@ -96,7 +106,10 @@ impl Recording {
 
     /// What does not change during it.
     pub(crate) fn summary(&self) -> Summary<'_> {
-        Summary { header: &self.header, ticks: self.ticks.len() - 1 }
+        Summary {
+            header: &self.header,
+            ticks: self.ticks.len() - 1,
+        }
     }
 
     /// What happened from tick `from` on in `count` ticks, or in as many as there are, or as fit into one answer.
@@ -105,14 +118,26 @@ impl Recording {
     /// [`RecordingError`] if the files have changed since they were opened.
     pub(crate) fn range(&self, from: Tick, count: u64) -> Result<Range, RecordingError> {
         let from = from.min(self.ticks.len());
-        let to = self.ticks.fitting(from, from.saturating_add(count.min(MAX_TICKS)));
-        let mut range = Range { ticks: self.ticks.read(from, to)?, ..Range::default() };
+        let to = self
+            .ticks
+            .fitting(from, from.saturating_add(count.min(MAX_TICKS)));
+        let mut range = Range {
+            ticks: self.ticks.read(from, to)?,
+            ..Range::default()
+        };
         for line in self.events.read::<Line>(from, to)? {
             range.flights.extend(flight(&line));
             if let Some((source, kind, text)) = line.event.readable() {
                 let (epoch, tick) = (self.header.epoch, line.tick);
                 let time_s = tick as f64 * self.header.tick_s;
-                range.log.push(LogRecord { epoch, tick, time_s, source, kind, text });
+                range.log.push(LogRecord {
+                    epoch,
+                    tick,
+                    time_s,
+                    source,
+                    kind,
+                    text,
+                });
             }
         }
         Ok(range)
@@ -123,14 +148,21 @@ impl Recording {
 fn events_beside(recording: &Path) -> PathBuf {
     let name = recording.file_name().unwrap_or_default().to_string_lossy();
     recording.with_file_name(
-        name.strip_prefix("recording").map_or(EVENTS.to_owned(), |rest| format!("events{rest}")),
+        name.strip_prefix("recording")
+            .map_or(EVENTS.to_owned(), |rest| format!("events{rest}")),
     )
 }
 
 /// What an event says of a command; `None` if it is about something else.
 fn flight(line: &Line) -> Option<Flight> {
     let (from, to, seq, command, fate) = match &line.event {
-        Event::CommandSent { from, to, seq, command, .. } => (from, to, *seq, command.as_str(), Fate::Sent),
+        Event::CommandSent {
+            from,
+            to,
+            seq,
+            command,
+            ..
+        } => (from, to, *seq, command.as_str(), Fate::Sent),
         Event::CommandDelivered { from, to, seq, .. } => (from, to, *seq, "", Fate::Delivered),
         Event::CommandDropped { from, to, seq, .. } => (from, to, *seq, "", Fate::Dropped),
         Event::CommandMissing { from, to, seq, .. } => (from, to, *seq, "", Fate::Missing),
@@ -160,7 +192,10 @@ impl Ranges {
     fn of_ticks(mut lines: Lines, begin: u64) -> Result<Self, RecordingError> {
         let mut starts = vec![begin];
         while let Some(line) = lines.read()? {
-            let (tick, expected) = (lines.parse::<RecordedTick>(&line.text)?.tick, starts.len() as u64 - 1);
+            let (tick, expected) = (
+                lines.parse::<RecordedTick>(&line.text)?.tick,
+                starts.len() as u64 - 1,
+            );
             if tick != expected {
                 return Err(lines.malformed(format!("tick {tick} where tick {expected} should be")));
             }
@@ -169,7 +204,11 @@ impl Ranges {
         if starts.len() == 1 {
             return Err(lines.malformed("no tick was completed".to_owned()));
         }
-        Ok(Self { file: lines.file.into_inner(), name: lines.name, starts })
+        Ok(Self {
+            file: lines.file.into_inner(),
+            name: lines.name,
+            starts,
+        })
     }
 
     /// Any number of lines for each of `ticks` ticks, in their order.
@@ -191,7 +230,11 @@ impl Ranges {
         while starts.len() as u64 <= ticks {
             starts.push(end);
         }
-        Ok(Self { file: lines.file.into_inner(), name: lines.name, starts })
+        Ok(Self {
+            file: lines.file.into_inner(),
+            name: lines.name,
+            starts,
+        })
     }
 
     /// Number of ticks.
@@ -207,7 +250,9 @@ impl Ranges {
     /// The end of a range that begins at `from`, at `to` at most, so that it is not too much for one answer.
     fn fitting(&self, from: Tick, to: Tick) -> Tick {
         let (to, limit) = (to.min(self.len()), self.start(from) + MAX_BYTES);
-        let fitting = (from..to).take_while(|tick| self.start(tick + 1) <= limit).count() as u64;
+        let fitting = (from..to)
+            .take_while(|tick| self.start(tick + 1) <= limit)
+            .count() as u64;
         to.min(from + fitting.max(1))
     }
 
@@ -216,8 +261,13 @@ impl Ranges {
         let (start, end) = (self.start(from), self.start(to));
         let mut bytes = vec![0; usize::try_from(end - start).unwrap_or(0)];
         let read = self.file.read_exact_at(&mut bytes, start);
-        read.map_err(|error| RecordingError::Unreadable { file: self.name.clone(), error })?;
-        let lines = bytes.split(|byte| *byte == b'\n').filter(|line| !line.is_empty());
+        read.map_err(|error| RecordingError::Unreadable {
+            file: self.name.clone(),
+            error,
+        })?;
+        let lines = bytes
+            .split(|byte| *byte == b'\n')
+            .filter(|line| !line.is_empty());
         let parse = |line| {
             serde_json::from_slice(line).map_err(|error| RecordingError::Malformed {
                 file: self.name.clone(),
@@ -250,16 +300,27 @@ impl Lines {
     fn open(path: &Path) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
         match File::open(path) {
-            Ok(file) => Ok(Self { file: BufReader::new(file), name, count: 0, at: 0 }),
+            Ok(file) => Ok(Self {
+                file: BufReader::new(file),
+                name,
+                count: 0,
+                at: 0,
+            }),
             Err(error) => Err(RecordingError::Unreadable { file: name, error }),
         }
     }
 
     fn read(&mut self) -> Result<Option<TextLine>, RecordingError> {
         let mut text = Vec::new();
-        let read = self.file.by_ref().take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut text);
-        let read =
-            read.map_err(|error| RecordingError::Unreadable { file: self.name.clone(), error })? as u64;
+        let read = self
+            .file
+            .by_ref()
+            .take(MAX_LINE_BYTES + 1)
+            .read_until(b'\n', &mut text);
+        let read = read.map_err(|error| RecordingError::Unreadable {
+            file: self.name.clone(),
+            error,
+        })? as u64;
         self.count += 1;
         if read > MAX_LINE_BYTES {
             return Err(self.malformed(format!("longer than {MAX_LINE_BYTES} bytes")));
@@ -277,6 +338,10 @@ impl Lines {
     }
 
     fn malformed(&self, reason: String) -> RecordingError {
-        RecordingError::Malformed { file: self.name.clone(), place: format!("line {}", self.count), reason }
+        RecordingError::Malformed {
+            file: self.name.clone(),
+            place: format!("line {}", self.count),
+            reason,
+        }
     }
 }

@@ -109,7 +109,10 @@ pub(crate) async fn told_to_leave(ending: &mut watch::Receiver<bool>) {
 fn routes(app: Arc<App>) -> Router {
     Router::new()
         .route("/", get(async || asset("index.html")))
-        .route("/assets/{*path}", get(async |Path(path): Path<String>| asset(&path)))
+        .route(
+            "/assets/{*path}",
+            get(async |Path(path): Path<String>| asset(&path)),
+        )
         .route("/ws", get(socket))
         .route("/recording", get(recording))
         .route("/recording/ticks", get(ticks))
@@ -120,11 +123,16 @@ fn routes(app: Arc<App>) -> Router {
 
 /// Serves until it is told to end, and until everybody has left.
 pub(crate) async fn serve(listener: TcpListener, app: Arc<App>) {
-    let (routes, connections) = (routes(app.clone()), Arc::new(Semaphore::new(MAX_CONNECTIONS)));
+    let (routes, connections) = (
+        routes(app.clone()),
+        Arc::new(Semaphore::new(MAX_CONNECTIONS)),
+    );
     let mut ending = app.ending();
     loop {
         // A semaphore that nobody closes: who comes when all places are taken waits at the door.
-        let Ok(place) = connections.clone().acquire_owned().await else { break };
+        let Ok(place) = connections.clone().acquire_owned().await else {
+            break;
+        };
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
             () = told_to_leave(&mut ending) => break,
@@ -176,13 +184,20 @@ async fn converse(
 
 /// Nothing is answered that the guard has not seen, and nothing without the headers that protect the page.
 async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let refused = app.guard.refuse(request.headers(), request.uri().path(), request.uri().query());
+    let refused = app.guard.refuse(
+        request.headers(),
+        request.uri().path(),
+        request.uri().query(),
+    );
     let mut response = match refused {
         Some(why) => (StatusCode::FORBIDDEN, why).into_response(),
         None => next.run(request).await,
     };
     response.headers_mut().extend(HEADERS);
-    response.headers_mut().entry(CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    response
+        .headers_mut()
+        .entry(CACHE_CONTROL)
+        .or_insert(HeaderValue::from_static("no-store"));
     response
 }
 
@@ -231,7 +246,10 @@ struct Wanted {
     count: u64,
 }
 
-async fn ticks(State(app): State<Arc<App>>, wanted: Result<Query<Wanted>, QueryRejection>) -> Response {
+async fn ticks(
+    State(app): State<Arc<App>>,
+    wanted: Result<Query<Wanted>, QueryRejection>,
+) -> Response {
     let Query(Wanted { from, count }) = match wanted {
         Ok(wanted) if wanted.count <= MAX_TICKS => wanted,
         _ => {
@@ -242,7 +260,9 @@ async fn ticks(State(app): State<Arc<App>>, wanted: Result<Query<Wanted>, QueryR
     if matches!(app.mode, Mode::Live(_)) {
         return not_found();
     }
-    let Ok(_turn) = app.reads.acquire().await else { return not_found() };
+    let Ok(_turn) = app.reads.acquire().await else {
+        return not_found();
+    };
     let reader = app.clone();
     let range = tokio::task::spawn_blocking(move || match &reader.mode {
         Mode::Recording(recording) => recording.range(from, count).map(|range| json(&range)),

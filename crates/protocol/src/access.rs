@@ -25,12 +25,20 @@ pub struct Grant {
 }
 
 fn grant(purpose: &'static str, messages: &'static [&'static str], keys: Vec<String>) -> Grant {
-    Grant { purpose, messages, keys }
+    Grant {
+        purpose,
+        messages,
+        keys,
+    }
 }
 
 /// The six queries and all of them in one, of one robot or of `*`.
 fn state_keys(keys: &Keys, robot: &str) -> Vec<String> {
-    QUERIES.iter().chain([&STATE]).map(|what| keys.robot(robot, what)).collect()
+    QUERIES
+        .iter()
+        .chain([&STATE])
+        .map(|what| keys.robot(robot, what))
+        .collect()
 }
 
 const PRESENCE: &[&str] = &["declare_liveliness_subscriber", "liveliness_query"];
@@ -45,15 +53,32 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
     let mut asks = state_keys(keys, "*");
     asks.extend([keys.join_as(robot), own_percept.clone()]);
     vec![
-        grant("says", &["put"], says.into_iter().chain([commands]).collect()),
-        grant("answers", &["declare_queryable", "reply"], state_keys(keys, name)),
+        grant(
+            "says",
+            &["put"],
+            says.into_iter().chain([commands]).collect(),
+        ),
+        grant(
+            "answers",
+            &["declare_queryable", "reply"],
+            state_keys(keys, name),
+        ),
         grant("asks", &["query"], asks),
         grant(
             "hears",
             &["declare_subscriber"],
-            vec![keys.clock(), own_commands, keys.robot("*", STATE), own_percept],
+            vec![
+                keys.clock(),
+                own_commands,
+                keys.robot("*", STATE),
+                own_percept,
+            ],
         ),
-        grant("is there", &["liveliness_token"], vec![keys.alive_robot(robot)]),
+        grant(
+            "is there",
+            &["liveliness_token"],
+            vec![keys.alive_robot(robot)],
+        ),
         grant("sees who is there", PRESENCE, vec![keys.alive()]),
     ]
 }
@@ -69,7 +94,14 @@ pub fn of_operator(keys: &Keys) -> Vec<Grant> {
         grant(
             "hears",
             &["declare_subscriber"],
-            vec![keys.world(), keys.log(), keys.clock(), keys.faults(), panels, keys.robot("*", STATE)],
+            vec![
+                keys.world(),
+                keys.log(),
+                keys.clock(),
+                keys.faults(),
+                panels,
+                keys.robot("*", STATE),
+            ],
         ),
         grant("sees who is there", PRESENCE, vec![keys.alive()]),
     ]
@@ -80,8 +112,12 @@ mod tests {
     use super::*;
 
     fn keys_of<'a>(grants: &'a [Grant], message: &str) -> Vec<&'a str> {
-        let of_kind = grants.iter().filter(|grant| grant.messages.contains(&message));
-        of_kind.flat_map(|grant| grant.keys.iter().map(String::as_str)).collect()
+        let of_kind = grants
+            .iter()
+            .filter(|grant| grant.messages.contains(&message));
+        of_kind
+            .flat_map(|grant| grant.keys.iter().map(String::as_str))
+            .collect()
     }
 
     #[test]
@@ -98,16 +134,33 @@ mod tests {
                 "cars/*/robot/*/command/Butler"
             ]
         );
-        for (message, others) in
-            [("reply", 0), ("declare_queryable", 0), ("liveliness_token", 0), ("query", 7)]
-        {
-            let foreign = keys_of(&grants, message).iter().filter(|key| !key.contains("/Butler")).count();
+        for (message, others) in [
+            ("reply", 0),
+            ("declare_queryable", 0),
+            ("liveliness_token", 0),
+            ("query", 7),
+        ] {
+            let foreign = keys_of(&grants, message)
+                .iter()
+                .filter(|key| !key.contains("/Butler"))
+                .count();
             assert_eq!(foreign, others, "{message}");
         }
-        assert!(keys_of(&grants, "query").iter().all(|key| !key.ends_with("/control")));
+        assert!(
+            keys_of(&grants, "query")
+                .iter()
+                .all(|key| !key.ends_with("/control"))
+        );
         let heard = keys_of(&grants, "declare_subscriber");
-        assert!(heard.contains(&"cars/*/robot/Butler/command/*") && heard.contains(&"cars/*/robot/*/state"));
-        assert!(heard.iter().all(|key| !key.contains("report") && !key.contains("*/command")));
+        assert!(
+            heard.contains(&"cars/*/robot/Butler/command/*")
+                && heard.contains(&"cars/*/robot/*/state")
+        );
+        assert!(
+            heard
+                .iter()
+                .all(|key| !key.contains("report") && !key.contains("*/command"))
+        );
     }
 
     #[test]
@@ -115,7 +168,13 @@ mod tests {
         let grants = of_operator(&Keys::of_any_run());
         assert!(keys_of(&grants, "query").contains(&"cars/*/control"));
         assert!(keys_of(&grants, "declare_subscriber").contains(&"cars/*/robot/*/panel"));
-        for message in ["put", "delete", "reply", "declare_queryable", "liveliness_token"] {
+        for message in [
+            "put",
+            "delete",
+            "reply",
+            "declare_queryable",
+            "liveliness_token",
+        ] {
             assert!(keys_of(&grants, message).is_empty(), "{message}");
         }
     }

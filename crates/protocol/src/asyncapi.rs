@@ -8,13 +8,14 @@ use serde_json::{Map, Value, json};
 
 use crate::keys::{Keys, QUERIES, STATE};
 use crate::messages::{
-    Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord, Panel,
-    Percept, PublicState, Report, Waiting, WorldFrame,
+    Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
+    Panel, Percept, PublicState, Report, Waiting, WorldFrame,
 };
 use crate::name::{RobotName, RunName};
 
 /// Names that stand for what an address leaves open. They are legal names, so that [`Keys`] builds the addresses.
-const PLACEHOLDERS: [(&str, &str); 3] = [("RUN-", "{run}"), ("NAME-", "{name}"), ("FROM-", "{from}")];
+const PLACEHOLDERS: [(&str, &str); 3] =
+    [("RUN-", "{run}"), ("NAME-", "{name}"), ("FROM-", "{from}")];
 
 /// Where something is said, by what a robot does there.
 struct Channel {
@@ -32,31 +33,56 @@ enum Operation {
     /// A message comes to it, because it subscribes.
     Receive(&'static str),
     /// It asks, and is answered.
-    Ask { with: &'static str, answer: &'static str },
+    Ask {
+        with: &'static str,
+        answer: &'static str,
+    },
     /// It is asked, and answers.
     Answer(&'static str),
 }
 use Operation::{Answer as Replies, Ask, Receive, Send};
 
 fn placeholder(name: &'static str) -> RobotName {
-    RobotName::new(name).unwrap_or_else(|error| unreachable!("a placeholder is a legal name: {error}"))
+    RobotName::new(name)
+        .unwrap_or_else(|error| unreachable!("a placeholder is a legal name: {error}"))
 }
 
 /// The keys of a run, with placeholders for what is open.
 fn channels() -> Vec<Channel> {
     let run = RunName::new("RUN-").unwrap_or_else(|error| unreachable!("a legal name: {error}"));
     let (keys, robot, from) = (Keys::new(&run), placeholder("NAME-"), placeholder("FROM-"));
-    let channel = |name, key, what, messages, operations| Channel { name, key, what, messages, operations };
+    let channel = |name, key, what, messages, operations| Channel {
+        name,
+        key,
+        what,
+        messages,
+        operations,
+    };
     let mut channels = vec![
-        channel("clock", keys.clock(), "A tick is granted.", &["clock"], &[Receive("clock")]),
+        channel(
+            "clock",
+            keys.clock(),
+            "A tick is granted.",
+            &["clock"],
+            &[Receive("clock")],
+        ),
         channel(
             "join",
             keys.join_as(&robot),
             "A robot asks the simulator to take part.",
             &["join_request", "join_answer"],
-            &[Ask { with: "join_request", answer: "join_answer" }],
+            &[Ask {
+                with: "join_request",
+                answer: "join_answer",
+            }],
         ),
-        channel("report", keys.report(&robot), "A robot has done its tick.", &["report"], &[Send("report")]),
+        channel(
+            "report",
+            keys.report(&robot),
+            "A robot has done its tick.",
+            &["report"],
+            &[Send("report")],
+        ),
         channel(
             "waiting",
             keys.waiting(&robot),
@@ -77,7 +103,10 @@ fn channels() -> Vec<Channel> {
             "All that a robot lets others know, served by itself and put for those who follow. Parameters tick and epoch.",
             &["query", "public_state"],
             &[
-                Ask { with: "query", answer: "public_state" },
+                Ask {
+                    with: "query",
+                    answer: "public_state",
+                },
                 Replies("public_state"),
                 Send("public_state"),
                 Receive("public_state"),
@@ -88,9 +117,21 @@ fn channels() -> Vec<Channel> {
             keys.percept(&robot),
             "What a robot senses around itself, served by the simulator. Parameters tick and epoch.",
             &["query", "percept"],
-            &[Ask { with: "query", answer: "percept" }, Receive("percept")],
+            &[
+                Ask {
+                    with: "query",
+                    answer: "percept",
+                },
+                Receive("percept"),
+            ],
         ),
-        channel("panel", keys.panel(&robot), "What people see of a robot.", &["panel"], &[Send("panel")]),
+        channel(
+            "panel",
+            keys.panel(&robot),
+            "What people see of a robot.",
+            &["panel"],
+            &[Send("panel")],
+        ),
         channel(
             "control",
             keys.control(),
@@ -98,9 +139,27 @@ fn channels() -> Vec<Channel> {
             &["control", "control_answer"],
             &[],
         ),
-        channel("world", keys.world(), "The picture, for observers.", &["world_frame"], &[]),
-        channel("log", keys.log(), "What changes, as lines, for observers.", &["log_record"], &[]),
-        channel("faults", keys.faults(), "What the launcher does to processes.", &["fault_order"], &[]),
+        channel(
+            "world",
+            keys.world(),
+            "The picture, for observers.",
+            &["world_frame"],
+            &[],
+        ),
+        channel(
+            "log",
+            keys.log(),
+            "What changes, as lines, for observers.",
+            &["log_record"],
+            &[],
+        ),
+        channel(
+            "faults",
+            keys.faults(),
+            "What the launcher does to processes.",
+            &["fault_order"],
+            &[],
+        ),
         channel(
             "alive_robot",
             keys.alive_robot(&robot),
@@ -108,11 +167,23 @@ fn channels() -> Vec<Channel> {
             &[],
             &[],
         ),
-        channel("alive_sim", keys.alive_sim(), "Liveliness token of the simulator.", &[], &[]),
+        channel(
+            "alive_sim",
+            keys.alive_sim(),
+            "Liveliness token of the simulator.",
+            &[],
+            &[],
+        ),
     ];
     let query = |name| {
         let what = "One field of what a robot lets others know. Parameters tick and epoch.";
-        channel(name, keys.query(&robot, name), what, &["query", "answer"], &[Replies("answer")])
+        channel(
+            name,
+            keys.query(&robot, name),
+            what,
+            &["query", "answer"],
+            &[Replies("answer")],
+        )
     };
     channels.extend(QUERIES.map(query));
     channels
@@ -120,7 +191,11 @@ fn channels() -> Vec<Channel> {
 
 /// The address of a channel, with the names of its parameters in it.
 fn address(key: &str) -> String {
-    PLACEHOLDERS.iter().fold(key.to_owned(), |address, (name, parameter)| address.replace(name, parameter))
+    PLACEHOLDERS
+        .iter()
+        .fold(key.to_owned(), |address, (name, parameter)| {
+            address.replace(name, parameter)
+        })
 }
 
 fn parameters(address: &str) -> Value {
@@ -129,8 +204,12 @@ fn parameters(address: &str) -> Value {
         ("name", "Name of the robot that it is about."),
         ("from", "Name of the sender, or `operator`."),
     ];
-    let named = all.into_iter().filter(|(name, _)| address.contains(&format!("{{{name}}}")));
-    named.map(|(name, description)| (name.to_owned(), json!({ "description": description }))).collect()
+    let named = all
+        .into_iter()
+        .filter(|(name, _)| address.contains(&format!("{{{name}}}")));
+    named
+        .map(|(name, description)| (name.to_owned(), json!({ "description": description })))
+        .collect()
 }
 
 fn reference(path: &[&str]) -> Value {
@@ -140,7 +219,12 @@ fn reference(path: &[&str]) -> Value {
 impl Channel {
     fn document(&self) -> Value {
         let address = address(&self.key);
-        let message = |name: &&str| ((*name).to_owned(), reference(&["components", "messages", name]));
+        let message = |name: &&str| {
+            (
+                (*name).to_owned(),
+                reference(&["components", "messages", name]),
+            )
+        };
         json!({
             "parameters": parameters(&address),
             "address": address,
@@ -153,7 +237,8 @@ impl Channel {
         let channel = || reference(&["channels", self.name]);
         let message = |name: &str| json!([reference(&["channels", self.name, "messages", name])]);
         let plain = |verb: &str, action: &str, name: &str| {
-            let operation = json!({ "action": action, "channel": channel(), "messages": message(name) });
+            let operation =
+                json!({ "action": action, "channel": channel(), "messages": message(name) });
             (format!("{verb}_{}", self.name), operation)
         };
         let query = |verb: &str, action: &str, with: &str, answer: &str| {
@@ -195,7 +280,8 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
     ];
     let described = |(name, of): (&str, Of)| (name.to_owned(), json!({ "payload": of(schemas) }));
     let mut messages: Map<String, Value> = all.into_iter().map(described).collect();
-    let summary = "A query without a payload; its parameters say as of which tick: `tick=12;epoch=1`.";
+    let summary =
+        "A query without a payload; its parameters say as of which tick: `tick=12;epoch=1`.";
     messages.insert("query".to_owned(), json!({ "summary": summary }));
     messages
 }
@@ -210,9 +296,12 @@ pub fn document() -> Value {
     let mut schemas = settings.into_generator();
     let messages = messages(&mut schemas);
     let channels = channels();
-    let operations = channels
-        .iter()
-        .flat_map(|channel| channel.operations.iter().map(|operation| channel.operation(operation)));
+    let operations = channels.iter().flat_map(|channel| {
+        channel
+            .operations
+            .iter()
+            .map(|operation| channel.operation(operation))
+    });
     json!({
         "asyncapi": "3.0.0",
         "info": {

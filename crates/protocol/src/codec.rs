@@ -35,13 +35,19 @@ pub trait Message: Serialize + DeserializeOwned {
 pub fn encode<M: Message>(message: &M) -> Vec<u8> {
     // Messages are structs of numbers, strings and maps with string keys: there is no value of theirs that JSON
     // cannot write.
-    serde_json::to_vec(message).unwrap_or_else(|error| unreachable!("a message is always JSON: {error}"))
+    serde_json::to_vec(message)
+        .unwrap_or_else(|error| unreachable!("a message is always JSON: {error}"))
 }
 
 fn shortened(mut text: String) -> String {
     const MAX_BYTES: usize = 500;
     if text.len() > MAX_BYTES {
-        text.truncate((0..=MAX_BYTES).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0));
+        text.truncate(
+            (0..=MAX_BYTES)
+                .rev()
+                .find(|at| text.is_char_boundary(*at))
+                .unwrap_or(0),
+        );
         text += "...";
     }
     text
@@ -60,13 +66,19 @@ pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Ma
         reason: shortened(reason),
     };
     if bytes.len() > MAX_MESSAGE_BYTES {
-        let reason = format!("{} bytes, more than the {MAX_MESSAGE_BYTES} allowed", bytes.len());
+        let reason = format!(
+            "{} bytes, more than the {MAX_MESSAGE_BYTES} allowed",
+            bytes.len()
+        );
         return Err(malformed(".".to_owned(), reason));
     }
     let mut json = serde_json::Deserializer::from_slice(bytes);
     let message: M = serde_path_to_error::deserialize(&mut json)
         .map_err(|error| malformed(error.path().to_string(), error.inner().to_string()))?;
-    json.end().map_err(|error| malformed(".".to_owned(), error.to_string()))?;
-    message.check().map_err(|(field, reason)| malformed(field, reason))?;
+    json.end()
+        .map_err(|error| malformed(".".to_owned(), error.to_string()))?;
+    message
+        .check()
+        .map_err(|(field, reason)| malformed(field, reason))?;
     Ok(message)
 }

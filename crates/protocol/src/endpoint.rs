@@ -14,7 +14,9 @@ fn parts(endpoint: &str) -> Option<(&str, &str)> {
 /// The host and the port of an address; brackets around an IPv6 host are not part of it.
 fn host_and_port(address: &str) -> Option<(&str, &str)> {
     let (host, port) = address.rsplit_once(':')?;
-    let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
+    let bare = host
+        .strip_prefix('[')
+        .and_then(|host| host.strip_suffix(']'));
     Some((bare.unwrap_or(host), port))
 }
 
@@ -33,7 +35,9 @@ pub fn is_tls(endpoint: &str) -> bool {
 /// ```
 #[must_use]
 pub fn is_local(endpoint: &str) -> bool {
-    let Some((protocol, address)) = parts(endpoint) else { return false };
+    let Some((protocol, address)) = parts(endpoint) else {
+        return false;
+    };
     if protocol == "unixsock-stream" {
         return true;
     }
@@ -48,11 +52,19 @@ pub fn is_local(endpoint: &str) -> bool {
 /// `0.0.0.0`, is none that a certificate could name.
 #[must_use]
 pub fn connectable(endpoint: &str) -> String {
-    let Some((protocol, address)) = parts(endpoint) else { return endpoint.to_owned() };
-    let Some((host, port)) = host_and_port(address) else { return endpoint.to_owned() };
+    let Some((protocol, address)) = parts(endpoint) else {
+        return endpoint.to_owned();
+    };
+    let Some((host, port)) = host_and_port(address) else {
+        return endpoint.to_owned();
+    };
     match host.parse::<IpAddr>() {
-        Ok(IpAddr::V4(Ipv4Addr::UNSPECIFIED)) => format!("{protocol}/{}:{port}", Ipv4Addr::LOCALHOST),
-        Ok(IpAddr::V6(Ipv6Addr::UNSPECIFIED)) => format!("{protocol}/[{}]:{port}", Ipv6Addr::LOCALHOST),
+        Ok(IpAddr::V4(Ipv4Addr::UNSPECIFIED)) => {
+            format!("{protocol}/{}:{port}", Ipv4Addr::LOCALHOST)
+        }
+        Ok(IpAddr::V6(Ipv6Addr::UNSPECIFIED)) => {
+            format!("{protocol}/[{}]:{port}", Ipv6Addr::LOCALHOST)
+        }
         _ => endpoint.to_owned(),
     }
 }

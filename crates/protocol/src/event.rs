@@ -200,7 +200,9 @@ pub enum Event {
 }
 
 /// Why the medium lost a message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
     /// By chance.
@@ -225,7 +227,8 @@ impl Line {
     /// The line of `events.jsonl`, without its end of line.
     #[must_use]
     pub fn to_json(&self) -> String {
-        serde_json::to_string(self).unwrap_or_else(|error| unreachable!("an event is always JSON: {error}"))
+        serde_json::to_string(self)
+            .unwrap_or_else(|error| unreachable!("an event is always JSON: {error}"))
     }
 }
 
@@ -237,56 +240,116 @@ impl Event {
         let says = |robot: &RobotName, kind, text: String| Some((robot.to_string(), kind, text));
         match self {
             Self::Init { seed, .. } => simulator(LogKind::Run, format!("initialized, seed {seed}")),
-            Self::Joined { robot, generation: None, at } => {
-                says(robot, LogKind::Membership, format!("takes part, at {:.2} m, {:.2} m", at.x, at.y))
-            }
-            Self::Joined { robot, generation: Some(generation), .. } => {
-                says(robot, LogKind::Membership, format!("is back as incarnation {generation}"))
-            }
+            Self::Joined {
+                robot,
+                generation: None,
+                at,
+            } => says(
+                robot,
+                LogKind::Membership,
+                format!("takes part, at {:.2} m, {:.2} m", at.x, at.y),
+            ),
+            Self::Joined {
+                robot,
+                generation: Some(generation),
+                ..
+            } => says(
+                robot,
+                LogKind::Membership,
+                format!("is back as incarnation {generation}"),
+            ),
             Self::Lost { robot } => says(robot, LogKind::Membership, "is lost".to_owned()),
-            Self::Missed { robot } => says(robot, LogKind::Membership, "missed the tick".to_owned()),
-            Self::Fault { robot, kind, begins } => {
+            Self::Missed { robot } => {
+                says(robot, LogKind::Membership, "missed the tick".to_owned())
+            }
+            Self::Fault {
+                robot,
+                kind,
+                begins,
+            } => {
                 let what = match kind {
                     FaultKind::Crash => "the process is killed",
                     FaultKind::Hang => "the process is stopped",
                     FaultKind::Slow => "the process is slowed down",
                 };
-                let text =
-                    if *begins { format!("fault: {what}") } else { format!("fault over: {what} no more") };
+                let text = if *begins {
+                    format!("fault: {what}")
+                } else {
+                    format!("fault over: {what} no more")
+                };
                 says(robot, LogKind::Membership, text)
             }
-            Self::Emotion { robot, from, to } => {
-                says(robot, LogKind::Emotion, change("emotion", from.as_ref(), to))
-            }
-            Self::Behavior { robot, from, to } => {
-                says(robot, LogKind::Behavior, change("behavior", from.as_ref(), to))
-            }
-            Self::CommandSent { from, to, performative, command, .. } => {
-                says(from, LogKind::Command, format!("-> {to}: {command} ({performative})"))
-            }
-            Self::CommandDelivered { from, to, seq } => {
-                says(to, LogKind::Command, format!("receives command {seq} of {from}"))
-            }
-            Self::CommandDropped { from, to, seq, because } => {
-                says(to, LogKind::Command, format!("command {seq} of {from} was lost on the way, {because}"))
-            }
-            Self::CommandDelayed { from, to, seq, until } => {
-                says(to, LogKind::Command, format!("command {seq} of {from} is held back until tick {until}"))
-            }
-            Self::CommandDuplicated { from, to, seq } => {
-                says(to, LogKind::Command, format!("command {seq} of {from} comes twice"))
-            }
-            Self::LinkCut { from, to, commands, queries } => {
+            Self::Emotion { robot, from, to } => says(
+                robot,
+                LogKind::Emotion,
+                change("emotion", from.as_ref(), to),
+            ),
+            Self::Behavior { robot, from, to } => says(
+                robot,
+                LogKind::Behavior,
+                change("behavior", from.as_ref(), to),
+            ),
+            Self::CommandSent {
+                from,
+                to,
+                performative,
+                command,
+                ..
+            } => says(
+                from,
+                LogKind::Command,
+                format!("-> {to}: {command} ({performative})"),
+            ),
+            Self::CommandDelivered { from, to, seq } => says(
+                to,
+                LogKind::Command,
+                format!("receives command {seq} of {from}"),
+            ),
+            Self::CommandDropped {
+                from,
+                to,
+                seq,
+                because,
+            } => says(
+                to,
+                LogKind::Command,
+                format!("command {seq} of {from} was lost on the way, {because}"),
+            ),
+            Self::CommandDelayed {
+                from,
+                to,
+                seq,
+                until,
+            } => says(
+                to,
+                LogKind::Command,
+                format!("command {seq} of {from} is held back until tick {until}"),
+            ),
+            Self::CommandDuplicated { from, to, seq } => says(
+                to,
+                LogKind::Command,
+                format!("command {seq} of {from} comes twice"),
+            ),
+            Self::LinkCut {
+                from,
+                to,
+                commands,
+                queries,
+            } => {
                 let what = match (commands, queries) {
                     (true, true) => "commands and queries",
                     (true, false) => "commands",
                     _ => "queries",
                 };
-                simulator(LogKind::Network, format!("{what} from {from} to {to} are cut"))
+                simulator(
+                    LogKind::Network,
+                    format!("{what} from {from} to {to} are cut"),
+                )
             }
-            Self::LinkHealed { from, to } => {
-                simulator(LogKind::Network, format!("messages from {from} to {to} pass again"))
-            }
+            Self::LinkHealed { from, to } => simulator(
+                LogKind::Network,
+                format!("messages from {from} to {to} pass again"),
+            ),
             Self::CommandMissing { from, to, seq } => says(
                 to,
                 LogKind::Command,
@@ -317,5 +380,8 @@ fn change(what: &str, from: Option<&String>, to: &str) -> String {
 /// A line of the readable log, in columns: simulated time, source, text.
 #[must_use]
 pub fn log_line(record: &LogRecord) -> String {
-    format!("{:>9.1} s  {:<12} {}", record.time_s, record.source, record.text)
+    format!(
+        "{:>9.1} s  {:<12} {}",
+        record.time_s, record.source, record.text
+    )
 }

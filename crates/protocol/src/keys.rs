@@ -18,8 +18,14 @@ pub struct Keys {
 }
 
 /// The six queries of the common robot interface, as the last chunk of their keys (seed, Figure 7).
-pub const QUERIES: [&str; 6] =
-    ["location", "speed", "direction", "state_variables", "emotion_state", "behavior_state"];
+pub const QUERIES: [&str; 6] = [
+    "location",
+    "speed",
+    "direction",
+    "state_variables",
+    "emotion_state",
+    "behavior_state",
+];
 
 /// All six answers in one: what a robot asks for when it wants more than one of them in a tick. One reply costs
 /// half of what six do.
@@ -29,13 +35,17 @@ impl Keys {
     /// The keys of run `run`.
     #[must_use]
     pub fn new(run: &RunName) -> Self {
-        Self { root: format!("cars/{run}") }
+        Self {
+            root: format!("cars/{run}"),
+        }
     }
 
     /// The keys of all runs: what is not about one run, as access control is not.
     #[must_use]
     pub fn of_any_run() -> Self {
-        Self { root: "cars/*".to_owned() }
+        Self {
+            root: "cars/*".to_owned(),
+        }
     }
 
     /// Everything that is said in the run.

@@ -20,17 +20,26 @@ pub struct BadName {
 }
 
 fn checked(name: &str) -> Result<String, BadName> {
-    let refuse = |reason| Err(BadName { name: name.chars().take(MAX_NAME_LEN).collect(), reason });
+    let refuse = |reason| {
+        Err(BadName {
+            name: name.chars().take(MAX_NAME_LEN).collect(),
+            reason,
+        })
+    };
     if name.is_empty() {
         return refuse("it is empty");
     }
     if name.len() > MAX_NAME_LEN {
         return refuse("it is longer than 64 characters");
     }
-    if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-' || c == '.')
+    if !name
+        .chars()
+        .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-' || c == '.')
         || name.starts_with('.')
     {
-        return refuse("only letters, digits, '_', '-' and '.' may stand in it, and no leading '.'");
+        return refuse(
+            "only letters, digits, '_', '-' and '.' may stand in it, and no leading '.'",
+        );
     }
     Ok(name.to_owned())
 }

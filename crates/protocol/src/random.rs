@@ -31,7 +31,9 @@ pub fn unit(stream: &mut Stream) -> f64 {
 fn fnv1a(bytes: &[u8]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
-    bytes.iter().fold(OFFSET, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(PRIME))
+    bytes.iter().fold(OFFSET, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(PRIME)
+    })
 }
 
 #[cfg(test)]
@@ -64,7 +66,11 @@ mod tests {
 
     #[test]
     fn streams_follow_the_published_derivation() {
-        for (seed, name) in [(0, "guests"), (42, "robot/Butler"), (MAX_SEED, "robot/Leguin")] {
+        for (seed, name) in [
+            (0, "guests"),
+            (42, "robot/Butler"),
+            (MAX_SEED, "robot/Leguin"),
+        ] {
             let mut stream = stream(seed, name);
             let drawn: [u64; 3] = std::array::from_fn(|_| stream.next_u64());
             assert_eq!(drawn, reference(seed, name), "seed {seed}, stream {name}");

@@ -9,8 +9,7 @@ use std::os::unix::process::CommandExt;
 pub const RUNTIME_VARIABLE: &str = "ZENOH_RUNTIME";
 
 /// All duties handed over to one runtime with one worker.
-pub const ONE_THREAD: &str =
-    "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))";
+pub const ONE_THREAD: &str = "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))";
 
 /// Makes this process use the lock-step thread set-up unless the environment already chooses one.
 ///
@@ -21,12 +20,17 @@ pub fn use_one_thread() {
     if std::env::var_os(RUNTIME_VARIABLE).is_some() {
         return;
     }
-    let Ok(program) = std::env::current_exe() else { return };
+    let Ok(program) = std::env::current_exe() else {
+        return;
+    };
     let mut arguments = std::env::args_os();
     let mut command = std::process::Command::new(program);
     if let Some(name) = arguments.next() {
         command.arg0(name);
     }
-    let error = command.args(arguments).env(RUNTIME_VARIABLE, ONE_THREAD).exec();
+    let error = command
+        .args(arguments)
+        .env(RUNTIME_VARIABLE, ONE_THREAD)
+        .exec();
     tracing::warn!(%error, "could not apply the lock-step thread set-up");
 }

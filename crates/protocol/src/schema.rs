@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::messages::{
-    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, Panel, Percept,
-    PublicState, RecordedTick, RecordingHeader, Report, Waiting, WorldFrame,
+    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, Panel,
+    Percept, PublicState, RecordedTick, RecordingHeader, Report, Waiting, WorldFrame,
 };
 
 /// The schema of every message, by the name of its file.

@@ -43,8 +43,16 @@ pub fn client_config(name: &str, credentials: &Credentials) -> String {
     );
     let mut tree = Tree::of([CLIENT_MODE].iter().chain(&SETTINGS));
     let endpoints = format!("[{:?}]", tls_endpoint());
-    tree.add("connect/endpoints", "Where the simulator listens.", &endpoints);
-    tree.add("connect/timeout_ms", "How long to go on trying to reach it, milliseconds.", "20000");
+    tree.add(
+        "connect/endpoints",
+        "Where the simulator listens.",
+        &endpoints,
+    );
+    tree.add(
+        "connect/timeout_ms",
+        "How long to go on trying to reach it, milliseconds.",
+        "20000",
+    );
     tree.add_tls("connect", credentials);
     tree.write(&mut text);
     text
@@ -64,17 +72,36 @@ pub fn simulator_config(keys: &Keys, robots: &[RobotName], credentials: &Credent
     let endpoints = format!("[{:?}]", tls_endpoint());
     tree.add("listen/endpoints", "Where it listens.", &endpoints);
     tree.add_tls("listen", credentials);
-    let mut grants: Vec<(&str, Vec<Grant>)> =
-        robots.iter().map(|robot| (robot.as_str(), of_robot(keys, robot))).collect();
+    let mut grants: Vec<(&str, Vec<Grant>)> = robots
+        .iter()
+        .map(|robot| (robot.as_str(), of_robot(keys, robot)))
+        .collect();
     grants.extend([OPERATOR, CONSOLE].map(|name| (name, of_operator(keys))));
     tree.add("access_control/enabled", "", "true");
-    tree.add("access_control/default_permission", "What no rule allows is refused.", "\"deny\"");
-    tree.add("access_control/rules", "What may be said, and on which keys.", &rules(keys, &grants));
-    let subjects =
-        grants.iter().map(|(name, _)| format!("{{ id: {name:?}, cert_common_names: [{name:?}] }}"));
-    tree.add("access_control/subjects", "Who somebody is, is what the certificate says.", &list(subjects));
+    tree.add(
+        "access_control/default_permission",
+        "What no rule allows is refused.",
+        "\"deny\"",
+    );
+    tree.add(
+        "access_control/rules",
+        "What may be said, and on which keys.",
+        &rules(keys, &grants),
+    );
+    let subjects = grants
+        .iter()
+        .map(|(name, _)| format!("{{ id: {name:?}, cert_common_names: [{name:?}] }}"));
+    tree.add(
+        "access_control/subjects",
+        "Who somebody is, is what the certificate says.",
+        &list(subjects),
+    );
     let policies = grants.iter().map(|(name, grants)| policy(name, grants));
-    tree.add("access_control/policies", "Who may do what.", &list(policies));
+    tree.add(
+        "access_control/policies",
+        "Who may do what.",
+        &list(policies),
+    );
     tree.write(&mut text);
     text
 }
@@ -93,7 +120,9 @@ fn rules(keys: &Keys, grants: &[(&str, Vec<Grant>)]) -> String {
         "{{ id: {ANSWERS:?}, permission: \"allow\", flows: [\"egress\"], messages: [{all}],\n  key_exprs: [{:?}] }}",
         keys.all()
     );
-    let inward = grants.iter().flat_map(|(name, grants)| grants.iter().map(move |grant| rule(name, grant)));
+    let inward = grants
+        .iter()
+        .flat_map(|(name, grants)| grants.iter().map(move |grant| rule(name, grant)));
     list([outward].into_iter().chain(inward))
 }
 
@@ -112,8 +141,13 @@ fn rule_id(name: &str, grant: &Grant) -> String {
 }
 
 fn policy(name: &str, grants: &[Grant]) -> String {
-    let rules = [ANSWERS.to_owned()].into_iter().chain(grants.iter().map(|grant| rule_id(name, grant)));
-    format!("{{ subjects: [{name:?}], rules: {:?} }}", rules.collect::<Vec<_>>())
+    let rules = [ANSWERS.to_owned()]
+        .into_iter()
+        .chain(grants.iter().map(|grant| rule_id(name, grant)));
+    format!(
+        "{{ subjects: [{name:?}], rules: {:?} }}",
+        rules.collect::<Vec<_>>()
+    )
 }
 
 fn list(items: impl Iterator<Item = String>) -> String {
@@ -137,7 +171,9 @@ impl Tree {
     }
 
     fn add(&mut self, path: &str, why: &str, value: &str) {
-        let leaf = path.split('/').fold(self, |tree, step| tree.branches.entry(step.to_owned()).or_default());
+        let leaf = path.split('/').fold(self, |tree, step| {
+            tree.branches.entry(step.to_owned()).or_default()
+        });
         (leaf.value, leaf.why) = (Some(value.to_owned()), why.to_owned());
     }
 
@@ -147,11 +183,27 @@ impl Tree {
             self.add(&format!("transport/link/tls/{key}"), why, value);
         };
         add("enable_mtls", "Both sides show a certificate.", "true");
-        add("verify_name_on_connect", "The simulator's names the host it is reached by.", "true");
+        add(
+            "verify_name_on_connect",
+            "The simulator's names the host it is reached by.",
+            "true",
+        );
         for (key, why, pem) in [
-            ("root_ca_certificate_base64".to_owned(), "ca.pem", credentials.ca),
-            (format!("{side}_certificate_base64"), "cert.pem", credentials.certificate),
-            (format!("{side}_private_key_base64"), "key.pem, which is secret", credentials.key),
+            (
+                "root_ca_certificate_base64".to_owned(),
+                "ca.pem",
+                credentials.ca,
+            ),
+            (
+                format!("{side}_certificate_base64"),
+                "cert.pem",
+                credentials.certificate,
+            ),
+            (
+                format!("{side}_private_key_base64"),
+                "key.pem, which is secret",
+                credentials.key,
+            ),
         ] {
             add(&key, why, &format!("{:?}", STANDARD.encode(pem)));
         }

@@ -3,8 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use protocol::messages::{
-    Clock, Command, CommandId, Control, Correction, Face, JoinRequest, News, Panel, Performative, Point,
-    Report, SensedRobot, SentCommand, Tone, Variable, Widget,
+    Clock, Command, CommandId, Control, Correction, Face, JoinRequest, News, Panel, Performative,
+    Point, Report, SensedRobot, SentCommand, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode, schema};
 
@@ -34,7 +34,10 @@ fn report() -> Report {
             performative: Performative::Achieve,
             command: "refill".into(),
         }],
-        missing: vec![CommandId { from: name("Vonda"), seq: 1 }],
+        missing: vec![CommandId {
+            from: name("Vonda"),
+            seq: 1,
+        }],
         log: vec!["jokes".into()],
     }
 }
@@ -53,13 +56,27 @@ fn round_trip<M: Message + PartialEq + std::fmt::Debug>(message: &M) {
 fn what_is_written_is_read_back_to_the_last_bit() {
     round_trip(&report());
     let news = News {
-        correction: Some(Correction { location: Point::new(1.0, 2.0), blocked: true }),
-        commands: vec![CommandId { from: name("Butler"), seq: 1 }],
+        correction: Some(Correction {
+            location: Point::new(1.0, 2.0),
+            blocked: true,
+        }),
+        commands: vec![CommandId {
+            from: name("Butler"),
+            seq: 1,
+        }],
         unreachable: vec![name("Vonda")],
-        sensed: vec![SensedRobot { name: name("Vonda"), location: Point::new(0.3, 0.7) }],
+        sensed: vec![SensedRobot {
+            name: name("Vonda"),
+            location: Point::new(0.3, 0.7),
+        }],
         joined: Some(2),
     };
-    round_trip(&Clock { epoch: 2, tick: 7, news: [(name("Leguin"), news)].into(), end: None });
+    round_trip(&Clock {
+        epoch: 2,
+        tick: 7,
+        news: [(name("Leguin"), news)].into(),
+        end: None,
+    });
     round_trip(&Command {
         epoch: 1,
         tick: 2,
@@ -69,16 +86,30 @@ fn what_is_written_is_read_back_to_the_last_bit() {
     });
     round_trip(&Control::Step { n: 10 });
     let widgets = vec![
-        Widget::Face { face: Face::Happy, intensity: 0.5 },
-        Widget::Badge { label: "emotion".into(), text: "HAPPY".into(), tone: Tone::Good },
-        Widget::Button { label: "Refill".into(), command: "refill".into() },
+        Widget::Face {
+            face: Face::Happy,
+            intensity: 0.5,
+        },
+        Widget::Badge {
+            label: "emotion".into(),
+            text: "HAPPY".into(),
+            tone: Tone::Good,
+        },
+        Widget::Button {
+            label: "Refill".into(),
+            command: "refill".into(),
+        },
     ];
     round_trip(&Panel { widgets });
 }
 
 #[test]
 fn a_quiet_clock_is_small() {
-    let clock = Clock { epoch: 1, tick: 123_456, ..Clock::default() };
+    let clock = Clock {
+        epoch: 1,
+        tick: 123_456,
+        ..Clock::default()
+    };
     assert_eq!(encode(&clock), br#"{"epoch":1,"tick":123456}"#);
 }
 
@@ -107,8 +138,16 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
         (r#""tick":12"#, r#""tick":-1"#, "tick"),
         (r#""tick":12,"#, "", "."),
         (r#""x":0.30000000000000004"#, r#""x":null"#, "proposal.x"),
-        (r#""speed_mps":0.3333333333333333"#, r#""speed_mps":1e999"#, "speed_mps"),
-        (r#""treats":7.0"#, r#""treats":[7]"#, "state_variables.treats"),
+        (
+            r#""speed_mps":0.3333333333333333"#,
+            r#""speed_mps":1e999"#,
+            "speed_mps",
+        ),
+        (
+            r#""treats":7.0"#,
+            r#""treats":[7]"#,
+            "state_variables.treats",
+        ),
         (r#""to":"Leguin""#, r#""to":"Le/guin""#, "sent[0].to"),
         (r#""seq":3"#, r#""seq":3.5"#, "sent[0].seq"),
         (r#"{"epoch""#, r#"["epoch""#, "[0]"),
@@ -131,13 +170,29 @@ fn sizes_are_bounded() {
 
     let mut many = report();
     many.log = vec![String::new(); 2000];
-    assert_eq!(decode::<Report>("key", "Butler", &encode(&many)).unwrap_err().field, "log");
+    assert_eq!(
+        decode::<Report>("key", "Butler", &encode(&many))
+            .unwrap_err()
+            .field,
+        "log"
+    );
 
     let huge = vec![b' '; 2 << 20];
-    assert!(decode::<Report>("key", "Butler", &huge).unwrap_err().reason.contains("bytes"));
     assert!(
-        decode::<Panel>("key", "x", &encode(&Panel { widgets: vec![Widget::Table { rows: vec![] }; 100] }))
-            .is_err()
+        decode::<Report>("key", "Butler", &huge)
+            .unwrap_err()
+            .reason
+            .contains("bytes")
+    );
+    assert!(
+        decode::<Panel>(
+            "key",
+            "x",
+            &encode(&Panel {
+                widgets: vec![Widget::Table { rows: vec![] }; 100]
+            })
+        )
+        .is_err()
     );
 }
 
@@ -146,7 +201,9 @@ fn garbage_never_panics() {
     for seed in 0..2000 {
         let mut stream = protocol::random::stream(seed, "garbage");
         let len = rand::RngExt::random_range(&mut stream, 0..200);
-        let bytes: Vec<u8> = (0..len).map(|_| rand::RngExt::random(&mut stream)).collect();
+        let bytes: Vec<u8> = (0..len)
+            .map(|_| rand::RngExt::random(&mut stream))
+            .collect();
         assert!(decode::<Report>("key", "x", &bytes).is_err());
         assert!(decode::<JoinRequest>("key", "x", &bytes).is_err());
     }
@@ -168,7 +225,11 @@ fn the_schemas_on_file_are_those_of_the_types() {
             std::fs::write(&file, &text).unwrap();
         }
         let on_file = std::fs::read_to_string(&file).unwrap_or_default();
-        assert!(on_file == text, "{} is out of date: run the test with CARS_UPDATE=1", file.display());
+        assert!(
+            on_file == text,
+            "{} is out of date: run the test with CARS_UPDATE=1",
+            file.display()
+        );
     }
 }
 
@@ -182,7 +243,11 @@ fn the_asyncapi_document_on_file_is_that_of_the_types() {
         std::fs::write(&file, &text).unwrap();
     }
     let on_file = std::fs::read_to_string(&file).unwrap_or_default();
-    assert!(on_file == text, "{} is out of date: run the test with CARS_UPDATE=1", file.display());
+    assert!(
+        on_file == text,
+        "{} is out of date: run the test with CARS_UPDATE=1",
+        file.display()
+    );
 }
 
 /// All values of `$ref` in a document.
@@ -207,20 +272,33 @@ fn the_asyncapi_document_holds_together() {
     assert!(references.len() > 100, "{}", references.len());
     for reference in references {
         let path = reference.strip_prefix('#').unwrap();
-        assert!(document.pointer(path).is_some(), "{reference} leads nowhere");
+        assert!(
+            document.pointer(path).is_some(),
+            "{reference} leads nowhere"
+        );
     }
     for (name, channel) in document["channels"].as_object().unwrap() {
         let address = channel["address"].as_str().unwrap();
         let parameters = channel["parameters"].as_object().unwrap();
-        let open: Vec<&str> = address.split('/').filter_map(|chunk| chunk.strip_prefix('{')).collect();
+        let open: Vec<&str> = address
+            .split('/')
+            .filter_map(|chunk| chunk.strip_prefix('{'))
+            .collect();
         assert_eq!(open.len(), parameters.len(), "{name}: {address}");
-        assert!(open.iter().all(|chunk| parameters.contains_key(chunk.trim_end_matches('}'))), "{address}");
+        assert!(
+            open.iter()
+                .all(|chunk| parameters.contains_key(chunk.trim_end_matches('}'))),
+            "{address}"
+        );
         assert!(!address.contains('-'), "a placeholder is left in {address}");
     }
     // Every message that has a schema on file and travels has one here, too.
     let messages = document["components"]["messages"].as_object().unwrap();
     let on_disk_only = ["event", "recorded_tick", "recording_header"];
-    for name in schema::all().keys().filter(|name| !on_disk_only.contains(name)) {
+    for name in schema::all()
+        .keys()
+        .filter(|name| !on_disk_only.contains(name))
+    {
         assert!(messages.contains_key(*name), "{name}");
     }
 }

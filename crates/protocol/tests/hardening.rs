@@ -6,8 +6,8 @@
 use proptest::prelude::*;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, Percept, PublicState, RecordedTick, RecordingHeader,
-    Report, Waiting, WorldFrame,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, Percept, PublicState, RecordedTick,
+    RecordingHeader, Report, Waiting, WorldFrame,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde_json::Value;
@@ -41,8 +41,13 @@ fn odd() -> impl Strategy<Value = Value> {
         .prop_map(Value::from),
         prop_oneof![Just(u64::MAX), Just(1 << 53), any::<u64>()].prop_map(Value::from),
         any::<i64>().prop_map(Value::from),
-        prop_oneof![Just(String::new()), "\\PC{0,40}", Just("x".repeat(5000)), Just("../../etc".to_owned())]
-            .prop_map(Value::from),
+        prop_oneof![
+            Just(String::new()),
+            "\\PC{0,40}",
+            Just("x".repeat(5000)),
+            Just("../../etc".to_owned())
+        ]
+        .prop_map(Value::from),
         Just(Value::Array(Vec::new())),
         Just(Value::Object(serde_json::Map::new())),
         (0_usize..3000).prop_map(|n| Value::Array(vec![Value::from("x"); n])),
@@ -57,7 +62,9 @@ fn replace(value: &mut Value, at: &mut usize, with: &Value) {
     *at = at.wrapping_sub(1);
     match value {
         Value::Array(values) => values.iter_mut().for_each(|value| replace(value, at, with)),
-        Value::Object(fields) => fields.values_mut().for_each(|value| replace(value, at, with)),
+        Value::Object(fields) => fields
+            .values_mut()
+            .for_each(|value| replace(value, at, with)),
         _ => {}
     }
 }
@@ -72,8 +79,15 @@ fn survives(bytes: &[u8]) {
             }
             Err(error) => {
                 let text = error.to_string();
-                assert!(text.contains("cars/demo/key") && text.contains("somebody"), "{text}");
-                assert!(text.len() < 2000, "an error repeats no whole message: {} bytes", text.len());
+                assert!(
+                    text.contains("cars/demo/key") && text.contains("somebody"),
+                    "{text}"
+                );
+                assert!(
+                    text.len() < 2000,
+                    "an error repeats no whole message: {} bytes",
+                    text.len()
+                );
             }
         }
     }

@@ -11,7 +11,14 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A reliable network in which everything is late.
 fn slow(seed: u64) -> MemoryNetwork {
-    MemoryNetwork::new(seed, Faults { nap: 0.2, longest: Duration::from_millis(1), ..Faults::default() })
+    MemoryNetwork::new(
+        seed,
+        Faults {
+            nap: 0.2,
+            longest: Duration::from_millis(1),
+            ..Faults::default()
+        },
+    )
 }
 
 fn listen(bus: &Bus, keys: &str) -> (Receiver<String>, Declared) {
@@ -24,7 +31,9 @@ fn listen(bus: &Bus, keys: &str) -> (Receiver<String>, Declared) {
 
 fn tokens(bus: &Bus, keys: &str) -> (Receiver<(String, bool)>, Declared) {
     let (sender, seen) = channel();
-    let declared = bus.watch(keys, move |key, is_there| drop(sender.send((key.to_owned(), is_there))));
+    let declared = bus.watch(keys, move |key, is_there| {
+        drop(sender.send((key.to_owned(), is_there)))
+    });
     (seen, declared.unwrap())
 }
 
@@ -36,9 +45,13 @@ fn a_link_keeps_its_order_and_a_token_comes_after_what_was_declared_before() {
         let (seen, _watch) = tokens(&b, "alive/*");
         let (messages, _subscription) = listen(&a, "to/*/a");
         let _token = a.token("alive/a").unwrap();
-        assert_eq!(seen.recv_timeout(PATIENCE), Ok(("alive/a".to_owned(), true)));
+        assert_eq!(
+            seen.recv_timeout(PATIENCE),
+            Ok(("alive/a".to_owned(), true))
+        );
         for n in 0..20 {
-            b.put(&format!("to/{n}/a"), n.to_string().into_bytes()).unwrap();
+            b.put(&format!("to/{n}/a"), n.to_string().into_bytes())
+                .unwrap();
             b.put(&format!("to/{n}/b"), b"not for a".to_vec()).unwrap();
         }
         for n in 0..20 {
@@ -50,8 +63,13 @@ fn a_link_keeps_its_order_and_a_token_comes_after_what_was_declared_before() {
 #[test]
 fn the_seed_chooses_the_order_between_links() {
     let order = |seed| {
-        let network =
-            MemoryNetwork::new(seed, Faults { pause: Duration::from_millis(2), ..Faults::default() });
+        let network = MemoryNetwork::new(
+            seed,
+            Faults {
+                pause: Duration::from_millis(2),
+                ..Faults::default()
+            },
+        );
         let (a, b, to) = (network.client(), network.client(), network.router());
         let (messages, _subscription) = listen(&to, "from/*");
         let (seen, _watch) = tokens(&a, "there");
@@ -61,7 +79,9 @@ fn the_seed_chooses_the_order_between_links() {
             a.put("from/a", vec![b'0' + n]).unwrap();
             b.put("from/b", vec![b'0' + n]).unwrap();
         }
-        (0..16).map(|_| messages.recv_timeout(PATIENCE).unwrap()).collect::<Vec<_>>()
+        (0..16)
+            .map(|_| messages.recv_timeout(PATIENCE).unwrap())
+            .collect::<Vec<_>>()
     };
     assert!((1..10).any(|seed| order(seed) != order(0)));
 }
@@ -70,7 +90,10 @@ fn the_seed_chooses_the_order_between_links() {
 fn a_question_has_one_answer_or_ends() {
     let network = slow(1);
     let (a, b) = (network.client(), network.client());
-    assert!(a.ask("where/b", "", None).unwrap().is_none(), "nobody serves it");
+    assert!(
+        a.ask("where/b", "", None).unwrap().is_none(),
+        "nobody serves it"
+    );
     let served = b.serve("where/*", |question| match question.parameter("tick") {
         Some("1") => question.answer(question.key(), question.body()),
         Some(_) => question.refuse("another tick"),
@@ -79,14 +102,29 @@ fn a_question_has_one_answer_or_ends() {
     let (seen, _watch) = tokens(&a, "alive/b");
     let token = b.token("alive/b").unwrap();
     seen.recv_timeout(PATIENCE).unwrap();
-    let answer = a.ask("where/b", "tick=1;epoch=2", Some(b"here".to_vec())).unwrap().unwrap();
-    assert_eq!((answer.key.as_str(), answer.result), ("where/b", Ok(b"here".to_vec())));
+    let answer = a
+        .ask("where/b", "tick=1;epoch=2", Some(b"here".to_vec()))
+        .unwrap()
+        .unwrap();
+    assert_eq!(
+        (answer.key.as_str(), answer.result),
+        ("where/b", Ok(b"here".to_vec()))
+    );
     let answer = a.ask("where/b", "epoch=2;tick=2", None).unwrap().unwrap();
     assert_eq!(answer.result, Err("another tick".to_owned()));
-    assert!(a.ask("where/b", "", None).unwrap().is_none(), "dropped unanswered");
+    assert!(
+        a.ask("where/b", "", None).unwrap().is_none(),
+        "dropped unanswered"
+    );
     drop((served, token));
-    assert_eq!(seen.recv_timeout(PATIENCE), Ok(("alive/b".to_owned(), false)));
-    assert!(a.ask("where/b", "tick=1", None).unwrap().is_none(), "nobody serves it any more");
+    assert_eq!(
+        seen.recv_timeout(PATIENCE),
+        Ok(("alive/b".to_owned(), false))
+    );
+    assert!(
+        a.ask("where/b", "tick=1", None).unwrap().is_none(),
+        "nobody serves it any more"
+    );
 }
 
 #[test]
@@ -107,7 +145,11 @@ fn a_publisher_knows_whether_it_is_watched() {
 #[test]
 fn a_link_that_breaks_takes_its_tokens_and_brings_everything_back() {
     // The links break again and again; what is put until it arrives arrives.
-    let faults = Faults { cut: 0.05, longest: Duration::from_millis(1), ..Faults::default() };
+    let faults = Faults {
+        cut: 0.05,
+        longest: Duration::from_millis(1),
+        ..Faults::default()
+    };
     let network = MemoryNetwork::new(3, faults);
     let (router, client) = (network.router(), network.client());
     let (messages, _subscription) = listen(&client, "to/client");
@@ -118,13 +160,18 @@ fn a_link_that_breaks_takes_its_tokens_and_brings_everything_back() {
         let expected = format!("to/client {n}");
         let arrives = || {
             router.put("to/client", n.to_string().into_bytes()).unwrap();
-            messages.recv_timeout(Duration::from_millis(5)).is_ok_and(|message| message == expected)
+            messages
+                .recv_timeout(Duration::from_millis(5))
+                .is_ok_and(|message| message == expected)
         };
         assert!((0..1000).any(|_| arrives()), "{n} never arrives");
         gone += seen.try_iter().filter(|(_, is_there)| !is_there).count();
     }
     let traffic = network.traffic();
-    assert!(traffic.cuts > 0 && traffic.lost > 0 && gone > 0, "{gone} {traffic:?}");
+    assert!(
+        traffic.cuts > 0 && traffic.lost > 0 && gone > 0,
+        "{gone} {traffic:?}"
+    );
 }
 
 #[test]
@@ -133,17 +180,32 @@ fn a_session_that_is_closed_or_killed_says_no_more() {
     let (a, b, c) = (network.client(), network.client(), network.client());
     let (seen, _watch) = tokens(&c, "alive/*");
     let _tokens = (a.token("alive/a").unwrap(), b.token("alive/b").unwrap());
-    let mut there: Vec<_> = (0..2).map(|_| seen.recv_timeout(PATIENCE).unwrap()).collect();
+    let mut there: Vec<_> = (0..2)
+        .map(|_| seen.recv_timeout(PATIENCE).unwrap())
+        .collect();
     there.sort();
-    assert_eq!(there, [("alive/a".to_owned(), true), ("alive/b".to_owned(), true)]);
+    assert_eq!(
+        there,
+        [("alive/a".to_owned(), true), ("alive/b".to_owned(), true)]
+    );
     a.close();
     network.kill(&b);
-    let mut gone: Vec<_> = (0..2).map(|_| seen.recv_timeout(PATIENCE).unwrap()).collect();
+    let mut gone: Vec<_> = (0..2)
+        .map(|_| seen.recv_timeout(PATIENCE).unwrap())
+        .collect();
     gone.sort();
-    assert_eq!(gone, [("alive/a".to_owned(), false), ("alive/b".to_owned(), false)]);
+    assert_eq!(
+        gone,
+        [("alive/a".to_owned(), false), ("alive/b".to_owned(), false)]
+    );
     for bus in [a, b] {
         let error = bus.put("x", Vec::new()).unwrap_err().to_string();
         assert!(error.contains("the session is closed"), "{error}");
     }
-    assert!(c.subscribe("a/**", |_, _| {}).unwrap_err().to_string().contains("`*` for a whole one"));
+    assert!(
+        c.subscribe("a/**", |_, _| {})
+            .unwrap_err()
+            .to_string()
+            .contains("`*` for a whole one")
+    );
 }

@@ -59,9 +59,19 @@ impl Board {
     }
 
     /// The state that `robot`, one of this process, reported for `tick`.
-    pub(crate) fn get(&self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Option<Arc<PublicState>> {
+    pub(crate) fn get(
+        &self,
+        robot: &RobotName,
+        epoch: Epoch,
+        tick: Tick,
+    ) -> Option<Arc<PublicState>> {
         let inner = self.lock();
-        inner.states.get(robot)?.iter().find(|state| (state.epoch, state.tick) == (epoch, tick)).cloned()
+        inner
+            .states
+            .get(robot)?
+            .iter()
+            .find(|state| (state.epoch, state.tick) == (epoch, tick))
+            .cloned()
     }
 
     /// Answers a question now, or when there is something to answer.
@@ -82,12 +92,19 @@ impl Inner {
 
     fn judge(&self, question: &Question) -> Verdict {
         let never = |reason: &str| Verdict::Never(reason.to_owned());
-        let Some(states) = Keys::robot_of(question.key()).and_then(|name| self.states.get(name)) else {
+        let Some(states) = Keys::robot_of(question.key()).and_then(|name| self.states.get(name))
+        else {
             return never("ask one robot by its name");
         };
-        let Some(newest) = states.back() else { return Verdict::Early };
-        let Some(tick) = question.parameter("tick") else { return Verdict::Answer(newest.clone()) };
-        let Ok(tick) = tick.parse::<Tick>() else { return never("parameter tick: not a whole number") };
+        let Some(newest) = states.back() else {
+            return Verdict::Early;
+        };
+        let Some(tick) = question.parameter("tick") else {
+            return Verdict::Answer(newest.clone());
+        };
+        let Ok(tick) = tick.parse::<Tick>() else {
+            return never("parameter tick: not a whole number");
+        };
         if let Some(epoch) = question.parameter("epoch") {
             match epoch.parse::<Epoch>() {
                 Ok(epoch) if epoch == newest.epoch => {}
@@ -97,7 +114,10 @@ impl Inner {
             }
         }
         // Asked during tick t, everybody answers with the state reported for t - 1.
-        match states.iter().find(|state| state.tick.checked_add(1) == Some(tick)) {
+        match states
+            .iter()
+            .find(|state| state.tick.checked_add(1) == Some(tick))
+        {
             Some(state) => Verdict::Answer(state.clone()),
             None if tick.checked_sub(2) == Some(newest.tick) => Verdict::Early,
             None if tick > newest.tick => never("that tick is far away"),

@@ -89,8 +89,10 @@ impl Cars<'_> {
     /// [`BadParameters`] says which parameter is wrong or unknown.
     pub fn parameters<P: serde::de::DeserializeOwned>(&self) -> Result<P, BadParameters> {
         let map = self.welcome.parameters.clone().into_iter().collect();
-        serde_json::from_value(serde_json::Value::Object(map))
-            .map_err(|error| BadParameters { robot: self.welcome.name.clone(), reason: error.to_string() })
+        serde_json::from_value(serde_json::Value::Object(map)).map_err(|error| BadParameters {
+            robot: self.welcome.name.clone(),
+            reason: error.to_string(),
+        })
     }
 
     /// Its own random stream, derived from the seed and its name: the only chance it may use.
@@ -101,7 +103,9 @@ impl Cars<'_> {
     /// Whether its last move was refused, so that it still stands where it was.
     #[must_use]
     pub fn was_blocked(&self) -> bool {
-        self.news.correction.is_some_and(|correction| correction.blocked)
+        self.news
+            .correction
+            .is_some_and(|correction| correction.blocked)
     }
 
     /// Robots within its sensing range now. Sensing is physical: no cut network hides anybody.
@@ -116,14 +120,19 @@ impl Cars<'_> {
     /// [`CallError::Interrupted`] if the epoch is over.
     pub fn percept(&mut self) -> Result<Percept, CallError> {
         let (epoch, tick) = (self.welcome.epoch, self.tick);
-        self.network.percept(&self.welcome.name, epoch, tick).map_err(|_| CallError::Interrupted)
+        self.network
+            .percept(&self.welcome.name, epoch, tick)
+            .map_err(|_| CallError::Interrupted)
     }
 
     /// Writes a line to the log of the run. It is cut to what a message may hold, and so is their number in a tick.
     pub fn log(&mut self, line: impl Into<String>) {
         let mut line = line.into();
         if line.len() > MAX_TEXT_BYTES {
-            let end = (0..=MAX_TEXT_BYTES).rev().find(|at| line.is_char_boundary(*at)).unwrap_or(0);
+            let end = (0..=MAX_TEXT_BYTES)
+                .rev()
+                .find(|at| line.is_char_boundary(*at))
+                .unwrap_or(0);
             line.truncate(end);
         }
         // Room is left for what the seat itself may have to say, and for the rest of the report.
@@ -143,10 +152,15 @@ impl Cars<'_> {
     ///
     /// # Errors
     /// [`CallError::UnknownRobot`] if nobody has this name.
-    pub fn set_robot_command(&mut self, to: &str, command: impl Into<String>) -> Result<Seq, CallError> {
+    pub fn set_robot_command(
+        &mut self,
+        to: &str,
+        command: impl Into<String>,
+    ) -> Result<Seq, CallError> {
         let to = self.known(to)?;
         self.outbox.last_seq += 1;
-        let (seq, performative, command) = (self.outbox.last_seq, Performative::Achieve, command.into());
+        let (seq, performative, command) =
+            (self.outbox.last_seq, Performative::Achieve, command.into());
         let message = protocol::messages::Command {
             epoch: self.welcome.epoch,
             tick: self.tick,
@@ -155,7 +169,12 @@ impl Cars<'_> {
             command: command.clone(),
         };
         self.network.send(&self.welcome.name, &to, &message);
-        self.outbox.sent.push(protocol::messages::SentCommand { to, seq, performative, command });
+        self.outbox.sent.push(protocol::messages::SentCommand {
+            to,
+            seq,
+            performative,
+            command,
+        });
         Ok(seq)
     }
 
@@ -188,7 +207,8 @@ impl Cars<'_> {
     /// # Errors
     /// See [`CallError`].
     pub fn get_robot_state_variables(&mut self, of: &str) -> Result<StateVariables, CallError> {
-        self.get_robot_state(of).map(|state| state.state_variables.clone())
+        self.get_robot_state(of)
+            .map(|state| state.state_variables.clone())
     }
 
     /// Another robot's emotion at the last tick (`getRobotEmotionState`).
@@ -196,7 +216,8 @@ impl Cars<'_> {
     /// # Errors
     /// See [`CallError`].
     pub fn get_robot_emotion_state(&mut self, of: &str) -> Result<String, CallError> {
-        self.get_robot_state(of).map(|state| state.emotion_state.clone())
+        self.get_robot_state(of)
+            .map(|state| state.emotion_state.clone())
     }
 
     /// Another robot's behavior at the last tick (`getRobotBehaviorState`).
@@ -204,7 +225,8 @@ impl Cars<'_> {
     /// # Errors
     /// See [`CallError`].
     pub fn get_robot_behavior_state(&mut self, of: &str) -> Result<String, CallError> {
-        self.get_robot_state(of).map(|state| state.behavior_state.clone())
+        self.get_robot_state(of)
+            .map(|state| state.behavior_state.clone())
     }
 
     /// All six answers at once. The first query of a tick to a robot costs a round trip; the answers cannot change
@@ -220,15 +242,22 @@ impl Cars<'_> {
         if self.news.unreachable.contains(&of) {
             return Err(CallError::Unreachable(of));
         }
-        self.network.state_of(&of, self.welcome.epoch, self.tick - 1).map_err(|undelivered| match undelivered
-        {
-            Undelivered::Lost => CallError::Unreachable(of),
-            Undelivered::Interrupted => CallError::Interrupted,
-        })
+        self.network
+            .state_of(&of, self.welcome.epoch, self.tick - 1)
+            .map_err(|undelivered| match undelivered {
+                Undelivered::Lost => CallError::Unreachable(of),
+                Undelivered::Interrupted => CallError::Interrupted,
+            })
     }
 
     fn known(&self, name: &str) -> Result<RobotName, CallError> {
-        let found = self.welcome.roster.iter().find(|robot| robot.as_str() == name);
-        found.cloned().ok_or_else(|| CallError::UnknownRobot(name.to_owned()))
+        let found = self
+            .welcome
+            .roster
+            .iter()
+            .find(|robot| robot.as_str() == name);
+        found
+            .cloned()
+            .ok_or_else(|| CallError::UnknownRobot(name.to_owned()))
     }
 }

@@ -13,7 +13,10 @@ use crate::host::{Host, HostError, HostOptions};
 
 /// What every robot's program understands.
 #[derive(Debug, Clone, Parser)]
-#[command(version, about = "A robot of the Cooperative Affective Robot Simulator")]
+#[command(
+    version,
+    about = "A robot of the Cooperative Affective Robot Simulator"
+)]
 pub struct RobotArgs {
     /// Which robot of the roster this is; several names run several robots in this process.
     #[arg(long = "name", value_name = "NAME")]
@@ -25,10 +28,20 @@ pub struct RobotArgs {
     #[arg(long, env = "CARS_CONNECT", default_value = DEFAULT_ENDPOINT, value_name = "ENDPOINT")]
     pub connect: String,
     /// How long to try to reach the simulator and to be let in, seconds.
-    #[arg(long, env = "CARS_PATIENCE_S", default_value_t = 20.0, value_name = "SECONDS")]
+    #[arg(
+        long,
+        env = "CARS_PATIENCE_S",
+        default_value_t = 20.0,
+        value_name = "SECONDS"
+    )]
     pub patience_s: f64,
     /// How long to wait for the simulator once it is gone, or the link to it is cut, seconds.
-    #[arg(long, env = "CARS_GONE_PATIENCE_S", default_value_t = 600.0, value_name = "SECONDS")]
+    #[arg(
+        long,
+        env = "CARS_GONE_PATIENCE_S",
+        default_value_t = 600.0,
+        value_name = "SECONDS"
+    )]
     pub gone_patience_s: f64,
     /// A configuration file of the middleware instead of the built-in settings.
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
@@ -39,11 +52,18 @@ impl RobotArgs {
     /// How these arguments say to reach a run.
     #[must_use]
     pub fn options(&self) -> HostOptions {
-        let patience = Duration::try_from_secs_f64(self.patience_s).unwrap_or(Duration::from_secs(20));
+        let patience =
+            Duration::try_from_secs_f64(self.patience_s).unwrap_or(Duration::from_secs(20));
         let gone_patience =
             Duration::try_from_secs_f64(self.gone_patience_s).unwrap_or(Duration::from_secs(600));
         let (run, connect) = (self.run.clone(), self.connect.clone());
-        HostOptions { run, connect, patience, gone_patience, zenoh_config: self.zenoh_config.clone() }
+        HostOptions {
+            run,
+            connect,
+            patience,
+            gone_patience,
+            zenoh_config: self.zenoh_config.clone(),
+        }
     }
 }
 
@@ -52,7 +72,8 @@ impl RobotArgs {
 pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> ExitCode {
     protocol::runtime::use_one_thread();
     let mut args = RobotArgs::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
+    let filter =
+        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
@@ -71,7 +92,14 @@ pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> 
     }
 }
 
-fn take_part(args: &RobotArgs, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> Result<(), HostError> {
-    let robots = args.names.iter().map(|name| (name.clone(), make(name))).collect();
+fn take_part(
+    args: &RobotArgs,
+    make: impl Fn(&RobotName) -> Box<dyn Robot>,
+) -> Result<(), HostError> {
+    let robots = args
+        .names
+        .iter()
+        .map(|name| (name.clone(), make(name)))
+        .collect();
     Host::connect(robots, args.options())?.run().map(|_end| ())
 }

@@ -19,7 +19,13 @@ pub(crate) struct Held {
 impl Held {
     /// Holds a command; a repetition changes nothing.
     pub(crate) fn hold(&mut self, from: RobotName, command: Command) {
-        if self.by_sender.entry(from).or_default().insert(command.seq, command).is_some() {
+        if self
+            .by_sender
+            .entry(from)
+            .or_default()
+            .insert(command.seq, command)
+            .is_some()
+        {
             return;
         }
         self.count += 1;
@@ -49,8 +55,12 @@ impl Held {
 
     fn make_room(&mut self) {
         let most = self.by_sender.iter().max_by_key(|(_, own)| own.len());
-        let Some(from) = most.map(|(from, _)| from.clone()) else { return };
-        let Some(own) = self.by_sender.get_mut(&from) else { return };
+        let Some(from) = most.map(|(from, _)| from.clone()) else {
+            return;
+        };
+        let Some(own) = self.by_sender.get_mut(&from) else {
+            return;
+        };
         if own.pop_first().is_some() {
             self.count -= 1;
             tracing::warn!(%from, "too many commands are waiting; the oldest one is dropped");
@@ -69,11 +79,20 @@ mod tests {
     use super::*;
 
     fn command(seq: Seq, epoch: Epoch) -> Command {
-        Command { epoch, tick: 1, seq, performative: Performative::Achieve, command: String::new() }
+        Command {
+            epoch,
+            tick: 1,
+            seq,
+            performative: Performative::Achieve,
+            command: String::new(),
+        }
     }
 
     fn id(from: &str, seq: Seq) -> CommandId {
-        CommandId { from: RobotName::new(from).unwrap(), seq }
+        CommandId {
+            from: RobotName::new(from).unwrap(),
+            seq,
+        }
     }
 
     #[test]
@@ -86,7 +105,10 @@ mod tests {
         assert_eq!(held.count, MAX_COMMANDS);
         assert!(held.take(&id("Quiet", 1), 1).is_some());
         assert!(held.take(&id("Flood", 1), 1).is_none());
-        assert!(held.take(&id("Flood", 2 * MAX_COMMANDS as u64), 1).is_some());
+        assert!(
+            held.take(&id("Flood", 2 * MAX_COMMANDS as u64), 1)
+                .is_some()
+        );
     }
 
     #[test]
@@ -95,7 +117,10 @@ mod tests {
         for sender in 0..MAX_COMMANDS + 500 {
             held.hold(id(&format!("Flood{sender}"), 1).from, command(1, 1));
         }
-        assert_eq!((held.count, held.by_sender.len()), (MAX_COMMANDS, MAX_COMMANDS));
+        assert_eq!(
+            (held.count, held.by_sender.len()),
+            (MAX_COMMANDS, MAX_COMMANDS)
+        );
     }
 
     #[test]

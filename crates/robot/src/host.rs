@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 use protocol::bus::{Bus, BusError, Declared, Publisher, Role};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, PublicState, Refusal, Report, Welcome};
+use protocol::messages::{
+    Clock, End, JoinAnswer, JoinRequest, PublicState, Refusal, Report, Welcome,
+};
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
 use crate::cri::{Robot, RobotError};
@@ -59,7 +61,9 @@ pub enum HostError {
     #[error("stopped from within this process")]
     Stopped,
     /// Nobody executes the run.
-    #[error("no simulator of run {run} answers at {connect}; is it running, and is the run's name right?")]
+    #[error(
+        "no simulator of run {run} answers at {connect}; is it running, and is the run's name right?"
+    )]
     NoSimulator {
         /// The run.
         run: RunName,
@@ -128,7 +132,10 @@ impl Host {
         robots: Vec<(RobotName, Box<dyn Robot>)>,
         options: HostOptions,
     ) -> Result<Self, HostError> {
-        let role = Role::Client { connect: options.connect.clone(), patience: options.patience };
+        let role = Role::Client {
+            connect: options.connect.clone(),
+            patience: options.patience,
+        };
         let bus = Bus::open(&role, options.zenoh_config.as_ref())?;
         Self::join_over(bus, robots, options)
     }
@@ -144,7 +151,14 @@ impl Host {
     ) -> Result<Self, HostError> {
         let keys = Keys::new(&options.run);
         let link = Link::new(bus.clone(), keys.clone(), options.gone_patience);
-        let mut host = Self { options, bus, keys, link, members: BTreeMap::new(), declared: Vec::new() };
+        let mut host = Self {
+            options,
+            bus,
+            keys,
+            link,
+            members: BTreeMap::new(),
+            declared: Vec::new(),
+        };
         let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
         host.listen(&names)?;
         for (name, robot) in robots {
@@ -166,7 +180,8 @@ impl Host {
         }
         // Last, so that who sees the token knows that everything above is in effect.
         for name in &names {
-            host.declared.push(host.bus.token(&host.keys.alive_robot(name))?);
+            host.declared
+                .push(host.bus.token(&host.keys.alive_robot(name))?);
         }
         Ok(host)
     }
@@ -174,26 +189,41 @@ impl Host {
     fn listen(&mut self, names: &[RobotName]) -> Result<(), BusError> {
         let queue = self.link.queue();
         // A full queue holds the link: back-pressure instead of loss. A closed one means that the process ends.
-        self.declared.push(self.bus.subscribe(&self.keys.clock(), move |key, bytes| {
-            let _ = queue.send(Event::Clock(decode(key, "simulator", bytes)));
-        })?);
+        self.declared
+            .push(self.bus.subscribe(&self.keys.clock(), move |key, bytes| {
+                let _ = queue.send(Event::Clock(decode(key, "simulator", bytes)));
+            })?);
         let queue = self.link.queue();
-        self.declared.push(self.bus.watch(&self.keys.alive_sim(), move |_, there| {
-            let _ = queue.send(Event::Simulator(there));
-        })?);
+        self.declared
+            .push(self.bus.watch(&self.keys.alive_sim(), move |_, there| {
+                let _ = queue.send(Event::Simulator(there));
+            })?);
         for name in names {
             self.link.host(name);
             self.link.board.host(name);
             let (queue, to) = (self.link.queue(), name.clone());
-            self.declared.push(self.bus.subscribe(&self.keys.commands_to(name), move |key, bytes| {
-                let Ok(from) = RobotName::new(Keys::last_chunk(key)) else { return };
-                let command = decode(key, from.as_str(), bytes);
-                let _ = queue.send(Event::Command { to: to.clone(), from, command });
-            })?);
+            self.declared.push(self.bus.subscribe(
+                &self.keys.commands_to(name),
+                move |key, bytes| {
+                    let Ok(from) = RobotName::new(Keys::last_chunk(key)) else {
+                        return;
+                    };
+                    let command = decode(key, from.as_str(), bytes);
+                    let _ = queue.send(Event::Command {
+                        to: to.clone(),
+                        from,
+                        command,
+                    });
+                },
+            )?);
             for what in QUERIES.iter().chain([&STATE]) {
                 let board = self.link.board.clone();
-                self.declared
-                    .push(self.bus.serve(&self.keys.query(name, what), move |question| board.ask(question))?);
+                self.declared.push(
+                    self.bus
+                        .serve(&self.keys.query(name, what), move |question| {
+                            board.ask(question)
+                        })?,
+                );
             }
         }
         Ok(())
@@ -219,9 +249,19 @@ impl Host {
                             return Ok(*welcome);
                         }
                         // A predecessor that was killed is noticed within its lease.
-                        JoinAnswer::Refused { reason: Refusal::NameTaken, .. } if !is_last_try => {}
-                        JoinAnswer::Refused { reason, explanation } => {
-                            return Err(HostError::Refused { name: name.clone(), reason, explanation });
+                        JoinAnswer::Refused {
+                            reason: Refusal::NameTaken,
+                            ..
+                        } if !is_last_try => {}
+                        JoinAnswer::Refused {
+                            reason,
+                            explanation,
+                        } => {
+                            return Err(HostError::Refused {
+                                name: name.clone(),
+                                reason,
+                                explanation,
+                            });
                         }
                     }
                 }
@@ -238,7 +278,10 @@ impl Host {
     /// What ends [`Host::run`] from another thread.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
-        Stopper { is_stopped: self.link.is_stopped.clone(), queue: self.link.queue() }
+        Stopper {
+            is_stopped: self.link.is_stopped.clone(),
+            queue: self.link.queue(),
+        }
     }
 
     /// Runs until the run ends.
@@ -294,7 +337,11 @@ impl Host {
             return Ok(());
         }
         let welcome = self.join(name)?;
-        if let Some(member) = self.members.get_mut(name).filter(|_| welcome.epoch == clock.epoch) {
+        if let Some(member) = self
+            .members
+            .get_mut(name)
+            .filter(|_| welcome.epoch == clock.epoch)
+        {
             member.seat.start_over(welcome);
             (member.is_seated, member.last) = (false, None);
         }
@@ -303,7 +350,12 @@ impl Host {
 }
 
 impl Member {
-    fn answer(&mut self, name: &RobotName, clock: &Clock, link: &mut Link) -> Result<(), HostError> {
+    fn answer(
+        &mut self,
+        name: &RobotName,
+        clock: &Clock,
+        link: &mut Link,
+    ) -> Result<(), HostError> {
         let welcome = self.seat.welcome();
         if clock.epoch != welcome.epoch {
             return Ok(()); // An echo of an earlier epoch.
@@ -322,12 +374,22 @@ impl Member {
             return Ok(());
         }
         let is_named = joined == Some(welcome.generation);
-        let Some((report, state)) = self.tick(clock, is_named, link)? else { return Ok(()) };
+        let Some((report, state)) = self.tick(clock, is_named, link)? else {
+            return Ok(());
+        };
         let bytes = encode(&report);
         if bytes.len() > MAX_MESSAGE_BYTES {
-            let reason = format!("{} bytes, more than the {MAX_MESSAGE_BYTES} allowed", bytes.len());
+            let reason = format!(
+                "{} bytes, more than the {MAX_MESSAGE_BYTES} allowed",
+                bytes.len()
+            );
             let (robot, field) = (name.clone(), "its report".to_owned());
-            return Err(RobotError::TooMuch { robot, field, reason }.into());
+            return Err(RobotError::TooMuch {
+                robot,
+                field,
+                reason,
+            }
+            .into());
         }
         // First what others may ask for, then the report: after it the clock may go on and they will ask.
         // Who follows has the state before the next clock, because both come the same way.
@@ -336,7 +398,14 @@ impl Member {
         }
         link.board.show(name, Arc::new(state));
         self.report.put(bytes.clone())?;
-        self.last = Some((Clock { epoch: clock.epoch, tick: clock.tick, ..Clock::default() }, bytes));
+        self.last = Some((
+            Clock {
+                epoch: clock.epoch,
+                tick: clock.tick,
+                ..Clock::default()
+            },
+            bytes,
+        ));
         self.paint()
     }
 

@@ -54,8 +54,9 @@ pub use entry::{RobotArgs, main};
 pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::{LocalHost, Sense};
 pub use protocol::messages::{
-    Clock, Command, CommandId, Correction, End, Face, News, Panel, Parameters, Percept, Point, PublicState,
-    Report, SensedBody, SensedKind, SensedRobot, StateVariables, Tone, Variable, Welcome, Widget,
+    Clock, Command, CommandId, Correction, End, Face, News, Panel, Parameters, Percept, Point,
+    PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables, Tone, Variable,
+    Welcome, Widget,
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RunName, Tick};

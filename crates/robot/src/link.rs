@@ -37,7 +37,11 @@ pub(crate) enum Event {
     /// A clock arrived.
     Clock(Result<Clock, Malformed>),
     /// A command arrived.
-    Command { to: RobotName, from: RobotName, command: Result<Command, Malformed> },
+    Command {
+        to: RobotName,
+        from: RobotName,
+        command: Result<Command, Malformed>,
+    },
     /// Another robot let its state be known, asked or followed.
     State { of: RobotName, state: PublicState },
     /// The simulator let a robot know what it senses, asked or followed.
@@ -124,8 +128,10 @@ impl Link {
             while let Some(clock) = self.clocks.pop_front() {
                 // Where the simulator has gone on without us, only its last clock can still be answered; the first clock
                 // of an epoch or of an incarnation must be seen all the same.
-                let is_first = clock.tick == 0 || clock.news.values().any(|news| news.joined.is_some());
-                let is_later = |later: &Clock| (later.epoch, later.tick) > (clock.epoch, clock.tick);
+                let is_first =
+                    clock.tick == 0 || clock.news.values().any(|news| news.joined.is_some());
+                let is_later =
+                    |later: &Clock| (later.epoch, later.tick) > (clock.epoch, clock.tick);
                 let is_superseded = self.clocks.iter().any(is_later) && !is_first;
                 if clock.end.is_some() || !is_superseded {
                     return Some(clock);
@@ -135,7 +141,11 @@ impl Link {
                 Some(since) => self.patience.saturating_sub(since.elapsed()),
                 None => LOOK_FOR_SIMULATOR,
             };
-            if !self.pump(left) && self.simulator_gone.is_some_and(|since| since.elapsed() >= self.patience) {
+            if !self.pump(left)
+                && self
+                    .simulator_gone
+                    .is_some_and(|since| since.elapsed() >= self.patience)
+            {
                 return None;
             }
         }
@@ -154,14 +164,20 @@ impl Link {
     /// A tick begins: what was known for the one before is of no use any more.
     pub(crate) fn begin(&mut self, epoch: Epoch, tick: Tick) {
         if epoch != self.current.0 {
-            self.commands.values_mut().for_each(|held| held.begin(epoch));
+            self.commands
+                .values_mut()
+                .for_each(|held| held.begin(epoch));
             self.sent.clear();
         }
         self.current = (epoch, tick);
-        self.states.retain(|(_, asked), _| *asked >= (epoch, tick.saturating_sub(1)));
-        self.percepts.retain(|(_, asked), _| *asked >= (epoch, tick));
-        self.followed.retain(|_, followed| tick.saturating_sub(followed.last_used) < UNUSED_TICKS);
-        self.sent.retain(|(_, _, command)| command.tick.saturating_add(self.repeat_ticks) > tick);
+        self.states
+            .retain(|(_, asked), _| *asked >= (epoch, tick.saturating_sub(1)));
+        self.percepts
+            .retain(|(_, asked), _| *asked >= (epoch, tick));
+        self.followed
+            .retain(|_, followed| tick.saturating_sub(followed.last_used) < UNUSED_TICKS);
+        self.sent
+            .retain(|(_, _, command)| command.tick.saturating_add(self.repeat_ticks) > tick);
     }
 
     /// Sends again what others may have missed.
@@ -173,23 +189,37 @@ impl Link {
 
     /// Waits for one event and files it. Returns whether there was one.
     fn pump(&mut self, patience: Duration) -> bool {
-        let Ok(event) = self.events.recv_timeout(patience) else { return false };
+        let Ok(event) = self.events.recv_timeout(patience) else {
+            return false;
+        };
         match event {
             Event::Clock(Ok(clock)) => self.file_clock(clock),
-            Event::Command { to, from, command: Ok(command) } => self.file_command(to, from, command),
-            Event::Clock(Err(error)) | Event::Command { command: Err(error), .. } => {
+            Event::Command {
+                to,
+                from,
+                command: Ok(command),
+            } => self.file_command(to, from, command),
+            Event::Clock(Err(error))
+            | Event::Command {
+                command: Err(error),
+                ..
+            } => {
                 tracing::warn!("{error}");
             }
             Event::State { of, state } => {
                 let asked = (state.epoch, state.tick);
                 // Nobody asks for anything else, and an answer does not change within a tick.
                 if asked.0 == self.current.0 && asked.1.abs_diff(self.current.1) <= 1 {
-                    self.states.entry((of, asked)).or_insert_with(|| Arc::new(state));
+                    self.states
+                        .entry((of, asked))
+                        .or_insert_with(|| Arc::new(state));
                 }
             }
             Event::Percept { of, percept } => {
                 let asked = (percept.epoch, percept.tick);
-                if asked.0.abs_diff(self.current.0) <= 1 && asked.1.saturating_sub(1) <= self.current.1 {
+                if asked.0.abs_diff(self.current.0) <= 1
+                    && asked.1.saturating_sub(1) <= self.current.1
+                {
                     self.percepts.entry((of, asked)).or_insert(percept);
                 }
             }
@@ -202,11 +232,16 @@ impl Link {
     fn note_simulator(&mut self, is_there: bool) {
         if is_there {
             if let Some(since) = self.simulator_gone.take() {
-                tracing::warn!("the simulator is back after {:.1} s", since.elapsed().as_secs_f64());
+                tracing::warn!(
+                    "the simulator is back after {:.1} s",
+                    since.elapsed().as_secs_f64()
+                );
             }
         } else if self.simulator_gone.is_none() {
             let patience_s = self.patience.as_secs_f64();
-            tracing::warn!("the simulator, or the link to it, is gone: waiting for it up to {patience_s} s");
+            tracing::warn!(
+                "the simulator, or the link to it, is gone: waiting for it up to {patience_s} s"
+            );
             self.simulator_gone = Some(Instant::now());
         }
     }
@@ -230,7 +265,8 @@ impl Link {
     /// Whether the tick under way is of no use any more: a clock has arrived that ends the run, begins the next epoch or
     /// shows that the simulator has gone on without us, or the process wants to leave.
     fn is_interrupted(&self) -> bool {
-        let ends_it = |clock: &Clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some();
+        let ends_it =
+            |clock: &Clock| (clock.epoch, clock.tick) > self.current || clock.end.is_some();
         self.is_stopped() || self.clocks.iter().any(ends_it)
     }
 
@@ -250,7 +286,10 @@ impl Link {
                 let _ = queue.try_send(event(sender, message));
             }
         };
-        if let Err(error) = self.bus.ask_then(key, &format!("tick={tick};epoch={}", self.current.0), file) {
+        if let Err(error) =
+            self.bus
+                .ask_then(key, &format!("tick={tick};epoch={}", self.current.0), file)
+        {
             tracing::warn!("{error}");
         }
         if !self.followed.contains_key(key) {
@@ -258,16 +297,25 @@ impl Link {
         }
     }
 
-    fn follow<M: Message + 'static>(&mut self, key: &str, of: &RobotName, event: fn(RobotName, M) -> Event) {
+    fn follow<M: Message + 'static>(
+        &mut self,
+        key: &str,
+        of: &RobotName,
+        event: fn(RobotName, M) -> Event,
+    ) {
         let (queue, sender) = (self.queue(), of.clone());
-        let subscribed =
-            self.bus.subscribe(key, move |key, bytes| match decode(key, sender.as_str(), bytes) {
+        let subscribed = self.bus.subscribe(key, move |key, bytes| {
+            match decode(key, sender.as_str(), bytes) {
                 Ok(message) => drop(queue.send(event(sender.clone(), message))),
                 Err(error) => tracing::warn!("{error}"),
-            });
+            }
+        });
         match subscribed {
             Ok(subscription) => {
-                let followed = Followed { _subscription: subscription, last_used: self.current.1 };
+                let followed = Followed {
+                    _subscription: subscription,
+                    last_used: self.current.1,
+                };
                 self.followed.insert(key.to_owned(), followed);
             }
             Err(error) => tracing::warn!("{error}"),
@@ -318,7 +366,9 @@ impl Link {
                 return Ok(found);
             }
             if self.is_interrupted()
-                || self.simulator_gone.is_some_and(|since| since.elapsed() > self.patience)
+                || self
+                    .simulator_gone
+                    .is_some_and(|since| since.elapsed() > self.patience)
             {
                 return Err(Undelivered::Interrupted);
             }
@@ -336,7 +386,14 @@ impl Link {
     fn tell_waiting(&self, on: &RobotName) {
         let (epoch, tick) = self.current;
         for robot in self.commands.keys() {
-            self.put(&self.keys.waiting(robot), &Waiting { epoch, tick, on: on.clone() });
+            self.put(
+                &self.keys.waiting(robot),
+                &Waiting {
+                    epoch,
+                    tick,
+                    on: on.clone(),
+                },
+            );
         }
     }
 
@@ -353,9 +410,13 @@ impl Link {
 
 fn read<M: Message>(answer: Option<AnswerOf>, sender: &RobotName) -> Option<M> {
     let answer = answer?;
-    let bytes =
-        answer.result.map_err(|reason| tracing::debug!(%sender, reason, "a query was refused")).ok()?;
-    decode(&answer.key, sender.as_str(), &bytes).map_err(|error| tracing::warn!("{error}")).ok()
+    let bytes = answer
+        .result
+        .map_err(|reason| tracing::debug!(%sender, reason, "a query was refused"))
+        .ok()?;
+    decode(&answer.key, sender.as_str(), &bytes)
+        .map_err(|error| tracing::warn!("{error}"))
+        .ok()
 }
 
 impl Network for Link {
@@ -368,26 +429,40 @@ impl Network for Link {
         if self.commands.contains_key(target) {
             return self.board.get(target, epoch, tick).ok_or(Undelivered::Lost);
         }
-        let (key, wanted) = (self.keys.query(target, STATE), (target.clone(), (epoch, tick)));
+        let (key, wanted) = (
+            self.keys.query(target, STATE),
+            (target.clone(), (epoch, tick)),
+        );
         let event = |of, state| Event::State { of, state };
         // Asked during a tick, everybody answers with the state reported for the tick before.
-        self.obtain(&key, tick + 1, target, event, |link| link.states.get(&wanted).cloned())
+        self.obtain(&key, tick + 1, target, event, |link| {
+            link.states.get(&wanted).cloned()
+        })
     }
 
-    fn percept(&mut self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Result<Percept, Undelivered> {
+    fn percept(
+        &mut self,
+        robot: &RobotName,
+        epoch: Epoch,
+        tick: Tick,
+    ) -> Result<Percept, Undelivered> {
         let (key, wanted) = (self.keys.percept(robot), (robot.clone(), (epoch, tick)));
         let event = |of, percept| Event::Percept { of, percept };
-        self.obtain(&key, tick, robot, event, |link| link.percepts.get(&wanted).cloned())
+        self.obtain(&key, tick, robot, event, |link| {
+            link.percepts.get(&wanted).cloned()
+        })
     }
 
     fn send(&mut self, from: &RobotName, to: &RobotName, command: &Command) {
         self.put(&self.keys.command(to, from), command);
-        self.sent.push_back((from.clone(), to.clone(), command.clone()));
+        self.sent
+            .push_back((from.clone(), to.clone(), command.clone()));
     }
 
     fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command> {
-        let found =
-            self.wait(&id.from, Some(COMMAND_PATIENCE), |link| link.commands.get_mut(to)?.take(id, epoch));
+        let found = self.wait(&id.from, Some(COMMAND_PATIENCE), |link| {
+            link.commands.get_mut(to)?.take(id, epoch)
+        });
         found.ok()
     }
 }

@@ -40,16 +40,33 @@ impl Network for LocalNetwork<'_, '_> {
         epoch: Epoch,
         tick: Tick,
     ) -> Result<Arc<PublicState>, Undelivered> {
-        let state = self.known.states.get(target).filter(|state| (state.epoch, state.tick) == (epoch, tick));
+        let state = self
+            .known
+            .states
+            .get(target)
+            .filter(|state| (state.epoch, state.tick) == (epoch, tick));
         state.cloned().ok_or(Undelivered::Lost)
     }
 
-    fn percept(&mut self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Result<Percept, Undelivered> {
-        Ok(Percept { epoch, tick, ..(self.sense)(robot) })
+    fn percept(
+        &mut self,
+        robot: &RobotName,
+        epoch: Epoch,
+        tick: Tick,
+    ) -> Result<Percept, Undelivered> {
+        Ok(Percept {
+            epoch,
+            tick,
+            ..(self.sense)(robot)
+        })
     }
 
     fn send(&mut self, from: &RobotName, to: &RobotName, command: &Command) {
-        self.known.commands.entry(to.clone()).or_default().hold(from.clone(), command.clone());
+        self.known
+            .commands
+            .entry(to.clone())
+            .or_default()
+            .hold(from.clone(), command.clone());
     }
 
     fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command> {
@@ -61,13 +78,23 @@ impl LocalHost {
     /// Seats robots with their welcomes; they act in the order given, which changes nothing.
     #[must_use]
     pub fn new(robots: Vec<(Box<dyn Robot>, Welcome)>) -> Self {
-        let seats = robots.into_iter().map(|(robot, welcome)| Seat::new(robot, welcome)).collect();
-        Self { seats, known: Known::default() }
+        let seats = robots
+            .into_iter()
+            .map(|(robot, welcome)| Seat::new(robot, welcome))
+            .collect();
+        Self {
+            seats,
+            known: Known::default(),
+        }
     }
 
     /// A command from outside the roster.
     pub fn inject(&mut self, to: &RobotName, from: &RobotName, command: Command) {
-        self.known.commands.entry(to.clone()).or_default().hold(from.clone(), command);
+        self.known
+            .commands
+            .entry(to.clone())
+            .or_default()
+            .hold(from.clone(), command);
     }
 
     /// Runs one tick of every robot. Everybody sees the others as they reported themselves for the tick before.
@@ -81,7 +108,10 @@ impl LocalHost {
     ) -> Result<BTreeMap<RobotName, Report>, RobotError> {
         let (mut reports, mut states) = (BTreeMap::new(), BTreeMap::new());
         for seat in &mut self.seats {
-            let mut network = LocalNetwork { known: &mut self.known, sense };
+            let mut network = LocalNetwork {
+                known: &mut self.known,
+                sense,
+            };
             let (report, state) = match clock.tick {
                 0 => seat.init(clock, &mut network)?,
                 _ => seat.tick(clock, &mut network)?,

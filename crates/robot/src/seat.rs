@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use protocol::messages::{Clock, Command, CommandId, News, Percept, Point, PublicState, Report, Welcome};
+use protocol::messages::{
+    Clock, Command, CommandId, News, Percept, Point, PublicState, Report, Welcome,
+};
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Message, RobotName, Tick};
 
@@ -27,7 +29,12 @@ pub trait Network {
     ///
     /// # Errors
     /// [`Undelivered`] says why there is none.
-    fn percept(&mut self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Result<Percept, Undelivered>;
+    fn percept(
+        &mut self,
+        robot: &RobotName,
+        epoch: Epoch,
+        tick: Tick,
+    ) -> Result<Percept, Undelivered>;
 
     /// Sends a command from one robot to another.
     fn send(&mut self, from: &RobotName, to: &RobotName, command: &Command);
@@ -62,8 +69,18 @@ impl Seat {
     pub fn new(robot: Box<dyn Robot>, welcome: Welcome) -> Self {
         let random = stream(welcome.seed, &welcome.stream);
         let proposal = welcome.location;
-        let outbox = Outbox { last_seq: welcome.last_seq, ..Outbox::default() };
-        Self { robot, welcome: Arc::new(welcome), random, outbox, proposal, gave_up: None }
+        let outbox = Outbox {
+            last_seq: welcome.last_seq,
+            ..Outbox::default()
+        };
+        Self {
+            robot,
+            welcome: Arc::new(welcome),
+            random,
+            outbox,
+            proposal,
+            gave_up: None,
+        }
     }
 
     /// What it was told when it joined.
@@ -75,7 +92,10 @@ impl Seat {
     /// The same robot in a new epoch.
     pub fn start_over(&mut self, welcome: Welcome) {
         self.random = stream(welcome.seed, &welcome.stream);
-        self.outbox = Outbox { last_seq: welcome.last_seq, ..Outbox::default() };
+        self.outbox = Outbox {
+            last_seq: welcome.last_seq,
+            ..Outbox::default()
+        };
         self.proposal = welcome.location;
         self.welcome = Arc::new(welcome);
     }
@@ -136,7 +156,9 @@ impl Seat {
     ) -> Result<(Report, PublicState), RobotError> {
         let (mut log, mut missing, welcome) = (Vec::new(), Vec::new(), self.welcome.clone());
         let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
-        let location = news.correction.map_or(self.proposal, |correction| correction.location);
+        let location = news
+            .correction
+            .map_or(self.proposal, |correction| correction.location);
         let (robot, mut cars) = self.enter(&welcome, clock.tick, &news, &mut log, network);
 
         robot.set_current_location(&mut cars, location);
@@ -144,7 +166,10 @@ impl Seat {
         for id in &news.commands {
             // One that the medium has doubled is named twice in a row, and is here once.
             if received.as_ref().is_none_or(|(last, _)| *last != id) {
-                received = cars.network.receive(&welcome.name, clock.epoch, id).map(|command| (id, command));
+                received = cars
+                    .network
+                    .receive(&welcome.name, clock.epoch, id)
+                    .map(|command| (id, command));
             }
             match &received {
                 Some((_, command)) => robot.set_command(&mut cars, &id.from, &command.command),
@@ -167,8 +192,26 @@ impl Seat {
         log: &'a mut Vec<String>,
         network: &'a mut dyn Network,
     ) -> (&'a mut dyn Robot, Cars<'a>) {
-        let Self { robot, random, outbox, gave_up, .. } = self;
-        (robot.as_mut(), Cars { welcome, tick, news, random, outbox, log, gave_up, network })
+        let Self {
+            robot,
+            random,
+            outbox,
+            gave_up,
+            ..
+        } = self;
+        (
+            robot.as_mut(),
+            Cars {
+                welcome,
+                tick,
+                news,
+                random,
+                outbox,
+                log,
+                gave_up,
+                network,
+            },
+        )
     }
 
     /// The end of every tick: where to go next, and what to tell.
@@ -185,11 +228,16 @@ impl Seat {
         let location = robot.current_location();
         let projected = robot.project_location(&mut cars);
         let (speed_mps, direction_rad) = (robot.speed(), crate::published_angle(robot.direction()));
-        let (emotion_state, behavior_state) =
-            (robot.emotion_state().to_owned(), robot.behavior_state().to_owned());
+        let (emotion_state, behavior_state) = (
+            robot.emotion_state().to_owned(),
+            robot.behavior_state().to_owned(),
+        );
         let mut state_variables = robot.state_variables();
         if let Some(reason) = self.gave_up.take() {
-            return Err(RobotError::GaveUp { robot: welcome.name.clone(), reason });
+            return Err(RobotError::GaveUp {
+                robot: welcome.name.clone(),
+                reason,
+            });
         }
 
         // A number that is none cannot travel. The run goes on, and its log says whose fault it is.
@@ -199,12 +247,17 @@ impl Seat {
         state_variables.retain(|name, value| {
             let can_travel = value.as_f64().is_none_or(f64::is_finite);
             if !can_travel {
-                log.push(format!("error: state variable {name} is not a finite number; left out"));
+                log.push(format!(
+                    "error: state variable {name} is not a finite number; left out"
+                ));
             }
             can_travel
         });
         let finite_or = |value: f64, instead: f64| if value.is_finite() { value } else { instead };
-        self.proposal = Point::new(finite_or(projected.x, location.x), finite_or(projected.y, location.y));
+        self.proposal = Point::new(
+            finite_or(projected.x, location.x),
+            finite_or(projected.y, location.y),
+        );
 
         let state = PublicState {
             epoch: welcome.epoch,
@@ -220,7 +273,11 @@ impl Seat {
         // A simulator would refuse it and wait for another one.
         match report.check() {
             Ok(()) => Ok((report, state)),
-            Err((field, reason)) => Err(RobotError::TooMuch { robot: welcome.name.clone(), field, reason }),
+            Err((field, reason)) => Err(RobotError::TooMuch {
+                robot: welcome.name.clone(),
+                field,
+                reason,
+            }),
         }
     }
 

@@ -32,7 +32,11 @@ impl Robot for Chatterbox {
     }
     fn state_variables(&self) -> StateVariables {
         let secret = "s".repeat(if self.0 { 5000 } else { 0 });
-        [("x".to_owned(), f64::INFINITY.into()), ("secret".to_owned(), secret.into())].into()
+        [
+            ("x".to_owned(), f64::INFINITY.into()),
+            ("secret".to_owned(), secret.into()),
+        ]
+        .into()
     }
     fn current_location(&self) -> Point {
         Point::new(1.0, 1.0)
@@ -57,7 +61,8 @@ fn chatterbox(is_endless: bool) -> LocalHost {
     let welcome = br#"{"answer":"welcome","protocol":1,"run":"r","name":"A","generation":1,"epoch":1,"tick":0,"seed":1,
         "stream":"robot/A","tick_s":0.5,"field_m":[9,9],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":1},
         "roster":["A"],"parameters":{}}"#;
-    let JoinAnswer::Welcome(welcome) = protocol::decode("join", "simulator", welcome).unwrap() else {
+    let JoinAnswer::Welcome(welcome) = protocol::decode("join", "simulator", welcome).unwrap()
+    else {
         unreachable!("it is a welcome")
     };
     LocalHost::new(vec![(Box::new(Chatterbox(is_endless)), *welcome)])
@@ -67,30 +72,57 @@ fn chatterbox(is_endless: bool) -> LocalHost {
 fn a_robot_that_gives_up_says_why_and_reports_nothing() {
     let mut host = chatterbox(false);
     for tick in 0..SILENT_AT {
-        let clock = Clock { epoch: 1, tick, ..Clock::default() };
+        let clock = Clock {
+            epoch: 1,
+            tick,
+            ..Clock::default()
+        };
         host.exchange(&clock, &mut |_| Percept::default()).unwrap();
     }
-    let clock = Clock { epoch: 1, tick: SILENT_AT, ..Clock::default() };
-    let error = host.exchange(&clock, &mut |_| Percept::default()).unwrap_err();
-    assert_eq!(error.to_string(), "A gives up: there is nothing left to say");
+    let clock = Clock {
+        epoch: 1,
+        tick: SILENT_AT,
+        ..Clock::default()
+    };
+    let error = host
+        .exchange(&clock, &mut |_| Percept::default())
+        .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "A gives up: there is nothing left to say"
+    );
 }
 
 #[test]
 fn reports_stay_within_the_limits_of_a_message() {
     let mut host = chatterbox(false);
-    let clock = Clock { epoch: 1, ..Clock::default() };
+    let clock = Clock {
+        epoch: 1,
+        ..Clock::default()
+    };
     let reports = host.exchange(&clock, &mut |_| Percept::default()).unwrap();
     let report = reports.values().next().unwrap();
     assert_eq!(report.check(), Ok(()));
     assert!(protocol::encode(report).len() < protocol::codec::MAX_MESSAGE_BYTES / 2);
-    assert!(report.log.last().unwrap().contains("state variable x is not a finite number"));
+    assert!(
+        report
+            .log
+            .last()
+            .unwrap()
+            .contains("state variable x is not a finite number")
+    );
     assert_eq!(report.proposal, Point::new(1.0, 1.0));
 }
 
 #[test]
 fn what_cannot_be_sent_ends_the_robot_with_the_reason() {
-    let clock = Clock { epoch: 1, ..Clock::default() };
-    let error = chatterbox(true).exchange(&clock, &mut |_| Percept::default()).unwrap_err();
+    let clock = Clock {
+        epoch: 1,
+        ..Clock::default()
+    };
+    let error = chatterbox(true)
+        .exchange(&clock, &mut |_| Percept::default())
+        .unwrap_err();
     assert_eq!(
         error.to_string(),
         "A says too much: state_variables.secret: 5000 bytes of text, more than the 4096 allowed"

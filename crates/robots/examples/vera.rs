@@ -1,7 +1,9 @@
 //! Vera likes parties and is shy: where too many stand around her she goes back to where she came from, until she is calm.
 
 use affect::behavior::{BehaviorGenerator, Row, Then::Go};
-use affect::{Circumstances, EmotionGenerator, EmotionLabel, EmotionRow, Intensity, RuleGenerator, Schemata};
+use affect::{
+    Circumstances, EmotionGenerator, EmotionLabel, EmotionRow, Intensity, RuleGenerator, Schemata,
+};
 use robot::{BadParameters, Cars, Panel, Point, Robot, RobotName, StateVariables, Widget};
 use robots::drive::{Course, Legs};
 
@@ -30,14 +32,32 @@ const HIDE: &str = "HIDE";
 
 /// Emotion state generator, over her one measure of progress: bodies around her, as a share of those that are too many.
 const FEEL: &[EmotionRow<f64, &str, Emotion>] = &[
-    EmotionRow { during: &[MINGLE], when: |crowding| *crowding >= 1.0, feel: Shy },
-    EmotionRow { during: &[HIDE], when: |crowding| *crowding < 0.25, feel: Calm },
+    EmotionRow {
+        during: &[MINGLE],
+        when: |crowding| *crowding >= 1.0,
+        feel: Shy,
+    },
+    EmotionRow {
+        during: &[HIDE],
+        when: |crowding| *crowding < 0.25,
+        feel: Calm,
+    },
 ];
 
 /// Behavior state generator: from this behavior, when this is felt, go over to that one.
 const BEHAVE: &[Row<&str, Emotion, ()>] = &[
-    Row { from: &[MINGLE], when: |felt| *felt == Shy, act: &[], then: Go(HIDE) },
-    Row { from: &[HIDE], when: |felt| *felt == Calm, act: &[], then: Go(MINGLE) },
+    Row {
+        from: &[MINGLE],
+        when: |felt| *felt == Shy,
+        act: &[],
+        then: Go(HIDE),
+    },
+    Row {
+        from: &[HIDE],
+        when: |felt| *felt == Calm,
+        act: &[],
+        then: Go(MINGLE),
+    },
 ];
 
 pub(crate) struct Vera {
@@ -52,9 +72,21 @@ pub(crate) struct Vera {
 
 impl Default for Vera {
     fn default() -> Self {
-        let esg = RuleGenerator::new(FEEL, |crowding, _| Intensity::saturating(crowding / 2.0), Calm);
+        let esg = RuleGenerator::new(
+            FEEL,
+            |crowding, _| Intensity::saturating(crowding / 2.0),
+            Calm,
+        );
         let (parameters, schemata, legs, at, near) = Default::default();
-        Self { parameters, schemata, esg, bsg: BehaviorGenerator::new(BEHAVE, MINGLE), legs, at, near }
+        Self {
+            parameters,
+            schemata,
+            esg,
+            bsg: BehaviorGenerator::new(BEHAVE, MINGLE),
+            legs,
+            at,
+            near,
+        }
     }
 }
 

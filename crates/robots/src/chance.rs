@@ -40,7 +40,10 @@ impl From<Chance> for Position {
 impl Chance {
     /// A stream whose seed is the next number of `parent`, the stream that the robot was given.
     pub fn split(parent: &mut Stream) -> Self {
-        Self::from(Position { key: parent.next_u64(), drawn: 0 })
+        Self::from(Position {
+            key: parent.next_u64(),
+            drawn: 0,
+        })
     }
 
     /// A stream from a seed.
@@ -105,7 +108,8 @@ mod tests {
     #[test]
     fn draws_have_the_mean_they_should() {
         let mut chance = Chance::new(1);
-        let mean = |draw: &mut dyn FnMut() -> f64| (0..20_000).map(|_| draw()).sum::<f64>() / 20_000.0;
+        let mean =
+            |draw: &mut dyn FnMut() -> f64| (0..20_000).map(|_| draw()).sum::<f64>() / 20_000.0;
         assert!((mean(&mut || chance.uniform()) - 0.5).abs() < 0.01);
         assert!((mean(&mut || chance.exponential(3.0)) - 3.0).abs() < 0.1);
         assert!((mean(&mut || chance.around(5.0)) - 5.0).abs() < 0.05);

@@ -44,7 +44,13 @@ pub struct Legs {
 
 impl Default for Legs {
     fn default() -> Self {
-        Self { heading: (1.0, 0.0), speed_mps: 0.0, side: 1.0, careful_s: 0.0, turn_s: 0.0 }
+        Self {
+            heading: (1.0, 0.0),
+            speed_mps: 0.0,
+            side: 1.0,
+            careful_s: 0.0,
+            turn_s: 0.0,
+        }
     }
 }
 
@@ -120,7 +126,10 @@ impl Legs {
         if step_m <= 0.0 {
             return self.stay(at);
         }
-        let straight = ((course.goal.x - at.x) / away_m, (course.goal.y - at.y) / away_m);
+        let straight = (
+            (course.goal.x - at.x) / away_m,
+            (course.goal.y - at.y) / away_m,
+        );
         let free = if self.careful_s > 0.0 {
             self.careful_s -= tick_s;
             // Without an answer the epoch is over, and nobody will use the step.
@@ -134,7 +143,9 @@ impl Legs {
         } else {
             Some((straight, step_m))
         };
-        let Some((heading, step_m)) = free else { return self.stay(at) };
+        let Some((heading, step_m)) = free else {
+            return self.stay(at);
+        };
         self.heading = heading;
         self.speed_mps = step_m / tick_s;
         stepped(at, heading, step_m)
@@ -152,8 +163,9 @@ impl Legs {
         let is_free = |heading| {
             let there = stepped(at, heading, step_m);
             let apart_m = cars.welcome().body_m - TOUCH_M;
-            let overlaps =
-                |body: Point| (body.x - there.x).abs() < apart_m && (body.y - there.y).abs() < apart_m;
+            let overlaps = |body: Point| {
+                (body.x - there.x).abs() < apart_m && (body.y - there.y).abs() < apart_m
+            };
             is_on_field(cars, there) && !percept.bodies.iter().any(|body| overlaps(body.location))
         };
         if is_free(straight) {

@@ -17,14 +17,23 @@ pub(crate) fn feeling(
     circumstances: &Circumstances<'_>,
 ) -> Vec<Widget> {
     let Some(feeling) = feeling else {
-        return vec![Widget::Face { face: Face::Neutral, intensity: 0.0 }, emotion(NEUTRAL, Tone::Neutral)];
+        return vec![
+            Widget::Face {
+                face: Face::Neutral,
+                intensity: 0.0,
+            },
+            emotion(NEUTRAL, Tone::Neutral),
+        ];
     };
     let (name, intensity) = (feeling.emotion.name(), feeling.intensity);
     let mut widgets = Vec::new();
     let told = Schemata::standard().emotion(name, intensity, circumstances);
     if let Ok(told) = &told {
         let face = face(told.components().facial_expression);
-        widgets.push(Widget::Face { face, intensity: intensity.value() });
+        widgets.push(Widget::Face {
+            face,
+            intensity: intensity.value(),
+        });
     }
     widgets.push(emotion(name, tone(feeling.emotion)));
     widgets.push(Widget::Bar {
@@ -35,23 +44,39 @@ pub(crate) fn feeling(
     });
     if let Ok(told) = &told {
         let text = told.components().causal_chain.spoken();
-        widgets.push(Widget::Text { label: "why".to_owned(), text });
+        widgets.push(Widget::Text {
+            label: "why".to_owned(),
+            text,
+        });
     }
     widgets
 }
 
 /// The badge of a behavior.
 pub(crate) fn behavior(name: &str) -> Widget {
-    Widget::Badge { label: "behavior".to_owned(), text: name.to_owned(), tone: Tone::Neutral }
+    Widget::Badge {
+        label: "behavior".to_owned(),
+        text: name.to_owned(),
+        tone: Tone::Neutral,
+    }
 }
 
 fn emotion(name: &str, tone: Tone) -> Widget {
-    Widget::Badge { label: "emotion".to_owned(), text: name.to_owned(), tone }
+    Widget::Badge {
+        label: "emotion".to_owned(),
+        text: name.to_owned(),
+        tone,
+    }
 }
 
 /// A table of names and values.
 pub(crate) fn table(rows: &[(&str, String)]) -> Widget {
-    Widget::Table { rows: rows.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
+    Widget::Table {
+        rows: rows
+            .iter()
+            .map(|(name, value)| vec![(*name).to_owned(), value.clone()])
+            .collect(),
+    }
 }
 
 /// A time for people.

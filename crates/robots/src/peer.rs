@@ -68,17 +68,27 @@ impl Peer {
             self.behavior = Some(state.behavior_state.clone());
             self.unheard_s = 0.0;
         }
-        let sensed = cars.sensed_robots().iter().find(|robot| robot.name.as_str() == self.name);
+        let sensed = cars
+            .sensed_robots()
+            .iter()
+            .find(|robot| robot.name.as_str() == self.name);
         let sensed = sensed.map(|robot| robot.location);
         self.is_sensed = sensed.is_some();
         let place = sensed.or(state.as_ref().map(|state| state.location));
-        let seen_after_s = place.is_some().then(|| std::mem::replace(&mut self.unseen_s, 0.0));
+        let seen_after_s = place
+            .is_some()
+            .then(|| std::mem::replace(&mut self.unseen_s, 0.0));
         let range_m = cars.welcome().sensing_range_m;
-        let was_searched = self.last.is_some_and(|last| own.distance_m(last) <= range_m);
+        let was_searched = self
+            .last
+            .is_some_and(|last| own.distance_m(last) <= range_m);
         self.is_missing = place.is_none() && (self.is_missing || was_searched);
         self.last = place.or(self.last);
         self.first = self.first.or(self.last);
-        News { state, seen_after_s }
+        News {
+            state,
+            seen_after_s,
+        }
     }
 
     /// The last place where it was known to be.
@@ -104,13 +114,18 @@ impl Peer {
     #[must_use]
     pub fn is_within(&self, radius_m: f64, own: Point, sensing_range_m: f64) -> bool {
         let is_certain = self.is_sensed || (sensing_range_m < radius_m && self.unseen_s == 0.0);
-        is_certain && self.last.is_some_and(|place| own.distance_m(place) <= radius_m)
+        is_certain
+            && self
+                .last
+                .is_some_and(|place| own.distance_m(place) <= radius_m)
     }
 
     /// Its behavior, unless its last answer is older than `stale_s`.
     #[must_use]
     pub fn behavior(&self, stale_s: f64) -> Option<&str> {
-        self.behavior.as_deref().filter(|_| !self.is_unknown(stale_s))
+        self.behavior
+            .as_deref()
+            .filter(|_| !self.is_unknown(stale_s))
     }
 
     /// Whether what goes on inside it cannot be known: it never answered, or not for longer than `stale_s`.

@@ -28,9 +28,15 @@ const CONTENT: &str = "treat_mean_s = 1e9";
 #[test]
 fn t01_both_start_happy_with_a_full_tray_and_at_rest() {
     let stage = Stage::pair(1, "", "");
-    assert_eq!((stage.emotion("Butler"), stage.behavior("Butler")), ("HAPPY", "SERVE"));
+    assert_eq!(
+        (stage.emotion("Butler"), stage.behavior("Butler")),
+        ("HAPPY", "SERVE")
+    );
     assert_eq!(stage.number("Butler", "treats"), 30.0);
-    assert_eq!((stage.emotion("Leguin"), stage.behavior("Leguin")), ("HAPPY", "WAIT"));
+    assert_eq!(
+        (stage.emotion("Leguin"), stage.behavior("Leguin")),
+        ("HAPPY", "WAIT")
+    );
     assert_eq!(stage.report("Leguin").speed_mps, 0.0);
 }
 
@@ -40,14 +46,25 @@ fn t02_without_a_refiller_emotions_rise_in_order_and_each_message_is_sent_once()
         let mut stage = deaf(seed, "");
         let mut emotions = vec!["HAPPY".to_owned()];
         let intercepts = stage.step_until(120.0, |stage| {
-            if emotions.last().is_none_or(|last| last != stage.emotion("Butler")) {
+            if emotions
+                .last()
+                .is_none_or(|last| last != stage.emotion("Butler"))
+            {
                 emotions.push(stage.emotion("Butler").to_owned());
             }
             stage.behavior("Butler") == "INTERCEPT"
         });
         assert!(intercepts, "seed {seed}");
-        assert_eq!(emotions, ["HAPPY", "CONFIDENT", "CONCERNED", "FRUSTRATED"], "seed {seed}");
-        assert_eq!(stage.commands_of("Butler"), ["refill", "hurry"], "seed {seed}");
+        assert_eq!(
+            emotions,
+            ["HAPPY", "CONFIDENT", "CONCERNED", "FRUSTRATED"],
+            "seed {seed}"
+        );
+        assert_eq!(
+            stage.commands_of("Butler"),
+            ["refill", "hurry"],
+            "seed {seed}"
+        );
     }
 }
 
@@ -57,7 +74,10 @@ fn t05_exchange_only_within_four_feet_and_in_need_and_it_fills_the_tray() {
         let mut stage = Stage::pair(seed, "", "");
         let mut exchanges = 0;
         for _ in 0..1200 {
-            let (before, needed) = (stage.behavior("Butler").to_owned(), stage.flag("Butler", "need"));
+            let (before, needed) = (
+                stage.behavior("Butler").to_owned(),
+                stage.flag("Butler", "need"),
+            );
             stage.step();
             let now = stage.behavior("Butler");
             if now == "EXCHANGE" && before != "EXCHANGE" {
@@ -66,7 +86,12 @@ fn t05_exchange_only_within_four_feet_and_in_need_and_it_fills_the_tray() {
                     "seed {seed}, tick {}",
                     stage.tick
                 );
-                assert_eq!(stage.behavior("Leguin"), "EXCHANGE", "seed {seed}, tick {}", stage.tick);
+                assert_eq!(
+                    stage.behavior("Leguin"),
+                    "EXCHANGE",
+                    "seed {seed}, tick {}",
+                    stage.tick
+                );
             }
             if before == "EXCHANGE" && now != "EXCHANGE" {
                 assert_eq!(stage.number("Butler", "treats"), 30.0);
@@ -105,11 +130,17 @@ fn t07_after_the_exchange_leguin_stands_until_she_is_sent_home() {
     let at = stage.at("Leguin");
     for _ in 0..10 {
         assert_eq!(stage.behavior("Butler"), "GO_BACK");
-        assert_eq!((stage.behavior("Leguin"), stage.report("Leguin").speed_mps), ("AWAIT_GO_HOME", 0.0));
+        assert_eq!(
+            (stage.behavior("Leguin"), stage.report("Leguin").speed_mps),
+            ("AWAIT_GO_HOME", 0.0)
+        );
         stage.step();
     }
     assert_eq!(stage.at("Leguin"), at);
-    let sent_home = stage.commands_of("Butler").into_iter().filter(|command| *command == "go home");
+    let sent_home = stage
+        .commands_of("Butler")
+        .into_iter()
+        .filter(|command| *command == "go home");
     assert_eq!(sent_home.count(), 1);
     stage.command("Leguin", "go home");
     stage.step();
@@ -121,7 +152,10 @@ fn t08_at_the_table_leguin_waits_for_refill_or_hurry() {
     for (command, emotion) in [("refill", "CONFIDENT"), ("hurry", "CONCERNED")] {
         let mut stage = Stage::pair(4, CONTENT, "");
         assert!(!stage.step_until(30.0, |stage| stage.behavior("Leguin") != "WAIT"));
-        assert_eq!((stage.at("Leguin"), stage.report("Leguin").speed_mps), (feet(4.0, 4.0), 0.0));
+        assert_eq!(
+            (stage.at("Leguin"), stage.report("Leguin").speed_mps),
+            (feet(4.0, 4.0), 0.0)
+        );
         stage.command("Leguin", command);
         stage.step();
         assert_eq!(stage.behavior("Leguin"), "REFILL", "{command}");
@@ -138,7 +172,13 @@ fn t08_other_words_do_not_move_her() {
         stage.command("Leguin", command);
         stage.step();
         assert_eq!(stage.behavior("Leguin"), "WAIT", "{command}");
-        assert!(stage.report("Leguin").log.iter().all(|line| line.len() < 200));
+        assert!(
+            stage
+                .report("Leguin")
+                .log
+                .iter()
+                .all(|line| line.len() < 200)
+        );
     }
 }
 
@@ -148,11 +188,17 @@ fn t09_hurry_on_the_way_makes_her_concerned_and_faster() {
     stage.command("Leguin", "refill");
     assert!(stage.step_until(5.0, |stage| stage.report("Leguin").speed_mps > 0.0));
     let speed_mps = stage.report("Leguin").speed_mps;
-    assert_eq!((stage.emotion("Leguin"), speed_mps), ("CONFIDENT", 3.0 * FT_M));
+    assert_eq!(
+        (stage.emotion("Leguin"), speed_mps),
+        ("CONFIDENT", 3.0 * FT_M)
+    );
     stage.command("Leguin", "hurry");
     stage.step();
     stage.step();
-    assert_eq!((stage.emotion("Leguin"), stage.behavior("Leguin")), ("CONCERNED", "REFILL"));
+    assert_eq!(
+        (stage.emotion("Leguin"), stage.behavior("Leguin")),
+        ("CONCERNED", "REFILL")
+    );
     assert!((stage.report("Leguin").speed_mps / speed_mps - 1.5).abs() < 1e-12);
 }
 
@@ -161,7 +207,10 @@ fn t10_intercepting_brings_them_nearer_and_serves_nobody() {
     for seed in 0..16 {
         let mut stage = deaf(seed, "");
         assert!(stage.step_until(120.0, |stage| stage.behavior("Butler") == "INTERCEPT"));
-        let (mut apart_ft, treats) = (stage.apart_ft("Butler", "Leguin"), stage.number("Butler", "treats"));
+        let (mut apart_ft, treats) = (
+            stage.apart_ft("Butler", "Leguin"),
+            stage.number("Butler", "treats"),
+        );
         let met = stage.step_until(60.0, |stage| {
             let now_ft = stage.apart_ft("Butler", "Leguin");
             assert!(now_ft <= apart_ft, "seed {seed}, tick {}", stage.tick);
@@ -182,13 +231,20 @@ fn t11_going_back_ends_at_the_start_and_may_come_too_late() {
         // A short supply, so that the way back matters; a refiller who is met far from the start.
         let mut stage = Stage::pair(seed, "treat_mean_s = 0.2\ntreat_capacity = 10", "");
         stage.drops = Box::new(|sent| sent.command != "go home");
-        assert!(stage.step_until(120.0, |stage| stage.behavior("Butler") == "GO_BACK"), "seed {seed}");
+        assert!(
+            stage.step_until(120.0, |stage| stage.behavior("Butler") == "GO_BACK"),
+            "seed {seed}"
+        );
         let is_back = stage.step_until(60.0, |stage| {
-            was_too_late |= stage.behavior("Butler") == "GO_BACK" && stage.number("Butler", "treats") == 0.0;
+            was_too_late |=
+                stage.behavior("Butler") == "GO_BACK" && stage.number("Butler", "treats") == 0.0;
             stage.behavior("Butler") != "GO_BACK"
         });
         if is_back && stage.behavior("Butler") == "SERVE" {
-            assert!(stage.at("Butler").distance_m(feet(25.0, 25.0)) <= 1.5 * FT_M, "seed {seed}");
+            assert!(
+                stage.at("Butler").distance_m(feet(25.0, 25.0)) <= 1.5 * FT_M,
+                "seed {seed}"
+            );
         } else {
             assert_eq!(stage.behavior("Butler"), "EXCHANGE", "seed {seed}");
         }
@@ -217,7 +273,10 @@ fn t14_vonda_stands_still_until_butler_calls_her() {
         let at = stage.at(idle);
         for _ in 0..1200 {
             stage.step();
-            assert_eq!((stage.emotion(idle), stage.behavior(idle)), ("HAPPY", "WAIT"));
+            assert_eq!(
+                (stage.emotion(idle), stage.behavior(idle)),
+                ("HAPPY", "WAIT")
+            );
             assert_eq!((stage.at(idle), stage.report(idle).speed_mps), (at, 0.0));
         }
         assert!(stage.number("Butler", "exchanges") >= 5.0, "{called}");
@@ -230,7 +289,12 @@ fn t14_vonda_does_not_step_in_when_butler_passes_her_in_need_of_leguin() {
     // She stands where Butler serves, and Leguin never comes.
     let vonda = Role::new("Vonda", "Vonda", feet(25.0, 28.0), "");
     let leguin = Role::new("Leguin", "Leguin", feet(4.0, 4.0), "");
-    let butler = Role::new("Butler", "Butler", feet(25.0, 25.0), "v_serve_mps = 0.0\ncaution = 0.0");
+    let butler = Role::new(
+        "Butler",
+        "Butler",
+        feet(25.0, 25.0),
+        "v_serve_mps = 0.0\ncaution = 0.0",
+    );
     let mut stage = Stage::new(1, vec![butler, leguin, vonda]);
     stage.drops = Box::new(|_| true);
     stage.begin();
@@ -248,7 +312,10 @@ fn t14_a_third_robot_changes_nothing_for_the_other_two() {
         let mut trace = Vec::new();
         for _ in 0..600 {
             stage.step();
-            trace.push((stage.report("Butler").clone(), stage.report("Leguin").clone()));
+            trace.push((
+                stage.report("Butler").clone(),
+                stage.report("Leguin").clone(),
+            ));
         }
         trace
     };
@@ -292,10 +359,15 @@ fn t16_whatever_is_felt_behavior_takes_only_the_ways_of_the_table() {
                         legal.contains(&(state.name(), next.name())),
                         "{state:?} -> {next:?}: {context:?}"
                     );
-                    assert!(next != butler::Behavior::Exchange || context.need, "{context:?}");
+                    assert!(
+                        next != butler::Behavior::Exchange || context.need,
+                        "{context:?}"
+                    );
                 }
-                let calls =
-                    decision.actions.iter().filter(|act| matches!(act, Act::CallRefill | Act::CallHurry));
+                let calls = decision
+                    .actions
+                    .iter()
+                    .filter(|act| matches!(act, Act::CallRefill | Act::CallHurry));
                 assert!(emotion.is_some() || !decision.actions.contains(&Act::CallHurry));
                 assert!(calls.count() <= 2);
             }
@@ -308,7 +380,10 @@ fn t16_with_a_constant_emotion_the_task_still_goes_on() {
     let mut stage = Stage::pair(7, "affect = \"off\"", "affect = \"off\"");
     for _ in 0..1200 {
         stage.step();
-        assert_eq!((stage.emotion("Butler"), stage.emotion("Leguin")), ("NEUTRAL", "NEUTRAL"));
+        assert_eq!(
+            (stage.emotion("Butler"), stage.emotion("Leguin")),
+            ("NEUTRAL", "NEUTRAL")
+        );
     }
     assert!(stage.number("Butler", "exchanges") >= 5.0);
     assert!(!stage.commands_of("Butler").contains(&"hurry"));
@@ -317,7 +392,12 @@ fn t16_with_a_constant_emotion_the_task_still_goes_on() {
 #[test]
 fn t17_a_query_tells_what_its_owner_publishes_and_nothing_else() {
     let published = |stage: &Stage, robot: &str| -> Vec<String> {
-        stage.report(robot).state_variables.keys().cloned().collect()
+        stage
+            .report(robot)
+            .state_variables
+            .keys()
+            .cloned()
+            .collect()
     };
     let mut stage = Stage::pair(8, "", "");
     stage.step();
@@ -326,8 +406,14 @@ fn t17_a_query_tells_what_its_owner_publishes_and_nothing_else() {
     assert!(leguin.contains(&"blocked_s".to_owned()) && !butler.contains(&"blocked_s".to_owned()));
     // A robot that asks gets exactly these.
     let asked = stage::asker::answers(8, "Leguin");
-    assert_eq!(asked.state_variables.keys().cloned().collect::<Vec<_>>(), leguin);
-    assert_eq!((asked.emotion_state.as_str(), asked.behavior_state.as_str()), ("HAPPY", "WAIT"));
+    assert_eq!(
+        asked.state_variables.keys().cloned().collect::<Vec<_>>(),
+        leguin
+    );
+    assert_eq!(
+        (asked.emotion_state.as_str(), asked.behavior_state.as_str()),
+        ("HAPPY", "WAIT")
+    );
     assert_eq!(asked.location, feet(4.0, 4.0));
 }
 
@@ -336,7 +422,10 @@ fn t18_a_completed_exchange_makes_butler_happy_at_once() {
     let mut stage = deaf(9, "");
     assert!(stage.step_until(200.0, |stage| stage.behavior("Butler") == "EXCHANGE"));
     assert!(stage.step_until(2.0, |stage| stage.behavior("Butler") == "GO_BACK"));
-    assert_eq!((stage.emotion("Butler"), stage.number("Butler", "intensity")), ("HAPPY", 0.0));
+    assert_eq!(
+        (stage.emotion("Butler"), stage.number("Butler", "intensity")),
+        ("HAPPY", 0.0)
+    );
 }
 
 #[test]
@@ -351,10 +440,14 @@ fn t18_butler_calms_down_when_leguin_gets_on_again() {
             ];
             let mut stage = Stage::new(seed, cast);
             // Bodies all around her: nobody gets through.
-            stage.obstacles =
-                (0..8).flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))]).collect();
+            stage.obstacles = (0..8)
+                .flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))])
+                .collect();
             stage.begin();
-            assert!(stage.step_until(120.0, |stage| stage.emotion("Butler") == "FRUSTRATED"), "seed {seed}");
+            assert!(
+                stage.step_until(120.0, |stage| stage.emotion("Butler") == "FRUSTRATED"),
+                "seed {seed}"
+            );
             if is_unblocked {
                 stage.obstacles.clear();
             }
@@ -369,10 +462,18 @@ fn t18_butler_calms_down_when_leguin_gets_on_again() {
             emotions.dedup();
             emotions
         };
-        assert_eq!(emotions(false), ["FRUSTRATED"], "seed {seed}: nothing changes for the better");
+        assert_eq!(
+            emotions(false),
+            ["FRUSTRATED"],
+            "seed {seed}: nothing changes for the better"
+        );
         let calmed = emotions(true);
-        let is_lower = |emotion: &String| ["CONCERNED", "CONFIDENT", "HAPPY"].contains(&emotion.as_str());
-        assert!(calmed[0] == "FRUSTRATED" && calmed.len() > 1, "seed {seed}: {calmed:?}");
+        let is_lower =
+            |emotion: &String| ["CONCERNED", "CONFIDENT", "HAPPY"].contains(&emotion.as_str());
+        assert!(
+            calmed[0] == "FRUSTRATED" && calmed.len() > 1,
+            "seed {seed}: {calmed:?}"
+        );
         assert!(calmed[1..].iter().all(is_lower), "seed {seed}: {calmed:?}");
     }
 }
@@ -402,9 +503,15 @@ fn t23_saved_and_restored_in_mid_run_both_continue_identically() {
             .collect::<Vec<_>>()
     };
     let straight = run(u64::MAX);
-    let behaviors: std::collections::BTreeSet<&str> =
-        straight.iter().map(|reports| reports[&name("Leguin")].behavior_state.as_str()).collect();
-    assert_eq!(behaviors.len(), leguin::Behavior::ALL.len(), "the run goes through every behavior");
+    let behaviors: std::collections::BTreeSet<&str> = straight
+        .iter()
+        .map(|reports| reports[&name("Leguin")].behavior_state.as_str())
+        .collect();
+    assert_eq!(
+        behaviors.len(),
+        leguin::Behavior::ALL.len(),
+        "the run goes through every behavior"
+    );
     for reborn_at in (1..240).step_by(7) {
         assert!(run(reborn_at) == straight, "saved at tick {reborn_at}");
     }
@@ -418,7 +525,13 @@ fn t25_the_order_in_which_robots_act_changes_nothing() {
             Some(Role::new("Leguin", "Leguin", feet(4.0, 4.0), "")),
             Some(Role::new("Vonda", "Vonda", feet(46.0, 4.0), "")),
         ];
-        let mut stage = Stage::new(11, order.into_iter().filter_map(|index| cast[index].take()).collect());
+        let mut stage = Stage::new(
+            11,
+            order
+                .into_iter()
+                .filter_map(|index| cast[index].take())
+                .collect(),
+        );
         stage.begin();
         (0..600)
             .map(|_| {

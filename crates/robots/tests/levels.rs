@@ -8,7 +8,9 @@ use stage::{Role, Stage, feet};
 
 /// Too far around her to be passed.
 fn wall() -> Vec<robot::Point> {
-    (0..8).flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))]).collect()
+    (0..8)
+        .flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))])
+        .collect()
 }
 
 /// Butler in the middle, and Leguin behind a wall.
@@ -29,7 +31,10 @@ fn deeds(mut stage: Stage) -> Vec<String> {
     for _ in 0..1200 {
         stage.step();
         for (robot, report) in &stage.reports {
-            deeds.push(format!("{robot} {:?} {} {:?}", report.proposal, report.behavior_state, report.sent));
+            deeds.push(format!(
+                "{robot} {:?} {} {:?}",
+                report.proposal, report.behavior_state, report.sent
+            ));
         }
     }
     deeds
@@ -38,12 +43,22 @@ fn deeds(mut stage: Stage) -> Vec<String> {
 #[test]
 fn without_the_sensory_motor_level_concern_does_not_speed_leguin_up() {
     for (level, factor) in [("on", 1.5), ("off", 1.0)] {
-        let mut stage = Stage::pair(5, "treat_mean_s = 1e9", &format!("sensory_motor = \"{level}\""));
+        let mut stage = Stage::pair(
+            5,
+            "treat_mean_s = 1e9",
+            &format!("sensory_motor = \"{level}\""),
+        );
         stage.command("Leguin", "hurry");
         assert!(stage.step_until(5.0, |stage| stage.report("Leguin").speed_mps > 0.0));
-        assert_eq!((stage.emotion("Leguin"), stage.behavior("Leguin")), ("CONCERNED", "REFILL"));
+        assert_eq!(
+            (stage.emotion("Leguin"), stage.behavior("Leguin")),
+            ("CONCERNED", "REFILL")
+        );
         let speed_mps = stage.report("Leguin").speed_mps;
-        assert!((speed_mps - factor * 3.0 * FT_M).abs() < 1e-12, "{level}: {speed_mps} m/s");
+        assert!(
+            (speed_mps - factor * 3.0 * FT_M).abs() < 1e-12,
+            "{level}: {speed_mps} m/s"
+        );
     }
 }
 
@@ -53,7 +68,10 @@ fn without_the_schematic_level_leguin_is_frustrated_and_goes_on() {
         let leguin = format!("block_patience_s = 10.0\nschematic = \"{level}\"");
         let mut stage = walled(17, "treat_mean_s = 1e9", &leguin);
         stage.command("Leguin", "hurry");
-        assert!(stage.step_until(60.0, |stage| stage.emotion("Leguin") == "FRUSTRATED"), "{level}");
+        assert!(
+            stage.step_until(60.0, |stage| stage.emotion("Leguin") == "FRUSTRATED"),
+            "{level}"
+        );
         assert_eq!(stage.behavior("Leguin"), behavior, "{level}");
         if level == "off" {
             // What she feels still follows her progress.
@@ -66,13 +84,26 @@ fn without_the_schematic_level_leguin_is_frustrated_and_goes_on() {
 
 #[test]
 fn without_the_schematic_level_butler_is_frustrated_and_serves_on() {
-    for (level, said, intercepts) in [("on", vec!["refill", "hurry"], true), ("off", vec!["refill"], false)] {
+    for (level, said, intercepts) in [
+        ("on", vec!["refill", "hurry"], true),
+        ("off", vec!["refill"], false),
+    ] {
         let mut stage = walled(3, &format!("schematic = \"{level}\""), "");
-        assert!(stage.step_until(120.0, |stage| stage.emotion("Butler") == "FRUSTRATED"), "{level}");
+        assert!(
+            stage.step_until(120.0, |stage| stage.emotion("Butler") == "FRUSTRATED"),
+            "{level}"
+        );
         assert_eq!(stage.commands_of("Butler"), said, "{level}");
         let is_seen = stage.step_until(10.0, |stage| stage.behavior("Butler") == "INTERCEPT");
-        assert_eq!(is_seen || stage.behavior("Butler") == "INTERCEPT", intercepts, "{level}");
-        assert!(stage.number("Butler", "intensity") > 0.5, "{level}: he feels it all the same");
+        assert_eq!(
+            is_seen || stage.behavior("Butler") == "INTERCEPT",
+            intercepts,
+            "{level}"
+        );
+        assert!(
+            stage.number("Butler", "intensity") > 0.5,
+            "{level}: he feels it all the same"
+        );
     }
 }
 
@@ -84,7 +115,10 @@ fn with_every_level_off_they_act_as_if_they_had_no_emotions_and_have_them() {
         let affectless = Stage::pair(seed, "affect = \"off\"", "affect = \"off\"");
         assert!(deeds(felt()) == deeds(affectless), "seed {seed}");
         let mut stage = felt();
-        assert!(stage.step_until(120.0, |stage| stage.emotion("Butler") == "CONCERNED"), "seed {seed}");
+        assert!(
+            stage.step_until(120.0, |stage| stage.emotion("Butler") == "CONCERNED"),
+            "seed {seed}"
+        );
     }
 }
 
@@ -99,7 +133,10 @@ fn any_levels_together_make_a_team_that_works() {
         let mut stage = make();
         stage.step_until(600.0, |_| false);
         let exchanges = stage.number("Butler", "exchanges");
-        assert!(exchanges >= 5.0, "Butler {butler}, Leguin {leguin}: {exchanges} exchanges");
+        assert!(
+            exchanges >= 5.0,
+            "Butler {butler}, Leguin {leguin}: {exchanges} exchanges"
+        );
         distinct.push(deeds(make()));
     }
     // Butler's word and Leguin's speed are the levels that show on an open field, where nobody has to give up.

@@ -1,6 +1,9 @@
 //! The robot of `docs/new-robot.md`: the page shows the code that is compiled here, and the robot does what the page says.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the failure")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests, where a panic is the failure"
+)]
 
 mod stage;
 #[path = "../examples/vera.rs"]
@@ -10,8 +13,8 @@ mod vera;
 use std::sync::Arc;
 
 use robot::{
-    Clock, Command, CommandId, Network, Percept, PublicState, RobotName, Seat, SensedBody, SensedKind, Tick,
-    Undelivered, Widget,
+    Clock, Command, CommandId, Network, Percept, PublicState, RobotName, Seat, SensedBody,
+    SensedKind, Tick, Undelivered, Widget,
 };
 use stage::{Role, Stage, feet};
 
@@ -29,22 +32,44 @@ fn shown(file: &str) -> &'static str {
 fn the_page_shows_the_files_as_they_are() {
     let code = include_str!("../examples/vera.rs");
     assert_eq!(shown("crates/robots/examples/vera.rs"), code);
-    assert_eq!(shown("crates/robots/examples/vera.toml"), include_str!("../examples/vera.toml"));
+    assert_eq!(
+        shown("crates/robots/examples/vera.toml"),
+        include_str!("../examples/vera.toml")
+    );
     assert!(code.lines().count() < 100, "{} lines", code.lines().count());
-    for (lines, file) in [(code, "Rust"), (include_str!("../examples/vera.toml"), "that say")] {
+    for (lines, file) in [
+        (code, "Rust"),
+        (include_str!("../examples/vera.toml"), "that say"),
+    ] {
         let words = format!("{} lines", lines.lines().count());
-        assert!(PAGE.contains(&words), "the page does not speak of {words} of {file}");
+        assert!(
+            PAGE.contains(&words),
+            "the page does not speak of {words} of {file}"
+        );
     }
 }
 
 /// Vera, 20 ft from a party in the middle of the field.
 fn party(parameters: &str) -> Stage {
-    let (robot, at, party) = (Box::new(vera::Vera::default()), feet(5.0, 25.0), feet(25.0, 25.0));
-    let text = format!("speed_mps = 1.0\nparty_m = {{ x = {}, y = {} }}\n{parameters}", party.x, party.y);
+    let (robot, at, party) = (
+        Box::new(vera::Vera::default()),
+        feet(5.0, 25.0),
+        feet(25.0, 25.0),
+    );
+    let text = format!(
+        "speed_mps = 1.0\nparty_m = {{ x = {}, y = {} }}\n{parameters}",
+        party.x, party.y
+    );
     let mut stage = Stage::new(1, vec![Role::played_by(robot, "Vera", at, &text)]);
-    stage.guests = [(22.0, 28.0), (22.0, 22.0), (28.0, 28.0), (28.0, 22.0), (25.0, 30.0)]
-        .map(|(x, y)| feet(x, y))
-        .into();
+    stage.guests = [
+        (22.0, 28.0),
+        (22.0, 22.0),
+        (28.0, 28.0),
+        (28.0, 22.0),
+        (25.0, 30.0),
+    ]
+    .map(|(x, y)| feet(x, y))
+    .into();
     stage.begin();
     stage
 }
@@ -55,7 +80,11 @@ fn minute(mut stage: Stage) -> Vec<(String, String, f64)> {
     for _ in 0..120 {
         stage.step();
         let away_m = stage.at("Vera").distance_m(feet(25.0, 25.0));
-        minute.push((stage.emotion("Vera").to_owned(), stage.behavior("Vera").to_owned(), away_m));
+        minute.push((
+            stage.emotion("Vera").to_owned(),
+            stage.behavior("Vera").to_owned(),
+            away_m,
+        ));
     }
     minute
 }
@@ -63,12 +92,24 @@ fn minute(mut stage: Stage) -> Vec<(String, String, f64)> {
 #[test]
 fn vera_becomes_shy_where_too_many_stand_and_hides_until_she_is_calm() {
     let minute = minute(party("bearable = 4"));
-    let mut states: Vec<(&str, &str)> =
-        minute.iter().map(|(emotion, behavior, _)| (emotion.as_str(), behavior.as_str())).collect();
+    let mut states: Vec<(&str, &str)> = minute
+        .iter()
+        .map(|(emotion, behavior, _)| (emotion.as_str(), behavior.as_str()))
+        .collect();
     states.dedup();
-    assert_eq!(states[..3], [("CALM", "MINGLE"), ("SHY", "HIDE"), ("CALM", "MINGLE")]);
-    let shy = minute.iter().position(|(emotion, ..)| emotion == "SHY").unwrap();
-    let calm = shy + minute[shy..].iter().position(|(emotion, ..)| emotion == "CALM").unwrap();
+    assert_eq!(
+        states[..3],
+        [("CALM", "MINGLE"), ("SHY", "HIDE"), ("CALM", "MINGLE")]
+    );
+    let shy = minute
+        .iter()
+        .position(|(emotion, ..)| emotion == "SHY")
+        .unwrap();
+    let calm = shy
+        + minute[shy..]
+            .iter()
+            .position(|(emotion, ..)| emotion == "CALM")
+            .unwrap();
     assert!(minute[shy].2 < minute[0].2, "she came nearer");
     assert!(minute[calm].2 > minute[shy].2 + 1.0, "she went away");
 }
@@ -77,9 +118,9 @@ fn vera_becomes_shy_where_too_many_stand_and_hides_until_she_is_calm() {
 fn vera_who_can_bear_more_stays() {
     let minute = minute(party("bearable = 50"));
     assert!(
-        minute
-            .iter()
-            .all(|(emotion, behavior, _)| (emotion.as_str(), behavior.as_str()) == ("CALM", "MINGLE"))
+        minute.iter().all(
+            |(emotion, behavior, _)| (emotion.as_str(), behavior.as_str()) == ("CALM", "MINGLE")
+        )
     );
     let (_, _, away_m) = minute.last().unwrap();
     assert!(*away_m < 1e-9, "she is in the middle, {away_m} m from it");
@@ -95,12 +136,24 @@ fn a_misspelled_parameter_of_vera_is_refused() {
 struct Crowd(usize);
 
 impl Network for Crowd {
-    fn state_of(&mut self, _: &RobotName, _: u32, _: Tick) -> Result<Arc<PublicState>, Undelivered> {
+    fn state_of(
+        &mut self,
+        _: &RobotName,
+        _: u32,
+        _: Tick,
+    ) -> Result<Arc<PublicState>, Undelivered> {
         Err(Undelivered::Lost)
     }
     fn percept(&mut self, _: &RobotName, epoch: u32, tick: Tick) -> Result<Percept, Undelivered> {
-        let guest = SensedBody { kind: SensedKind::Guest, location: feet(30.0, 30.0) };
-        Ok(Percept { epoch, tick, bodies: vec![guest; self.0] })
+        let guest = SensedBody {
+            kind: SensedKind::Guest,
+            location: feet(30.0, 30.0),
+        };
+        Ok(Percept {
+            epoch,
+            tick,
+            bodies: vec![guest; self.0],
+        })
     }
     fn send(&mut self, _: &RobotName, _: &RobotName, _: &Command) {}
     fn receive(&mut self, _: &RobotName, _: u32, _: &CommandId) -> Option<Command> {
@@ -111,7 +164,13 @@ impl Network for Crowd {
 #[test]
 fn vera_accounts_for_what_she_feels() {
     let text = "bearable = 4\nspeed_mps = 1.0\nparty_m = { x = 1.0, y = 1.0 }";
-    let welcome = stage::welcome("Vera", feet(5.0, 5.0), 1, &[stage::name("Vera")], stage::parameters(text));
+    let welcome = stage::welcome(
+        "Vera",
+        feet(5.0, 5.0),
+        1,
+        &[stage::name("Vera")],
+        stage::parameters(text),
+    );
     let mut seat = Seat::new(Box::new(vera::Vera::default()), welcome);
     let clock = |tick| -> Clock {
         serde_json::from_value(serde_json::json!({ "epoch": 1, "tick": tick, "news": {} })).unwrap()
@@ -125,5 +184,8 @@ fn vera_accounts_for_what_she_feels() {
         }
     };
     assert_eq!(why(1, 3), "I have room.");
-    assert_eq!(why(2, 4), "4 are around me; because of this I want to hide.");
+    assert_eq!(
+        why(2, 4),
+        "4 are around me; because of this I want to hide."
+    );
 }

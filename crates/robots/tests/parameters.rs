@@ -1,6 +1,9 @@
 //! The shipped files say what the code does, and what makes no sense is refused.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the failure")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests, where a panic is the failure"
+)]
 
 mod stage;
 
@@ -34,15 +37,22 @@ fn in_si(value: &toml::Value) -> serde_json::Value {
             quantity.map_or_else(|| text.clone().into(), Into::into)
         }
         toml::Value::Array(values) => values.iter().map(in_si).collect(),
-        toml::Value::Table(table) => table.iter().map(|(key, value)| (key.clone(), in_si(value))).collect(),
+        toml::Value::Table(table) => table
+            .iter()
+            .map(|(key, value)| (key.clone(), in_si(value)))
+            .collect(),
         other => serde_json::to_value(other).unwrap(),
     }
 }
 
 /// Names of all parameters, with those of tables.
 fn names(value: &serde_json::Value, prefix: &str) -> Vec<String> {
-    let Some(map) = value.as_object() else { return vec![prefix.to_owned()] };
-    map.iter().flat_map(|(key, value)| names(value, &format!("{prefix}.{key}"))).collect()
+    let Some(map) = value.as_object() else {
+        return vec![prefix.to_owned()];
+    };
+    map.iter()
+        .flat_map(|(key, value)| names(value, &format!("{prefix}.{key}")))
+        .collect()
 }
 
 fn check_file<P: Default + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned>(file: &str) {
@@ -52,7 +62,11 @@ fn check_file<P: Default + PartialEq + std::fmt::Debug + Serialize + Deserialize
     shipped_names.sort();
     default_names.sort();
     assert_eq!(shipped_names, default_names, "{file} names every parameter");
-    assert_eq!(serde_json::from_value::<P>(shipped).unwrap(), P::default(), "{file} and the code differ");
+    assert_eq!(
+        serde_json::from_value::<P>(shipped).unwrap(),
+        P::default(),
+        "{file} and the code differ"
+    );
 }
 
 #[test]
@@ -66,7 +80,10 @@ fn every_line_of_the_shipped_files_says_where_it_comes_from() {
     for file in ["robots/butler.toml", "robots/leguin.toml"] {
         let text = std::fs::read_to_string(configs().join(file)).unwrap();
         for line in text.lines().filter(|line| line.contains(" = ")) {
-            assert!(line.contains("[D]") || line.contains("[I]"), "{file}: {line}");
+            assert!(
+                line.contains("[D]") || line.contains("[I]"),
+                "{file}: {line}"
+            );
         }
     }
 }
@@ -78,8 +95,13 @@ fn the_shipped_scenarios_name_robots_that_exist_and_parameters_that_they_know() 
             let name = robot["name"].as_str().unwrap();
             assert!(robots::make(name).is_some(), "{file}: {name}");
             let mut parameters = read(robot["params_from"].as_str().unwrap());
-            parameters
-                .extend(robot.get("params").and_then(|own| own.as_table()).cloned().unwrap_or_default());
+            parameters.extend(
+                robot
+                    .get("params")
+                    .and_then(|own| own.as_table())
+                    .cloned()
+                    .unwrap_or_default(),
+            );
             let parameters = in_si(&toml::Value::Table(parameters));
             let refused = match name {
                 "Butler" => Butler::new(serde_json::from_value(parameters).unwrap()).err(),
@@ -92,7 +114,11 @@ fn the_shipped_scenarios_name_robots_that_exist_and_parameters_that_they_know() 
 
 #[test]
 fn classes_can_be_made_and_others_cannot() {
-    assert!(robots::CLASSES.iter().all(|class| robots::make(class).is_some()));
+    assert!(
+        robots::CLASSES
+            .iter()
+            .all(|class| robots::make(class).is_some())
+    );
     assert!(robots::make("Cherry").is_none());
 }
 
@@ -127,11 +153,30 @@ fn senseless_parameters_are_refused_with_their_name() {
         Leguin::new(parameters).map(|_| ())
     };
     assert!(leguin("hurry_mult = -1.0").is_err());
-    assert_eq!(leguin("sensory_motor = \"off\"\nschematic = \"off\""), Ok(()));
-    assert!(leguin("sensory_motor = \"no\"").unwrap_err().contains("`no`"));
-    assert!(leguin("schematic = true").unwrap_err().contains("schematic"));
-    assert!(leguin("sensorymotor = \"off\"").unwrap_err().contains("sensorymotor"));
-    assert!(leguin("await_patience_s = 0.0").unwrap_err().contains("await_patience_s"));
+    assert_eq!(
+        leguin("sensory_motor = \"off\"\nschematic = \"off\""),
+        Ok(())
+    );
+    assert!(
+        leguin("sensory_motor = \"no\"")
+            .unwrap_err()
+            .contains("`no`")
+    );
+    assert!(
+        leguin("schematic = true")
+            .unwrap_err()
+            .contains("schematic")
+    );
+    assert!(
+        leguin("sensorymotor = \"off\"")
+            .unwrap_err()
+            .contains("sensorymotor")
+    );
+    assert!(
+        leguin("await_patience_s = 0.0")
+            .unwrap_err()
+            .contains("await_patience_s")
+    );
 }
 
 #[test]
@@ -140,7 +185,10 @@ fn panels_show_face_feeling_and_account_and_differ() {
     let kinds = |robot: &dyn Robot| -> Vec<String> {
         let panel = serde_json::to_value(robot.panel()).unwrap();
         let widgets = panel["widgets"].as_array().unwrap();
-        widgets.iter().map(|widget| widget["widget"].as_str().unwrap().to_owned()).collect()
+        widgets
+            .iter()
+            .map(|widget| widget["widget"].as_str().unwrap().to_owned())
+            .collect()
     };
     for kind in ["face", "badge", "bar", "text", "sparkline", "table"] {
         assert!(kinds(&butler).contains(&kind.to_owned()), "{kind}");
@@ -148,8 +196,7 @@ fn panels_show_face_feeling_and_account_and_differ() {
     let leguin = Leguin::default();
     assert_ne!(kinds(&butler), kinds(&leguin));
     assert!(kinds(&leguin).contains(&"button".to_owned()));
-    let is_happy =
-        |widget: &Widget| matches!(widget, Widget::Badge { text, tone: Tone::Good, .. } if text == "HAPPY");
+    let is_happy = |widget: &Widget| matches!(widget, Widget::Badge { text, tone: Tone::Good, .. } if text == "HAPPY");
     assert!(leguin.panel().widgets.iter().any(is_happy));
 
     butler = Butler::new(toml::from_str("affect = \"off\"").unwrap()).unwrap();
@@ -172,20 +219,33 @@ fn jokes_are_rare_and_come_from_the_happy() {
             stage.step();
             for robot in ["Butler", "Leguin"] {
                 for line in &stage.report(robot).log {
-                    assert!(line.starts_with("jokes: ") && joker_was_happy(&stage, robot), "{line}");
+                    assert!(
+                        line.starts_with("jokes: ") && joker_was_happy(&stage, robot),
+                        "{line}"
+                    );
                     jokes += 1;
                 }
             }
             seconds += 0.5;
         }
     }
-    assert!((seconds / 200.0..seconds / 20.0).contains(&f64::from(jokes)), "{jokes} jokes in {seconds} s");
+    assert!(
+        (seconds / 200.0..seconds / 20.0).contains(&f64::from(jokes)),
+        "{jokes} jokes in {seconds} s"
+    );
 }
 
 #[test]
 fn a_misspelled_refiller_is_complained_about() {
-    let mut stage =
-        Stage::new(1, vec![Role::new("Butler", "Butler", feet(25.0, 25.0), "refiller = \"Legiun\"")]);
+    let mut stage = Stage::new(
+        1,
+        vec![Role::new(
+            "Butler",
+            "Butler",
+            feet(25.0, 25.0),
+            "refiller = \"Legiun\"",
+        )],
+    );
     stage.begin();
     assert!(stage.report("Butler").log[0].contains("Legiun"));
     stage.step_until(60.0, |_| false);

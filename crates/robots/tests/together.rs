@@ -9,7 +9,10 @@ fn count_exchanges(stage: &mut Stage, limit_s: f64) -> (u32, u32) {
     let (mut butlers, mut leguins) = (0, 0);
     let mut before = (String::new(), String::new());
     stage.step_until(limit_s, |stage| {
-        let now = (stage.behavior("Butler").to_owned(), stage.behavior("Leguin").to_owned());
+        let now = (
+            stage.behavior("Butler").to_owned(),
+            stage.behavior("Leguin").to_owned(),
+        );
         butlers += u32::from(now.0 == "EXCHANGE" && before.0 != "EXCHANGE");
         leguins += u32::from(now.1 == "EXCHANGE" && before.1 != "EXCHANGE");
         before = now;
@@ -32,12 +35,20 @@ fn a_need_that_arises_beside_a_waiting_leguin_is_met_at_once_by_both() {
         let mut stage = Stage::new(
             seed,
             vec![
-                Role::new("Butler", "Butler", feet(25.0, 25.0), "v_serve_mps = 0.1\nv_refill_mps = 0.02"),
+                Role::new(
+                    "Butler",
+                    "Butler",
+                    feet(25.0, 25.0),
+                    "v_serve_mps = 0.1\nv_refill_mps = 0.02",
+                ),
                 Role::new("Leguin", "Leguin", feet(25.0, 28.0), ""),
             ],
         );
         stage.begin();
-        assert!(stage.step_until(120.0, |stage| stage.behavior("Butler") == "EXCHANGE"), "seed {seed}");
+        assert!(
+            stage.step_until(120.0, |stage| stage.behavior("Butler") == "EXCHANGE"),
+            "seed {seed}"
+        );
         assert_eq!(stage.behavior("Leguin"), "EXCHANGE", "seed {seed}");
     }
 }
@@ -54,9 +65,16 @@ fn an_exchange_that_one_side_enters_is_entered_by_the_other_whoever_is_cut_off_w
                         from == asker && (first..first + lasting).contains(&tick)
                     });
                     let (butlers, leguins) = count_exchanges(&mut stage, 150.0);
-                    let what = format!("seed {seed}: {asker} cut off from {first} for {lasting} ticks");
-                    assert!(butlers >= 2 && leguins >= 2, "{what}: {butlers}, {leguins} exchanges");
-                    assert!(butlers.abs_diff(leguins) <= 1, "{what}: {butlers}, {leguins} exchanges");
+                    let what =
+                        format!("seed {seed}: {asker} cut off from {first} for {lasting} ticks");
+                    assert!(
+                        butlers >= 2 && leguins >= 2,
+                        "{what}: {butlers}, {leguins} exchanges"
+                    );
+                    assert!(
+                        butlers.abs_diff(leguins) <= 1,
+                        "{what}: {butlers}, {leguins} exchanges"
+                    );
                 }
             }
         }
@@ -74,7 +92,11 @@ fn commands_that_come_a_tick_early_or_late_leave_nobody_standing() {
             let before = stage.behavior("Butler").to_owned();
             stage.step();
             butlers += u32::from(stage.behavior("Butler") == "EXCHANGE" && before != "EXCHANGE");
-            due.extend(stage.sent[known..].iter().map(|sent| (sent.tick + delay, sent.command.clone())));
+            due.extend(
+                stage.sent[known..]
+                    .iter()
+                    .map(|sent| (sent.tick + delay, sent.command.clone())),
+            );
             known = stage.sent.len();
             let now = stage.tick;
             for (_, command) in due.iter().filter(|(tick, _)| *tick == now) {
@@ -130,7 +152,10 @@ fn a_lost_go_home_is_repeated_only_by_the_timer() {
         let lost_until = stage.tick + 6;
         stage.drops = Box::new(move |sent| sent.command == "go home" && sent.tick < lost_until);
         stage.step_until(9.0, |_| false);
-        let said = stage.commands_of("Butler").into_iter().filter(|command| *command == "go home");
+        let said = stage
+            .commands_of("Butler")
+            .into_iter()
+            .filter(|command| *command == "go home");
         assert_eq!(said.count(), sent_home, "resend {resend}");
         let is_going = stage.behavior("Leguin") == "GO_HOME";
         assert_eq!(is_going, resend == "on");
@@ -144,9 +169,16 @@ fn a_lost_call_is_repeated_while_she_is_seen_to_wait() {
     let is_early = |tick: u64| tick < 120;
     stage.drops = Box::new(move |sent| is_early(sent.tick));
     assert!(stage.step_until(120.0, |stage| stage.behavior("Butler") == "EXCHANGE"));
-    let calls: Vec<u64> =
-        stage.sent.iter().filter(|sent| sent.command == "refill").map(|sent| sent.tick).collect();
-    assert!(calls.len() >= 2 && calls.windows(2).all(|pair| pair[1] - pair[0] == 10), "{calls:?}");
+    let calls: Vec<u64> = stage
+        .sent
+        .iter()
+        .filter(|sent| sent.command == "refill")
+        .map(|sent| sent.tick)
+        .collect();
+    assert!(
+        calls.len() >= 2 && calls.windows(2).all(|pair| pair[1] - pair[0] == 10),
+        "{calls:?}"
+    );
 }
 
 #[test]
@@ -167,8 +199,9 @@ fn without_emotions_one_lost_message_is_the_end() {
 fn a_refiller_who_does_not_get_on_turns_back_frustrated() {
     let mut stage = Stage::pair(17, "treat_mean_s = 1e9", "block_patience_s = 10.0");
     // A wall around her, too wide to be passed.
-    stage.obstacles =
-        (0..8).flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))]).collect();
+    stage.obstacles = (0..8)
+        .flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))])
+        .collect();
     stage.command("Leguin", "refill");
     let mut was_frustrated = false;
     assert!(stage.step_until(60.0, |stage| {
@@ -189,7 +222,10 @@ fn a_call_on_the_way_home_is_kept_for_later() {
     assert_eq!(stage.behavior("Leguin"), "GO_HOME");
     assert!(stage.step_until(30.0, |stage| stage.behavior("Leguin") == "WAIT"));
     stage.step();
-    assert_eq!((stage.behavior("Leguin"), stage.flag("Leguin", "hurried")), ("REFILL", true));
+    assert_eq!(
+        (stage.behavior("Leguin"), stage.flag("Leguin", "hurried")),
+        ("REFILL", true)
+    );
 }
 
 #[test]
@@ -198,12 +234,18 @@ fn every_tray_is_accounted_for() {
         let mut stage = Stage::pair(seed, "", "");
         let mut given = 30.0;
         for _ in 0..1200 {
-            let (treats, exchanges) = (stage.number("Butler", "treats"), stage.number("Butler", "exchanges"));
+            let (treats, exchanges) = (
+                stage.number("Butler", "treats"),
+                stage.number("Butler", "exchanges"),
+            );
             stage.step();
             if stage.number("Butler", "exchanges") > exchanges {
                 given += 30.0 - treats;
             }
-            assert_eq!(given - stage.number("Butler", "served"), stage.number("Butler", "treats"));
+            assert_eq!(
+                given - stage.number("Butler", "served"),
+                stage.number("Butler", "treats")
+            );
         }
         // Mean 1 s while serving: the count stays within five standard deviations of a Poisson count.
         let taps = stage.number("Butler", "served") + stage.number("Butler", "missed");

@@ -28,10 +28,14 @@ struct Place {
 
 impl Diagnostic for FileError {
     fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
-        self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
+        self.help
+            .as_ref()
+            .map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
     }
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.place.as_ref().map(|place| &place.source as &dyn SourceCode)
+        self.place
+            .as_ref()
+            .map(|place| &place.source as &dyn SourceCode)
     }
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let label = self.place.as_ref().map(|place| place.label.clone());
@@ -43,7 +47,11 @@ impl FileError {
     /// An error that has no place in a text.
     #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: message.into(), help: None, place: None }
+        Self {
+            message: message.into(),
+            help: None,
+            place: None,
+        }
     }
 
     /// A file that cannot be read.
@@ -59,14 +67,24 @@ impl FileError {
             source: NamedSource::new(&source.name, source.text.clone()).with_language("toml"),
             label: LabeledSpan::at(span.unwrap_or(0..0), message),
         };
-        Self { message: format!("{} cannot be used", source.name), help: None, place: Some(Box::new(place)) }
+        Self {
+            message: format!("{} cannot be used", source.name),
+            help: None,
+            place: Some(Box::new(place)),
+        }
     }
 
     /// The error in one line, for where no file can be shown: the line it is at, and the reason.
     #[must_use]
     pub fn in_words(&self) -> String {
-        let Some(place) = &self.place else { return self.message.clone() };
-        let before = place.source.inner().get(..place.label.offset()).unwrap_or_default();
+        let Some(place) = &self.place else {
+            return self.message.clone();
+        };
+        let before = place
+            .source
+            .inner()
+            .get(..place.label.offset())
+            .unwrap_or_default();
         let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
         let reason = place.label.label().unwrap_or(&self.message);
         format!("line {line}: {reason}")
@@ -105,12 +123,20 @@ impl Source {
         let unreadable = |error: std::io::Error| FileError::unreadable(path, &error);
         let mut text = String::new();
         let file = File::open(path).map_err(unreadable)?;
-        file.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(unreadable)?;
+        file.take(MAX_FILE_BYTES + 1)
+            .read_to_string(&mut text)
+            .map_err(unreadable)?;
         if text.len() as u64 > MAX_FILE_BYTES {
-            let text = format!("cannot read {}: it is longer than {MAX_FILE_BYTES} bytes", path.display());
+            let text = format!(
+                "cannot read {}: it is longer than {MAX_FILE_BYTES} bytes",
+                path.display()
+            );
             return Err(FileError::new(text));
         }
-        Ok(Self { name: path.display().to_string(), text })
+        Ok(Self {
+            name: path.display().to_string(),
+            text,
+        })
     }
 
     /// Reads a TOML text into a type that refuses unknown keys.
@@ -118,6 +144,7 @@ impl Source {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, FileError> {
-        toml::from_str(&self.text).map_err(|error| FileError::at(self, error.span(), error.message()))
+        toml::from_str(&self.text)
+            .map_err(|error| FileError::at(self, error.span(), error.message()))
     }
 }

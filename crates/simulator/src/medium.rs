@@ -80,7 +80,16 @@ impl Medium {
     #[must_use]
     pub fn new(seed: u64, tick_s: f64, network: Network, roster: Vec<RobotName>) -> Self {
         let (bad, cut) = (BTreeMap::new(), BTreeMap::new());
-        Self { seed, tick_s, network, roster, sent: Vec::new(), arrivals: BTreeMap::new(), bad, cut }
+        Self {
+            seed,
+            tick_s,
+            network,
+            roster,
+            sent: Vec::new(),
+            arrivals: BTreeMap::new(),
+            bad,
+            cut,
+        }
     }
 
     /// Takes over a command that was sent in the tick that has just ended.
@@ -107,7 +116,12 @@ impl Medium {
             return;
         }
         let mut now: BTreeMap<Pair, Scope> = BTreeMap::new();
-        for partition in self.network.partitions.iter().filter(|partition| partition.lasts_at(tick)) {
+        for partition in self
+            .network
+            .partitions
+            .iter()
+            .filter(|partition| partition.lasts_at(tick))
+        {
             for pair in pairs(&self.roster).filter(|(from, to)| partition.separates(from, to)) {
                 let scope = now.entry(pair).or_default();
                 scope.commands |= partition.commands;
@@ -125,7 +139,12 @@ impl Medium {
                 events.push(if is == Scope::default() {
                     Event::LinkHealed { from, to }
                 } else {
-                    Event::LinkCut { from, to, commands, queries }
+                    Event::LinkCut {
+                        from,
+                        to,
+                        commands,
+                        queries,
+                    }
                 });
             }
         }
@@ -141,14 +160,24 @@ impl Medium {
                 (Kind::Commands, self.network.commands(&pair.0, &pair.1)),
                 (Kind::Queries, self.network.queries(&pair.0, &pair.1)),
             ] {
-                let Some(Burst { enter, leave, .. }) = channel.burst else { continue };
+                let Some(Burst { enter, leave, .. }) = channel.burst else {
+                    continue;
+                };
                 let (from, to) = &pair;
-                let kind_name = if kind == Kind::Commands { "commands" } else { "queries" };
-                let weather = self.bad.entry((kind, pair.clone())).or_insert_with(|| Weather {
-                    is_bad: false,
-                    chance: stream(self.seed, &format!("medium/burst/{kind_name}/{from}/{to}")),
-                });
-                let changes = unit(&mut weather.chance) < if weather.is_bad { leave } else { enter };
+                let kind_name = if kind == Kind::Commands {
+                    "commands"
+                } else {
+                    "queries"
+                };
+                let weather = self
+                    .bad
+                    .entry((kind, pair.clone()))
+                    .or_insert_with(|| Weather {
+                        is_bad: false,
+                        chance: stream(self.seed, &format!("medium/burst/{kind_name}/{from}/{to}")),
+                    });
+                let changes =
+                    unit(&mut weather.chance) < if weather.is_bad { leave } else { enter };
                 weather.is_bad ^= changes;
             }
         }
@@ -168,10 +197,17 @@ impl Medium {
         let [loss, duplication, delay] = std::array::from_fn(|_| unit(&mut chance));
         let pair = (from.clone(), to.clone());
         if let Some(because) = self.loses(Kind::Commands, &channel, &pair, loss) {
-            events.push(Event::CommandDropped { from, to, seq, because });
+            events.push(Event::CommandDropped {
+                from,
+                to,
+                seq,
+                because,
+            });
             return;
         }
-        let late = channel.delay_s.map_or(0, |delay_s| ticks(delay_s.quantile(delay), self.tick_s));
+        let late = channel
+            .delay_s
+            .map_or(0, |delay_s| ticks(delay_s.quantile(delay), self.tick_s));
         if late > 0 {
             events.push(Event::CommandDelayed {
                 from: from.clone(),
@@ -180,18 +216,32 @@ impl Medium {
                 until: tick + late,
             });
         }
-        let copies = if duplication < channel.duplication { 2 } else { 1 };
+        let copies = if duplication < channel.duplication {
+            2
+        } else {
+            1
+        };
         if copies > 1 {
             events.push(Event::CommandDuplicated { from, to, seq });
         }
-        self.arrivals.entry(tick + late).or_default().push((command, copies));
+        self.arrivals
+            .entry(tick + late)
+            .or_default()
+            .push((command, copies));
     }
 
     /// Why a message is lost, if it is; `drawn` is its chance.
     fn loses(&self, kind: Kind, channel: &Channel, pair: &Pair, drawn: f64) -> Option<Cause> {
         let cut = self.cut.get(pair).copied().unwrap_or_default();
-        let is_cut = if kind == Kind::Commands { cut.commands } else { cut.queries };
-        let is_bad = self.bad.get(&(kind, pair.clone())).is_some_and(|weather| weather.is_bad);
+        let is_cut = if kind == Kind::Commands {
+            cut.commands
+        } else {
+            cut.queries
+        };
+        let is_bad = self
+            .bad
+            .get(&(kind, pair.clone()))
+            .is_some_and(|weather| weather.is_bad);
         let bad = channel.burst.filter(|_| is_bad);
         match bad {
             _ if is_cut => Some(Cause::Partition),
@@ -204,15 +254,27 @@ impl Medium {
     fn deliver(&mut self, tick: Tick, decision: &mut Decision) {
         for (command, copies) in self.arrivals.remove(&tick).unwrap_or_default() {
             let Underway { to, from, seq } = command;
-            let is_cut = self.cut.get(&(from.clone(), to.clone())).is_some_and(|scope| scope.commands);
+            let is_cut = self
+                .cut
+                .get(&(from.clone(), to.clone()))
+                .is_some_and(|scope| scope.commands);
             if is_cut {
                 // A cable that is cut loses what is in it, too.
                 let because = Cause::Partition;
-                decision.events.push(Event::CommandDropped { from, to, seq, because });
+                decision.events.push(Event::CommandDropped {
+                    from,
+                    to,
+                    seq,
+                    because,
+                });
                 continue;
             }
             let id = CommandId { from, seq };
-            decision.delivered.entry(to).or_default().extend(std::iter::repeat_n(id, copies));
+            decision
+                .delivered
+                .entry(to)
+                .or_default()
+                .extend(std::iter::repeat_n(id, copies));
         }
         decision.delivered.values_mut().for_each(|ids| ids.sort());
     }
@@ -224,10 +286,15 @@ impl Medium {
             return;
         }
         for (asker, target) in pairs(&self.roster) {
-            let back_is_cut =
-                self.cut.get(&(target.clone(), asker.clone())).is_some_and(|scope| scope.queries);
+            let back_is_cut = self
+                .cut
+                .get(&(target.clone(), asker.clone()))
+                .is_some_and(|scope| scope.queries);
             let channel = self.network.queries(&asker, &target);
-            let drawn = unit(&mut stream(self.seed, &format!("medium/query/{tick}/{asker}/{target}")));
+            let drawn = unit(&mut stream(
+                self.seed,
+                &format!("medium/query/{tick}/{asker}/{target}"),
+            ));
             let pair = (asker.clone(), target.clone());
             let lost = self.loses(Kind::Queries, &channel, &pair, drawn);
             if lost.is_none() && !back_is_cut {
@@ -259,7 +326,13 @@ impl Medium {
 fn pairs(roster: &[RobotName]) -> impl Iterator<Item = Pair> {
     let with = |from: &RobotName| {
         let from = from.clone();
-        roster.iter().filter(move |to| **to != from).cloned().collect::<Vec<_>>()
+        roster
+            .iter()
+            .filter(move |to| **to != from)
+            .cloned()
+            .collect::<Vec<_>>()
     };
-    roster.iter().flat_map(move |from| with(from).into_iter().map(|to| (from.clone(), to)))
+    roster
+        .iter()
+        .flat_map(move |from| with(from).into_iter().map(|to| (from.clone(), to)))
 }

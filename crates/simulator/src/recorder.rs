@@ -37,15 +37,23 @@ pub(crate) fn check_log_name(name: &str) -> Result<(), String> {
     let is_plain = !name.is_empty()
         && name.len() <= 100
         && !name.starts_with('.')
-        && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
+        && name
+            .bytes()
+            .all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
     if !is_plain {
-        return Err(format!("{name:?} is no file name of letters, digits, `.`, `_` and `-`"));
+        return Err(format!(
+            "{name:?} is no file name of letters, digits, `.`, `_` and `-`"
+        ));
     }
     let is_taken = [EVENTS, RECORDING, SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG].contains(&name)
         || name.starts_with("scenario")
         || name.starts_with("events")
         || name.starts_with("recording");
-    if is_taken { Err(format!("the run keeps something else in {name}")) } else { Ok(()) }
+    if is_taken {
+        Err(format!("the run keeps something else in {name}"))
+    } else {
+        Ok(())
+    }
 }
 
 /// The folder of a run: `OUT/NAME`.
@@ -58,7 +66,9 @@ impl RunFolder {
     /// The folder of run `run` under `out`.
     #[must_use]
     pub fn new(out: &Path, run: &RunName) -> Self {
-        Self { path: out.join(run.as_str()) }
+        Self {
+            path: out.join(run.as_str()),
+        }
     }
 
     /// A folder that is known by its path.
@@ -75,13 +85,20 @@ impl RunFolder {
     /// [`FileError`] if that cannot be done, if the folder holds something that is not a run, or a run in progress.
     pub fn create(&self, scenario: &Scenario) -> Result<RunLock, FileError> {
         if self.path.exists() && !self.file(SCENARIO).exists() && has_entries(&self.path) {
-            let text = format!("{} is there and is not the folder of a run", self.path.display());
-            return Err(FileError::new(text).with_help("choose another --run or --out, or move it away"));
+            let text = format!(
+                "{} is there and is not the folder of a run",
+                self.path.display()
+            );
+            return Err(
+                FileError::new(text).with_help("choose another --run or --out, or move it away")
+            );
         }
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
         let lock = self.lock()?;
-        let (log, own) =
-            (self.log(), [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name)));
+        let (log, own) = (
+            self.log(),
+            [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name)),
+        );
         for file in self.superseded().into_iter().chain(own).chain([log]) {
             if file.exists() {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
@@ -103,12 +120,23 @@ impl RunFolder {
 
     /// Files of epochs that `init` ended.
     fn superseded(&self) -> Vec<PathBuf> {
-        let entries = std::fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let entries = std::fs::read_dir(&self.path)
+            .into_iter()
+            .flatten()
+            .flatten();
         let is_superseded = |path: &PathBuf| {
-            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            PER_EPOCH.iter().any(|file| name.starts_with(&superseded_prefix(file)))
+            let name = path
+                .file_name()
+                .and_then(|name| name.to_str())
+                .unwrap_or_default();
+            PER_EPOCH
+                .iter()
+                .any(|file| name.starts_with(&superseded_prefix(file)))
         };
-        entries.map(|entry| entry.path()).filter(is_superseded).collect()
+        entries
+            .map(|entry| entry.path())
+            .filter(is_superseded)
+            .collect()
     }
 
     /// Keeps the files of the epoch before this one under its number.
@@ -116,9 +144,13 @@ impl RunFolder {
         for name in PER_EPOCH {
             let (file, suffix) = (self.file(name), name.rsplit('.').next().unwrap_or_default());
             if file.exists() {
-                let kept =
-                    self.file(&format!("{}{}.{suffix}", superseded_prefix(name), epoch.saturating_sub(1)));
-                std::fs::rename(&file, kept).map_err(|error| self.failed("keep files in", &error))?;
+                let kept = self.file(&format!(
+                    "{}{}.{suffix}",
+                    superseded_prefix(name),
+                    epoch.saturating_sub(1)
+                ));
+                std::fs::rename(&file, kept)
+                    .map_err(|error| self.failed("keep files in", &error))?;
             }
         }
         Ok(())
@@ -129,8 +161,13 @@ impl RunFolder {
     pub fn log(&self) -> PathBuf {
         let scenario = std::fs::read_to_string(self.file(SCENARIO)).unwrap_or_default();
         let scenario: toml::Table = toml::from_str(&scenario).unwrap_or_default();
-        let name = scenario.get("record").and_then(|record| record.get("log_name")?.as_str());
-        self.file(name.filter(|name| check_log_name(name).is_ok()).unwrap_or(LOG))
+        let name = scenario
+            .get("record")
+            .and_then(|record| record.get("log_name")?.as_str());
+        self.file(
+            name.filter(|name| check_log_name(name).is_ok())
+                .unwrap_or(LOG),
+        )
     }
 
     /// A file of the folder.
@@ -174,23 +211,37 @@ impl Recorder {
     ///
     /// # Errors
     /// [`FileError`] if the files cannot be made.
-    pub fn begin(folder: &RunFolder, run: &RunName, simulation: &Simulation) -> Result<Self, FileError> {
+    pub fn begin(
+        folder: &RunFolder,
+        run: &RunName,
+        simulation: &Simulation,
+    ) -> Result<Self, FileError> {
         let (scenario, epoch) = (simulation.scenario(), simulation.epoch());
         if epoch > 1 {
             folder.keep(epoch)?;
         }
         std::fs::write(folder.file(SCENARIO), scenario.to_toml()?)
             .map_err(|error| folder.failed("write to", &error))?;
-        let make = |name| File::create(folder.file(name)).map_err(|error| folder.failed("write to", &error));
+        let make = |name| {
+            File::create(folder.file(name)).map_err(|error| folder.failed("write to", &error))
+        };
         let log = || {
-            let file = File::options().create(true).append(true).open(folder.file(&scenario.record.log_name));
-            file.map(BufWriter::new).map_err(|error| folder.failed("write to", &error))
+            let file = File::options()
+                .create(true)
+                .append(true)
+                .open(folder.file(&scenario.record.log_name));
+            file.map(BufWriter::new)
+                .map_err(|error| folder.failed("write to", &error))
         };
         let mut recorder = Self {
             folder: folder.clone(),
             events: BufWriter::new(make(EVENTS)?),
             log: scenario.record.log.then(log).transpose()?,
-            recording: scenario.record.frames.then(|| make(RECORDING).map(BufWriter::new)).transpose()?,
+            recording: scenario
+                .record
+                .frames
+                .then(|| make(RECORDING).map(BufWriter::new))
+                .transpose()?,
             summary: Summary::begin(run, simulation),
         };
         if let Some(recording) = &mut recorder.recording {
@@ -215,7 +266,14 @@ impl Recorder {
             if let Some((source, kind, text)) = line.event.readable() {
                 let (epoch, tick) = (simulation.epoch(), line.tick);
                 let time_s = simulation.time_s(tick);
-                lines.push(LogRecord { epoch, tick, time_s, source, kind, text });
+                lines.push(LogRecord {
+                    epoch,
+                    tick,
+                    time_s,
+                    source,
+                    kind,
+                    text,
+                });
             }
         }
         self.events.flush().map_err(unwritable)?;
@@ -231,7 +289,9 @@ impl Recorder {
     }
 
     fn write_log(&mut self, lines: &[LogRecord]) -> std::io::Result<()> {
-        let Some(log) = self.log.as_mut().filter(|_| !lines.is_empty()) else { return Ok(()) };
+        let Some(log) = self.log.as_mut().filter(|_| !lines.is_empty()) else {
+            return Ok(());
+        };
         for line in lines {
             writeln!(log, "{}", log_line(line))?;
         }
@@ -250,10 +310,11 @@ impl Recorder {
     /// [`FileError`] if it cannot be written.
     pub fn finish(mut self, simulation: &Simulation) -> Result<Summary, FileError> {
         self.summary.finish(simulation);
-        let text =
-            serde_json::to_string_pretty(&self.summary).map_err(|error| FileError::new(error.to_string()))?;
+        let text = serde_json::to_string_pretty(&self.summary)
+            .map_err(|error| FileError::new(error.to_string()))?;
         let file = self.folder.file(SUMMARY);
-        std::fs::write(file, text + "\n").map_err(|error| self.folder.failed("write to", &error))?;
+        std::fs::write(file, text + "\n")
+            .map_err(|error| self.folder.failed("write to", &error))?;
         Ok(self.summary)
     }
 }
@@ -271,7 +332,8 @@ fn unwritable(error: std::io::Error) -> FileError {
 }
 
 fn json(value: &impl serde::Serialize) -> String {
-    serde_json::to_string(value).unwrap_or_else(|error| unreachable!("a record is always JSON: {error}"))
+    serde_json::to_string(value)
+        .unwrap_or_else(|error| unreachable!("a record is always JSON: {error}"))
 }
 
 fn header(run: &RunName, simulation: &Simulation) -> RecordingHeader {

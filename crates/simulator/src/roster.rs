@@ -13,7 +13,8 @@ const MAX_ROBOTS: usize = 100;
 /// # Errors
 /// [`FileError`] names the line that is not a usable class name.
 pub fn scenario_of(roster: &Source) -> Result<Source, FileError> {
-    let mut text = String::from("[guests]\ncount = 100\n\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n");
+    let mut text =
+        String::from("[guests]\ncount = 100\n\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n");
     let mut offset = 0;
     let mut count = 0;
     for line in roster.text.split_inclusive('\n') {
@@ -32,13 +33,19 @@ pub fn scenario_of(roster: &Source) -> Result<Source, FileError> {
         text += &format!("\n[[robot]]\nname = \"{name}\"\nat = [\"{x} ft\", \"{y} ft\"]\n");
         count += 1;
     }
-    Ok(Source { name: format!("{} (as a scenario)", roster.name), text })
+    Ok(Source {
+        name: format!("{} (as a scenario)", roster.name),
+        text,
+    })
 }
 
 /// The waiter in the middle; the others along the edge from the food table on.
 fn place(index: usize) -> (f64, f64) {
     match index {
         0 => (25.0, 25.0),
-        i => (5.0 + 3.0 * ((i - 1) % 15) as f64, 2.0 + 3.0 * ((i - 1) / 15) as f64),
+        i => (
+            5.0 + 3.0 * ((i - 1) % 15) as f64,
+            2.0 + 3.0 * ((i - 1) / 15) as f64,
+        ),
     }
 }

@@ -72,7 +72,11 @@ pub struct Record {
 
 impl Default for Record {
     fn default() -> Self {
-        Self { log: true, log_name: crate::recorder::LOG.to_owned(), frames: true }
+        Self {
+            log: true,
+            log_name: crate::recorder::LOG.to_owned(),
+            frames: true,
+        }
     }
 }
 
@@ -149,7 +153,10 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse_alone(source: &Source) -> Result<Self, FileError> {
-        source.parse::<raw::Scenario>()?.refuse_files(source)?.check(source, Path::new("."))
+        source
+            .parse::<raw::Scenario>()?
+            .refuse_files(source)?
+            .check(source, Path::new("."))
     }
 
     /// The scenario as a file that says everything and gives the same run.
@@ -157,7 +164,8 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] if a parameter cannot be written as TOML (a JSON `null`).
     pub fn to_toml(&self) -> Result<String, FileError> {
-        toml::to_string(&raw::Scenario::from(self)).map_err(|error| FileError::new(error.to_string()))
+        toml::to_string(&raw::Scenario::from(self))
+            .map_err(|error| FileError::new(error.to_string()))
     }
 
     /// How long it simulates, seconds.
@@ -176,10 +184,17 @@ impl Scenario {
     #[must_use]
     pub fn hall(&self) -> Hall {
         Hall {
-            field: Field { size_m: (self.field_m[0], self.field_m[1]), body_m: self.body_m },
+            field: Field {
+                size_m: (self.field_m[0], self.field_m[1]),
+                body_m: self.body_m,
+            },
             obstacles: self.obstacles.iter().copied().map(to_world).collect(),
             guests: self.guests,
-            robots: self.robots.values().map(|robot| to_world(robot.at)).collect(),
+            robots: self
+                .robots
+                .values()
+                .map(|robot| to_world(robot.at))
+                .collect(),
             tick_s: self.tick_s,
             max_speed_mps: self.max_speed_mps,
         }
@@ -200,7 +215,9 @@ fn check_seed(seed: u64) -> Result<u64, String> {
     if seed <= MAX_SEED {
         return Ok(seed);
     }
-    Err(format!("a seed is at most {MAX_SEED} (2^53 - 1), so that every language can hold it"))
+    Err(format!(
+        "a seed is at most {MAX_SEED} (2^53 - 1), so that every language can hold it"
+    ))
 }
 
 fn triangular(raw: &raw::Triangle) -> Result<Triangular, String> {
@@ -217,5 +234,7 @@ pub fn parse_speed(text: &str) -> Result<Option<f64>, String> {
     }
     let factor = text.trim_end_matches('x').parse::<f64>().ok();
     let factor = factor.filter(|factor| *factor > 0.0 && factor.is_finite());
-    factor.map(Some).ok_or_else(|| format!("{text:?} is neither a number above zero nor `max`"))
+    factor
+        .map(Some)
+        .ok_or_else(|| format!("{text:?} is neither a number above zero nor `max`"))
 }

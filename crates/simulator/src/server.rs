@@ -163,7 +163,11 @@ impl Server {
                 .keys()
                 .map(|name| Ok((name.clone(), bus.publisher(&keys.percept(name))?)))
                 .collect::<Result<_, BusError>>()?,
-            members: scenario.robots.keys().map(|name| (name.clone(), Member::default())).collect(),
+            members: scenario
+                .robots
+                .keys()
+                .map(|name| (name.clone(), Member::default()))
+                .collect(),
             lateness: scenario.lateness.clone(),
             open: Open {
                 clock: Clock::default(),
@@ -200,15 +204,21 @@ impl Server {
     fn listen(&mut self) -> Result<(), BusError> {
         // A send fails only when the process ends; then nobody is left to tell.
         let queue = self.queue();
-        self.declared.push(self.bus.subscribe(&self.keys.reports(), move |key, bytes| {
-            let robot = Keys::robot_of(key).unwrap_or_default();
-            let _ = queue.send(Event::Report(decode(key, robot, bytes), robot.to_owned()));
-        })?);
+        self.declared.push(
+            self.bus
+                .subscribe(&self.keys.reports(), move |key, bytes| {
+                    let robot = Keys::robot_of(key).unwrap_or_default();
+                    let _ = queue.send(Event::Report(decode(key, robot, bytes), robot.to_owned()));
+                })?,
+        );
         let queue = self.queue();
-        self.declared.push(self.bus.subscribe(&self.keys.all_waiting(), move |key, bytes| {
-            let robot = Keys::robot_of(key).unwrap_or_default();
-            let _ = queue.send(Event::Waiting(decode(key, robot, bytes), robot.to_owned()));
-        })?);
+        self.declared.push(
+            self.bus
+                .subscribe(&self.keys.all_waiting(), move |key, bytes| {
+                    let robot = Keys::robot_of(key).unwrap_or_default();
+                    let _ = queue.send(Event::Waiting(decode(key, robot, bytes), robot.to_owned()));
+                })?,
+        );
         for (key, event) in [
             (self.keys.join(), Event::Join as fn(Question) -> Event),
             (self.keys.joins(), Event::Join),
@@ -221,10 +231,13 @@ impl Server {
             })?);
         }
         let queue = self.queue();
-        self.declared.push(self.bus.watch(&self.keys.alive_robots(), move |key, is_there| {
-            let robot = Keys::robot_of(key).unwrap_or_default();
-            let _ = queue.send(Event::Token(robot.to_owned(), is_there));
-        })?);
+        self.declared.push(
+            self.bus
+                .watch(&self.keys.alive_robots(), move |key, is_there| {
+                    let robot = Keys::robot_of(key).unwrap_or_default();
+                    let _ = queue.send(Event::Token(robot.to_owned(), is_there));
+                })?,
+        );
         self.declared.push(self.bus.token(&self.keys.alive_sim())?);
         Ok(())
     }
@@ -233,7 +246,11 @@ impl Server {
     ///
     /// # Errors
     /// [`ServerError`] if it cannot go on; what was recorded until then is kept.
-    pub fn run(mut self, mut scenario: Scenario, folder: &RunFolder) -> Result<Summary, ServerError> {
+    pub fn run(
+        mut self,
+        mut scenario: Scenario,
+        folder: &RunFolder,
+    ) -> Result<Summary, ServerError> {
         let mut epoch: Epoch = 1;
         loop {
             let mut simulation = Simulation::new(scenario.clone(), epoch)?;
@@ -254,7 +271,11 @@ impl Server {
         }
     }
 
-    fn epoch(&mut self, simulation: &mut Simulation, recorder: &mut Recorder) -> Result<(), Interrupt> {
+    fn epoch(
+        &mut self,
+        simulation: &mut Simulation,
+        recorder: &mut Recorder,
+    ) -> Result<(), Interrupt> {
         // Nothing of an epoch before may reach into this one.
         (self.open.is_open, self.open.is_announced) = (false, false);
         self.operator.clear();
@@ -286,7 +307,11 @@ impl Server {
     fn gather(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
         self.open.since = Instant::now();
         while self.members.values().any(|member| !member.is_ready()) {
-            let patience = if self.open.is_announced { REPEAT_AFTER } else { SAY_AFTER };
+            let patience = if self.open.is_announced {
+                REPEAT_AFTER
+            } else {
+                SAY_AFTER
+            };
             match self.receive(patience) {
                 Some(event) => self.handle(event, simulation)?,
                 // From now on every robot that comes changes what there is to say.
@@ -306,13 +331,20 @@ impl Server {
         for (to, command) in std::mem::take(&mut self.operator) {
             let seq = simulation.command(&to, &command);
             let (epoch, tick) = (simulation.epoch(), simulation.tick());
-            let message = Command { epoch, tick, seq, performative: Performative::Achieve, command };
+            let message = Command {
+                epoch,
+                tick,
+                seq,
+                performative: Performative::Achieve,
+                command,
+            };
             let key = self.keys.command(&to, &RobotName::operator());
             self.put_operator(&key, &message);
             self.operator_sent.push((key, message));
         }
         let tick = simulation.tick();
-        self.operator_sent.retain(|(_, command)| command.tick + 2 > tick);
+        self.operator_sent
+            .retain(|(_, command)| command.tick + 2 > tick);
     }
 
     fn put_operator(&self, key: &str, command: &Command) {
@@ -346,8 +378,12 @@ impl Server {
         self.observers.frame(simulation, &self.status(simulation));
         recorder.summary().wall = std::mem::take(&mut self.summary_wall);
         let summary = recorder.finish(simulation)?;
-        let clock =
-            Clock { epoch: simulation.epoch(), tick: simulation.tick(), end: Some(end), ..Clock::default() };
+        let clock = Clock {
+            epoch: simulation.epoch(),
+            tick: simulation.tick(),
+            end: Some(end),
+            ..Clock::default()
+        };
         self.clock.put(encode(&clock))?;
         self.say_goodbye(&clock, simulation);
         self.declared.clear();
@@ -359,11 +395,19 @@ impl Server {
     /// end of the run hears it again.
     fn say_goodbye(&mut self, clock: &Clock, simulation: &Simulation) {
         let deadline = Instant::now() + Duration::from_secs(1);
-        let took_part =
-            |name: &RobotName| simulation.report(name).is_some_and(|report| report.tick == simulation.tick());
-        let is_awaited = |(name, member): &(&RobotName, &Member)| member.is_present || took_part(name);
-        let mut awaited: Vec<_> =
-            self.members.iter().filter(is_awaited).map(|(name, _)| name.clone()).collect();
+        let took_part = |name: &RobotName| {
+            simulation
+                .report(name)
+                .is_some_and(|report| report.tick == simulation.tick())
+        };
+        let is_awaited =
+            |(name, member): &(&RobotName, &Member)| member.is_present || took_part(name);
+        let mut awaited: Vec<_> = self
+            .members
+            .iter()
+            .filter(is_awaited)
+            .map(|(name, _)| name.clone())
+            .collect();
         while !awaited.is_empty() && Instant::now() < deadline {
             let left = deadline.saturating_duration_since(Instant::now());
             match self.receive(self.options.repeat_after.min(left)) {
@@ -403,7 +447,11 @@ impl Server {
 
     /// A message that changes nothing: counted, and said once in a while.
     fn ignore(&mut self, reason: &str, text: &str) {
-        let count = self.summary_wall.ignored.entry(reason.to_owned()).or_default();
+        let count = self
+            .summary_wall
+            .ignored
+            .entry(reason.to_owned())
+            .or_default();
         *count += 1;
         if count.is_power_of_two() {
             tracing::warn!(count = *count, "ignored a message, {reason}: {text}");
@@ -412,8 +460,12 @@ impl Server {
 
     fn on_report(&mut self, robot: &str, report: Report) {
         let open = (self.open.clock.epoch, self.open.clock.tick);
-        let Ok(name) = RobotName::new(robot) else { return self.ignore("unknown robot", robot) };
-        let Some(member) = self.members.get_mut(&name) else { return self.ignore("unknown robot", robot) };
+        let Ok(name) = RobotName::new(robot) else {
+            return self.ignore("unknown robot", robot);
+        };
+        let Some(member) = self.members.get_mut(&name) else {
+            return self.ignore("unknown robot", robot);
+        };
         if member.is_lost && report.generation == member.generation {
             member.is_heard_of();
             return self.ignore("lost", robot);
@@ -422,7 +474,8 @@ impl Server {
             member.hears_predecessor();
         }
         let is_due = self.open.is_open && !self.open.given_up.contains(&name);
-        if (report.epoch, report.tick) != open || !is_due || report.generation != member.generation {
+        if (report.epoch, report.tick) != open || !is_due || report.generation != member.generation
+        {
             return self.ignore("stale", robot);
         }
         self.open.waits.remove(&name);
@@ -452,7 +505,8 @@ impl Server {
     /// Robots of the open tick whose report is still to come.
     fn awaited(&self) -> impl Iterator<Item = &RobotName> {
         let is_awaited = |(name, member): &(&RobotName, &Member)| {
-            let is_settled = self.open.reports.contains_key(*name) || self.open.given_up.contains(*name);
+            let is_settled =
+                self.open.reports.contains_key(*name) || self.open.given_up.contains(*name);
             self.open.is_open && !member.is_lost && !is_settled
         };
         self.members.iter().filter(is_awaited).map(|(name, _)| name)
@@ -504,7 +558,11 @@ impl Server {
             repeated: now,
         };
         // Before the clock, on the same way: whoever follows has it when the tick begins.
-        for (name, publisher) in self.percepts.iter().filter(|(_, publisher)| publisher.is_watched()) {
+        for (name, publisher) in self
+            .percepts
+            .iter()
+            .filter(|(_, publisher)| publisher.is_watched())
+        {
             publisher.put(encode(&simulation.percept(name)))?;
         }
         Ok(self.clock.put(encode(&self.open.clock))?)
@@ -523,7 +581,8 @@ impl Server {
             held.longest_s = held.longest_s.max(held_s);
         }
         if std::mem::take(&mut self.open.is_announced) {
-            self.observers.released(simulation, &self.status(simulation));
+            self.observers
+                .released(simulation, &self.status(simulation));
         }
         Exchange {
             reports: std::mem::take(&mut self.open.reports),
@@ -535,10 +594,18 @@ impl Server {
     fn next_look(&self) -> Duration {
         let elapsed = self.open.since.elapsed();
         let announce = (!self.open.is_announced).then(|| SAY_AFTER.saturating_sub(elapsed));
-        let repeat = self.options.repeat_after.saturating_sub(self.open.repeated.elapsed());
-        let acts = self.awaited().any(|name| self.lateness.of(name) != OnLate::Wait);
+        let repeat = self
+            .options
+            .repeat_after
+            .saturating_sub(self.open.repeated.elapsed());
+        let acts = self
+            .awaited()
+            .any(|name| self.lateness.of(name) != OnLate::Wait);
         let deadline = acts.then(|| self.deadline().saturating_sub(elapsed));
-        announce.into_iter().chain(deadline).fold(repeat, Duration::min)
+        announce
+            .into_iter()
+            .chain(deadline)
+            .fold(repeat, Duration::min)
     }
 
     fn deadline(&self) -> Duration {
@@ -570,7 +637,10 @@ impl Server {
     /// The deadline is over: the scenario says, robot by robot, what then.
     fn judge_late(&mut self) -> Result<(), Interrupt> {
         let late: Vec<RobotName> = self.awaited().cloned().collect();
-        if late.iter().any(|name| self.lateness.of(name) == OnLate::Abort) {
+        if late
+            .iter()
+            .any(|name| self.lateness.of(name) == OnLate::Abort)
+        {
             return Err(Interrupt::End(End::Aborted));
         }
         for name in late {
@@ -583,7 +653,9 @@ impl Server {
 
     /// The clock goes on without a robot in this tick, and from now on if it is lost.
     fn give_up(&mut self, name: &RobotName) {
-        let Some(member) = self.members.get_mut(name) else { return };
+        let Some(member) = self.members.get_mut(name) else {
+            return;
+        };
         if member.miss(self.lateness.lose_after) {
             self.open.membership.push(Membership::Lost(name.clone()));
         }
@@ -592,7 +664,9 @@ impl Server {
 
     fn repeat_clock(&mut self) -> Result<(), BusError> {
         self.open.repeated = Instant::now();
-        self.operator_sent.iter().for_each(|(key, command)| self.put_operator(key, command));
+        self.operator_sent
+            .iter()
+            .for_each(|(key, command)| self.put_operator(key, command));
         self.clock.put(encode(&self.open.clock))
     }
 
@@ -607,6 +681,9 @@ fn introduce(clock: &mut Clock, name: &RobotName, generation: u32, simulation: &
     let news = clock.news.entry(name.clone()).or_default();
     news.joined = Some(generation);
     if let (None, Some(location)) = (news.correction, simulation.location(name)) {
-        news.correction = Some(Correction { location, blocked: false });
+        news.correction = Some(Correction {
+            location,
+            blocked: false,
+        });
     }
 }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{
-    Clock, CommandId, Correction, Cut, End, News, Percept, Performative, Point, ProcessOrder, PublicState,
-    Report, SensedBody, SensedKind, SensedRobot, StateVariables, Welcome,
+    Clock, CommandId, Correction, Cut, End, News, Percept, Performative, Point, ProcessOrder,
+    PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
@@ -26,7 +26,11 @@ pub trait Barrier {
     ///
     /// # Errors
     /// The interrupt, if the tick is given up.
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, Self::Interrupt>;
+    fn exchange(
+        &mut self,
+        clock: Clock,
+        simulation: &Simulation,
+    ) -> Result<Exchange, Self::Interrupt>;
 }
 
 /// What came of a tick.
@@ -59,7 +63,10 @@ pub struct TickRecord {
 impl TickRecord {
     /// The lines of `events.jsonl`.
     pub fn lines(&self) -> impl Iterator<Item = Line> + '_ {
-        self.events.iter().map(|event| Line { tick: self.tick, event: event.clone() })
+        self.events.iter().map(|event| Line {
+            tick: self.tick,
+            event: event.clone(),
+        })
     }
 }
 
@@ -105,7 +112,12 @@ impl Simulation {
             tick: 0,
             now: 0,
             world,
-            medium: Medium::new(scenario.seed, scenario.tick_s, scenario.network.clone(), names.clone()),
+            medium: Medium::new(
+                scenario.seed,
+                scenario.tick_s,
+                scenario.network.clone(),
+                names.clone(),
+            ),
             names,
             arriving: BTreeMap::new(),
             unreachable: BTreeMap::new(),
@@ -132,7 +144,11 @@ impl Simulation {
         }];
         for name in &self.names {
             let at = self.location(name).unwrap_or_default();
-            events.push(Event::Joined { robot: name.clone(), generation: None, at });
+            events.push(Event::Joined {
+                robot: name.clone(),
+                generation: None,
+                at,
+            });
         }
         let clock = self.clock(0, &[]);
         let exchange = barrier.exchange(clock, self)?;
@@ -165,7 +181,10 @@ impl Simulation {
     /// Where each robot wants to be; one that has not reported stays.
     fn proposals(&self) -> Vec<Option<world::Point>> {
         let proposal = |name: &RobotName| {
-            let report = self.reports.get(name).filter(|_| !self.silent.contains(name))?;
+            let report = self
+                .reports
+                .get(name)
+                .filter(|_| !self.silent.contains(name))?;
             Some(world::Point::new(report.proposal.x, report.proposal.y))
         };
         self.names.iter().map(proposal).collect()
@@ -177,7 +196,11 @@ impl Simulation {
             self.blocked[index] = by.is_some();
             if let Some(by) = by {
                 let at = to_wire(self.world.robots()[index]);
-                events.push(Event::Blocked { robot: self.names[index].clone(), by, at });
+                events.push(Event::Blocked {
+                    robot: self.names[index].clone(),
+                    by,
+                    at,
+                });
             }
         }
     }
@@ -187,9 +210,15 @@ impl Simulation {
         Some(match verdict {
             Verdict::Advanced | Verdict::Stayed => return None,
             Verdict::Blocked { by: Blocker::Edge } => "edge".to_owned(),
-            Verdict::Blocked { by: Blocker::Body(Body::Obstacle(_)) } => "obstacle".to_owned(),
-            Verdict::Blocked { by: Blocker::Body(Body::Guest(_)) } => "guest".to_owned(),
-            Verdict::Blocked { by: Blocker::Body(Body::Robot(index)) } => self.names[index].to_string(),
+            Verdict::Blocked {
+                by: Blocker::Body(Body::Obstacle(_)),
+            } => "obstacle".to_owned(),
+            Verdict::Blocked {
+                by: Blocker::Body(Body::Guest(_)),
+            } => "guest".to_owned(),
+            Verdict::Blocked {
+                by: Blocker::Body(Body::Robot(index)),
+            } => self.names[index].to_string(),
             Verdict::TooFast | Verdict::NotFinite => "too_fast".to_owned(),
         })
     }
@@ -198,10 +227,14 @@ impl Simulation {
     fn clock(&self, tick: Tick, verdicts: &[Verdict]) -> Clock {
         let mut news = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            let is_refused = verdicts.get(index).is_some_and(|verdict| self.blocker(*verdict).is_some());
+            let is_refused = verdicts
+                .get(index)
+                .is_some_and(|verdict| self.blocker(*verdict).is_some());
             let is_corrected = is_refused || self.silent.contains(name);
-            let correction = is_corrected
-                .then(|| Correction { location: to_wire(self.world.robots()[index]), blocked: is_refused });
+            let correction = is_corrected.then(|| Correction {
+                location: to_wire(self.world.robots()[index]),
+                blocked: is_refused,
+            });
             let own = News {
                 correction,
                 commands: self.arriving.get(name).cloned().unwrap_or_default(),
@@ -213,7 +246,12 @@ impl Simulation {
                 news.insert(name.clone(), own);
             }
         }
-        Clock { epoch: self.epoch, tick, news, end: None }
+        Clock {
+            epoch: self.epoch,
+            tick,
+            news,
+            end: None,
+        }
     }
 
     /// Whom each robot cannot ask: those from whom the medium cuts it off, and those whose last report is missing.
@@ -238,7 +276,11 @@ impl Simulation {
             events.push(match change {
                 Membership::Joined(robot, generation) => {
                     let at = self.location(&robot).unwrap_or_default();
-                    Event::Joined { robot, generation: Some(generation), at }
+                    Event::Joined {
+                        robot,
+                        generation: Some(generation),
+                        at,
+                    }
                 }
                 Membership::Lost(robot) => Event::Lost { robot },
             });
@@ -250,7 +292,9 @@ impl Simulation {
             match reports.remove(&name) {
                 Some(report) => self.note_report(&name, report, &mut events),
                 None => {
-                    events.push(Event::Missed { robot: name.clone() });
+                    events.push(Event::Missed {
+                        robot: name.clone(),
+                    });
                     self.silent.push(name);
                 }
             }
@@ -258,7 +302,9 @@ impl Simulation {
         self.tick = tick;
         self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
         self.close_digest();
-        events.push(Event::Tick { digest: self.digest.to_string() });
+        events.push(Event::Tick {
+            digest: self.digest.to_string(),
+        });
         TickRecord { tick, events }
     }
 
@@ -267,7 +313,9 @@ impl Simulation {
         for (to, ids) in std::mem::take(&mut self.arriving) {
             for id in ids {
                 let (to, from, seq) = (to.clone(), id.from.clone(), id.seq);
-                let has_arrived = reports.get(&to).is_some_and(|report| !report.missing.contains(&id));
+                let has_arrived = reports
+                    .get(&to)
+                    .is_some_and(|report| !report.missing.contains(&id));
                 events.push(if has_arrived {
                     Event::CommandDelivered { from, to, seq }
                 } else {
@@ -279,22 +327,49 @@ impl Simulation {
 
     fn note_report(&mut self, robot: &RobotName, report: Report, events: &mut Vec<Event>) {
         let before = self.reports.get(robot);
-        let change =
-            |from: Option<&String>, to: &String| (from != Some(to)).then(|| (from.cloned(), to.clone()));
-        if let Some((from, to)) = change(before.map(|report| &report.emotion_state), &report.emotion_state) {
-            events.push(Event::Emotion { robot: robot.clone(), from, to });
+        let change = |from: Option<&String>, to: &String| {
+            (from != Some(to)).then(|| (from.cloned(), to.clone()))
+        };
+        if let Some((from, to)) = change(
+            before.map(|report| &report.emotion_state),
+            &report.emotion_state,
+        ) {
+            events.push(Event::Emotion {
+                robot: robot.clone(),
+                from,
+                to,
+            });
         }
-        if let Some((from, to)) = change(before.map(|report| &report.behavior_state), &report.behavior_state)
-        {
-            events.push(Event::Behavior { robot: robot.clone(), from, to });
+        if let Some((from, to)) = change(
+            before.map(|report| &report.behavior_state),
+            &report.behavior_state,
+        ) {
+            events.push(Event::Behavior {
+                robot: robot.clone(),
+                from,
+                to,
+            });
         }
         for sent in &report.sent {
             let (from, to, seq) = (robot.clone(), sent.to.clone(), sent.seq);
             let (performative, command) = (sent.performative, sent.command.clone());
-            events.push(Event::CommandSent { from, to, seq, performative, command });
-            self.medium.accept(Underway { to: sent.to.clone(), from: robot.clone(), seq });
+            events.push(Event::CommandSent {
+                from,
+                to,
+                seq,
+                performative,
+                command,
+            });
+            self.medium.accept(Underway {
+                to: sent.to.clone(),
+                from: robot.clone(),
+                seq,
+            });
         }
-        events.extend(report.log.iter().map(|text| Event::Say { robot: robot.clone(), text: text.clone() }));
+        events.extend(report.log.iter().map(|text| Event::Say {
+            robot: robot.clone(),
+            text: text.clone(),
+        }));
         self.reports.insert(robot.clone(), report);
     }
 
@@ -304,7 +379,12 @@ impl Simulation {
             tick.place(body.x, body.y);
         }
         for name in &self.names {
-            tick.report(name, self.reports.get(name).filter(|_| !self.silent.contains(name)));
+            tick.report(
+                name,
+                self.reports
+                    .get(name)
+                    .filter(|_| !self.silent.contains(name)),
+            );
         }
         self.digest.close(&tick);
     }
@@ -315,11 +395,30 @@ impl Simulation {
         let tick = self.tick + 1;
         let order = |fault: &Fault| {
             let (robot, kind) = (fault.robot.clone(), fault.kind);
-            let for_s = if let FaultEnd::After(wall_s) = fault.end { Some(wall_s) } else { None };
-            let begins = ProcessOrder { robot: robot.clone(), kind, begins: true, for_s };
-            let ends = ProcessOrder { robot, kind, begins: false, for_s: None };
+            let for_s = if let FaultEnd::After(wall_s) = fault.end {
+                Some(wall_s)
+            } else {
+                None
+            };
+            let begins = ProcessOrder {
+                robot: robot.clone(),
+                kind,
+                begins: true,
+                for_s,
+            };
+            let ends = ProcessOrder {
+                robot,
+                kind,
+                begins: false,
+                for_s: None,
+            };
             let is_over = fault.end == FaultEnd::At(tick);
-            [(fault.at == tick).then_some(begins), is_over.then_some(ends)].into_iter().flatten()
+            [
+                (fault.at == tick).then_some(begins),
+                is_over.then_some(ends),
+            ]
+            .into_iter()
+            .flatten()
         };
         self.scenario.faults.iter().flat_map(order).collect()
     }
@@ -338,7 +437,11 @@ impl Simulation {
     pub fn command(&mut self, to: &RobotName, command: &str) -> Seq {
         self.operator_seq += 1;
         let (from, seq) = (RobotName::operator(), self.operator_seq);
-        self.medium.accept(Underway { to: to.clone(), from: from.clone(), seq });
+        self.medium.accept(Underway {
+            to: to.clone(),
+            from: from.clone(),
+            seq,
+        });
         self.between.push(Event::CommandSent {
             from,
             to: to.clone(),
@@ -352,12 +455,23 @@ impl Simulation {
     /// The last event of the run.
     #[must_use]
     pub fn end(&self, reason: End) -> TickRecord {
-        TickRecord { tick: self.tick, events: vec![Event::End { reason, digest: self.digest.to_string() }] }
+        TickRecord {
+            tick: self.tick,
+            events: vec![Event::End {
+                reason,
+                digest: self.digest.to_string(),
+            }],
+        }
     }
 
     /// What a robot is told when it joins.
     #[must_use]
-    pub fn welcome(&self, run: &RunName, name: &RobotName, generation: Generation) -> Option<Welcome> {
+    pub fn welcome(
+        &self,
+        run: &RunName,
+        name: &RobotName,
+        generation: Generation,
+    ) -> Option<Welcome> {
         let spec = self.scenario.robots.get(name)?;
         let last = self.reports.get(name);
         let mut welcome = Welcome {
@@ -392,18 +506,29 @@ impl Simulation {
     /// What a robot senses around itself now.
     #[must_use]
     pub fn percept(&self, name: &RobotName) -> Percept {
-        let Some(index) = self.index(name) else { return Percept::default() };
+        let Some(index) = self.index(name) else {
+            return Percept::default();
+        };
         let center = self.world.robots()[index];
-        let others = self.world.near(center, self.scenario.sensing_range_m).into_iter();
-        let bodies = others.filter(|near| near.body != Body::Robot(index)).map(|near| SensedBody {
-            kind: match near.body {
-                Body::Obstacle(_) => SensedKind::Obstacle,
-                Body::Guest(_) => SensedKind::Guest,
-                Body::Robot(_) => SensedKind::Robot,
-            },
-            location: to_wire(near.center),
-        });
-        Percept { epoch: self.epoch, tick: self.now, bodies: bodies.collect() }
+        let others = self
+            .world
+            .near(center, self.scenario.sensing_range_m)
+            .into_iter();
+        let bodies = others
+            .filter(|near| near.body != Body::Robot(index))
+            .map(|near| SensedBody {
+                kind: match near.body {
+                    Body::Obstacle(_) => SensedKind::Obstacle,
+                    Body::Guest(_) => SensedKind::Guest,
+                    Body::Robot(_) => SensedKind::Robot,
+                },
+                location: to_wire(near.center),
+            });
+        Percept {
+            epoch: self.epoch,
+            tick: self.now,
+            bodies: bodies.collect(),
+        }
     }
 
     fn sensed_robots(&self, of: usize) -> Vec<SensedRobot> {
@@ -411,8 +536,10 @@ impl Simulation {
         let is_near = |other: &usize| {
             *other != of && robots[of].distance_m(robots[*other]) <= self.scenario.sensing_range_m
         };
-        let sensed =
-            |other: usize| SensedRobot { name: self.names[other].clone(), location: to_wire(robots[other]) };
+        let sensed = |other: usize| SensedRobot {
+            name: self.names[other].clone(),
+            location: to_wire(robots[other]),
+        };
         (0..robots.len()).filter(is_near).map(sensed).collect()
     }
 
@@ -423,7 +550,8 @@ impl Simulation {
     /// Where a robot stands.
     #[must_use]
     pub fn location(&self, name: &RobotName) -> Option<Point> {
-        self.index(name).map(|index| to_wire(self.world.robots()[index]))
+        self.index(name)
+            .map(|index| to_wire(self.world.robots()[index]))
     }
 
     /// Whether a robot's last move was refused.

@@ -105,7 +105,11 @@ impl Summary {
     /// An epoch begins.
     #[must_use]
     pub fn begin(run: &RunName, simulation: &Simulation) -> Self {
-        let robots = simulation.names().iter().map(|name| (name.clone(), RobotSummary::default())).collect();
+        let robots = simulation
+            .names()
+            .iter()
+            .map(|name| (name.clone(), RobotSummary::default()))
+            .collect();
         Self {
             run: run.clone(),
             seed: simulation.scenario().seed,
@@ -138,7 +142,11 @@ impl Summary {
             Event::CommandDropped { to, .. } => self.robot(to).dropped += 1,
             Event::CommandMissing { to, .. } => self.robot(to).missing += 1,
             Event::Missed { robot } => self.robot(robot).missed += 1,
-            Event::Joined { robot, generation: Some(_), .. } => self.robot(robot).returns += 1,
+            Event::Joined {
+                robot,
+                generation: Some(_),
+                ..
+            } => self.robot(robot).returns += 1,
             Event::End { reason, digest } => {
                 self.end = Some(*reason);
                 self.digest.clone_from(digest);
@@ -176,9 +184,14 @@ impl Summary {
             let own = self.robot(&robot);
             add(&mut own.emotions_s, since.emotion, ticks, tick_s);
             add(&mut own.behaviors_s, since.behavior, ticks, tick_s);
-            own.state_variables = simulation.state_variables(&robot).cloned().unwrap_or_default();
+            own.state_variables = simulation
+                .state_variables(&robot)
+                .cloned()
+                .unwrap_or_default();
         }
-        self.wall.elapsed_s = self.begun.map_or(0.0, |begun| begun.elapsed().as_secs_f64());
+        self.wall.elapsed_s = self
+            .begun
+            .map_or(0.0, |begun| begun.elapsed().as_secs_f64());
     }
 }
 

@@ -48,11 +48,18 @@ impl Dimension {
 #[must_use]
 pub fn quantity(text: &str) -> Option<(f64, Dimension)> {
     let text = text.trim();
-    let split = text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E')))?;
+    let split =
+        text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E')))?;
     let (number, unit) = text.split_at(split);
-    let number: f64 = number.parse().ok().filter(|number: &f64| number.is_finite())?;
+    let number: f64 = number
+        .parse()
+        .ok()
+        .filter(|number: &f64| number.is_finite())?;
     let unit = unit.trim();
-    UNITS.iter().find(|(name, ..)| *name == unit).map(|(_, dimension, factor)| (number * factor, *dimension))
+    UNITS
+        .iter()
+        .find(|(name, ..)| *name == unit)
+        .map(|(_, dimension, factor)| (number * factor, *dimension))
 }
 
 macro_rules! quantity_type {

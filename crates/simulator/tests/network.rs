@@ -16,7 +16,13 @@ const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]
 
 fn parse(network: &str) -> Result<Scenario, FileError> {
     let text = format!("seed = 5\n{network}\n{ROBOTS}");
-    Scenario::parse(&Source { name: "test".into(), text }, Path::new("."))
+    Scenario::parse(
+        &Source {
+            name: "test".into(),
+            text,
+        },
+        Path::new("."),
+    )
 }
 
 fn medium(network: &str) -> Medium {
@@ -30,7 +36,11 @@ fn name(name: &str) -> RobotName {
 }
 
 fn command(from: &str, to: &str, seq: u64) -> Underway {
-    Underway { to: name(to), from: name(from), seq }
+    Underway {
+        to: name(to),
+        from: name(from),
+        seq,
+    }
 }
 
 /// One command from A to B a tick, sent in the ticks from 1 on; what the network decides at the ticks from 2 on.
@@ -47,18 +57,29 @@ fn play(network: &str, ticks: u64, also: impl Fn(u64, &mut Medium)) -> BTreeMap<
 /// Numbers of the commands from A that were lost, with the cause.
 fn lost(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, Cause)> {
     let dropped = |event: &Event| match event {
-        Event::CommandDropped { from, seq, because, .. } if from.as_str() == "A" => Some((*seq, *because)),
+        Event::CommandDropped {
+            from, seq, because, ..
+        } if from.as_str() == "A" => Some((*seq, *because)),
         _ => None,
     };
-    decisions.values().flat_map(|decision| decision.events.iter().filter_map(dropped)).collect()
+    decisions
+        .values()
+        .flat_map(|decision| decision.events.iter().filter_map(dropped))
+        .collect()
 }
 
 /// When the commands from A to B arrived: tick and number.
 fn arrived(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, u64)> {
     let at_b = |(tick, decision): (&u64, &Decision)| {
-        let ids = decision.delivered.get(&name("B")).cloned().unwrap_or_default();
+        let ids = decision
+            .delivered
+            .get(&name("B"))
+            .cloned()
+            .unwrap_or_default();
         let tick = *tick;
-        ids.into_iter().filter(|id| id.from.as_str() == "A").map(move |id| (tick, id.seq))
+        ids.into_iter()
+            .filter(|id| id.from.as_str() == "A")
+            .map(move |id| (tick, id.seq))
     };
     decisions.iter().flat_map(at_b).collect()
 }
@@ -67,13 +88,21 @@ fn arrived(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, u64)> {
 fn a_perfect_network_loses_nothing_and_a_dead_one_everything() {
     for network in ["", "network.commands.loss = 0.0"] {
         let decisions = play(network, 100, |_, _| ());
-        assert_eq!(arrived(&decisions), (1..=100).map(|seq| (seq + 1, seq)).collect::<Vec<_>>());
+        assert_eq!(
+            arrived(&decisions),
+            (1..=100).map(|seq| (seq + 1, seq)).collect::<Vec<_>>()
+        );
         assert!(
-            decisions.values().all(|decision| decision.events.is_empty() && decision.unreachable.is_empty())
+            decisions
+                .values()
+                .all(|decision| decision.events.is_empty() && decision.unreachable.is_empty())
         );
     }
     let decisions = play("network.commands.loss = 1.0", 100, |_, _| ());
-    assert_eq!((arrived(&decisions).len(), lost(&decisions).len()), (0, 100));
+    assert_eq!(
+        (arrived(&decisions).len(), lost(&decisions).len()),
+        (0, 100)
+    );
 }
 
 #[test]
@@ -101,34 +130,43 @@ fn other_messages_and_robots_change_nothing_of_the_fate_of_one() {
         medium.accept(command("B", "A", tick));
         medium.accept(command("C", "B", tick));
     });
-    assert_eq!((lost(&alone), arrived(&alone)), (lost(&in_company), arrived(&in_company)));
+    assert_eq!(
+        (lost(&alone), arrived(&alone)),
+        (lost(&in_company), arrived(&in_company))
+    );
 }
 
 #[test]
 fn what_is_lost_does_not_depend_on_what_else_the_network_does() {
     let plain = lost(&play("network.commands.loss = 0.3", 500, |_, _| ()));
-    let more =
-        "network.commands = { loss = 0.3, duplication = 0.5, delay = \"2 s\" }\nnetwork.queries.loss = 0.5";
+    let more = "network.commands = { loss = 0.3, duplication = 0.5, delay = \"2 s\" }\nnetwork.queries.loss = 0.5";
     assert_eq!(plain, lost(&play(more, 500, |_, _| ())));
 }
 
 #[test]
 fn delays_are_those_of_the_scenario_and_are_told() {
     let decisions = play("network.commands.delay = \"1.5 s\"", 50, |_, _| ());
-    assert_eq!(arrived(&decisions), (1..=47).map(|seq| (seq + 4, seq)).collect::<Vec<_>>());
-    let told = decisions.values().flat_map(|decision| &decision.events);
-    assert!(
-        told.clone()
-            .all(|event| matches!(event, Event::CommandDelayed { seq, until, .. } if *until == seq + 4))
+    assert_eq!(
+        arrived(&decisions),
+        (1..=47).map(|seq| (seq + 4, seq)).collect::<Vec<_>>()
     );
+    let told = decisions.values().flat_map(|decision| &decision.events);
+    assert!(told.clone().all(
+        |event| matches!(event, Event::CommandDelayed { seq, until, .. } if *until == seq + 4)
+    ));
     assert_eq!(told.count(), 50);
 
     let network = "network.commands.delay = { min = \"0 s\", mode = \"0 s\", max = \"5 s\" }";
     let decisions = play(network, 5000, |_, _| ());
-    let late: Vec<f64> =
-        arrived(&decisions).iter().map(|(tick, seq)| (tick - seq - 1) as f64 * 0.5).collect();
+    let late: Vec<f64> = arrived(&decisions)
+        .iter()
+        .map(|(tick, seq)| (tick - seq - 1) as f64 * 0.5)
+        .collect();
     let mean = late.iter().sum::<f64>() / late.len() as f64;
-    assert!((mean - 5.0 / 3.0).abs() < 0.1, "a triangle's mean is the mean of its corners: {mean}");
+    assert!(
+        (mean - 5.0 / 3.0).abs() < 0.1,
+        "a triangle's mean is the mean of its corners: {mean}"
+    );
     assert!(late.contains(&0.0) && late.iter().all(|late| *late <= 5.0));
 }
 
@@ -138,7 +176,9 @@ fn a_doubled_command_arrives_twice_in_a_row_and_is_told() {
     let twice: Vec<(u64, u64)> = (1..=10).flat_map(|seq| [(seq + 1, seq); 2]).collect();
     assert_eq!(arrived(&decisions), twice);
     assert!(
-        decisions.values().all(|decision| matches!(&decision.events[..], [Event::CommandDuplicated { .. }]))
+        decisions
+            .values()
+            .all(|decision| matches!(&decision.events[..], [Event::CommandDuplicated { .. }]))
     );
 }
 
@@ -151,9 +191,15 @@ fn bursts_lose_in_runs() {
     assert!(lost.iter().all(|(_, cause)| *cause == Cause::Burst));
     let share = lost.len() as f64 / 40_000.0;
     assert!((share - 0.2).abs() < 0.03, "{share}");
-    let runs = 1 + lost.windows(2).filter(|pair| pair[1].0 != pair[0].0 + 1).count();
+    let runs = 1 + lost
+        .windows(2)
+        .filter(|pair| pair[1].0 != pair[0].0 + 1)
+        .count();
     let length = lost.len() as f64 / runs as f64;
-    assert!((length - 10.0).abs() < 1.5, "mean length of a burst: {length}");
+    assert!(
+        (length - 10.0).abs() < 1.5,
+        "mean length of a burst: {length}"
+    );
 }
 
 #[test]
@@ -162,32 +208,53 @@ fn a_link_can_be_worse_than_the_rest() {
     assert_eq!(lost(&play(network, 50, |_, _| ())).len(), 50);
     let back = "[[network.link]]\nfrom = \"B\"\nto = \"A\"\ncommands = { loss = 1.0 }\n";
     assert!(lost(&play(back, 50, |_, _| ())).is_empty());
-    let only_queries =
-        "network.commands.loss = 1.0\n[[network.link]]\nfrom = \"A\"\nto = \"B\"\nqueries = { loss = 0.0 }\n";
+    let only_queries = "network.commands.loss = 1.0\n[[network.link]]\nfrom = \"A\"\nto = \"B\"\nqueries = { loss = 0.0 }\n";
     assert_eq!(lost(&play(only_queries, 50, |_, _| ())).len(), 50);
 }
 
 /// Who cannot ask whom at each tick, as one text.
 fn cut_off(decision: &Decision) -> String {
     let one = |(asker, targets): (&RobotName, &Vec<RobotName>)| {
-        format!("{asker}:{}", targets.iter().map(RobotName::as_str).collect::<String>())
+        format!(
+            "{asker}:{}",
+            targets.iter().map(RobotName::as_str).collect::<String>()
+        )
     };
-    decision.unreachable.iter().map(one).collect::<Vec<_>>().join(" ")
+    decision
+        .unreachable
+        .iter()
+        .map(one)
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 #[test]
 fn a_partition_cuts_commands_and_queries_from_its_first_to_its_last_tick() {
-    let network =
-        "[[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"10 s\"\n";
-    let decisions = play(network, 30, |tick, medium| medium.accept(command("B", "C", tick)));
+    let network = "[[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"10 s\"\n";
+    let decisions = play(network, 30, |tick, medium| {
+        medium.accept(command("B", "C", tick))
+    });
     // What is decided at the ticks 10 to 19 was sent one tick earlier.
-    assert_eq!(lost(&decisions), (9..=18).map(|seq| (seq, Cause::Partition)).collect::<Vec<_>>());
+    assert_eq!(
+        lost(&decisions),
+        (9..=18)
+            .map(|seq| (seq, Cause::Partition))
+            .collect::<Vec<_>>()
+    );
     for (tick, decision) in &decisions {
-        let expected = if (10..20).contains(tick) { "A:BC B:A C:A" } else { "" };
+        let expected = if (10..20).contains(tick) {
+            "A:BC B:A C:A"
+        } else {
+            ""
+        };
         assert_eq!(cut_off(decision), expected, "tick {tick}");
         let told = |cut: bool| {
             let is_told = |event: &&Event| match event {
-                Event::LinkCut { commands: true, queries: true, .. } => cut,
+                Event::LinkCut {
+                    commands: true,
+                    queries: true,
+                    ..
+                } => cut,
                 Event::LinkHealed { .. } => !cut,
                 _ => false,
             };
@@ -195,29 +262,49 @@ fn a_partition_cuts_commands_and_queries_from_its_first_to_its_last_tick() {
         };
         assert_eq!(
             (told(true), told(false)),
-            (if *tick == 10 { 4 } else { 0 }, if *tick == 20 { 4 } else { 0 })
+            (
+                if *tick == 10 { 4 } else { 0 },
+                if *tick == 20 { 4 } else { 0 }
+            )
         );
     }
 }
 
 #[test]
 fn a_partition_can_be_one_way_or_of_one_kind_only() {
-    let one_way = "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0 s\"\none_way = true\n";
-    let decisions = play(one_way, 20, |tick, medium| medium.accept(command("B", "A", tick)));
+    let one_way =
+        "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0 s\"\none_way = true\n";
+    let decisions = play(one_way, 20, |tick, medium| {
+        medium.accept(command("B", "A", tick))
+    });
     assert_eq!(lost(&decisions).len(), 20);
-    assert!(decisions.values().all(|decision| decision.delivered.contains_key(&name("A"))));
+    assert!(
+        decisions
+            .values()
+            .all(|decision| decision.delivered.contains_key(&name("A")))
+    );
     // A question needs an answer: neither can ask the other.
-    assert!(decisions.values().all(|decision| cut_off(decision) == "A:B B:A"));
+    assert!(
+        decisions
+            .values()
+            .all(|decision| cut_off(decision) == "A:B B:A")
+    );
 
-    let queries =
-        "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0 s\"\ncuts = [\"queries\"]\n";
+    let queries = "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0 s\"\ncuts = [\"queries\"]\n";
     let decisions = play(queries, 20, |_, _| ());
-    assert!(lost(&decisions).is_empty() && decisions.values().all(|decision| cut_off(decision) == "A:B B:A"));
-    let commands =
-        "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0 s\"\ncuts = [\"commands\"]\n";
+    assert!(
+        lost(&decisions).is_empty()
+            && decisions
+                .values()
+                .all(|decision| cut_off(decision) == "A:B B:A")
+    );
+    let commands = "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0 s\"\ncuts = [\"commands\"]\n";
     let decisions = play(commands, 20, |_, _| ());
     assert!(
-        lost(&decisions).len() == 20 && decisions.values().all(|decision| decision.unreachable.is_empty())
+        lost(&decisions).len() == 20
+            && decisions
+                .values()
+                .all(|decision| decision.unreachable.is_empty())
     );
 }
 
@@ -226,25 +313,42 @@ fn a_cut_loses_what_is_on_its_way() {
     let network = "network.commands.delay = \"3 s\"\n[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"5 s\"\nuntil = \"6 s\"\n";
     let lost = lost(&play(network, 40, |_, _| ()));
     // Two ticks of cut: what is sent then, and what would arrive then.
-    assert_eq!(lost.iter().map(|(seq, _)| *seq).collect::<Vec<_>>(), [9, 3, 10, 4]);
+    assert_eq!(
+        lost.iter().map(|(seq, _)| *seq).collect::<Vec<_>>(),
+        [9, 3, 10, 4]
+    );
 }
 
 #[test]
 fn lost_queries_are_one_verdict_for_asker_target_and_tick() {
     let decisions = play("network.queries.loss = 0.25", 4000, |_, _| ());
-    let count = decisions.values().filter(|decision| cut_off(decision).contains("A:B")).count() as f64;
+    let count = decisions
+        .values()
+        .filter(|decision| cut_off(decision).contains("A:B"))
+        .count() as f64;
     assert!((count / 4000.0 - 0.25).abs() < 0.05, "{count}");
     assert!(lost(&decisions).is_empty());
     for decision in decisions.values() {
-        let told = decision.events.iter().filter(|event| matches!(event, Event::QueryLost { .. })).count();
-        assert_eq!(told, decision.unreachable.values().map(Vec::len).sum::<usize>());
+        let told = decision
+            .events
+            .iter()
+            .filter(|event| matches!(event, Event::QueryLost { .. }))
+            .count();
+        assert_eq!(
+            told,
+            decision.unreachable.values().map(Vec::len).sum::<usize>()
+        );
     }
 }
 
 #[test]
 fn a_person_at_the_console_is_not_on_the_robots_network() {
     let mut medium = medium("network.commands = { loss = 1.0, delay = \"5 s\" }");
-    medium.accept(Underway { to: name("A"), from: RobotName::operator(), seq: 1 });
+    medium.accept(Underway {
+        to: name("A"),
+        from: RobotName::operator(),
+        seq: 1,
+    });
     let decision = medium.decide(2);
     assert!(decision.events.is_empty() && decision.delivered[&name("A")].len() == 1);
 }
@@ -256,21 +360,54 @@ fn impossible_networks_are_refused_where_they_stand() {
         ("network.commands.loss = 1.5".to_owned(), "from 0 to 1"),
         ("network.commands.loss = -0.1".to_owned(), "from 0 to 1"),
         ("network.commands.loss = nan".to_owned(), "from 0 to 1"),
-        ("network.commands.burst = { enter = 2, leave = 0.1 }".to_owned(), "burst.enter"),
+        (
+            "network.commands.burst = { enter = 2, leave = 0.1 }".to_owned(),
+            "burst.enter",
+        ),
         ("network.commands.delay = \"1 h\"".to_owned(), "1000 ticks"),
-        ("network.commands.delay = { min = \"3 s\", mode = \"1 s\", max = \"2 s\" }".to_owned(), "delay"),
-        ("network.queries.delay = \"1 s\"".to_owned(), "within their tick"),
+        (
+            "network.commands.delay = { min = \"3 s\", mode = \"1 s\", max = \"2 s\" }".to_owned(),
+            "delay",
+        ),
+        (
+            "network.queries.delay = \"1 s\"".to_owned(),
+            "within their tick",
+        ),
         ("[network]\ncommands = { los = 0.1 }".to_owned(), "los"),
-        ("[[network.link]]\nfrom = \"A\"\nto = \"Z\"\ncommands = { loss = 1.0 }".to_owned(), "called Z"),
-        (partition("groups = [[\"A\"], [\"Z\"]]\nfrom = \"0 s\""), "called Z"),
-        (partition("groups = [[\"A\"]]\nfrom = \"0 s\""), "two groups"),
-        (partition("groups = [[\"A\", \"B\"], [\"B\"]]\nfrom = \"0 s\""), "in two groups"),
-        (partition("groups = [[\"A\"], [\"B\"]]\nfrom = \"5 s\"\nuntil = \"5 s\""), "before it begins"),
-        (partition("groups = [[\"A\"], [\"B\"]]\nfrom = \"-5 s\""), "beginning"),
-        (partition("groups = [[\"A\"], [\"B\"]]\nfrom = \"5 s\"\ncuts = []"), "cuts nothing"),
+        (
+            "[[network.link]]\nfrom = \"A\"\nto = \"Z\"\ncommands = { loss = 1.0 }".to_owned(),
+            "called Z",
+        ),
+        (
+            partition("groups = [[\"A\"], [\"Z\"]]\nfrom = \"0 s\""),
+            "called Z",
+        ),
+        (
+            partition("groups = [[\"A\"]]\nfrom = \"0 s\""),
+            "two groups",
+        ),
+        (
+            partition("groups = [[\"A\", \"B\"], [\"B\"]]\nfrom = \"0 s\""),
+            "in two groups",
+        ),
+        (
+            partition("groups = [[\"A\"], [\"B\"]]\nfrom = \"5 s\"\nuntil = \"5 s\""),
+            "before it begins",
+        ),
+        (
+            partition("groups = [[\"A\"], [\"B\"]]\nfrom = \"-5 s\""),
+            "beginning",
+        ),
+        (
+            partition("groups = [[\"A\"], [\"B\"]]\nfrom = \"5 s\"\ncuts = []"),
+            "cuts nothing",
+        ),
     ] {
         let error = parse(&network).unwrap_err().in_words();
-        assert!(error.starts_with("line ") && error.contains(reason), "{network}: {error}");
+        assert!(
+            error.starts_with("line ") && error.contains(reason),
+            "{network}: {error}"
+        );
     }
 }
 
@@ -281,6 +418,13 @@ fn the_resolved_file_has_the_same_network() {
                    [[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"7 s\"\none_way = true\ncuts = [\"queries\"]\n";
     let scenario = parse(network).unwrap();
     let text = scenario.to_toml().unwrap();
-    let again = Scenario::parse(&Source { name: "again".into(), text }, Path::new(".")).unwrap();
+    let again = Scenario::parse(
+        &Source {
+            name: "again".into(),
+            text,
+        },
+        Path::new("."),
+    )
+    .unwrap();
     assert_eq!(again.network, scenario.network);
 }

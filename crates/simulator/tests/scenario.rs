@@ -10,7 +10,13 @@ use simulator::diagnostic::{FileError, Source};
 use simulator::scenario::{Changes, OnLate};
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
-    Scenario::parse(&Source { name: "hall.toml".into(), text: text.into() }, Path::new("."))
+    Scenario::parse(
+        &Source {
+            name: "hall.toml".into(),
+            text: text.into(),
+        },
+        Path::new("."),
+    )
 }
 
 /// The error as people see it, without colors.
@@ -24,7 +30,8 @@ fn shown(error: &FileError) -> String {
 #[test]
 fn units_become_si_and_defaults_are_those_of_the_paper() {
     let scenario =
-        parse("[guests]\ncount = 100\n[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n").unwrap();
+        parse("[guests]\ncount = 100\n[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n")
+            .unwrap();
     assert_eq!(scenario.field_m, [15.24, 15.24]);
     assert_eq!(scenario.body_m, 0.6096);
     assert_eq!((scenario.tick_s, scenario.ticks), (0.5, 1200));
@@ -60,32 +67,62 @@ fn the_resolved_file_gives_the_same_scenario() {
 fn errors_show_line_place_and_reason() {
     for (text, line, reason) in [
         ("sed = 4\n", "1 │ sed = 4", "unknown field `sed`"),
-        ("tick = \"0.5 ft\"\n", "1 │ tick = \"0.5 ft\"", "is not a time"),
+        (
+            "tick = \"0.5 ft\"\n",
+            "1 │ tick = \"0.5 ft\"",
+            "is not a time",
+        ),
         ("tick = 0.5\n", "1 │ tick = 0.5", "a time such as"),
-        ("duration = \"-1 s\"\n", "1 │ duration", "must be more than zero"),
+        (
+            "duration = \"-1 s\"\n",
+            "1 │ duration",
+            "must be more than zero",
+        ),
         ("seed = 9007199254740992\n", "1 │ seed", "2^53"),
-        ("on_late = \"panic\"\n", "1 │ on_late", "unknown variant `panic`"),
+        (
+            "on_late = \"panic\"\n",
+            "1 │ on_late",
+            "unknown variant `panic`",
+        ),
         (
             "[guests]\ncount = 5\nspeed = { min = \"3 ft/s\", mode = \"1 ft/s\", max = \"2 ft/s\" }\n",
             "3 │ speed",
             "min",
         ),
-        ("[guests]\ncount = 700\n", "[guests]", "700 guests do not fit"),
-        ("[[robot]]\nname = \"a b\"\nat = [\"1 m\", \"1 m\"]\n", "2 │ name", "not a usable name"),
+        (
+            "[guests]\ncount = 700\n",
+            "[guests]",
+            "700 guests do not fit",
+        ),
+        (
+            "[[robot]]\nname = \"a b\"\nat = [\"1 m\", \"1 m\"]\n",
+            "2 │ name",
+            "not a usable name",
+        ),
         (
             "[[robot]]\nname = \"operator\"\nat = [\"1 m\", \"1 m\"]\n",
             "[[robot]]",
             "kept for commands from outside",
         ),
-        ("[[robot]]\nname = \"A\"\nat = [\"99 m\", \"1 m\"]\n", "[[robot]]", "robot A"),
+        (
+            "[[robot]]\nname = \"A\"\nat = [\"99 m\", \"1 m\"]\n",
+            "[[robot]]",
+            "robot A",
+        ),
         (
             "[[robot]]\nname = \"A\"\nat = [\"1 m\", \"1 m\"]\n[[robot]]\nname = \"A\"\nat = [\"3 m\", \"1 m\"]\n",
             "[[robot]]",
             "a second robot called A",
         ),
-        ("[[obstacle]]\nat = [\"1 m\"]\n", "2 │ at", "invalid length 1"),
+        (
+            "[[obstacle]]\nat = [\"1 m\"]\n",
+            "2 │ at",
+            "invalid length 1",
+        ),
     ] {
-        let error = parse(text).err().unwrap_or_else(|| unreachable!("accepted: {text}"));
+        let error = parse(text)
+            .err()
+            .unwrap_or_else(|| unreachable!("accepted: {text}"));
         let shown = shown(&error);
         assert!(shown.contains("hall.toml"), "{shown}");
         assert!(shown.contains(line), "no {line:?} in\n{shown}");
@@ -97,17 +134,37 @@ fn errors_show_line_place_and_reason() {
 fn the_command_line_changes_a_scenario() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("hall.toml");
-    std::fs::write(&file, "[guests]\ncount = 5\n[[robot]]\nname = \"Butler\"\nat = [\"5 m\", \"5 m\"]\n")
-        .unwrap();
+    std::fs::write(
+        &file,
+        "[guests]\ncount = 5\n[[robot]]\nname = \"Butler\"\nat = [\"5 m\", \"5 m\"]\n",
+    )
+    .unwrap();
     let load = |set: &[&str]| {
         let set = set.iter().map(|change| change.parse().unwrap()).collect();
-        Scenario::load(&file, &Changes { seed: Some(9), duration_s: Some(10.0), set })
+        Scenario::load(
+            &file,
+            &Changes {
+                seed: Some(9),
+                duration_s: Some(10.0),
+                set,
+            },
+        )
     };
-    let scenario =
-        load(&["guests.count=7", "robot.Butler.params.refiller=Vonda", "robot.0.class=Leguin"]).unwrap();
-    assert_eq!((scenario.seed, scenario.ticks, scenario.guests.count), (9, 20, 7));
+    let scenario = load(&[
+        "guests.count=7",
+        "robot.Butler.params.refiller=Vonda",
+        "robot.0.class=Leguin",
+    ])
+    .unwrap();
+    assert_eq!(
+        (scenario.seed, scenario.ticks, scenario.guests.count),
+        (9, 20, 7)
+    );
     let robot = scenario.robots.values().next().unwrap();
-    assert_eq!((robot.class.as_str(), &robot.parameters["refiller"]), ("Leguin", &"Vonda".into()));
+    assert_eq!(
+        (robot.class.as_str(), &robot.parameters["refiller"]),
+        ("Leguin", &"Vonda".into())
+    );
 
     let unknown = shown(&load(&["guest.count=7"]).unwrap_err());
     assert!(unknown.contains("unknown field `guest`"), "{unknown}");
@@ -117,14 +174,20 @@ fn the_command_line_changes_a_scenario() {
 
 #[test]
 fn a_plain_roster_is_the_experiment_of_the_paper() {
-    let source = Source { name: "CARSConfig.txt".into(), text: "# who\nButler\n\nLeguin\nVonda\n".into() };
+    let source = Source {
+        name: "CARSConfig.txt".into(),
+        text: "# who\nButler\n\nLeguin\nVonda\n".into(),
+    };
     let text = simulator::roster::scenario_of(&source).unwrap();
     let scenario = Scenario::parse(&text, Path::new(".")).unwrap();
     let names: Vec<String> = scenario.roster().iter().map(ToString::to_string).collect();
     assert_eq!(names, ["Butler", "Leguin", "Vonda"]);
     assert_eq!(scenario.guests.count, 100);
 
-    let bad = Source { name: "CARSConfig.txt".into(), text: "Butler\nLe guin\n".into() };
+    let bad = Source {
+        name: "CARSConfig.txt".into(),
+        text: "Butler\nLe guin\n".into(),
+    };
     let error = shown(&simulator::roster::scenario_of(&bad).unwrap_err());
     assert!(error.contains("2 │ Le guin"), "{error}");
 }

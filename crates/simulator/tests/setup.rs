@@ -12,7 +12,14 @@ use simulator::diagnostic::Source;
 fn scenario() -> Scenario {
     let text = "seed = 7\nduration = \"33 s\"\n[guests]\ncount = 5\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n\
                 [[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams = { x = 1 }\n[[robot]]\nname = \"B\"\nat = [\"7 m\", \"5 m\"]\n";
-    Scenario::parse(&Source { name: "hall".into(), text: text.into() }, Path::new(".")).unwrap()
+    Scenario::parse(
+        &Source {
+            name: "hall".into(),
+            text: text.into(),
+        },
+        Path::new("."),
+    )
+    .unwrap()
 }
 
 fn name(name: &str) -> RobotName {
@@ -23,7 +30,12 @@ fn name(name: &str) -> RobotName {
 fn blamed(change: impl FnOnce(&mut Setup)) -> Vec<String> {
     let mut setup = scenario().setup();
     change(&mut setup);
-    scenario().with_setup(&setup).unwrap_err().into_iter().map(|error| error.field).collect()
+    scenario()
+        .with_setup(&setup)
+        .unwrap_err()
+        .into_iter()
+        .map(|error| error.field)
+        .collect()
 }
 
 #[test]
@@ -52,20 +64,58 @@ fn every_mistake_is_told_beside_its_field() {
     assert_eq!(blamed(|setup| setup.seed = u64::MAX), ["seed"]);
     assert_eq!(blamed(|setup| setup.duration_s = 0.0), ["duration_s"]);
     assert_eq!(blamed(|setup| setup.duration_s = 1e300), ["duration_s"]);
-    let wrong = Range { min: 3.0, mode: 1.0, max: 2.0 };
-    assert_eq!(blamed(|setup| setup.guest_speed_mps = wrong), ["guest_speed_mps"]);
-    assert_eq!(blamed(|setup| setup.guest_duration_s = wrong), ["guest_duration_s"]);
+    let wrong = Range {
+        min: 3.0,
+        mode: 1.0,
+        max: 2.0,
+    };
+    assert_eq!(
+        blamed(|setup| setup.guest_speed_mps = wrong),
+        ["guest_speed_mps"]
+    );
+    assert_eq!(
+        blamed(|setup| setup.guest_duration_s = wrong),
+        ["guest_duration_s"]
+    );
     assert_eq!(blamed(|setup| setup.guests = 100_000), ["guests"]);
     assert_eq!(blamed(|setup| setup.guests = u32::MAX), ["guests"]);
     assert_eq!(blamed(|setup| setup.field_m = [0.1, 5.0]), ["field_m"]);
     assert_eq!(blamed(|setup| setup.field_m = [1e9, 5.0]), ["field_m"]);
-    assert_eq!(blamed(|setup| setup.obstacles.push(Point::new(-1.0, 1.0))), ["obstacles"]);
-    assert_eq!(blamed(|setup| setup.robots.extend([(name("B"), Point::new(99.0, 1.0))])), ["robots.B"]);
-    assert_eq!(blamed(|setup| setup.robots.extend([(name("B"), Point::new(5.1, 5.0))])), ["robots.B"]);
-    assert_eq!(blamed(|setup| setup.robots.extend([(name("C"), Point::new(1.0, 9.0))])), ["robots.C"]);
-    assert_eq!(blamed(|setup| assert!(setup.robots.remove(&name("A")).is_some())), ["robots.A"]);
-    for bad in ["", "../x", "a/b", ".hidden", "events.jsonl", "scenario.toml", "recording.jsonl", "x\n"] {
-        assert_eq!(blamed(|setup| setup.log_file.name = bad.into()), ["log_file.name"], "{bad:?}");
+    assert_eq!(
+        blamed(|setup| setup.obstacles.push(Point::new(-1.0, 1.0))),
+        ["obstacles"]
+    );
+    assert_eq!(
+        blamed(|setup| setup.robots.extend([(name("B"), Point::new(99.0, 1.0))])),
+        ["robots.B"]
+    );
+    assert_eq!(
+        blamed(|setup| setup.robots.extend([(name("B"), Point::new(5.1, 5.0))])),
+        ["robots.B"]
+    );
+    assert_eq!(
+        blamed(|setup| setup.robots.extend([(name("C"), Point::new(1.0, 9.0))])),
+        ["robots.C"]
+    );
+    assert_eq!(
+        blamed(|setup| assert!(setup.robots.remove(&name("A")).is_some())),
+        ["robots.A"]
+    );
+    for bad in [
+        "",
+        "../x",
+        "a/b",
+        ".hidden",
+        "events.jsonl",
+        "scenario.toml",
+        "recording.jsonl",
+        "x\n",
+    ] {
+        assert_eq!(
+            blamed(|setup| setup.log_file.name = bad.into()),
+            ["log_file.name"],
+            "{bad:?}"
+        );
     }
     // Several mistakes are told at once.
     assert_eq!(
@@ -80,14 +130,29 @@ fn every_mistake_is_told_beside_its_field() {
 #[test]
 fn a_scenario_for_other_robots_is_refused_with_both_rosters() {
     let text = "[[robot]]\nname = \"Z\"\nat = [\"5 m\", \"5 m\"]\n";
-    let other = Scenario::parse_alone(&Source { name: "z".into(), text: text.into() }).unwrap();
+    let other = Scenario::parse_alone(&Source {
+        name: "z".into(),
+        text: text.into(),
+    })
+    .unwrap();
     let reason = other.with_roster_of(&scenario()).unwrap_err();
-    assert!(reason.contains('Z') && reason.contains('A') && reason.contains('B'), "{reason}");
+    assert!(
+        reason.contains('Z') && reason.contains('A') && reason.contains('B'),
+        "{reason}"
+    );
 }
 
 #[test]
 fn a_scenario_from_outside_reads_no_files() {
     let text = "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams_from = \"/etc/passwd\"\n";
-    let error = Scenario::parse_alone(&Source { name: "x".into(), text: text.into() }).unwrap_err();
-    assert!(error.in_words().contains("params_from"), "{}", error.in_words());
+    let error = Scenario::parse_alone(&Source {
+        name: "x".into(),
+        text: text.into(),
+    })
+    .unwrap_err();
+    assert!(
+        error.in_words().contains("params_from"),
+        "{}",
+        error.in_words()
+    );
 }

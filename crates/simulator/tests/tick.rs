@@ -41,7 +41,10 @@ impl<F: FnMut(&RobotName, &Clock, &mut Report)> Barrier for Puppets<F> {
             reports.insert(name.clone(), report);
         }
         self.clocks.push(clock);
-        Ok(Exchange { reports, membership: vec![] })
+        Ok(Exchange {
+            reports,
+            membership: vec![],
+        })
     }
 }
 
@@ -53,10 +56,16 @@ fn play(
     ticks: usize,
     act: impl FnMut(&RobotName, &Clock, &mut Report),
 ) -> (Simulation, Vec<Clock>, Vec<TickRecord>) {
-    let source = Source { name: "test".into(), text: text.into() };
+    let source = Source {
+        name: "test".into(),
+        text: text.into(),
+    };
     let scenario = Scenario::parse(&source, Path::new(".")).unwrap();
     let mut simulation = Simulation::new(scenario, 1).unwrap();
-    let mut puppets = Puppets { act, clocks: vec![] };
+    let mut puppets = Puppets {
+        act,
+        clocks: vec![],
+    };
     let mut records = vec![simulation.init(&mut puppets).unwrap()];
     for _ in 0..ticks {
         records.push(simulation.step(&mut puppets).unwrap());
@@ -76,7 +85,12 @@ fn an_accepted_proposal_is_where_the_robot_is_and_is_not_told() {
         }
     });
     assert_eq!(simulation.location(&name("A")), Some(Point::new(2.5, 2.25)));
-    assert!(clocks[1].news.get(&name("A")).is_none_or(|news| news.correction.is_none()));
+    assert!(
+        clocks[1]
+            .news
+            .get(&name("A"))
+            .is_none_or(|news| news.correction.is_none())
+    );
 }
 
 #[test]
@@ -88,9 +102,20 @@ fn who_collides_is_not_advanced_and_is_told_where_it_stands() {
     });
     assert_eq!(simulation.location(&name("A")), Some(Point::new(2.0, 2.0)));
     let correction = clocks[1].news[&name("A")].correction.unwrap();
-    assert_eq!((correction.location, correction.blocked), (Point::new(2.0, 2.0), true));
-    let blocked = Event::Blocked { robot: name("A"), by: "B".into(), at: Point::new(2.0, 2.0) };
-    assert!(records[1].events.contains(&blocked), "{:?}", records[1].events);
+    assert_eq!(
+        (correction.location, correction.blocked),
+        (Point::new(2.0, 2.0), true)
+    );
+    let blocked = Event::Blocked {
+        robot: name("A"),
+        by: "B".into(),
+        at: Point::new(2.0, 2.0),
+    };
+    assert!(
+        records[1].events.contains(&blocked),
+        "{:?}",
+        records[1].events
+    );
 }
 
 #[test]
@@ -104,7 +129,13 @@ fn nobody_leaves_the_field_or_jumps() {
     let by: Vec<String> = records[1]
         .events
         .iter()
-        .filter_map(|event| if let Event::Blocked { by, .. } = event { Some(by.clone()) } else { None })
+        .filter_map(|event| {
+            if let Event::Blocked { by, .. } = event {
+                Some(by.clone())
+            } else {
+                None
+            }
+        })
         .collect();
     assert_eq!(by.len(), 2);
     assert_eq!(by[1], "too_fast");
@@ -124,13 +155,27 @@ fn a_command_sent_in_a_tick_is_named_by_the_next_clock_in_the_order_of_senders()
         }
     });
     let ids = |list: &[(&str, u64)]| -> Vec<CommandId> {
-        list.iter().map(|(from, seq)| CommandId { from: name(from), seq: *seq }).collect()
+        list.iter()
+            .map(|(from, seq)| CommandId {
+                from: name(from),
+                seq: *seq,
+            })
+            .collect()
     };
-    assert_eq!(clocks[2].news[&name("A")].commands, ids(&[("A", 1), ("A", 3), ("B", 1), ("B", 3)]));
-    assert_eq!(clocks[2].news[&name("B")].commands, ids(&[("A", 2), ("B", 2)]));
+    assert_eq!(
+        clocks[2].news[&name("A")].commands,
+        ids(&[("A", 1), ("A", 3), ("B", 1), ("B", 3)])
+    );
+    assert_eq!(
+        clocks[2].news[&name("B")].commands,
+        ids(&[("A", 2), ("B", 2)])
+    );
     assert!(clocks[1].news.is_empty() && clocks[3].news.is_empty());
-    let delivered =
-        records[2].events.iter().filter(|event| matches!(event, Event::CommandDelivered { .. })).count();
+    let delivered = records[2]
+        .events
+        .iter()
+        .filter(|event| matches!(event, Event::CommandDelivered { .. }))
+        .count();
     assert_eq!(delivered, 6);
 }
 
@@ -138,9 +183,15 @@ fn a_command_sent_in_a_tick_is_named_by_the_next_clock_in_the_order_of_senders()
 fn a_command_from_outside_is_delivered_at_the_next_tick_and_recorded() {
     let (mut simulation, ..) = play(TWO, 1, |_, _, _| {});
     assert_eq!(simulation.command(&name("B"), "refill"), 1);
-    let mut puppets = Puppets { act: |_: &RobotName, _: &Clock, _: &mut Report| {}, clocks: vec![] };
+    let mut puppets = Puppets {
+        act: |_: &RobotName, _: &Clock, _: &mut Report| {},
+        clocks: vec![],
+    };
     let record = simulation.step(&mut puppets).unwrap();
-    let id = CommandId { from: RobotName::operator(), seq: 1 };
+    let id = CommandId {
+        from: RobotName::operator(),
+        seq: 1,
+    };
     assert_eq!(puppets.clocks[0].news[&name("B")].commands, [id]);
     assert!(matches!(&record.events[0], Event::CommandSent { command, .. } if command == "refill"));
 }
@@ -150,7 +201,10 @@ fn robots_within_range_are_sensed_with_where_they_are() {
     let near = TWO.replace("4 m", "3 m");
     let (_, clocks, _) = play(&near, 1, |_, _, _| {});
     let sensed = &clocks[1].news[&name("A")].sensed;
-    assert_eq!((sensed[0].name.as_str(), sensed[0].location), ("B", Point::new(3.0, 2.0)));
+    assert_eq!(
+        (sensed[0].name.as_str(), sensed[0].location),
+        ("B", Point::new(3.0, 2.0))
+    );
     let (_, clocks, _) = play(TWO, 1, |_, _, _| {});
     assert!(clocks[1].news.is_empty(), "2 m is beyond 6 ft");
 }
@@ -160,20 +214,40 @@ fn a_percept_is_as_of_the_tick_under_way() {
     struct Asker(Option<protocol::messages::Percept>);
     impl Barrier for Asker {
         type Interrupt = Infallible;
-        fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, Infallible> {
+        fn exchange(
+            &mut self,
+            clock: Clock,
+            simulation: &Simulation,
+        ) -> Result<Exchange, Infallible> {
             self.0 = Some(simulation.percept(&simulation.names()[0]));
             assert_eq!(self.0.as_ref().unwrap().tick, clock.tick);
             Ok(Exchange::default())
         }
     }
     let near = TWO.replace("4 m", "3 m") + "[[obstacle]]\nat = [\"2 m\", \"3 m\"]\n";
-    let source = Source { name: "test".into(), text: near };
-    let mut simulation = Simulation::new(Scenario::parse(&source, Path::new(".")).unwrap(), 1).unwrap();
+    let source = Source {
+        name: "test".into(),
+        text: near,
+    };
+    let mut simulation =
+        Simulation::new(Scenario::parse(&source, Path::new(".")).unwrap(), 1).unwrap();
     let mut asker = Asker(None);
     simulation.init(&mut asker).unwrap();
     simulation.step(&mut asker).unwrap();
-    let kinds: Vec<_> = asker.0.unwrap().bodies.iter().map(|body| body.kind).collect();
-    assert_eq!(kinds, [protocol::messages::SensedKind::Obstacle, protocol::messages::SensedKind::Robot]);
+    let kinds: Vec<_> = asker
+        .0
+        .unwrap()
+        .bodies
+        .iter()
+        .map(|body| body.kind)
+        .collect();
+    assert_eq!(
+        kinds,
+        [
+            protocol::messages::SensedKind::Obstacle,
+            protocol::messages::SensedKind::Robot
+        ]
+    );
 }
 
 #[test]
@@ -181,21 +255,40 @@ fn who_does_not_report_stays_and_is_out_of_reach_at_the_next_tick() {
     struct Deaf;
     impl Barrier for Deaf {
         type Interrupt = Infallible;
-        fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, Infallible> {
-            let mut puppets = Puppets { act: |_: &RobotName, _: &Clock, _: &mut Report| {}, clocks: vec![] };
+        fn exchange(
+            &mut self,
+            clock: Clock,
+            simulation: &Simulation,
+        ) -> Result<Exchange, Infallible> {
+            let mut puppets = Puppets {
+                act: |_: &RobotName, _: &Clock, _: &mut Report| {},
+                clocks: vec![],
+            };
             let mut exchange = puppets.exchange(clock, simulation)?;
             exchange.reports.remove("B");
             Ok(exchange)
         }
     }
-    let source = Source { name: "test".into(), text: TWO.into() };
-    let mut simulation = Simulation::new(Scenario::parse(&source, Path::new(".")).unwrap(), 1).unwrap();
+    let source = Source {
+        name: "test".into(),
+        text: TWO.into(),
+    };
+    let mut simulation =
+        Simulation::new(Scenario::parse(&source, Path::new(".")).unwrap(), 1).unwrap();
     let record = simulation.init(&mut Deaf).unwrap();
     assert!(record.events.contains(&Event::Missed { robot: name("B") }));
-    let mut puppets = Puppets { act: |_: &RobotName, _: &Clock, _: &mut Report| {}, clocks: vec![] };
+    let mut puppets = Puppets {
+        act: |_: &RobotName, _: &Clock, _: &mut Report| {},
+        clocks: vec![],
+    };
     simulation.step(&mut puppets).unwrap();
     assert_eq!(puppets.clocks[0].news[&name("A")].unreachable, [name("B")]);
-    assert!(!puppets.clocks[0].news[&name("B")].correction.unwrap().blocked);
+    assert!(
+        !puppets.clocks[0].news[&name("B")]
+            .correction
+            .unwrap()
+            .blocked
+    );
 }
 
 #[test]
@@ -219,7 +312,12 @@ fn every_value_that_a_robot_reports_is_in_the_digest() {
         |report| drop(report.state_variables.insert("x".into(), 1.0.into())),
         |report| {
             let (to, performative) = (RobotName::operator(), Performative::Achieve);
-            report.sent = vec![SentCommand { to, seq: 1, performative, command: "x".into() }];
+            report.sent = vec![SentCommand {
+                to,
+                seq: 1,
+                performative,
+                command: "x".into(),
+            }];
         },
         |report| report.log = vec!["x".into()],
     ];
@@ -229,13 +327,20 @@ fn every_value_that_a_robot_reports_is_in_the_digest() {
         assert!(!seen.contains(&other), "a change is not in the digest");
         seen.push(other);
     }
-    assert_eq!(digest(|report| report.speed_mps = -0.0), seen[0], "minus zero is zero");
+    assert_eq!(
+        digest(|report| report.speed_mps = -0.0),
+        seen[0],
+        "minus zero is zero"
+    );
 }
 
 #[test]
 fn another_seed_is_another_run() {
     let hall = |seed: u64| {
-        format!("seed = {seed}\n{}", TWO.replacen("[[robot]]", "[guests]\ncount = 20\n[[robot]]", 1))
+        format!(
+            "seed = {seed}\n{}",
+            TWO.replacen("[[robot]]", "[guests]\ncount = 20\n[[robot]]", 1)
+        )
     };
     let digest = |seed| play(&hall(seed), 5, |_, _, _| {}).0.digest();
     assert_eq!(digest(1), digest(1));

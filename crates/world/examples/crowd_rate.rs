@@ -13,7 +13,10 @@ const FT: f64 = 0.3048;
 const STEPS: usize = 20_000_000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("{:>9} {:>9} {:>15} {:>10} {:>9}", "guests", "ticks", "guest-steps/s", "ns/step", "blocked");
+    println!(
+        "{:>9} {:>9} {:>15} {:>10} {:>9}",
+        "guests", "ticks", "guest-steps/s", "ns/step", "blocked"
+    );
     for count in [100, 1_000, 10_000, 100_000] {
         let mut world = World::new(&hall(count)?, Xoshiro256PlusPlus::seed_from_u64(1))?;
         let ticks = STEPS / count;
@@ -39,7 +42,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn hall(count: usize) -> Result<Hall, Box<dyn std::error::Error>> {
     let side_m = 50.0 * FT * (count as f64 / 100.0).sqrt();
     Ok(Hall {
-        field: Field { size_m: (side_m, side_m), body_m: 2.0 * FT },
+        field: Field {
+            size_m: (side_m, side_m),
+            body_m: 2.0 * FT,
+        },
         obstacles: Vec::new(),
         guests: Guests {
             count,

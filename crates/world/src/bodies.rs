@@ -164,7 +164,12 @@ impl Bodies {
             });
         }
         ids.sort_unstable();
-        ids.into_iter().map(|id| Near { body: self.body(id), center: self.centers[id] }).collect()
+        ids.into_iter()
+            .map(|id| Near {
+                body: self.body(id),
+                center: self.centers[id],
+            })
+            .collect()
     }
 }
 
@@ -181,9 +186,16 @@ mod tests {
         let side_m = (8.0 * guests as f64).sqrt();
         let still = Triangular::new(0.0, 0.0, 0.0).unwrap();
         let hall = Hall {
-            field: Field { size_m: (side_m, side_m), body_m: 1.0 },
+            field: Field {
+                size_m: (side_m, side_m),
+                body_m: 1.0,
+            },
             obstacles: Vec::new(),
-            guests: Guests { count: guests, speed_mps: still, duration_s: still },
+            guests: Guests {
+                count: guests,
+                speed_mps: still,
+                duration_s: still,
+            },
             robots: Vec::new(),
             tick_s: 0.1,
             max_speed_mps: 1.0,
@@ -191,7 +203,9 @@ mod tests {
         let bodies = place(&hall, &mut Xoshiro256PlusPlus::seed_from_u64(3)).unwrap();
         let mut count = 0;
         for &center in bodies.guests() {
-            bodies.grid.visit_around(center, hall.field.body_m, |_| count += 1);
+            bodies
+                .grid
+                .visit_around(center, hall.field.body_m, |_| count += 1);
         }
         count
     }
@@ -200,7 +214,10 @@ mod tests {
     fn work_grows_linearly_with_the_crowd() {
         for guests in [100, 1_000, 10_000, 100_000] {
             let each = comparisons(guests) as f64 / guests as f64;
-            assert!((1.0..2.5).contains(&each), "{each} comparisons for each of {guests} guests");
+            assert!(
+                (1.0..2.5).contains(&each),
+                "{each} comparisons for each of {guests} guests"
+            );
         }
     }
 }

@@ -17,7 +17,10 @@ pub struct TriangularError {
 impl fmt::Display for TriangularError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { min, mode, max } = self;
-        write!(f, "need 0 <= min <= mode <= max, all finite; got min {min}, mode {mode}, max {max}")
+        write!(
+            f,
+            "need 0 <= min <= mode <= max, all finite; got min {min}, mode {mode}, max {max}"
+        )
     }
 }
 
@@ -98,16 +101,36 @@ pub enum HallError {
 impl fmt::Display for HallError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::OutOfRange { name, value, min, max } => {
-                write!(f, "{name} is {value:?}; it must be a number from {min:?} to {max:?}")
+            Self::OutOfRange {
+                name,
+                value,
+                min,
+                max,
+            } => {
+                write!(
+                    f,
+                    "{name} is {value:?}; it must be a number from {min:?} to {max:?}"
+                )
             }
-            Self::FieldTooSmall { size_m: (width_m, height_m), body_m } => {
-                write!(f, "a field of {width_m} m by {height_m} m has no room for a body of {body_m} m")
+            Self::FieldTooSmall {
+                size_m: (width_m, height_m),
+                body_m,
+            } => {
+                write!(
+                    f,
+                    "a field of {width_m} m by {height_m} m has no room for a body of {body_m} m"
+                )
             }
-            Self::TooManyBodies { count, max } => write!(f, "{count} bodies; at most {max} are supported"),
+            Self::TooManyBodies { count, max } => {
+                write!(f, "{count} bodies; at most {max} are supported")
+            }
             Self::ObstacleOffField { index, at } => off_field(f, "obstacle", index, at),
             Self::RobotOffField { index, at } => off_field(f, "robot", index, at),
-            Self::RobotOnObstacle { index, at, obstacle } => {
+            Self::RobotOnObstacle {
+                index,
+                at,
+                obstacle,
+            } => {
                 write!(f, "robot {index} at {at} m overlaps obstacle {obstacle}")
             }
             Self::RobotOnRobot { index, at, other } => {
@@ -124,7 +147,10 @@ impl fmt::Display for HallError {
 }
 
 fn off_field(f: &mut fmt::Formatter<'_>, kind: &str, index: usize, at: Point) -> fmt::Result {
-    write!(f, "{kind} {index} at {at} m does not lie wholly inside the field")
+    write!(
+        f,
+        "{kind} {index} at {at} m does not lie wholly inside the field"
+    )
 }
 
 impl std::error::Error for HallError {}

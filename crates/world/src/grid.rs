@@ -78,7 +78,10 @@ impl Grid {
     pub(crate) fn visit_around(&self, center: Point, reach_m: f64, mut visit: impl FnMut(usize)) {
         // The same rounding, monotone function numbers the cells of bodies and of the window's edges, so no
         // body inside the window can be in a cell outside it.
-        let (left, right) = (self.column(center.x - reach_m), self.column(center.x + reach_m));
+        let (left, right) = (
+            self.column(center.x - reach_m),
+            self.column(center.x + reach_m),
+        );
         let (bottom, top) = (self.row(center.y - reach_m), self.row(center.y + reach_m));
         for row in bottom..=top {
             for &head in &self.heads[row * self.columns + left..=row * self.columns + right] {
@@ -148,7 +151,11 @@ mod tests {
     #[test]
     fn finds_across_cells_and_edges() {
         let mut grid = Grid::new((10.0, 10.0), 1.0, 3);
-        for center in [Point::new(0.5, 0.5), Point::new(1.5, 0.5), Point::new(9.5, 9.5)] {
+        for center in [
+            Point::new(0.5, 0.5),
+            Point::new(1.5, 0.5),
+            Point::new(9.5, 9.5),
+        ] {
             grid.push(center);
         }
         assert_eq!(found(&grid, Point::new(1.0, 1.0), 0.6), [0, 1]);
@@ -162,7 +169,14 @@ mod tests {
 
     #[test]
     fn chains_survive_any_order_of_leaving() {
-        for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        for order in [
+            [0, 1, 2],
+            [0, 2, 1],
+            [1, 0, 2],
+            [1, 2, 0],
+            [2, 0, 1],
+            [2, 1, 0],
+        ] {
             let mut grid = Grid::new((10.0, 10.0), 1.0, 3);
             (0..3).for_each(|_| grid.push(Point::new(2.5, 2.5)));
             for (gone, id) in order.into_iter().enumerate() {
@@ -177,7 +191,10 @@ mod tests {
     fn memory_is_bounded_whatever_the_field() {
         for size_m in [(1e6, 1e6), (1e6, 1e-3), (1e-3, 1e6), (3.0, 7e5)] {
             let (columns, rows) = shape(size_m, 1e-3, CELLS);
-            assert!(columns >= 1 && rows >= 1 && (columns * rows) as u64 <= CELLS, "{columns} {rows}");
+            assert!(
+                columns >= 1 && rows >= 1 && (columns * rows) as u64 <= CELLS,
+                "{columns} {rows}"
+            );
         }
         assert_eq!(shape((50.0, 50.0), 2.0, CELLS), (25, 25));
     }

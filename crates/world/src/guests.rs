@@ -60,8 +60,15 @@ pub(crate) struct Crowd {
 impl Crowd {
     /// Draws every guest's first course, in index order.
     pub(crate) fn new(guests: hall::Guests, tick_s: f64, rng: &mut impl Rng) -> Self {
-        let courses = (0..guests.count).map(|_| Course::draw(&guests, tick_s, rng)).collect();
-        Self { guests, tick_s, courses, blockers: vec![None; guests.count] }
+        let courses = (0..guests.count)
+            .map(|_| Course::draw(&guests, tick_s, rng))
+            .collect();
+        Self {
+            guests,
+            tick_s,
+            courses,
+            blockers: vec![None; guests.count],
+        }
     }
 
     pub(crate) fn courses(&self) -> &[Course] {
@@ -74,7 +81,9 @@ impl Crowd {
 
     /// Every guest's step of one tick, in index order; who has no time left draws a new course first.
     pub(crate) fn advance(&mut self, bodies: &mut Bodies, rng: &mut impl Rng) {
-        for (index, (course, blocker)) in self.courses.iter_mut().zip(&mut self.blockers).enumerate() {
+        for (index, (course, blocker)) in
+            self.courses.iter_mut().zip(&mut self.blockers).enumerate()
+        {
             if course.ticks_left == 0 {
                 *course = Course::draw(&self.guests, self.tick_s, rng);
             }
@@ -101,7 +110,11 @@ mod tests {
             (1e300, 1e-6, u64::MAX),
         ];
         for (duration_s, tick_s, ticks) in cases {
-            assert_eq!(whole_ticks(duration_s, tick_s), ticks, "{duration_s} s in ticks of {tick_s} s");
+            assert_eq!(
+                whole_ticks(duration_s, tick_s),
+                ticks,
+                "{duration_s} s in ticks of {tick_s} s"
+            );
         }
     }
 }

@@ -73,7 +73,10 @@ impl Field {
         in_range("field height_m", self.size_m.1, BODY_MIN_M, SIDE_MAX_M)?;
         in_range("body_m", self.body_m, BODY_MIN_M, SIDE_MAX_M)?;
         if self.columns_and_rows().0 == 0 || self.columns_and_rows().1 == 0 {
-            return Err(HallError::FieldTooSmall { size_m: self.size_m, body_m: self.body_m });
+            return Err(HallError::FieldTooSmall {
+                size_m: self.size_m,
+                body_m: self.body_m,
+            });
         }
         Ok(())
     }
@@ -118,14 +121,30 @@ impl Hall {
         self.field.check()?;
         in_range("tick_s", self.tick_s, TICK_MIN_S, TICK_MAX_S)?;
         in_range("max_speed_mps", self.max_speed_mps, 0.0, SPEED_MAX_MPS)?;
-        let count = self.obstacles.len().saturating_add(self.robots.len()).saturating_add(self.guests.count);
+        let count = self
+            .obstacles
+            .len()
+            .saturating_add(self.robots.len())
+            .saturating_add(self.guests.count);
         if count > BODIES_MAX {
-            return Err(HallError::TooManyBodies { count, max: BODIES_MAX });
+            return Err(HallError::TooManyBodies {
+                count,
+                max: BODIES_MAX,
+            });
         }
         Ok(())
     }
 }
 
 fn in_range(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), HallError> {
-    if min <= value && value <= max { Ok(()) } else { Err(HallError::OutOfRange { name, value, min, max }) }
+    if min <= value && value <= max {
+        Ok(())
+    } else {
+        Err(HallError::OutOfRange {
+            name,
+            value,
+            min,
+            max,
+        })
+    }
 }

@@ -50,7 +50,13 @@ impl<R: Rng> World<R> {
         let bodies = place(hall, &mut rng)?;
         let crowd = Crowd::new(hall.guests, hall.tick_s, &mut rng);
         let stride_m = hall.max_speed_mps * hall.tick_s;
-        Ok(Self { bodies, crowd, tick_s: hall.tick_s, stride_m, rng })
+        Ok(Self {
+            bodies,
+            crowd,
+            tick_s: hall.tick_s,
+            stride_m,
+            rng,
+        })
     }
 
     /// One tick: robots in index order attempt the locations they propose, then guests in index order the next
@@ -63,15 +69,24 @@ impl<R: Rng> World<R> {
     ///
     /// If there is not exactly one proposal for each robot.
     pub fn advance(&mut self, proposals: &[Option<Point>]) -> Vec<Verdict> {
-        assert_eq!(proposals.len(), self.robots().len(), "there is one proposal for each robot");
-        let verdicts =
-            proposals.iter().enumerate().map(|(index, to)| self.advance_robot(index, *to)).collect();
+        assert_eq!(
+            proposals.len(),
+            self.robots().len(),
+            "there is one proposal for each robot"
+        );
+        let verdicts = proposals
+            .iter()
+            .enumerate()
+            .map(|(index, to)| self.advance_robot(index, *to))
+            .collect();
         self.crowd.advance(&mut self.bodies, &mut self.rng);
         verdicts
     }
 
     fn advance_robot(&mut self, index: usize, proposal: Option<Point>) -> Verdict {
-        let Some(to) = proposal else { return Verdict::Stayed };
+        let Some(to) = proposal else {
+            return Verdict::Stayed;
+        };
         if !to.is_finite() {
             return Verdict::NotFinite;
         }

@@ -45,7 +45,11 @@ fn place_robots(bodies: &mut Bodies, robots: &[Point]) -> Result<(), HallError> 
         }
         match bodies.hit(at) {
             Some(Body::Obstacle(obstacle)) => {
-                return Err(HallError::RobotOnObstacle { index, at, obstacle });
+                return Err(HallError::RobotOnObstacle {
+                    index,
+                    at,
+                    obstacle,
+                });
             }
             Some(Body::Robot(other)) => return Err(HallError::RobotOnRobot { index, at, other }),
             Some(Body::Guest(_)) => unreachable!("guests are placed after the robots"),
@@ -59,7 +63,9 @@ fn place_robots(bodies: &mut Bodies, robots: &[Point]) -> Result<(), HallError> 
 fn scatter(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> bool {
     for _ in 0..guests {
         let field = *bodies.field();
-        let free = (0..TRIES).map(|_| anywhere(&field, rng)).find(|&at| bodies.hit(at).is_none());
+        let free = (0..TRIES)
+            .map(|_| anywhere(&field, rng))
+            .find(|&at| bodies.hit(at).is_none());
         let Some(at) = free else { return false };
         bodies.push(at);
     }
@@ -67,7 +73,8 @@ fn scatter(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> bool {
 }
 
 fn anywhere(field: &Field, rng: &mut impl Rng) -> Point {
-    let mut along = |side_m: f64| field.body_m * 0.5 + rng.random::<f64>() * (side_m - field.body_m);
+    let mut along =
+        |side_m: f64| field.body_m * 0.5 + rng.random::<f64>() * (side_m - field.body_m);
     let x = along(field.size_m.0);
     let y = along(field.size_m.1);
     Point::new(x, y)
@@ -77,7 +84,10 @@ fn anywhere(field: &Field, rng: &mut impl Rng) -> Point {
 fn line_up(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> Result<(), HallError> {
     let mut places = free_places(bodies);
     if places.len() < guests {
-        return Err(HallError::NoRoom { count: guests, room: places.len() });
+        return Err(HallError::NoRoom {
+            count: guests,
+            room: places.len(),
+        });
     }
     for guest in 0..guests {
         let chosen = rng.random_range(guest..places.len());
@@ -94,7 +104,10 @@ fn line_up(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> Result<(),
 ///
 /// Called where the hall jammed or the field is small, so the number of places is in proportion to the bodies.
 fn free_places(bodies: &Bodies) -> Vec<Point> {
-    let Field { size_m: (width_m, _), body_m } = *bodies.field();
+    let Field {
+        size_m: (width_m, _),
+        body_m,
+    } = *bodies.field();
     let (_, rows) = bodies.field().columns_and_rows();
     let last_x_m = width_m - body_m * 0.5 + TOLERANCE_M;
     let mut places = Vec::new();

@@ -82,17 +82,26 @@ mod tests {
             (0.0, 1.0, f64::NAN),
             (0.0, 1.0, f64::INFINITY),
         ] {
-            assert!(Triangular::new(min, mode, max).is_err(), "{min} {mode} {max}");
+            assert!(
+                Triangular::new(min, mode, max).is_err(),
+                "{min} {mode} {max}"
+            );
         }
         let text = Triangular::new(0.5, 0.2, 1.0).unwrap_err().to_string();
-        assert_eq!(text, "need 0 <= min <= mode <= max, all finite; got min 0.5, mode 0.2, max 1");
+        assert_eq!(
+            text,
+            "need 0 <= min <= mode <= max, all finite; got min 0.5, mode 0.2, max 1"
+        );
     }
 
     #[test]
     fn constant_is_constant_and_still_draws_one() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let mut other = rng.clone();
-        assert_eq!(Triangular::new(0.7, 0.7, 0.7).unwrap().sample(&mut rng), 0.7);
+        assert_eq!(
+            Triangular::new(0.7, 0.7, 0.7).unwrap().sample(&mut rng),
+            0.7
+        );
         other.next_u64();
         assert_eq!(rng, other);
     }
@@ -108,6 +117,9 @@ mod tests {
         // Standard error is 0.0009; four of them.
         assert!((mean - (min + mode + max) / 3.0).abs() < 0.004, "{mean}");
         let below_mode = draws.iter().filter(|&&draw| draw < mode).count() as f64 / 1e5;
-        assert!((below_mode - (mode - min) / (max - min)).abs() < 0.006, "{below_mode}");
+        assert!(
+            (below_mode - (mode - min) / (max - min)).abs() < 0.006,
+            "{below_mode}"
+        );
     }
 }

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use protocol::bus::{Bus, Declared, Question, Role};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
-    Clock, Command, CommandId, JoinAnswer, JoinRequest, News, Performative, Point, PublicState, Refusal,
-    Report, SentCommand, Variable, Welcome,
+    Clock, Command, CommandId, JoinAnswer, JoinRequest, News, Performative, Point, PublicState,
+    Refusal, Report, SentCommand, Variable, Welcome,
 };
 use protocol::random::{Stream, stream, unit};
 use protocol::{Message, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
@@ -73,7 +73,9 @@ impl Shown {
     /// Shows a further state, and forgets what nobody asks for any more.
     fn show(&self, state: PublicState, kept: usize) {
         let mut board = self.board.lock().unwrap_or_else(PoisonError::into_inner);
-        board.states.retain(|old| old.epoch == state.epoch && old.tick < state.tick);
+        board
+            .states
+            .retain(|old| old.epoch == state.epoch && old.tick < state.tick);
         board.states.push(state);
         while board.states.len() > kept {
             board.states.remove(0);
@@ -84,7 +86,10 @@ impl Shown {
     }
 
     fn answer(&self, question: Question) {
-        self.judge(&mut self.board.lock().unwrap_or_else(PoisonError::into_inner), question);
+        self.judge(
+            &mut self.board.lock().unwrap_or_else(PoisonError::into_inner),
+            question,
+        );
     }
 
     fn judge(&self, board: &mut Board, question: Question) {
@@ -92,7 +97,8 @@ impl Shown {
         if matches!(number("epoch"), Some(Err(_))) && self.wrong.is("query.unknown") {
             std::process::exit(1);
         }
-        let (Ok(tick), Ok(epoch)) = (number("tick").transpose(), number("epoch").transpose()) else {
+        let (Ok(tick), Ok(epoch)) = (number("tick").transpose(), number("epoch").transpose())
+        else {
             return question.refuse("not a whole number");
         };
         let newest = board.states.last().cloned();
@@ -108,7 +114,12 @@ impl Shown {
             tick.is_none_or(|tick| state.tick + 1 == tick)
                 && epoch.is_none_or(|epoch| epoch == u64::from(state.epoch))
         };
-        let found = board.states.iter().rev().find(|state| is_meant(state)).cloned();
+        let found = board
+            .states
+            .iter()
+            .rev()
+            .find(|state| is_meant(state))
+            .cloned();
         let found = found.or(newest.filter(|_| self.wrong.is("query.early")));
         match found {
             Some(state) => {
@@ -116,7 +127,9 @@ impl Shown {
                 let bytes = answer.map_or_else(|| encode(&state), |answer| encode(&answer));
                 question.answer(question.key(), bytes);
             }
-            None if is_early && !self.wrong.is("query.early:impatient") => board.early.push(question),
+            None if is_early && !self.wrong.is("query.early:impatient") => {
+                board.early.push(question)
+            }
             None => question.refuse("not now"),
         }
     }
@@ -187,18 +200,38 @@ fn join(
     patience: Duration,
     wrong: &Wrong,
 ) -> Result<Welcome, Failure> {
-    let protocol = if wrong.is("join.request") { 99 } else { PROTOCOL_VERSION };
-    let instance = if wrong.is("join.request:instance") { "me".to_owned() } else { bus.id() };
+    let protocol = if wrong.is("join.request") {
+        99
+    } else {
+        PROTOCOL_VERSION
+    };
+    let instance = if wrong.is("join.request:instance") {
+        "me".to_owned()
+    } else {
+        bus.id()
+    };
     let sdk = "by hand".to_owned();
-    let request = JoinRequest { protocol, run: run.clone(), name: name.clone(), instance, sdk };
+    let request = JoinRequest {
+        protocol,
+        run: run.clone(),
+        name: name.clone(),
+        instance,
+        sdk,
+    };
     let (key, begun) = (Keys::new(run).join_as(name), Instant::now());
     loop {
-        let answer = bus.ask(&key, "", Some(encode(&request)))?.and_then(|answer| answer.result.ok());
-        match answer.map(|bytes| wrong.read(&key, &bytes).ok_or("an answer that is none")).transpose()? {
+        let answer = bus
+            .ask(&key, "", Some(encode(&request)))?
+            .and_then(|answer| answer.result.ok());
+        match answer
+            .map(|bytes| wrong.read(&key, &bytes).ok_or("an answer that is none"))
+            .transpose()?
+        {
             Some(JoinAnswer::Welcome(welcome)) => return Ok(*welcome),
-            Some(JoinAnswer::Refused { reason, explanation })
-                if reason != Refusal::NameTaken || wrong.is("join.refused:impatient") =>
-            {
+            Some(JoinAnswer::Refused {
+                reason,
+                explanation,
+            }) if reason != Refusal::NameTaken || wrong.is("join.refused:impatient") => {
                 return Err(explanation.into());
             }
             _ if begun.elapsed() > patience => return Err("not let in".into()),
@@ -217,29 +250,40 @@ fn listen(
 ) -> Result<Vec<Declared>, Failure> {
     let (clocks, reader) = (queue.clone(), wrong.clone());
     let clocks = bus.subscribe(&keys.clock(), move |key, bytes| {
-        reader.read(key, bytes).map(|clock| clocks.send(Event::Clock(clock)));
+        reader
+            .read(key, bytes)
+            .map(|clock| clocks.send(Event::Clock(clock)));
     })?;
     let (commands, reader) = (queue.clone(), wrong.clone());
     let commands = bus.subscribe(&keys.commands_to(name), move |key, bytes| {
         let from = RobotName::new(Keys::last_chunk(key)).ok();
-        from.zip(reader.read(key, bytes)).map(|(from, command)| commands.send(Event::Command(from, command)));
+        from.zip(reader.read(key, bytes))
+            .map(|(from, command)| commands.send(Event::Command(from, command)));
     })?;
     Ok(vec![clocks, commands])
 }
 
 impl Robot {
     fn join_run(name: &str, wrong: Wrong) -> Result<Self, Failure> {
-        let (name, run) = (RobotName::new(name)?, RunName::new(&variable("CARS_RUN", "default"))?);
+        let (name, run) = (
+            RobotName::new(name)?,
+            RunName::new(&variable("CARS_RUN", "default"))?,
+        );
         let patience = Duration::from_secs_f64(variable("CARS_PATIENCE_S", "20").parse()?);
         let connect = variable("CARS_CONNECT", protocol::bus::DEFAULT_ENDPOINT);
         let bus = Bus::open(&Role::Client { connect, patience }, None)?;
         let keys = Keys::new(&run);
         let (queue, events) = sync_channel(4096);
-        let shown = Shown { board: Arc::default(), wrong: wrong.clone() };
+        let shown = Shown {
+            board: Arc::default(),
+            wrong: wrong.clone(),
+        };
         let mut declared = Vec::new();
         for what in QUERIES.iter().chain([&STATE]) {
             let shown = shown.clone();
-            declared.push(bus.serve(&keys.query(&name, what), move |question| shown.answer(question))?);
+            declared.push(bus.serve(&keys.query(&name, what), move |question| {
+                shown.answer(question)
+            })?);
         }
         let is_late = wrong.is("join.ready-last");
         if !is_late {
@@ -250,7 +294,11 @@ impl Robot {
         }
         let welcome = join(&bus, &run, &name, patience, &wrong)?;
         let (random, clocks) = (stream(welcome.seed, &welcome.stream), Vec::new());
-        welcome.state_before.iter().chain(&welcome.last_state).for_each(|last| shown.show(last.clone(), 2));
+        welcome
+            .state_before
+            .iter()
+            .chain(&welcome.last_state)
+            .for_each(|last| shown.show(last.clone(), 2));
         declared.push(bus.token(&keys.alive_robot(&name))?);
         if is_late {
             std::thread::sleep(Duration::from_millis(300));
@@ -295,7 +343,11 @@ impl Robot {
         if self.wrong.is("determinism.seed") {
             self.random = stream(std::process::id().into(), &welcome.stream);
         }
-        self.last_seq = if self.wrong.is("return.numbers") { 0 } else { welcome.last_seq };
+        self.last_seq = if self.wrong.is("return.numbers") {
+            0
+        } else {
+            welcome.last_seq
+        };
         (self.at, self.proposal, self.heard) = (welcome.location, welcome.location, 0);
         (self.is_seated, self.tick) = (false, welcome.tick);
         self.sent.clear();
@@ -325,7 +377,9 @@ impl Robot {
             Event::Command(from, command) => {
                 self.arrived += 1;
                 let (place, at) = (self.arrived, self.tick);
-                self.held.entry((from, command.seq)).or_insert(Held { command, place, at });
+                self.held
+                    .entry((from, command.seq))
+                    .or_insert(Held { command, place, at });
             }
         }
     }
@@ -343,13 +397,16 @@ impl Robot {
             return Ok(());
         }
         let news = clock.news.get(&self.name).cloned().unwrap_or_default();
-        if news.joined.is_some_and(|joined| joined > self.welcome.generation)
+        if news
+            .joined
+            .is_some_and(|joined| joined > self.welcome.generation)
             && !self.wrong.is("return.replaced")
         {
             return Err("another process is this robot now".into());
         }
         let is_first = self.welcome.tick == 0 && clock.tick == 0;
-        let is_named = news.joined == Some(self.welcome.generation) || self.wrong.is("return.generation");
+        let is_named =
+            news.joined == Some(self.welcome.generation) || self.wrong.is("return.generation");
         if !self.is_seated && !is_first && !is_named {
             return Ok(());
         }
@@ -364,10 +421,16 @@ impl Robot {
     }
 
     fn say_again(&self) -> Result<(), Failure> {
-        for (_, key, bytes) in self.sent.iter().filter(|_| !self.wrong.is("clock.duplicate:commands")) {
+        for (_, key, bytes) in self
+            .sent
+            .iter()
+            .filter(|_| !self.wrong.is("clock.duplicate:commands"))
+        {
             self.bus.put(key, bytes.clone())?;
         }
-        Ok(self.bus.put(&self.keys.report(&self.name), self.last.clone())?)
+        Ok(self
+            .bus
+            .put(&self.keys.report(&self.name), self.last.clone())?)
     }
 
     fn do_tick(&mut self, clock: &Clock, news: &News) -> Result<(), Failure> {
@@ -376,7 +439,8 @@ impl Robot {
             _ => self.proposal,
         };
         let (mut log, mut sent, mut missing) = (Vec::new(), Vec::new(), Vec::new());
-        self.sent.retain(|(tick, ..)| tick + self.welcome.repeat_ticks > clock.tick);
+        self.sent
+            .retain(|(tick, ..)| tick + self.welcome.repeat_ticks > clock.tick);
         for (id, command) in self.named(&news.commands) {
             match command {
                 Some(command) => {
@@ -393,8 +457,14 @@ impl Robot {
         }
         let mut step = || (unit(&mut self.random) - 0.5) * 0.2;
         self.proposal = Point::new(self.at.x + step(), self.at.y + step());
-        let (angle, turn) =
-            (unit(&mut self.random) * 3.0, if self.wrong.is("number.angles") { 7.0 } else { 0.0 });
+        let (angle, turn) = (
+            unit(&mut self.random) * 3.0,
+            if self.wrong.is("number.angles") {
+                7.0
+            } else {
+                0.0
+            },
+        );
         let state = PublicState {
             epoch: clock.epoch,
             tick: clock.tick,
@@ -412,19 +482,29 @@ impl Robot {
         let mut report = Report {
             epoch: clock.epoch,
             tick: clock.tick,
-            generation: if self.wrong.is("tick.answer:generation") { 7 } else { self.welcome.generation },
+            generation: if self.wrong.is("tick.answer:generation") {
+                7
+            } else {
+                self.welcome.generation
+            },
             proposal: self.proposal,
             speed_mps: state.speed_mps,
             direction_rad: state.direction_rad,
             emotion_state: state.emotion_state.clone(),
             behavior_state: state.behavior_state.clone(),
             state_variables: state.state_variables.clone(),
-            sent: if self.wrong.is("command.sent") { Vec::new() } else { sent },
+            sent: if self.wrong.is("command.sent") {
+                Vec::new()
+            } else {
+                sent
+            },
             missing,
             log,
         };
         if self.wrong.is("number.finite") {
-            report.state_variables.insert("ratio".to_owned(), Variable::Number(f64::NAN));
+            report
+                .state_variables
+                .insert("ratio".to_owned(), Variable::Number(f64::NAN));
         }
         self.report(&report, state)
     }
@@ -436,17 +516,21 @@ impl Robot {
         if !is_late {
             self.shown.show(state.clone(), kept);
             if !self.wrong.is("tick.state-first:unheard") {
-                self.bus.put(&self.keys.query(&self.name, STATE), encode(&state))?;
+                self.bus
+                    .put(&self.keys.query(&self.name, STATE), encode(&state))?;
             }
         }
         self.last = encode(report);
-        self.bus.put(&self.keys.report(&self.name), encode(report))?;
+        self.bus
+            .put(&self.keys.report(&self.name), encode(report))?;
         if self.wrong.is("tick.answer") {
-            self.bus.put(&self.keys.report(&self.name), encode(report))?;
+            self.bus
+                .put(&self.keys.report(&self.name), encode(report))?;
         }
         if is_late {
             std::thread::sleep(Duration::from_millis(30));
-            self.bus.put(&self.keys.query(&self.name, STATE), encode(&state))?;
+            self.bus
+                .put(&self.keys.query(&self.name, STATE), encode(&state))?;
             self.shown.show(state, kept);
         }
         Ok(())
@@ -464,29 +548,52 @@ impl Robot {
             return Ok(());
         }
         self.last_seq += 1;
-        let (seq, performative, command) = (self.last_seq, Performative::Achieve, format!("heard {text}"));
+        let (seq, performative, command) = (
+            self.last_seq,
+            Performative::Achieve,
+            format!("heard {text}"),
+        );
         let (epoch, tick) = (clock.epoch, clock.tick);
-        let message = Command { epoch, tick, seq, performative, command: command.clone() };
+        let message = Command {
+            epoch,
+            tick,
+            seq,
+            performative,
+            command: command.clone(),
+        };
         let (key, bytes) = (self.keys.command(to, &self.name), encode(&message));
         self.bus.put(&key, bytes.clone())?;
         self.sent.push((tick, key, bytes));
-        sent.push(SentCommand { to: to.clone(), seq, performative, command });
+        sent.push(SentCommand {
+            to: to.clone(),
+            seq,
+            performative,
+            command,
+        });
         Ok(())
     }
 
     /// The commands that a clock names, as it names them; `None` for what does not come within two seconds.
     fn named(&mut self, ids: &[CommandId]) -> Vec<(CommandId, Option<Command>)> {
         let deadline = Instant::now() + Duration::from_secs(2);
-        let is_here = |robot: &Self, id: &CommandId| robot.held.contains_key(&(id.from.clone(), id.seq));
+        let is_here =
+            |robot: &Self, id: &CommandId| robot.held.contains_key(&(id.from.clone(), id.seq));
         while !ids.iter().all(|id| is_here(self, id)) {
-            match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            match self
+                .events
+                .recv_timeout(deadline.saturating_duration_since(Instant::now()))
+            {
                 Ok(event) => self.file(event),
                 Err(_) => break,
             }
         }
         let mut ids = ids.to_vec();
         if self.wrong.is("command.order") {
-            ids.sort_by_key(|id| self.held.get(&(id.from.clone(), id.seq)).map(|held| held.place));
+            ids.sort_by_key(|id| {
+                self.held
+                    .get(&(id.from.clone(), id.seq))
+                    .map(|held| held.place)
+            });
         }
         if self.wrong.is("command.twice") {
             ids.dedup();

@@ -19,7 +19,10 @@ fn sigterm_ends_the_program_in_order() {
     launch.wait();
     is_gone(&program);
     let log = stage.log("exec-term");
-    assert!(log.contains("Leguin: end {\"type\":\"end\",\"reason\":\"interrupted\"}"), "{log}");
+    assert!(
+        log.contains("Leguin: end {\"type\":\"end\",\"reason\":\"interrupted\"}"),
+        "{log}"
+    );
     says(&launch, &["Leguin ended with exit status 143"]);
     nobody_is_left("exec-term");
 }
@@ -27,7 +30,8 @@ fn sigterm_ends_the_program_in_order() {
 #[test]
 fn a_program_that_hears_nothing_is_killed() {
     // It hangs in the middle of tick 3, reads nothing, ignores the signal, and has a child.
-    let hang = "if is tick; then trap '' TERM; sleep 600 & echo $! > child; while :; do sleep 1; done; fi";
+    let hang =
+        "if is tick; then trap '' TERM; sleep 600 & echo $! > child; while :; do sleep 1; done; fi";
     let stage = Stage::each_tick(&format!("{PID}\n{hang}"), "");
     let mut launch = stage.start("exec-deaf", &["--speed", "10"]);
     let (program, child) = (stage.written("pid"), stage.written("child"));
@@ -47,14 +51,21 @@ fn interrupting_the_launch_leaves_nobody() {
     launch.signal(Signal::SIGINT);
     launch.wait();
     is_gone(&program);
-    assert!(!stage.log("exec-interrupt").contains("gives up"), "{}", stage.log("exec-interrupt"));
+    assert!(
+        !stage.log("exec-interrupt").contains("gives up"),
+        "{}",
+        stage.log("exec-interrupt")
+    );
     nobody_is_left("exec-interrupt");
 }
 
 #[test]
 fn a_program_does_not_outlive_a_robot_that_is_killed_or_never_gets_in() {
-    for (signal, code) in [(Signal::SIGKILL, None), (Signal::SIGTERM, Some(143)), (Signal::SIGINT, Some(130))]
-    {
+    for (signal, code) in [
+        (Signal::SIGKILL, None),
+        (Signal::SIGTERM, Some(143)),
+        (Signal::SIGINT, Some(130)),
+    ] {
         // Nobody listens there: it tries for its patience. And it reads nothing.
         let run = format!("exec-alone-{}", signal as i32);
         let stage = Stage::new("echo $$ > pid; while :; do sleep 1; done", "");
@@ -71,7 +82,9 @@ fn a_program_does_not_outlive_a_robot_that_is_killed_or_never_gets_in() {
             "80",
             "--",
         ]);
-        command.arg(stage.lab.out().join("leguin.sh")).stdin(Stdio::null());
+        command
+            .arg(stage.lab.out().join("leguin.sh"))
+            .stdin(Stdio::null());
         let mut alone = Running::start(command, &run, stage.lab.out().join(&run));
         let program = stage.written("pid");
         alone.signal(signal);
@@ -97,13 +110,21 @@ fn an_incarnation_that_takes_over_is_told_what_the_last_one_reported() {
     );
     let mut launch = stage.start("exec-return", &["--speed", "10"]);
     let program = stage.written("pid");
-    eventually("a few ticks", || (stage.lab.bytes("exec-return").len() > 2000).then_some(()));
+    eventually("a few ticks", || {
+        (stage.lab.bytes("exec-return").len() > 2000).then_some(())
+    });
     send(program.parse().unwrap(), Signal::SIGKILL);
     launch.finish();
     let log = stage.log("exec-return");
     assert!(log.contains("its program was ended by SIGKILL"), "{log}");
-    let lines: Vec<&str> = log.lines().skip_while(|line| !line.contains("\"generation\":2,")).collect();
-    assert!(lines[0].contains("\"last_state_variables\":{\"steps\":7.0}"), "{log}");
+    let lines: Vec<&str> = log
+        .lines()
+        .skip_while(|line| !line.contains("\"generation\":2,"))
+        .collect();
+    assert!(
+        lines[0].contains("\"last_state_variables\":{\"steps\":7.0}"),
+        "{log}"
+    );
     assert!(lines[0].contains("\"stream\":\"robot/Leguin#2\""), "{log}");
     let tick = |line: &str| {
         let (_, rest) = line.split_once("\"tick\":").unwrap();
@@ -117,6 +138,10 @@ fn an_incarnation_that_takes_over_is_told_what_the_last_one_reported() {
 /// The process of `cars exec` itself, and not its program.
 fn robot(run: &str) -> u32 {
     let found = eventually("cars exec", || named(run, "Leguin"));
-    assert!(find(run).iter().any(|(pid, program)| *pid == found && program == "cars"));
+    assert!(
+        find(run)
+            .iter()
+            .any(|(pid, program)| *pid == found && program == "cars")
+    );
     found
 }

@@ -74,15 +74,35 @@ fn questions_that_have_no_answer_say_why() {
     );
     stage.start("exec-questions", &[]).finish();
     let log = stage.log("exec-questions");
-    let answers: Vec<&str> =
-        log.lines().filter_map(|line| line.split_once("answer ")).map(|(_, a)| a).collect();
+    let answers: Vec<&str> = log
+        .lines()
+        .filter_map(|line| line.split_once("answer "))
+        .map(|(_, a)| a)
+        .collect();
     assert_eq!(answers.len(), 8, "{log}");
-    for (at, error) in [(0, "too early"), (1, "unknown robot"), (5, "unknown robot"), (6, "unknown query")] {
+    for (at, error) in [
+        (0, "too early"),
+        (1, "unknown robot"),
+        (5, "unknown robot"),
+        (6, "unknown query"),
+    ] {
         let expected = format!("{{\"type\":\"answer\",\"error\":\"{error}\"}}");
-        assert!(answers[at].ends_with(&expected), "answer {at}: {}", answers[at]);
+        assert!(
+            answers[at].ends_with(&expected),
+            "answer {at}: {}",
+            answers[at]
+        );
     }
-    assert!(answers[4].contains("{\"type\":\"answer\",\"value\":"), "{}", answers[4]);
-    assert!(answers[7].contains("\"behavior_state\":\"SERVE\""), "{}", answers[7]);
+    assert!(
+        answers[4].contains("{\"type\":\"answer\",\"value\":"),
+        "{}",
+        answers[4]
+    );
+    assert!(
+        answers[7].contains("\"behavior_state\":\"SERVE\""),
+        "{}",
+        answers[7]
+    );
 }
 
 #[test]
@@ -92,31 +112,55 @@ fn a_slow_program_is_late_and_named_and_changes_nothing() {
     let mut launch = stage.start("exec-slow", &[]);
     launch.finish();
     says(&launch, &["waiting for Leguin"]);
-    let held_s =
-        stage.lab.summary("exec-slow")["wall"]["held_up_by"]["Leguin"]["longest_s"].as_f64().unwrap();
-    assert!(held_s > 1.0, "the summary says who held up the run: {held_s}");
-    assert!(stage.lab.events("exec-slow").iter().all(|event| event["event"] != "lost"));
+    let held_s = stage.lab.summary("exec-slow")["wall"]["held_up_by"]["Leguin"]["longest_s"]
+        .as_f64()
+        .unwrap();
+    assert!(
+        held_s > 1.0,
+        "the summary says who held up the run: {held_s}"
+    );
+    assert!(
+        stage
+            .lab
+            .events("exec-slow")
+            .iter()
+            .all(|event| event["event"] != "lost")
+    );
 
     let quick = Stage::each_tick("", "");
     quick.start("exec-quick", &[]).finish();
-    assert_same(("slow", &stage.lab.bytes("exec-slow")), ("quick", &quick.lab.bytes("exec-quick")));
+    assert_same(
+        ("slow", &stage.lab.bytes("exec-slow")),
+        ("quick", &quick.lab.bytes("exec-quick")),
+    );
 }
 
 #[test]
 fn init_starts_the_same_process_over() {
     let stage = Stage::each_tick(r#"if is init; then echo "init in $$: $json" >&2; fi"#, "");
     let mut launch = stage.start("exec-again", &["--paused"]);
-    let ctl = |args: &[&str]| stage.lab.ok(&[&["ctl"], args, &["--run", "exec-again"]].concat());
+    let ctl = |args: &[&str]| {
+        stage
+            .lab
+            .ok(&[&["ctl"], args, &["--run", "exec-again"]].concat())
+    };
     ready(&stage.lab, "exec-again");
     ctl(&["step", "3"]);
     ctl(&["init"]);
     ctl(&["start"]);
     launch.finish();
     let log = stage.log("exec-again");
-    let inits: Vec<(&str, &str)> =
-        log.lines().filter_map(|line| line.split_once("init in ")?.1.split_once(':')).collect();
-    let [first, second] = inits[..] else { panic!("two lines init are expected:\n{log}") };
+    let inits: Vec<(&str, &str)> = log
+        .lines()
+        .filter_map(|line| line.split_once("init in ")?.1.split_once(':'))
+        .collect();
+    let [first, second] = inits[..] else {
+        panic!("two lines init are expected:\n{log}")
+    };
     assert_eq!(first.0, second.0, "the process is the same");
-    assert!(first.1.contains("\"epoch\":1,") && second.1.contains("\"epoch\":2,"), "{log}");
+    assert!(
+        first.1.contains("\"epoch\":1,") && second.1.contains("\"epoch\":2,"),
+        "{log}"
+    );
     nobody_is_left("exec-again");
 }

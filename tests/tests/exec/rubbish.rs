@@ -7,11 +7,29 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
     (
         "words",
         "say 'hello there'",
-        &["its line `hello there` is not understood: it is no JSON", "expected is one JSON object"],
+        &[
+            "its line `hello there` is not understood: it is no JSON",
+            "expected is one JSON object",
+        ],
     ),
-    ("list", "say '[1]'", &["its line `[1]` is", "it has no type"]),
-    ("type", r#"say '{"type":"dance"}'"#, &[r#"there is no type "dance"; expected is"#, "percept, random"]),
-    ("field", r#"say '{"type":"query","of":"Butler"}'"#, &["missing field `what`"]),
+    (
+        "list",
+        "say '[1]'",
+        &["its line `[1]` is", "it has no type"],
+    ),
+    (
+        "type",
+        r#"say '{"type":"dance"}'"#,
+        &[
+            r#"there is no type "dance"; expected is"#,
+            "percept, random",
+        ],
+    ),
+    (
+        "field",
+        r#"say '{"type":"query","of":"Butler"}'"#,
+        &["missing field `what`"],
+    ),
     (
         "speed",
         r#"say '{"type":"done","speed_mps":"fast"}'"#,
@@ -66,16 +84,34 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
     (
         "orders",
         r#"for i in $(seq 1025); do say '{"type":"command","to":"Butler","command":"smile"}'; done"#,
-        &["said too much for one tick: 1025 commands", "allowed are 1024"],
+        &[
+            "said too much for one tick: 1025 commands",
+            "allowed are 1024",
+        ],
     ),
     (
         "exit",
         "echo 'out of memory' >&2; exit 3",
-        &["its program ended with exit status 3 before the run did", "  out of memory"],
+        &[
+            "its program ended with exit status 3 before the run did",
+            "  out of memory",
+        ],
     ),
-    ("leave", "exit 0", &["its program ended with exit status 0 before the run did, and wrote no errors"]),
-    ("kill", "kill -9 $$", &["its program was ended by SIGKILL before the run did"]),
-    ("deaf", "exec >&-; sleep 600", &["its program has closed its standard output"]),
+    (
+        "leave",
+        "exit 0",
+        &["its program ended with exit status 0 before the run did, and wrote no errors"],
+    ),
+    (
+        "kill",
+        "kill -9 $$",
+        &["its program was ended by SIGKILL before the run did"],
+    ),
+    (
+        "deaf",
+        "exec >&-; sleep 600",
+        &["its program has closed its standard output"],
+    ),
 ];
 
 #[test]
@@ -83,7 +119,8 @@ fn every_mishap_is_named_and_ends_the_robot() {
     std::thread::scope(|scope| {
         for (name, lines, expected) in MISHAPS {
             scope.spawn(move || {
-                let lines = format!(r#"case $json in *'"type":"tick","tick":3,'*) {lines} ;; esac"#);
+                let lines =
+                    format!(r#"case $json in *'"type":"tick","tick":3,'*) {lines} ;; esac"#);
                 let (run, stage) = (format!("exec-mishap-{name}"), Stage::each_tick(&lines, ""));
                 let mut launch = stage.start(&run, &["--speed", "20"]);
                 let status = launch.wait();
@@ -116,25 +153,41 @@ fn a_program_that_is_not_there_is_named() {
     ];
     let (code, text) = stage.lab.cars_without_out(&args);
     assert_eq!(code, 1, "{text}");
-    assert!(text.contains("Leguin: no-such-program cannot be started: No such file"), "{text}");
+    assert!(
+        text.contains("Leguin: no-such-program cannot be started: No such file"),
+        "{text}"
+    );
 }
 
 #[test]
 fn a_dead_program_is_lost_where_the_clock_goes_on() {
     let silent = r#"case $json in *'"type":"tick","tick":10,'*) exit 3 ;; esac"#;
     // A tick that it has answered counts. Nobody is given up for being slow here.
-    let answering = r#"case $json in *'"type":"tick","tick":10,'*) say '{"type":"done"}'; exit 3 ;; esac"#;
+    let answering =
+        r#"case $json in *'"type":"tick","tick":10,'*) say '{"type":"done"}'; exit 3 ;; esac"#;
     for (name, lines, tick) in [("silent", silent, 10), ("answering", answering, 11)] {
         let stage = Stage::each_tick(lines, "required = false");
         for time in 1..=2 {
             let run = format!("exec-lost-{name}-{time}");
-            stage.start(&run, &["--set", "on_late=continue", "--set", "deadline=60 s"]).finish();
+            stage
+                .start(
+                    &run,
+                    &["--set", "on_late=continue", "--set", "deadline=60 s"],
+                )
+                .finish();
             let mut lost = stage.lab.events(&run);
             lost.retain(|event| event["event"] == "lost");
             assert_eq!(lost.len(), 1, "{lost:?}");
-            assert_eq!((&lost[0]["robot"], &lost[0]["tick"]), (&"Leguin".into(), &tick.into()), "{name}");
+            assert_eq!(
+                (&lost[0]["robot"], &lost[0]["tick"]),
+                (&"Leguin".into(), &tick.into()),
+                "{name}"
+            );
             let log = stage.log(&run);
-            assert!(log.contains("its program ended with exit status 3"), "{log}");
+            assert!(
+                log.contains("its program ended with exit status 3"),
+                "{log}"
+            );
             nobody_is_left(&run);
         }
     }

@@ -26,11 +26,23 @@ impl Robot {
 
     fn new_in(out: &Path, lab: Lab, language: &str) -> Self {
         let (root, out) = (root(), out.to_str().unwrap());
-        let args =
-            ["new", "robot", "Rosie", "--lang", language, "--out", out, "--cars", root.to_str().unwrap()];
+        let args = [
+            "new",
+            "robot",
+            "Rosie",
+            "--lang",
+            language,
+            "--out",
+            out,
+            "--cars",
+            root.to_str().unwrap(),
+        ];
         let (code, text) = lab.cars_without_out(&args);
         assert_eq!(code, 0, "{text}");
-        assert!(text.contains("launch.toml"), "it says what comes next: {text}");
+        assert!(
+            text.contains("launch.toml"),
+            "it says what comes next: {text}"
+        );
         let folder = Path::new(out).join("Rosie");
         Self { lab, folder }
     }
@@ -65,11 +77,19 @@ impl Robot {
         let [first, second] = runs.each_ref().map(|run| self.lab.bytes(run));
         assert_same(("the first launch", &first), ("the second launch", &second));
         let log = self.cars_log(&runs[0]);
-        for part in ["behavior STROLL", "emotion HAPPY -> FRUSTRATED", "emotion FRUSTRATED -> HAPPY"] {
+        for part in [
+            "behavior STROLL",
+            "emotion HAPPY -> FRUSTRATED",
+            "emotion FRUSTRATED -> HAPPY",
+        ] {
             assert!(log.contains(part), "{language}: no {part:?} in\n{log}");
         }
-        let recording = std::fs::read_to_string(self.lab.file(&runs[0], "recording.jsonl")).unwrap();
-        assert!(recording.lines().any(|line| line.contains("\"x\":12.192")), "it reaches the end of its way");
+        let recording =
+            std::fs::read_to_string(self.lab.file(&runs[0], "recording.jsonl")).unwrap();
+        assert!(
+            recording.lines().any(|line| line.contains("\"x\":12.192")),
+            "it reaches the end of its way"
+        );
         self.obeys(language);
         assert_conforms(&self.folder.join("launch.toml"), "Rosie");
         first
@@ -78,7 +98,12 @@ impl Robot {
     fn obeys(&self, language: &str) {
         let run = format!("new-{language}-orders");
         let mut launch = self.start(&run, &["--paused"]);
-        let cars = |args: &[&str]| self.lab.cars(&[args, &["--run", &run]].concat()).output().unwrap();
+        let cars = |args: &[&str]| {
+            self.lab
+                .cars(&[args, &["--run", &run]].concat())
+                .output()
+                .unwrap()
+        };
         ready(&self.lab, &run);
         for order in ["rest", r#"say "boo" \ backwards"#] {
             assert!(cars(&["command", "Rosie", order]).status.success());
@@ -102,7 +127,11 @@ impl Robot {
         launch.finish();
         nobody_is_left(&run);
         let digest = |run: &str| self.lab.summary(run)["digest"].clone();
-        assert_eq!(digest(&run), digest(&format!("new-{language}-first")), "{language}");
+        assert_eq!(
+            digest(&run),
+            digest(&format!("new-{language}-first")),
+            "{language}"
+        );
     }
 }
 
@@ -115,7 +144,10 @@ fn python_path() -> OsString {
 
 /// Whether a tool is there; where it is not, that is said aloud, and in CI it is a failure.
 fn has(tool: &str, test: &mut Command, help: &str) -> bool {
-    let found = test.stdin(Stdio::null()).output().is_ok_and(|output| output.status.success());
+    let found = test
+        .stdin(Stdio::null())
+        .output()
+        .is_ok_and(|output| output.status.success());
     if !found {
         let text = format!("the test of a new robot in {tool} is skipped: {help}");
         assert!(std::env::var_os("CI").is_none(), "{text}");
@@ -127,8 +159,16 @@ fn has(tool: &str, test: &mut Command, help: &str) -> bool {
 
 fn build(command: &mut Command) {
     let output = command.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(
+        output.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
 }
 
 /// The robot in Rust, built where the project is, so that nothing is compiled twice.
@@ -143,7 +183,9 @@ fn rust() -> Robot {
     std::fs::copy(root().join("Cargo.lock"), robot.folder.join("Cargo.lock")).unwrap();
     let target = programs().parent().unwrap();
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(&robot.folder).env("CARGO_TARGET_DIR", target);
+    cargo
+        .current_dir(&robot.folder)
+        .env("CARGO_TARGET_DIR", target);
     build(cargo.args(["build", "--quiet", "--offline", "--release"]));
     let launch = robot.folder.join("launch.toml");
     let text = std::fs::read_to_string(&launch).unwrap();
@@ -171,16 +213,36 @@ fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
         command.arg("--version");
         command
     };
-    if has("C", &mut version("cc"), "install a C compiler that is called `cc`") {
+    if has(
+        "C",
+        &mut version("cc"),
+        "install a C compiler that is called `cc`",
+    ) {
         assert_same(("Rust", &rust), ("C", &c().plays("c")));
     }
-    if has("Node.js", &mut version("node"), "install Node.js 18 or newer") {
-        assert_same(("Rust", &rust), ("Node.js", &Robot::new("node").plays("node")));
+    if has(
+        "Node.js",
+        &mut version("node"),
+        "install Node.js 18 or newer",
+    ) {
+        assert_same(
+            ("Rust", &rust),
+            ("Node.js", &Robot::new("node").plays("node")),
+        );
     }
     let mut python = Command::new("python3");
-    python.args(["-c", "import cars_robot"]).env("PYTHONPATH", python_path());
-    if has("Python", &mut python, "install what sdk/python needs: pip install ./sdk/python") {
-        assert_same(("Rust", &rust), ("Python", &Robot::new("python").plays("python")));
+    python
+        .args(["-c", "import cars_robot"])
+        .env("PYTHONPATH", python_path());
+    if has(
+        "Python",
+        &mut python,
+        "install what sdk/python needs: pip install ./sdk/python",
+    ) {
+        assert_same(
+            ("Rust", &rust),
+            ("Python", &Robot::new("python").plays("python")),
+        );
     }
 }
 
@@ -209,26 +271,52 @@ fn nothing_is_overwritten_and_what_is_wrong_is_said() {
     let (_, text) = again(&["Rita", "--lang", "cobol"]);
     assert!(text.contains("rust, python, c, bash, node"), "{text}");
     let (_, text) = again(&["Rita", "--lang", "rust", "--cars", "/"]);
-    assert!(text.contains("whose SDK this robot uses, is not at /") && text.contains("--cars DIR"), "{text}");
-    assert!(!robot.lab.out().join("Rita").exists(), "a robot that cannot be made leaves nothing");
+    assert!(
+        text.contains("whose SDK this robot uses, is not at /") && text.contains("--cars DIR"),
+        "{text}"
+    );
+    assert!(
+        !robot.lab.out().join("Rita").exists(),
+        "a robot that cannot be made leaves nothing"
+    );
 }
 
 #[test]
 fn whatever_its_name_is_its_files_are_read() {
     let lab = Lab::new();
-    for (name, language) in
-        [("a.b-C_9", "rust"), ("9", "bash"), ("_", "c"), ("R2-D2", "node"), ("x.y", "python")]
-    {
-        lab.ok(&["new", "robot", name, "--lang", language, "--cars", root().to_str().unwrap()]);
+    for (name, language) in [
+        ("a.b-C_9", "rust"),
+        ("9", "bash"),
+        ("_", "c"),
+        ("R2-D2", "node"),
+        ("x.y", "python"),
+    ] {
+        lab.ok(&[
+            "new",
+            "robot",
+            name,
+            "--lang",
+            language,
+            "--cars",
+            root().to_str().unwrap(),
+        ]);
         let folder = lab.out().join(name);
         for file in walk(&folder) {
             let text = std::fs::read_to_string(&file).unwrap();
-            assert!(!text.contains("@NAME@") && !text.contains("@CARS@"), "{}", file.display());
-            let left =
-                text.split('@').skip(1).step_by(2).find(|word| word.chars().all(|c| c.is_ascii_uppercase()));
+            assert!(
+                !text.contains("@NAME@") && !text.contains("@CARS@"),
+                "{}",
+                file.display()
+            );
+            let left = text
+                .split('@')
+                .skip(1)
+                .step_by(2)
+                .find(|word| word.chars().all(|c| c.is_ascii_uppercase()));
             assert_eq!(left, None, "{}", file.display());
         }
-        let (code, text) = lab.cars_without_out(&["check", folder.join("scenario.toml").to_str().unwrap()]);
+        let (code, text) =
+            lab.cars_without_out(&["check", folder.join("scenario.toml").to_str().unwrap()]);
         assert_eq!(code, 0, "{text}");
     }
     let manifest = std::fs::read_to_string(lab.out().join("a.b-C_9/Cargo.toml")).unwrap();
@@ -236,6 +324,16 @@ fn whatever_its_name_is_its_files_are_read() {
 }
 
 fn walk(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    entries
+        .flat_map(|path| {
+            if path.is_dir() {
+                walk(&path)
+            } else {
+                vec![path]
+            }
+        })
+        .collect()
 }

@@ -25,7 +25,10 @@ impl Stage {
     /// Leguin is this script; `more` is added to her process in the launch file.
     pub(crate) fn new(script: &str, more: &str) -> Self {
         let lab = Lab::new();
-        let program = lab.write("leguin.sh", &format!("{WORDS}cd {}\n{script}\n", lab.out().display()));
+        let program = lab.write(
+            "leguin.sh",
+            &format!("{WORDS}cd {}\n{script}\n", lab.out().display()),
+        );
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
         let scenario = root().join("configs/hors_doeuvres.toml");
         let text = format!(
@@ -71,7 +74,9 @@ impl Stage {
 
 /// Waits until a run has no process any more.
 pub(crate) fn nobody_is_left(run: &str) {
-    eventually("the last process to be gone", || find(run).is_empty().then_some(()));
+    eventually("the last process to be gone", || {
+        find(run).is_empty().then_some(())
+    });
 }
 
 /// Waits until a program has printed all of this; it may be over, and its last lines still on their way.
@@ -79,7 +84,11 @@ pub(crate) fn nobody_is_left(run: &str) {
 pub(crate) fn says(launch: &Running, parts: &[&str]) {
     let begun = Instant::now();
     while let Some(missing) = parts.iter().find(|part| !launch.printed().contains(**part)) {
-        assert!(begun.elapsed() < PATIENCE, "no {missing:?} in\n{}", launch.printed());
+        assert!(
+            begun.elapsed() < PATIENCE,
+            "no {missing:?} in\n{}",
+            launch.printed()
+        );
         std::thread::sleep(Duration::from_millis(10));
     }
 }
@@ -87,8 +96,13 @@ pub(crate) fn says(launch: &Running, parts: &[&str]) {
 /// Waits until a launch that is paused has gathered its robots.
 pub(crate) fn ready(lab: &Lab, run: &str) {
     eventually("the launch to be ready", || {
-        let status = lab.cars(&["ctl", "status", "--json", "--run", run]).output().unwrap();
-        String::from_utf8_lossy(&status.stdout).contains("\"ready\"").then_some(())
+        let status = lab
+            .cars(&["ctl", "status", "--json", "--run", run])
+            .output()
+            .unwrap();
+        String::from_utf8_lossy(&status.stdout)
+            .contains("\"ready\"")
+            .then_some(())
     });
 }
 
@@ -96,6 +110,8 @@ pub(crate) fn ready(lab: &Lab, run: &str) {
 pub(crate) fn is_gone(pid: &str) {
     let stat = format!("/proc/{}/stat", pid.trim());
     eventually("the program to be gone", || {
-        std::fs::read_to_string(&stat).map_or(true, |stat| stat.contains(") Z ")).then_some(())
+        std::fs::read_to_string(&stat)
+            .map_or(true, |stat| stat.contains(") Z "))
+            .then_some(())
     });
 }

@@ -33,7 +33,9 @@ pub(crate) fn unending(model: &Protocol) -> Option<Vec<Action>> {
         let mut actions = Vec::new();
         model.actions(&state, &mut actions);
         for action in actions {
-            let Some(next) = model.next_state(&state, action) else { continue };
+            let Some(next) = model.next_state(&state, action) else {
+                continue;
+            };
             let to = *numbers.entry(fingerprint(&next)).or_insert_with(|| {
                 reached.push(Some((number, action)));
                 before.push(Vec::new());

@@ -38,23 +38,81 @@ use stateright::{Checker, HasDiscoveries, Model};
 
 /// What goes wrong together; all of it at once would be too much to see.
 const WORLDS: [(&str, Budget); 7] = [
-    ("losses and echoes", Budget { losses: 2, duplicates: 1, repeats: 1, ..NOTHING }),
+    (
+        "losses and echoes",
+        Budget {
+            losses: 2,
+            duplicates: 1,
+            repeats: 1,
+            ..NOTHING
+        },
+    ),
     (
         "a process dies and another comes",
-        Budget { crashes: 1, starts: 1, losses: 1, duplicates: 1, ..NOTHING },
+        Budget {
+            crashes: 1,
+            starts: 1,
+            losses: 1,
+            duplicates: 1,
+            ..NOTHING
+        },
     ),
-    ("a link breaks and heals", Budget { cuts: 2, losses: 1, ..NOTHING }),
+    (
+        "a link breaks and heals",
+        Budget {
+            cuts: 2,
+            losses: 1,
+            ..NOTHING
+        },
+    ),
     (
         "a link breaks and another process takes the place",
-        Budget { cuts: 1, starts: 1, losses: 1, ..NOTHING },
+        Budget {
+            cuts: 1,
+            starts: 1,
+            losses: 1,
+            ..NOTHING
+        },
     ),
-    ("the clock goes on without the late", Budget { lates: 2, losses: 1, duplicates: 1, ..NOTHING }),
-    ("and without the lost, who return", Budget { lates: 2, crashes: 1, starts: 1, ..NOTHING }),
-    ("a new epoch", Budget { inits: 1, losses: 1, duplicates: 1, ..NOTHING }),
+    (
+        "the clock goes on without the late",
+        Budget {
+            lates: 2,
+            losses: 1,
+            duplicates: 1,
+            ..NOTHING
+        },
+    ),
+    (
+        "and without the lost, who return",
+        Budget {
+            lates: 2,
+            crashes: 1,
+            starts: 1,
+            ..NOTHING
+        },
+    ),
+    (
+        "a new epoch",
+        Budget {
+            inits: 1,
+            losses: 1,
+            duplicates: 1,
+            ..NOTHING
+        },
+    ),
 ];
 
-const NOTHING: Budget =
-    Budget { losses: 0, duplicates: 0, repeats: 0, crashes: 0, cuts: 0, starts: 0, lates: 0, inits: 0 };
+const NOTHING: Budget = Budget {
+    losses: 0,
+    duplicates: 0,
+    repeats: 0,
+    crashes: 0,
+    cuts: 0,
+    starts: 0,
+    lates: 0,
+    inits: 0,
+};
 
 /// What goes wrong within these bounds, in words and as the actions that lead there; `None` if nothing does.
 fn counterexample(
@@ -63,9 +121,18 @@ fn counterexample(
     broken: Option<Rule>,
     enough: HasDiscoveries,
 ) -> Option<String> {
-    let model = Protocol { last_tick: 2, budget, broken };
+    let model = Protocol {
+        last_tick: 2,
+        budget,
+        broken,
+    };
     let begun = Instant::now();
-    let checker = model.checker().threads(4).finish_when(enough).spawn_bfs().join();
+    let checker = model
+        .checker()
+        .threads(4)
+        .finish_when(enough)
+        .spawn_bfs()
+        .join();
     let safe_s = begun.elapsed().as_secs_f64();
     let states = checker.unique_state_count();
     let mut found = Vec::new();
@@ -73,9 +140,15 @@ fn counterexample(
         let is_bad = property.expectation.discovery_is_failure();
         match checker.discovery(property.name) {
             Some(path) if is_bad => {
-                found.push(format!("{world}: not so: {}\n{:?}", property.name, path.into_actions()));
+                found.push(format!(
+                    "{world}: not so: {}\n{:?}",
+                    property.name,
+                    path.into_actions()
+                ));
             }
-            None if !is_bad && found.is_empty() => found.push(format!("{world}: never: {}", property.name)),
+            None if !is_bad && found.is_empty() => {
+                found.push(format!("{world}: never: {}", property.name))
+            }
             _ => {}
         }
     }
@@ -110,7 +183,11 @@ fn every_rule_is_needed() {
         (Rule::RepeatsClock, 0, "the end is out of reach"),
         (Rule::RepeatsReport, 0, "the end is out of reach"),
         (Rule::RepeatsCommands, 0, "the end is out of reach"),
-        (Rule::NumbersAnew, 1, "what is delivered is what was recorded"),
+        (
+            Rule::NumbersAnew,
+            1,
+            "what is delivered is what was recorded",
+        ),
         (Rule::NamesInOpenClock, 1, "the end is out of reach"),
         (Rule::ChecksGeneration, 3, "nothing stale is counted"),
         (Rule::LooksAfterAll, 4, "the clock never waits for nobody"),
@@ -121,6 +198,9 @@ fn every_rule_is_needed() {
         let found = counterexample(world, budget, Some(rule), enough);
         let found = found.unwrap_or_else(|| panic!("nothing goes wrong without {rule:?}"));
         assert!(found.contains(shows), "without {rule:?}: {found}");
-        println!("without {rule:?}: {}", found.lines().next().unwrap_or_default());
+        println!(
+            "without {rule:?}: {}",
+            found.lines().next().unwrap_or_default()
+        );
     }
 }

@@ -2,7 +2,9 @@
 
 use stateright::{Model, Property};
 
-use crate::machine::{A, B, Budget, Clock, Fault, Member, NAMES, Name, Process, Rule, Simulator, State, Up};
+use crate::machine::{
+    A, B, Budget, Clock, Fault, Member, NAMES, Name, Process, Rule, Simulator, State, Up,
+};
 use crate::robot::Seen;
 
 /// What is checked: the protocol within bounds, perhaps with one rule broken.
@@ -73,15 +75,20 @@ impl Protocol {
                 let clock = process.down.remove(0);
                 let simulator = &state.simulator;
                 let member = &simulator.members[process.name];
-                let welcome = (member.instance == number + 1).then_some((simulator.epoch, member.generation));
-                note(state, number, |process| process.on_clock(clock, welcome, self, recorded));
+                let welcome =
+                    (member.instance == number + 1).then_some((simulator.epoch, member.generation));
+                note(state, number, |process| {
+                    process.on_clock(clock, welcome, self, recorded)
+                });
             }
             Way::Out => {
                 let command = process.out.remove(0);
                 for to in 0..state.processes.len() {
                     let process = &state.processes[to];
                     if process.name == B && process.is_alive && process.is_connected {
-                        note(state, to, |process| process.on_command(command, self, state_of(&recorded)));
+                        note(state, to, |process| {
+                            process.on_command(command, self, state_of(&recorded))
+                        });
                     }
                 }
             }
@@ -146,7 +153,9 @@ impl Protocol {
         let instance = state.processes.len() + 1;
         let last_seq = state.on_join(name, instance, self);
         let (member, epoch) = (&state.simulator.members[name], state.simulator.epoch);
-        state.processes.push(Process::join(name, member, epoch, last_seq));
+        state
+            .processes
+            .push(Process::join(name, member, epoch, last_seq));
     }
 }
 
@@ -165,7 +174,12 @@ impl Model for Protocol {
     type Action = Action;
 
     fn init_states(&self) -> Vec<State> {
-        let clock = Clock { epoch: 0, tick: 0, joined: [0, 0], named: None };
+        let clock = Clock {
+            epoch: 0,
+            tick: 0,
+            joined: [0, 0],
+            named: None,
+        };
         let simulator = Simulator {
             members: [Member::default(), Member::default()],
             epoch: 1,
@@ -177,9 +191,19 @@ impl Model for Protocol {
             underway: None,
             recorded: Default::default(),
         };
-        let left = Budget { starts: self.budget.starts + 2, ..self.budget };
-        let mut state = State { simulator, processes: Vec::new(), left, fault: None };
-        NAMES.into_iter().for_each(|name| self.start(&mut state, name));
+        let left = Budget {
+            starts: self.budget.starts + 2,
+            ..self.budget
+        };
+        let mut state = State {
+            simulator,
+            processes: Vec::new(),
+            left,
+            fault: None,
+        };
+        NAMES
+            .into_iter()
+            .for_each(|name| self.start(&mut state, name));
         vec![state]
     }
 
@@ -193,13 +217,19 @@ impl Model for Protocol {
             let is_report = matches!(process.up.first(), Some(Up::Report(_)));
             let links = [
                 (Way::Up, !process.up.is_empty(), is_report),
-                (Way::Down, !process.down.is_empty(), !process.down.is_empty()),
+                (
+                    Way::Down,
+                    !process.down.is_empty(),
+                    !process.down.is_empty(),
+                ),
                 (Way::Out, !process.out.is_empty(), !process.out.is_empty()),
             ];
             for (way, has_some, can_fail) in links {
                 actions.extend(has_some.then_some(Action::Deliver(number, way)));
                 actions.extend((can_fail && left.losses > 0).then_some(Action::Lose(number, way)));
-                actions.extend((can_fail && left.duplicates > 0).then_some(Action::Duplicate(number, way)));
+                actions.extend(
+                    (can_fail && left.duplicates > 0).then_some(Action::Duplicate(number, way)),
+                );
             }
             if !process.is_alive {
                 continue;
@@ -211,10 +241,15 @@ impl Model for Protocol {
             let is_with_sender = |p: &Process| {
                 p.name == A
                     && p.is_alive
-                    && p.sent.iter().any(|c| Some(c.seq) == process.waits.as_ref().and_then(|w| w.named))
+                    && p.sent
+                        .iter()
+                        .any(|c| Some(c.seq) == process.waits.as_ref().and_then(|w| w.named))
             };
-            let is_hopeless = process.waits.is_some() && !state.processes.iter().any(is_with_sender);
-            actions.extend((is_hopeless && Self::is_quiet(state)).then_some(Action::GiveUpWaiting(number)));
+            let is_hopeless =
+                process.waits.is_some() && !state.processes.iter().any(is_with_sender);
+            actions.extend(
+                (is_hopeless && Self::is_quiet(state)).then_some(Action::GiveUpWaiting(number)),
+            );
         }
         if state.is_held() {
             actions.extend((Self::is_quiet(state) || left.repeats > 0).then_some(Action::Repeat));
@@ -225,7 +260,8 @@ impl Model for Protocol {
                 actions.push(Action::Start(name));
             }
         }
-        let can_init = !state.simulator.is_gathering && state.simulator.clock.tick > 0 && left.inits > 0;
+        let can_init =
+            !state.simulator.is_gathering && state.simulator.clock.tick > 0 && left.inits > 0;
         actions.extend(can_init.then_some(Action::Init));
     }
 
@@ -278,9 +314,10 @@ impl Model for Protocol {
             Property::always("nothing stale is counted", |_, state: &State| {
                 state.fault != Some(Fault::StaleCounted)
             }),
-            Property::always("what is delivered is what was recorded", |_, state: &State| {
-                state.fault != Some(Fault::OtherCommand)
-            }),
+            Property::always(
+                "what is delivered is what was recorded",
+                |_, state: &State| state.fault != Some(Fault::OtherCommand),
+            ),
             Property::sometimes("the run ends", |_, state: &State| state.simulator.is_over),
         ]
     }

@@ -37,8 +37,18 @@ impl Process {
     /// `Host::join_over`: welcomed, then its token.
     pub(crate) fn join(name: usize, member: &Member, epoch: u8, last_seq: u8) -> Self {
         let (generation, up) = (member.generation, vec![Up::Token(true)]);
-        let here = Self { is_alive: true, is_connected: true, ..Self::nobody(name) };
-        Self { epoch, generation, last_seq, up, ..here }
+        let here = Self {
+            is_alive: true,
+            is_connected: true,
+            ..Self::nobody(name)
+        };
+        Self {
+            epoch,
+            generation,
+            last_seq,
+            up,
+            ..here
+        }
     }
 
     /// `Link::file_clock`, `Link::is_interrupted`, then `Host::on_clock`. `welcome` is what `Host::join` would get in
@@ -91,8 +101,19 @@ impl Process {
     /// Its end. What it has sent is still under way.
     pub(crate) fn end(&mut self) {
         let (up, out) = (std::mem::take(&mut self.up), std::mem::take(&mut self.out));
-        let Self { name, is_connected, is_shown, .. } = *self;
-        *self = Self { is_connected, is_shown, up, out, ..Self::nobody(name) };
+        let Self {
+            name,
+            is_connected,
+            is_shown,
+            ..
+        } = *self;
+        *self = Self {
+            is_connected,
+            is_shown,
+            up,
+            out,
+            ..Self::nobody(name)
+        };
         if is_connected {
             self.up.push(Up::Token(false));
         }
@@ -145,7 +166,11 @@ impl Process {
         if joined > self.generation {
             return self.end(); // Replaced.
         }
-        if let Some(last) = self.last.clone().filter(|_| protocol.keeps(Rule::DoesTicksOnce)) {
+        if let Some(last) = self
+            .last
+            .clone()
+            .filter(|_| protocol.keeps(Rule::DoesTicksOnce))
+        {
             let done = (last.epoch, last.tick);
             if done >= (clock.epoch, clock.tick) {
                 if done == (clock.epoch, clock.tick) {
@@ -172,7 +197,11 @@ impl Process {
         recorded: &impl Fn(u8) -> Option<u8>,
         seen: &mut Seen,
     ) {
-        let is_here = |seq: &u8| self.held.get(seq).is_some_and(|command| command.epoch == clock.epoch);
+        let is_here = |seq: &u8| {
+            self.held
+                .get(seq)
+                .is_some_and(|command| command.epoch == clock.epoch)
+        };
         if self.name == B && clock.named.is_some_and(|seq| !is_here(&seq)) {
             self.waits = Some(clock);
         } else {
@@ -236,14 +265,26 @@ impl Process {
         let mut sent = None;
         if self.name == A && clock.tick < protocol.last_tick {
             self.last_seq += 1;
-            let (epoch, tick, seq, generation) = (clock.epoch, clock.tick, self.last_seq, self.generation);
-            let command = Command { epoch, tick, seq, generation };
+            let (epoch, tick, seq, generation) =
+                (clock.epoch, clock.tick, self.last_seq, self.generation);
+            let command = Command {
+                epoch,
+                tick,
+                seq,
+                generation,
+            };
             self.send(command);
             self.sent.push(command);
             sent = Some(command);
         }
         let (epoch, tick, generation) = (clock.epoch, clock.tick, self.generation);
-        let report = Report { epoch, tick, generation, sent, is_missing };
+        let report = Report {
+            epoch,
+            tick,
+            generation,
+            sent,
+            is_missing,
+        };
         self.report(report.clone());
         self.last = Some(report);
     }

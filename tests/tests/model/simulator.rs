@@ -7,7 +7,9 @@ impl State {
     fn awaited(&self) -> impl Iterator<Item = Name> + '_ {
         let simulator = &self.simulator;
         NAMES.into_iter().filter(|name| {
-            simulator.is_open && !simulator.members[*name].is_lost && simulator.reports[*name].is_none()
+            simulator.is_open
+                && !simulator.members[*name].is_lost
+                && simulator.reports[*name].is_none()
         })
     }
 
@@ -24,7 +26,12 @@ impl State {
     /// `Server::gather`, as far as it goes.
     fn gather(&mut self, protocol: &Protocol) {
         let simulator = &mut self.simulator;
-        if !simulator.is_gathering || simulator.members.iter().any(|m| !m.is_present || m.instance == 0) {
+        if !simulator.is_gathering
+            || simulator
+                .members
+                .iter()
+                .any(|m| !m.is_present || m.instance == 0)
+        {
             return;
         }
         simulator.is_gathering = false;
@@ -39,7 +46,12 @@ impl State {
     fn begin_tick(&mut self, tick: u8, protocol: &Protocol) {
         let simulator = &mut self.simulator;
         let named = simulator.underway.take();
-        let mut clock = Clock { epoch: simulator.epoch, tick, joined: [0, 0], named };
+        let mut clock = Clock {
+            epoch: simulator.epoch,
+            tick,
+            joined: [0, 0],
+            named,
+        };
         for name in NAMES {
             let member = &mut simulator.members[name];
             member.is_given_up = false;
@@ -59,7 +71,11 @@ impl State {
     /// To every process whose link is there; what is on a link already need not be on it twice.
     fn put_clock(&mut self) {
         let clock = &self.simulator.clock;
-        for process in self.processes.iter_mut().filter(|process| process.is_alive && process.is_connected) {
+        for process in self
+            .processes
+            .iter_mut()
+            .filter(|process| process.is_alive && process.is_connected)
+        {
             if process.down.last() != Some(clock) {
                 process.down.push(clock.clone());
             }
@@ -119,7 +135,11 @@ impl State {
         }
         if let Some(command) = a.and_then(|report| report.sent) {
             simulator.underway = Some(command.seq);
-            if simulator.recorded.insert(command.seq, (command.generation, false)).is_some() {
+            if simulator
+                .recorded
+                .insert(command.seq, (command.generation, false))
+                .is_some()
+            {
                 self.fault = Some(Fault::DeliveredTwice);
             }
         }
@@ -170,7 +190,10 @@ impl State {
     /// Whether another process is this robot, or is about to show its token: `Member::is_taken_from`.
     pub(crate) fn is_taken(&self, name: Name) -> bool {
         let member = &self.simulator.members[name];
-        let process = member.instance.checked_sub(1).map(|number| &self.processes[number]);
+        let process = member
+            .instance
+            .checked_sub(1)
+            .map(|number| &self.processes[number]);
         member.is_present || process.is_some_and(|process| process.is_alive && process.is_connected)
     }
 
@@ -185,10 +208,19 @@ impl State {
         } else {
             member.generation = member.generation.max(1);
         }
-        let open = simulator.reports[name].as_ref().and_then(|report| report.sent).map(|command| command.seq);
-        let recorded = open.max(simulator.recorded.keys().next_back().copied()).unwrap_or(0);
+        let open = simulator.reports[name]
+            .as_ref()
+            .and_then(|report| report.sent)
+            .map(|command| command.seq);
+        let recorded = open
+            .max(simulator.recorded.keys().next_back().copied())
+            .unwrap_or(0);
         let anew = SEQS_OF_A_GENERATION * (member.generation - 1) * u8::from(member.is_seated);
-        if protocol.keeps(Rule::NumbersAnew) { anew } else { recorded }
+        if protocol.keeps(Rule::NumbersAnew) {
+            anew
+        } else {
+            recorded
+        }
     }
 
     /// `Server::go_on_without_late`.
@@ -234,7 +266,12 @@ impl crate::machine::Member {
         if !((self.is_pending || self.has_returned) && self.is_present) {
             return None;
         }
-        (self.is_pending, self.has_returned, self.is_lost, self.missed) = (false, false, false, 0);
+        (
+            self.is_pending,
+            self.has_returned,
+            self.is_lost,
+            self.missed,
+        ) = (false, false, false, 0);
         Some(self.generation)
     }
 }

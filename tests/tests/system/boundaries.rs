@@ -14,8 +14,21 @@ const ALLOWED: [(&str, &[&str]); 10] = [
     ("simulator", &["world", "protocol"]),
     ("console", &["protocol"]),
     ("conform", &["protocol"]),
-    ("cars", &["simulator", "robot", "robots", "affect", "conform", "protocol"]),
-    ("system-tests", &["simulator", "robot", "robots", "conform", "protocol"]),
+    (
+        "cars",
+        &[
+            "simulator",
+            "robot",
+            "robots",
+            "affect",
+            "conform",
+            "protocol",
+        ],
+    ),
+    (
+        "system-tests",
+        &["simulator", "robot", "robots", "conform", "protocol"],
+    ),
 ];
 
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
@@ -26,20 +39,42 @@ fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
         .output();
     let metadata: serde_json::Value = serde_json::from_slice(&output.unwrap().stdout).unwrap();
     let names = |list: &serde_json::Value| -> BTreeSet<String> {
-        list.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()
+        list.as_array()
+            .unwrap()
+            .iter()
+            .map(|entry| entry["name"].as_str().unwrap().to_owned())
+            .collect()
     };
     let packages = metadata["packages"].as_array().unwrap();
-    packages.iter().map(|p| (p["name"].as_str().unwrap().to_owned(), names(&p["dependencies"]))).collect()
+    packages
+        .iter()
+        .map(|p| {
+            (
+                p["name"].as_str().unwrap().to_owned(),
+                names(&p["dependencies"]),
+            )
+        })
+        .collect()
 }
 
 #[test]
 fn crates_depend_only_on_what_their_layer_allows() {
     let found = dependencies();
     let ours: BTreeSet<&str> = ALLOWED.iter().map(|(name, _)| *name).collect();
-    assert_eq!(found.keys().map(String::as_str).collect::<BTreeSet<_>>(), ours, "a crate came or went");
+    assert_eq!(
+        found.keys().map(String::as_str).collect::<BTreeSet<_>>(),
+        ours,
+        "a crate came or went"
+    );
     for (name, allowed) in ALLOWED {
-        for dependency in found[name].iter().filter(|dependency| ours.contains(dependency.as_str())) {
-            assert!(allowed.contains(&dependency.as_str()), "{name} must not depend on {dependency}");
+        for dependency in found[name]
+            .iter()
+            .filter(|dependency| ours.contains(dependency.as_str()))
+        {
+            assert!(
+                allowed.contains(&dependency.as_str()),
+                "{name} must not depend on {dependency}"
+            );
         }
     }
 }
@@ -68,7 +103,10 @@ fn one_file_names_the_middleware() {
     sources(&system_tests::root().join("crates"), &mut files);
     let names_it = |file: &PathBuf| std::fs::read_to_string(file).unwrap().contains("zenoh::");
     let naming: Vec<_> = files.into_iter().filter(names_it).collect();
-    assert!(matches!(&naming[..], [one] if one.ends_with("protocol/src/bus/middleware.rs")), "{naming:?}");
+    assert!(
+        matches!(&naming[..], [one] if one.ends_with("protocol/src/bus/middleware.rs")),
+        "{naming:?}"
+    );
 }
 
 #[test]
@@ -76,11 +114,17 @@ fn the_pure_crates_know_no_clock_no_network_and_no_files() {
     for (name, dependencies) in dependencies() {
         if name == "world" || name == "affect" {
             for impure in ["tokio", "tracing", "zenoh", "clap", "nix"] {
-                assert!(!dependencies.contains(impure), "{name} must not depend on {impure}");
+                assert!(
+                    !dependencies.contains(impure),
+                    "{name} must not depend on {impure}"
+                );
             }
         }
         if name == "world" {
-            assert!(!dependencies.contains("serde"), "the environment is not a message");
+            assert!(
+                !dependencies.contains("serde"),
+                "the environment is not a message"
+            );
         }
     }
 }

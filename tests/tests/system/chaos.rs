@@ -44,12 +44,24 @@ impl Cable {
         let to = format!("tcp/127.0.0.1:{port}");
         let mut command = Command::new(programs().join("cars"));
         command.args(["net", "proxy", "--listen", "tcp/127.0.0.1:0", "--to", &to]);
-        let mut proxy = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let mut proxy = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
         let (mut line, mut said) = (String::new(), BufReader::new(proxy.stdout.take().unwrap()));
         said.read_line(&mut line).unwrap();
-        let address = line.strip_prefix("listening at ").and_then(|rest| rest.split(',').next()).unwrap();
+        let address = line
+            .strip_prefix("listening at ")
+            .and_then(|rest| rest.split(',').next())
+            .unwrap();
         let endpoint = format!("tcp/{address}");
-        Self { proxy, _said: said, endpoint, heals: None }
+        Self {
+            proxy,
+            _said: said,
+            endpoint,
+            heals: None,
+        }
     }
 
     fn say(&mut self, order: &str) {
@@ -86,16 +98,22 @@ fn launch_file(lab: &Lab, n: usize) -> String {
         "seed = 7\nduration = \"100000 s\"\non_late = \"continue\"\ndeadline = \"0.2 s\"\nlose_after = 2\n\
                         record = { frames = false }\n[guests]\ncount = 10\n"
             .to_owned();
-    let mut launch = "scenario = \"chaos.toml\"\nspeed = 100\n[console]\nenabled = false\n".to_owned();
+    let mut launch =
+        "scenario = \"chaos.toml\"\nspeed = 100\n[console]\nenabled = false\n".to_owned();
     for i in 0..n {
         let (x, y) = (2 + 3 * (i % 4), 2 + 3 * (i / 4));
-        scenario += &format!("[[robot]]\nname = \"R{i}\"\nclass = \"Vonda\"\nat = [\"{x} m\", \"{y} m\"]\n");
+        scenario += &format!(
+            "[[robot]]\nname = \"R{i}\"\nclass = \"Vonda\"\nat = [\"{x} m\", \"{y} m\"]\n"
+        );
         launch += &format!(
             "[[process]]\nname = \"R{i}\"\ncommand = [\"cars-vonda\"]\nrestart = \"on-failure\"\nbackoff = \"0.05 s\"\n"
         );
     }
     lab.write("chaos.toml", &scenario);
-    lab.write("chaos-launch.toml", &launch).to_str().unwrap().to_owned()
+    lab.write("chaos-launch.toml", &launch)
+        .to_str()
+        .unwrap()
+        .to_owned()
 }
 
 /// Strikes robots of a launch `count` times; returns whom. In the end all links are whole.
@@ -104,7 +122,9 @@ fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) ->
     let mut struck = BTreeSet::new();
     for _ in 0..count {
         let robot = below(chance, cables.len());
-        cables.iter_mut().for_each(|cable| cable.heal_by(Instant::now()));
+        cables
+            .iter_mut()
+            .for_each(|cable| cable.heal_by(Instant::now()));
         let is_cut = cables[robot].heals.is_some();
         let blow = match below(chance, 3) {
             0 if kills[robot] < MAX_KILLS => Blow::Kill,
@@ -121,7 +141,9 @@ fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) ->
                 kills[robot] += 1;
                 send(pid, Signal::SIGKILL);
                 // The next blow is not to strike the one that is dying.
-                eventually("it to be gone", || (named(run, &name) != Some(pid)).then_some(()));
+                eventually("it to be gone", || {
+                    (named(run, &name) != Some(pid)).then_some(())
+                });
             }
             Blow::Stop(lasting) => {
                 send(pid, Signal::SIGSTOP);
@@ -133,7 +155,11 @@ fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) ->
         struck.insert(name);
     }
     // One that was cut a moment ago has to be missed before it is back.
-    let last = cables.iter().filter_map(|cable| cable.heals).max().unwrap_or_else(Instant::now);
+    let last = cables
+        .iter()
+        .filter_map(|cable| cable.heals)
+        .max()
+        .unwrap_or_else(Instant::now);
     std::thread::sleep(last.saturating_duration_since(Instant::now()));
     cables.iter_mut().for_each(|cable| cable.heal_by(last));
     struck
@@ -141,36 +167,60 @@ fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) ->
 
 #[test]
 fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
-    let events = std::env::var("CARS_CHAOS").ok().and_then(|n| n.parse().ok()).unwrap_or(EVENTS);
-    let seed = std::env::var("CARS_CHAOS_SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(1);
+    let events = std::env::var("CARS_CHAOS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(EVENTS);
+    let seed = std::env::var("CARS_CHAOS_SEED")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(1);
     let launches = ROBOTS.len().min(events);
     let lab = Lab::new();
     for (index, n) in ROBOTS.iter().take(launches).enumerate() {
         let run = format!("chaos-{index}");
         let file = launch_file(&lab, *n);
-        let port = TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
+        let port = TcpListener::bind(("127.0.0.1", 0))
+            .unwrap()
+            .local_addr()
+            .unwrap()
+            .port();
         let mut cables: Vec<Cable> = (0..*n).map(|_| Cable::new(port)).collect();
-        let links = cables.iter().enumerate().map(|(i, cable)| format!("--link=R{i}={}", cable.endpoint));
-        let args = ["launch".to_owned(), file, format!("--connect-port={port}")].into_iter().chain(links);
+        let links = cables
+            .iter()
+            .enumerate()
+            .map(|(i, cable)| format!("--link=R{i}={}", cable.endpoint));
+        let args = ["launch".to_owned(), file, format!("--connect-port={port}")]
+            .into_iter()
+            .chain(links);
         let args: Vec<String> = args.collect();
         let mut launch = lab.start(&run, &args.iter().map(String::as_str).collect::<Vec<_>>());
         // Its first lines may have been said before the launcher listened: whether it runs is asked.
         eventually("the clock to run", || {
-            let output = lab.cars(&["ctl", "status", "--json", "--run", &run]).output().ok()?;
-            String::from_utf8_lossy(&output.stdout).contains("\"phase\":\"running\"").then_some(())
+            let output = lab
+                .cars(&["ctl", "status", "--json", "--run", &run])
+                .output()
+                .ok()?;
+            String::from_utf8_lossy(&output.stdout)
+                .contains("\"phase\":\"running\"")
+                .then_some(())
         });
         let mut chance = stream(seed, &run);
         let struck = strike(&run, &mut cables, events / launches, &mut chance);
         // The clock still goes, whoever is missing.
         let status = || -> u64 {
             let text = lab.ok(&["ctl", "status", "--json", "--run", &run]);
-            serde_json::from_str::<serde_json::Value>(&text).unwrap()["tick"].as_u64().unwrap()
+            serde_json::from_str::<serde_json::Value>(&text).unwrap()["tick"]
+                .as_u64()
+                .unwrap()
         };
         let reached = status();
         eventually("further ticks", || (status() > reached + 10).then_some(()));
         lab.ok(&["ctl", "stop", "--run", &run]);
         launch.finish();
-        eventually("the last process to be gone", || find(&run).is_empty().then_some(()));
+        eventually("the last process to be gone", || {
+            find(&run).is_empty().then_some(())
+        });
         check_record(&lab, &run, &struck);
     }
 }
@@ -181,9 +231,14 @@ fn check_record(lab: &Lab, run: &str, struck: &BTreeSet<String>) {
     assert!(bytes.ends_with(b"\n"));
     let events = lab.events(run);
     assert_eq!(events.last().unwrap()["reason"], "stopped");
-    let ticks =
-        events.iter().filter(|event| event["event"] == "tick").map(|event| event["tick"].as_u64().unwrap());
-    assert!(ticks.enumerate().all(|(index, tick)| index as u64 == tick), "a tick is missing or out of order");
+    let ticks = events
+        .iter()
+        .filter(|event| event["event"] == "tick")
+        .map(|event| event["tick"].as_u64().unwrap());
+    assert!(
+        ticks.enumerate().all(|(index, tick)| index as u64 == tick),
+        "a tick is missing or out of order"
+    );
     let named: BTreeSet<String> = events
         .iter()
         .filter(|event| {
@@ -191,14 +246,22 @@ fn check_record(lab: &Lab, run: &str, struck: &BTreeSet<String>) {
         })
         .map(|event| event["robot"].as_str().unwrap().to_owned())
         .collect();
-    assert!(struck.is_subset(&named), "struck {struck:?}, named {named:?}");
+    assert!(
+        struck.is_subset(&named),
+        "struck {struck:?}, named {named:?}"
+    );
     // A robot is lost before a further incarnation of it joins, and every incarnation has a higher number.
     for robot in struck {
-        let own = events.iter().filter(|event| event["robot"] == robot.as_str());
+        let own = events
+            .iter()
+            .filter(|event| event["robot"] == robot.as_str());
         let generations: Vec<u64> = own
             .filter(|event| event["event"] == "joined")
             .filter_map(|event| event["generation"].as_u64())
             .collect();
-        assert!(generations.windows(2).all(|pair| pair[0] <= pair[1]), "{robot}: {generations:?}");
+        assert!(
+            generations.windows(2).all(|pair| pair[0] <= pair[1]),
+            "{robot}: {generations:?}"
+        );
     }
 }

@@ -26,7 +26,10 @@ fn paused(lab: &Lab, run: &str, more: &[&str]) -> Running {
     args.extend(more);
     let launch = lab.start(run, &args);
     eventually("the launch to be ready", || {
-        let output = lab.cars(&["ctl", "status", "--json", "--run", run]).output().unwrap();
+        let output = lab
+            .cars(&["ctl", "status", "--json", "--run", run])
+            .output()
+            .unwrap();
         let status: Value = serde_json::from_slice(&output.stdout).ok()?;
         (status["phase"] == "ready").then_some(())
     });
@@ -61,7 +64,10 @@ fn pausing_and_stepping_change_nothing_in_the_record() {
     ctl(&lab, "ctl-paused", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-straight", "--duration", "60 s"]);
-    assert_same(("paused", &lab.bytes("ctl-paused")), ("straight", &lab.bytes("ctl-straight")));
+    assert_same(
+        ("paused", &lab.bytes("ctl-paused")),
+        ("straight", &lab.bytes("ctl-straight")),
+    );
 }
 
 #[test]
@@ -80,10 +86,16 @@ fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
     ctl(&lab, "ctl-init", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-fresh", "--duration", "60 s"]);
-    assert_same(("after init", &lab.bytes("ctl-init")), ("fresh", &lab.bytes("ctl-fresh")));
+    assert_same(
+        ("after init", &lab.bytes("ctl-init")),
+        ("fresh", &lab.bytes("ctl-fresh")),
+    );
     // Nothing is lost: what the first epoch recorded is kept, too, up to where it was left.
     let kept = std::fs::read(lab.file("ctl-init", "events-epoch1.jsonl")).unwrap();
-    assert!(lab.bytes("ctl-fresh").starts_with(&kept), "the first epoch went the same way");
+    assert!(
+        lab.bytes("ctl-fresh").starts_with(&kept),
+        "the first epoch went the same way"
+    );
     assert!(String::from_utf8(kept).unwrap().lines().count() > 50);
 }
 
@@ -92,11 +104,25 @@ fn init_with_another_seed_is_another_run() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-seed", &["--duration", "30 s"]);
     ctl(&lab, "ctl-seed", &["init", "--seed", "77"]);
-    eventually("the new epoch", || (status(&lab, "ctl-seed")["phase"] == "ready").then_some(()));
+    eventually("the new epoch", || {
+        (status(&lab, "ctl-seed")["phase"] == "ready").then_some(())
+    });
     ctl(&lab, "ctl-seed", &["start"]);
     launch.finish();
-    lab.ok(&["run", FILE, "--run", "ctl-77", "--duration", "30 s", "--seed", "77"]);
-    assert_same(("after init", &lab.bytes("ctl-seed")), ("fresh", &lab.bytes("ctl-77")));
+    lab.ok(&[
+        "run",
+        FILE,
+        "--run",
+        "ctl-77",
+        "--duration",
+        "30 s",
+        "--seed",
+        "77",
+    ]);
+    assert_same(
+        ("after init", &lab.bytes("ctl-seed")),
+        ("fresh", &lab.bytes("ctl-77")),
+    );
 }
 
 #[test]
@@ -109,7 +135,11 @@ fn control_answers_at_once_while_the_clock_is_held() {
     // Less than the time after which an asker gives up.
     let begun = Instant::now();
     let stepped = ctl(&lab, "ctl-held", &["step", "10"]);
-    assert!(begun.elapsed() < Duration::from_secs(10), "step took {:?}", begun.elapsed());
+    assert!(
+        begun.elapsed() < Duration::from_secs(10),
+        "step took {:?}",
+        begun.elapsed()
+    );
     assert!(stepped["tick"].as_u64().unwrap() < 15, "{stepped}");
     let awaited: Vec<&str> = stepped["awaiting"]
         .as_array()
@@ -124,7 +154,10 @@ fn control_answers_at_once_while_the_clock_is_held() {
     ctl(&lab, "ctl-held", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-not-held", "--duration", "60 s"]);
-    assert_same(("held", &lab.bytes("ctl-held")), ("not held", &lab.bytes("ctl-not-held")));
+    assert_same(
+        ("held", &lab.bytes("ctl-held")),
+        ("not held", &lab.bytes("ctl-not-held")),
+    );
 }
 
 #[test]
@@ -137,11 +170,16 @@ fn init_ends_a_tick_that_hangs() {
     ctl(&lab, "ctl-rescue", &["step", "10"]);
     ctl(&lab, "ctl-rescue", &["init"]);
     send(leguin, Signal::SIGCONT);
-    eventually("the new epoch", || (status(&lab, "ctl-rescue")["phase"] == "ready").then_some(()));
+    eventually("the new epoch", || {
+        (status(&lab, "ctl-rescue")["phase"] == "ready").then_some(())
+    });
     ctl(&lab, "ctl-rescue", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-no-rescue", "--duration", "30 s"]);
-    assert_same(("rescued", &lab.bytes("ctl-rescue")), ("fresh", &lab.bytes("ctl-no-rescue")));
+    assert_same(
+        ("rescued", &lab.bytes("ctl-rescue")),
+        ("fresh", &lab.bytes("ctl-no-rescue")),
+    );
 }
 
 #[test]
@@ -153,7 +191,10 @@ fn stop_ends_the_run_with_its_record_complete() {
     launch.finish();
     let events = lab.events("ctl-stop");
     let (end, tick) = (&events[events.len() - 1], &events[events.len() - 2]);
-    assert_eq!((&end["event"], &end["reason"], &end["tick"]), (&"end".into(), &"stopped".into(), &20.into()));
+    assert_eq!(
+        (&end["event"], &end["reason"], &end["tick"]),
+        (&"end".into(), &"stopped".into(), &20.into())
+    );
     assert_eq!(end["digest"], tick["digest"]);
     assert_eq!(lab.summary("ctl-stop")["end"], "stopped");
     let (_, text) = lab.fails(&["ctl", "status", "--run", "ctl-stop"]);
@@ -170,7 +211,9 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
     assert!(scenario.contains("count = 100"), "{scenario}");
     let fewer = lab.write(
         "fewer.toml",
-        &scenario.replace("count = 100", "count = 7").replace("seed = 2002", "seed = 5"),
+        &scenario
+            .replace("count = 100", "count = 7")
+            .replace("seed = 2002", "seed = 5"),
     );
     let fewer = fewer.to_str().unwrap();
     ctl(&lab, "ctl-load", &["load", fewer]);
@@ -179,16 +222,32 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
         (status["phase"] == "ready" && status["epoch"] == 2 && status["seed"] == 5).then_some(())
     });
     assert_eq!(launch.processes(), processes);
-    let (_, text) = lab.fails(&["ctl", "load", "configs/three_robots.toml", "--run", "ctl-load"]);
+    let (_, text) = lab.fails(&[
+        "ctl",
+        "load",
+        "configs/three_robots.toml",
+        "--run",
+        "ctl-load",
+    ]);
     assert!(text.contains("Vonda"), "{text}");
     ctl(&lab, "ctl-load", &["start"]);
     launch.finish();
     // What is kept of the second epoch is what a fresh run of its scenario gives, and the first epoch is kept, too.
     lab.ok(&["run", fewer, "--run", "ctl-loaded"]);
-    assert_same(("loaded", &lab.bytes("ctl-load")), ("fresh", &lab.bytes("ctl-loaded")));
+    assert_same(
+        ("loaded", &lab.bytes("ctl-load")),
+        ("fresh", &lab.bytes("ctl-loaded")),
+    );
     let read = |run, name| std::fs::read(lab.file(run, name)).unwrap();
-    assert_eq!(read("ctl-load", "scenario.toml"), read("ctl-loaded", "scenario.toml"));
-    for kept in ["events-epoch1.jsonl", "scenario-epoch1.toml", "recording-epoch1.jsonl"] {
+    assert_eq!(
+        read("ctl-load", "scenario.toml"),
+        read("ctl-loaded", "scenario.toml")
+    );
+    for kept in [
+        "events-epoch1.jsonl",
+        "scenario-epoch1.toml",
+        "recording-epoch1.jsonl",
+    ] {
         assert!(lab.file("ctl-load", kept).exists(), "{kept}");
     }
 }

@@ -35,7 +35,14 @@ fn a_launch_and_a_run_in_one_process_are_the_same() {
     assert_same(("first launch", &first), ("second launch", &second));
     // Nothing would be shown by two runs in which nothing happens.
     let text = String::from_utf8(local).unwrap();
-    for event in ["command_sent", "command_delivered", "emotion", "behavior", "blocked", "\"end\""] {
+    for event in [
+        "command_sent",
+        "command_delivered",
+        "emotion",
+        "behavior",
+        "blocked",
+        "\"end\"",
+    ] {
         assert!(text.contains(event), "no {event} in the run");
     }
 }
@@ -43,7 +50,10 @@ fn a_launch_and_a_run_in_one_process_are_the_same() {
 #[test]
 fn another_seed_is_another_run() {
     let lab = Lab::new();
-    assert_ne!(in_process(&lab, "a", FILE, &["--seed", "3"]), in_process(&lab, "b", FILE, &["--seed", "4"]));
+    assert_ne!(
+        in_process(&lab, "a", FILE, &["--seed", "3"]),
+        in_process(&lab, "b", FILE, &["--seed", "4"])
+    );
 }
 
 #[test]
@@ -60,11 +70,20 @@ fn the_order_in_which_robots_start_changes_nothing() {
     let lab = Lab::new();
     let scenario = root().join("configs/hors_doeuvres.toml");
     let process = |name: &str| {
-        format!("[[process]]\nname = \"{name}\"\ncommand = [\"cars-{}\"]\n", name.to_lowercase())
+        format!(
+            "[[process]]\nname = \"{name}\"\ncommand = [\"cars-{}\"]\n",
+            name.to_lowercase()
+        )
     };
     let head = format!("scenario = {:?}\n", scenario.display().to_string());
-    let forward = lab.write("forward.toml", &(head.clone() + &process("Butler") + &process("Leguin")));
-    let backward = lab.write("backward.toml", &(head + &process("Leguin") + &process("Butler")));
+    let forward = lab.write(
+        "forward.toml",
+        &(head.clone() + &process("Butler") + &process("Leguin")),
+    );
+    let backward = lab.write(
+        "backward.toml",
+        &(head + &process("Leguin") + &process("Butler")),
+    );
     let forward = launched(&lab, "order-forward", forward.to_str().unwrap(), &[]);
     let backward = launched(&lab, "order-backward", backward.to_str().unwrap(), &[]);
     assert_same(("forward", &forward), ("backward", &backward));
@@ -75,10 +94,14 @@ struct Load(Arc<AtomicBool>, Vec<std::thread::JoinHandle<()>>);
 
 impl Load {
     fn on_all_cores() -> Self {
-        let (stop, cores) =
-            (Arc::new(AtomicBool::new(false)), std::thread::available_parallelism().unwrap().get());
+        let (stop, cores) = (
+            Arc::new(AtomicBool::new(false)),
+            std::thread::available_parallelism().unwrap().get(),
+        );
         let burn = |stop: Arc<AtomicBool>| move || while !stop.load(Ordering::Relaxed) {};
-        let threads = (0..2 * cores).map(|_| std::thread::spawn(burn(stop.clone()))).collect();
+        let threads = (0..2 * cores)
+            .map(|_| std::thread::spawn(burn(stop.clone())))
+            .collect();
         Self(stop, threads)
     }
 }
@@ -120,9 +143,19 @@ fn several_robots_in_one_process_are_the_same() {
 #[test]
 fn the_resolved_scenario_of_a_run_gives_the_same_run() {
     let lab = Lab::new();
-    let first = in_process(&lab, "resolved-first", FILE, &["--seed", "5", "--set", "guests.count=60"]);
+    let first = in_process(
+        &lab,
+        "resolved-first",
+        FILE,
+        &["--seed", "5", "--set", "guests.count=60"],
+    );
     let resolved = lab.file("resolved-first", "scenario.toml");
-    lab.ok(&["run", resolved.to_str().unwrap(), "--run", "resolved-second"]);
+    lab.ok(&[
+        "run",
+        resolved.to_str().unwrap(),
+        "--run",
+        "resolved-second",
+    ]);
     assert_same(("first", &first), ("second", &lab.bytes("resolved-second")));
 }
 
@@ -138,33 +171,67 @@ fn a_lossy_network_is_part_of_the_seed() {
         "robot.Butler.params.resend=on",
     ];
     let with = |first: [&'static str; 4]| first.into_iter().chain(args).collect::<Vec<_>>();
-    lab.ok(&with(["run", "configs/hors_doeuvres.toml", "--run", "lossy-run"]));
-    lab.start("lossy-launch", &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"])).finish();
-    assert_same(("run", &lab.bytes("lossy-run")), ("launch", &lab.bytes("lossy-launch")));
+    lab.ok(&with([
+        "run",
+        "configs/hors_doeuvres.toml",
+        "--run",
+        "lossy-run",
+    ]));
+    lab.start(
+        "lossy-launch",
+        &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"]),
+    )
+    .finish();
+    assert_same(
+        ("run", &lab.bytes("lossy-run")),
+        ("launch", &lab.bytes("lossy-launch")),
+    );
     // The recording of both is the same, too.
     let recording = |run: &str| std::fs::read(lab.file(run, "recording.jsonl")).unwrap();
     let without_name = |run: &str| String::from_utf8(recording(run)).unwrap().replace(run, "");
     assert!(without_name("lossy-run") == without_name("lossy-launch"));
-    let dropped = lab.events("lossy-run").iter().filter(|event| event["event"] == "command_dropped").count();
-    let sent: Vec<_> =
-        lab.events("lossy-run").into_iter().filter(|event| event["event"] == "command_sent").collect();
-    assert!(dropped > 0 && dropped < sent.len(), "{dropped} of {}", sent.len());
+    let dropped = lab
+        .events("lossy-run")
+        .iter()
+        .filter(|event| event["event"] == "command_dropped")
+        .count();
+    let sent: Vec<_> = lab
+        .events("lossy-run")
+        .into_iter()
+        .filter(|event| event["event"] == "command_sent")
+        .collect();
+    assert!(
+        dropped > 0 && dropped < sent.len(),
+        "{dropped} of {}",
+        sent.len()
+    );
     assert!(sent.iter().all(|event| event["performative"] == "achieve"));
 }
 
 /// The experiment of the paper with a cut between the two robots, commands and queries.
-const CUT: &str =
-    "network.partition=[{ groups = [[\"Butler\"], [\"Leguin\"]], from = \"60 s\", until = \"180 s\" }]";
+const CUT: &str = "network.partition=[{ groups = [[\"Butler\"], [\"Leguin\"]], from = \"60 s\", until = \"180 s\" }]";
 
 #[test]
 fn a_partition_is_part_of_the_seed_and_told_in_the_summary() {
     let lab = Lab::new();
     let with = |first: [&'static str; 4]| {
-        first.into_iter().chain(["--duration", "300 s", "--set", CUT]).collect::<Vec<_>>()
+        first
+            .into_iter()
+            .chain(["--duration", "300 s", "--set", CUT])
+            .collect::<Vec<_>>()
     };
-    lab.ok(&with(["run", "configs/hors_doeuvres.toml", "--run", "cut-run"]));
+    lab.ok(&with([
+        "run",
+        "configs/hors_doeuvres.toml",
+        "--run",
+        "cut-run",
+    ]));
     for run in ["cut-launch", "cut-again"] {
-        lab.start(run, &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"])).finish();
+        lab.start(
+            run,
+            &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"]),
+        )
+        .finish();
         assert_same(("run", &lab.bytes("cut-run")), (run, &lab.bytes(run)));
     }
     let events = lab.events("cut-launch");
@@ -175,15 +242,27 @@ fn a_partition_is_part_of_the_seed_and_told_in_the_summary() {
             .map(|event| event["tick"].as_u64().unwrap())
             .collect()
     };
-    assert_eq!((at("link_cut"), at("link_healed")), (vec![120, 120], vec![360, 360]));
+    assert_eq!(
+        (at("link_cut"), at("link_healed")),
+        (vec![120, 120], vec![360, 360])
+    );
     let summary = lab.summary("cut-launch");
     let network = &summary["network"];
     assert_eq!(network, &lab.summary("cut-run")["network"]);
-    let (there, back) = (&network["links"]["Butler -> Leguin"], &network["links"]["Leguin -> Butler"]);
-    assert_eq!((&there["unreachable_ticks"], &back["longest_stale_s"]), (&240.into(), &120.0.into()));
+    let (there, back) = (
+        &network["links"]["Butler -> Leguin"],
+        &network["links"]["Leguin -> Butler"],
+    );
+    assert_eq!(
+        (&there["unreachable_ticks"], &back["longest_stale_s"]),
+        (&240.into(), &120.0.into())
+    );
     assert_eq!(network["cuts"][0]["until_s"], 180.0);
     let dropped = at("command_dropped");
-    assert!(!dropped.is_empty() && dropped.iter().all(|tick| (120..360).contains(tick)), "{dropped:?}");
+    assert!(
+        !dropped.is_empty() && dropped.iter().all(|tick| (120..360).contains(tick)),
+        "{dropped:?}"
+    );
     assert_eq!(there["dropped"]["partition"], dropped.len());
 }
 
@@ -192,15 +271,43 @@ fn delays_and_doubles_are_the_same_as_processes_and_in_one() {
     let lab = Lab::new();
     let network = "network.commands={ loss = 0.2, duplication = 0.3, delay = { min = \"0 s\", mode = \"1 s\", max = \"10 s\" }, burst = { enter = 0.05, leave = 0.2 } }";
     let with = |first: [&'static str; 4]| {
-        let more = ["--duration", "300 s", "--set", network, "--set", "network.queries.loss=0.2"];
+        let more = [
+            "--duration",
+            "300 s",
+            "--set",
+            network,
+            "--set",
+            "network.queries.loss=0.2",
+        ];
         first.into_iter().chain(more).collect::<Vec<_>>()
     };
-    lab.ok(&with(["run", "configs/hors_doeuvres.toml", "--run", "late-run"]));
-    lab.start("late-launch", &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"])).finish();
-    assert_same(("run", &lab.bytes("late-run")), ("launch", &lab.bytes("late-launch")));
+    lab.ok(&with([
+        "run",
+        "configs/hors_doeuvres.toml",
+        "--run",
+        "late-run",
+    ]));
+    lab.start(
+        "late-launch",
+        &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"]),
+    )
+    .finish();
+    assert_same(
+        ("run", &lab.bytes("late-run")),
+        ("launch", &lab.bytes("late-launch")),
+    );
     let events = lab.events("late-run");
-    for kind in ["command_delayed", "command_duplicated", "command_dropped", "query_lost"] {
+    for kind in [
+        "command_delayed",
+        "command_duplicated",
+        "command_dropped",
+        "query_lost",
+    ] {
         assert!(events.iter().any(|event| event["event"] == kind), "{kind}");
     }
-    assert!(events.iter().all(|event| event["event"] != "command_missing"));
+    assert!(
+        events
+            .iter()
+            .all(|event| event["event"] != "command_missing")
+    );
 }

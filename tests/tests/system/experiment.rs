@@ -35,7 +35,12 @@ impl Change<'_> {
 }
 
 /// Plays one hall to its end and shows every tick to `look`, which keeps its notes.
-fn play<N: Default>(file: &str, seed: u64, set: &[&str], look: &impl Fn(&mut N, &Change<'_>)) -> (N, Hall) {
+fn play<N: Default>(
+    file: &str,
+    seed: u64,
+    set: &[&str],
+    look: &impl Fn(&mut N, &Change<'_>),
+) -> (N, Hall) {
     let (mut notes, mut hall) = (N::default(), Hall::new(scenario(file, seed, set)));
     for _ in 0..hall.simulation.scenario().ticks {
         let (butler, leguin) = (hall.behavior("Butler"), hall.behavior("Leguin"));
@@ -58,13 +63,18 @@ fn for_each_seed<T: Send>(one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let next = AtomicU64::new(1);
     let work = || {
         let seeds = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
-        seeds.take_while(|seed| *seed <= SEEDS).map(|seed| (seed, one(seed))).collect::<Vec<_>>()
+        seeds
+            .take_while(|seed| *seed <= SEEDS)
+            .map(|seed| (seed, one(seed)))
+            .collect::<Vec<_>>()
     };
     let mut done: Vec<(u64, T)> = std::thread::scope(|scope| {
         let count = std::thread::available_parallelism().map_or(1, usize::from);
         let workers: Vec<_> = (0..count).map(|_| scope.spawn(work)).collect();
         let join = |worker: std::thread::ScopedJoinHandle<'_, _>| {
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            worker
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         };
         workers.into_iter().flat_map(join).collect()
     });
@@ -73,7 +83,11 @@ fn for_each_seed<T: Send>(one: impl Fn(u64) -> T + Sync) -> Vec<T> {
 }
 
 /// Plays the hall over all seeds; returns the notes that `look` made of each.
-fn watch<N: Default + Send>(file: &str, set: &[&str], look: impl Fn(&mut N, &Change<'_>) + Sync) -> Vec<N> {
+fn watch<N: Default + Send>(
+    file: &str,
+    set: &[&str],
+    look: impl Fn(&mut N, &Change<'_>) + Sync,
+) -> Vec<N> {
     for_each_seed(|seed| play(file, seed, set, &look).0)
 }
 
@@ -90,7 +104,9 @@ fn mean(values: &[f64]) -> f64 {
 
 /// Sums of pairs of counts.
 fn totals(notes: &[(u32, u32)]) -> (u32, u32) {
-    notes.iter().fold((0, 0), |sum, note| (sum.0 + note.0, sum.1 + note.1))
+    notes
+        .iter()
+        .fold((0, 0), |sum, note| (sum.0 + note.0, sum.1 + note.1))
 }
 
 /// Items 15 to 17.
@@ -101,33 +117,57 @@ fn t01_the_hall_is_that_of_the_paper() {
     assert_eq!((scenario.guests.count, scenario.body_m), (100, 2.0 * FT_M));
     let table = scenario.obstacles[0];
     let hall = Hall::new(scenario);
-    assert!(hall.at("Leguin").distance_m(table) <= 4.0 * FT_M, "Leguin is at the table");
-    assert!(hall.at("Butler").distance_m(Point::new(25.0 * FT_M, 25.0 * FT_M)) < 3.0 * FT_M);
+    assert!(
+        hall.at("Leguin").distance_m(table) <= 4.0 * FT_M,
+        "Leguin is at the table"
+    );
+    assert!(
+        hall.at("Butler")
+            .distance_m(Point::new(25.0 * FT_M, 25.0 * FT_M))
+            < 3.0 * FT_M
+    );
     assert_eq!(hall.number("Butler", "treats"), 30.0);
-    assert_eq!((hall.emotion("Butler"), hall.behavior("Butler")), ("HAPPY".into(), "SERVE".into()));
-    assert_eq!((hall.emotion("Leguin"), hall.behavior("Leguin")), ("HAPPY".into(), "WAIT".into()));
+    assert_eq!(
+        (hall.emotion("Butler"), hall.behavior("Butler")),
+        ("HAPPY".into(), "SERVE".into())
+    );
+    assert_eq!(
+        (hall.emotion("Leguin"), hall.behavior("Leguin")),
+        ("HAPPY".into(), "WAIT".into())
+    );
 }
 
 /// Items 17, 22 and 23.
 #[test]
 fn t05_an_exchange_happens_within_four_feet_and_fills_the_tray() {
-    let notes = watch(HALL, &[], |(exchanges, from_intercept): &mut (u32, u32), change| {
-        let hall = change.hall;
-        if change.meets() {
-            *exchanges += 1;
-            *from_intercept += u32::from(change.butler.0 == "INTERCEPT");
-            // He knows where she was at the last tick; meanwhile each may have moved by one stride.
-            let stride_m = 4.5 * FT_M * hall.simulation.scenario().tick_s;
-            let apart_m = hall.at("Butler").distance_m(hall.at("Leguin"));
-            assert!(apart_m <= 4.0 * FT_M + stride_m, "seed {}: {apart_m} m", change.seed);
-        }
-        if change.butler.0 == "EXCHANGE" && change.butler.1 != "EXCHANGE" {
-            assert_eq!((change.butler.1, hall.number("Butler", "treats")), ("GO_BACK", 30.0));
-            assert_eq!(sent(change.events, "go home"), 1, "he sends her home");
-        } else {
-            assert_eq!(sent(change.events, "go home"), 0, "only after an exchange");
-        }
-    });
+    let notes = watch(
+        HALL,
+        &[],
+        |(exchanges, from_intercept): &mut (u32, u32), change| {
+            let hall = change.hall;
+            if change.meets() {
+                *exchanges += 1;
+                *from_intercept += u32::from(change.butler.0 == "INTERCEPT");
+                // He knows where she was at the last tick; meanwhile each may have moved by one stride.
+                let stride_m = 4.5 * FT_M * hall.simulation.scenario().tick_s;
+                let apart_m = hall.at("Butler").distance_m(hall.at("Leguin"));
+                assert!(
+                    apart_m <= 4.0 * FT_M + stride_m,
+                    "seed {}: {apart_m} m",
+                    change.seed
+                );
+            }
+            if change.butler.0 == "EXCHANGE" && change.butler.1 != "EXCHANGE" {
+                assert_eq!(
+                    (change.butler.1, hall.number("Butler", "treats")),
+                    ("GO_BACK", 30.0)
+                );
+                assert_eq!(sent(change.events, "go home"), 1, "he sends her home");
+            } else {
+                assert_eq!(sent(change.events, "go home"), 0, "only after an exchange");
+            }
+        },
+    );
     let (exchanges, from_intercept) = totals(&notes);
     println!("{exchanges} exchanges, {from_intercept} of them begun from INTERCEPT");
     assert!(exchanges > 150 && from_intercept > 0);
@@ -141,23 +181,41 @@ fn t07_after_the_exchange_leguin_stands_until_she_is_sent_home() {
         at: Option<Point>,
         counts: (u32, u32),
     }
-    let notes = watch(HALL, &[], |Notes { at, counts: (waits, departures) }, change| {
-        let delivered = change
+    let notes = watch(
+        HALL,
+        &[],
+        |Notes {
+             at,
+             counts: (waits, departures),
+         },
+         change| {
+            let delivered = change
             .events
             .iter()
             .any(|event| matches!(event, Event::CommandDelivered { to, .. } if to.as_str() == "Leguin"));
-        // What she does in a tick moves her in the next: in the first tick of GO_HOME she still stands.
-        if matches!(change.leguin, ("EXCHANGE" | "AWAIT_GO_HOME", "AWAIT_GO_HOME" | "GO_HOME")) {
-            *waits += 1;
-            assert_eq!(Some(change.hall.at("Leguin")), *at, "seed {}", change.seed);
-        }
-        if change.leguin == ("AWAIT_GO_HOME", "GO_HOME") {
-            *departures += 1;
-            assert!(delivered, "seed {}: she left without having been sent", change.seed);
-        }
-        assert!(change.leguin != ("EXCHANGE", "GO_HOME"), "she stops and waits in between");
-        *at = Some(change.hall.at("Leguin"));
-    });
+            // What she does in a tick moves her in the next: in the first tick of GO_HOME she still stands.
+            if matches!(
+                change.leguin,
+                ("EXCHANGE" | "AWAIT_GO_HOME", "AWAIT_GO_HOME" | "GO_HOME")
+            ) {
+                *waits += 1;
+                assert_eq!(Some(change.hall.at("Leguin")), *at, "seed {}", change.seed);
+            }
+            if change.leguin == ("AWAIT_GO_HOME", "GO_HOME") {
+                *departures += 1;
+                assert!(
+                    delivered,
+                    "seed {}: she left without having been sent",
+                    change.seed
+                );
+            }
+            assert!(
+                change.leguin != ("EXCHANGE", "GO_HOME"),
+                "she stops and waits in between"
+            );
+            *at = Some(change.hall.at("Leguin"));
+        },
+    );
     let (waits, departures) = totals(&notes.iter().map(|notes| notes.counts).collect::<Vec<_>>());
     println!("{waits} ticks of waiting, {departures} departures");
     assert!(waits > 150 && departures > 150);
@@ -194,24 +252,35 @@ fn t10_intercepting_is_moving_toward_leguin() {
     }
     /// Share of the moves that brought Butler nearer to where Leguin was.
     fn share_toward(behavior: &str) -> f64 {
-        let notes = watch(HALL, &[], |Notes { before, counts: (nearer, moves) }, change| {
-            let now = (change.hall.at("Butler"), change.hall.at("Leguin"));
-            let has_way_to_go = matches!(change.leguin.0, "REFILL" | "WAIT");
-            let moved = before.filter(|before| before.0 != now.0);
-            if let (true, true, Some((butler, leguin))) =
-                (change.butler == (behavior, behavior), has_way_to_go, moved)
-            {
-                *moves += 1;
-                *nearer += u32::from(now.0.distance_m(leguin) < butler.distance_m(leguin));
-            }
-            *before = Some(now);
-        });
+        let notes = watch(
+            HALL,
+            &[],
+            |Notes {
+                 before,
+                 counts: (nearer, moves),
+             },
+             change| {
+                let now = (change.hall.at("Butler"), change.hall.at("Leguin"));
+                let has_way_to_go = matches!(change.leguin.0, "REFILL" | "WAIT");
+                let moved = before.filter(|before| before.0 != now.0);
+                if let (true, true, Some((butler, leguin))) =
+                    (change.butler == (behavior, behavior), has_way_to_go, moved)
+                {
+                    *moves += 1;
+                    *nearer += u32::from(now.0.distance_m(leguin) < butler.distance_m(leguin));
+                }
+                *before = Some(now);
+            },
+        );
         let (nearer, moves) = totals(&notes.iter().map(|notes| notes.counts).collect::<Vec<_>>());
         f64::from(nearer) / f64::from(moves)
     }
     let (intercept, serve) = (share_toward("INTERCEPT"), share_toward("SERVE"));
     println!("share of moves toward Leguin: {intercept:.2} intercepting, {serve:.2} serving");
-    assert!(intercept > 0.75, "he drives straight at her, around guests where he must: {intercept}");
+    assert!(
+        intercept > 0.75,
+        "he drives straight at her, around guests where he must: {intercept}"
+    );
     assert!(serve < 0.65, "serving is a random walk: {serve}");
 }
 
@@ -223,23 +292,36 @@ fn t11_butler_goes_back_to_where_he_started_and_serves_again() {
         if change.butler == ("GO_BACK", "SERVE") {
             *returns += 1;
             let missed_m = change.hall.at("Butler").distance_m(start);
-            assert!(missed_m <= 2.5 * FT_M, "seed {}: {missed_m} m from the start", change.seed);
+            assert!(
+                missed_m <= 2.5 * FT_M,
+                "seed {}: {missed_m} m from the start",
+                change.seed
+            );
         }
         let is_empty = change.hall.number("Butler", "treats") == 0.0;
         *emptied += u32::from(change.butler.1 == "GO_BACK" && is_empty);
     });
     let (returns, emptied) = totals(&notes);
-    println!("{returns} returns; in {emptied} ticks the tray was empty before the start was reached");
+    println!(
+        "{returns} returns; in {emptied} ticks the tray was empty before the start was reached"
+    );
     assert!(returns > 150);
-    assert!(emptied > 0, "sometimes the treats are gone before he is back");
+    assert!(
+        emptied > 0,
+        "sometimes the treats are gone before he is back"
+    );
 }
 
 /// Share of the exchanges that Butler began by intercepting, over all seeds.
 fn share_intercepted(set: &[&str]) -> f64 {
-    let notes = watch(HALL, set, |(exchanges, from_intercept): &mut (u32, u32), change| {
-        *exchanges += u32::from(change.meets());
-        *from_intercept += u32::from(change.meets() && change.butler.0 == "INTERCEPT");
-    });
+    let notes = watch(
+        HALL,
+        set,
+        |(exchanges, from_intercept): &mut (u32, u32), change| {
+            *exchanges += u32::from(change.meets());
+            *from_intercept += u32::from(change.meets() && change.butler.0 == "INTERCEPT");
+        },
+    );
     let (exchanges, from_intercept) = totals(&notes);
     f64::from(from_intercept) / f64::from(exchanges)
 }
@@ -248,9 +330,17 @@ fn share_intercepted(set: &[&str]) -> f64 {
 #[test]
 fn t12_who_blocks_leguin_frustrates_butler_who_intercepts_and_else_he_does_not() {
     // Obstacles side by side, from wall to wall around the table's corner.
-    let around = (1..=9).step_by(2).map(|y| (9, y)).chain((1..=7).step_by(2).map(|x| (x, 9)));
-    let around = around.map(|(x, y)| format!("{{ at = [\"{x} ft\", \"{y} ft\"] }}")).collect::<Vec<_>>();
-    let wall = format!("obstacle=[{{ at = [\"2 ft\", \"2 ft\"] }}, {}]", around.join(", "));
+    let around = (1..=9)
+        .step_by(2)
+        .map(|y| (9, y))
+        .chain((1..=7).step_by(2).map(|x| (x, 9)));
+    let around = around
+        .map(|(x, y)| format!("{{ at = [\"{x} ft\", \"{y} ft\"] }}"))
+        .collect::<Vec<_>>();
+    let wall = format!(
+        "obstacle=[{{ at = [\"2 ft\", \"2 ft\"] }}, {}]",
+        around.join(", ")
+    );
     for (what, set) in [
         ("a wall", vec![wall.as_str(), "guests.count=0"]),
         ("a wall and guests", vec![wall.as_str()]),
@@ -258,7 +348,8 @@ fn t12_who_blocks_leguin_frustrates_butler_who_intercepts_and_else_he_does_not()
     ] {
         let is_met = watch(HALL, &set, |is_met: &mut bool, change| {
             let hall = change.hall;
-            *is_met |= hall.emotion("Butler") == "FRUSTRATED" && change.butler == ("SERVE", "INTERCEPT");
+            *is_met |=
+                hall.emotion("Butler") == "FRUSTRATED" && change.butler == ("SERVE", "INTERCEPT");
         });
         let share = is_met.iter().filter(|is_met| **is_met).count() as f64 / is_met.len() as f64;
         println!(
@@ -275,8 +366,8 @@ fn t12_who_blocks_leguin_frustrates_butler_who_intercepts_and_else_he_does_not()
 /// Item 21.
 #[test]
 fn t13_the_more_guests_the_more_exchanges_are_begun_by_intercepting() {
-    let shares =
-        ["guests.count=0", "guests.count=50", "guests.count=100"].map(|set| share_intercepted(&[set]));
+    let shares = ["guests.count=0", "guests.count=50", "guests.count=100"]
+        .map(|set| share_intercepted(&[set]));
     println!("share of exchanges begun from INTERCEPT with 0, 50, 100 guests: {shares:.3?}");
     assert!(shares[0] < shares[1] && shares[1] < shares[2], "{shares:?}");
 }
@@ -285,15 +376,26 @@ fn t13_the_more_guests_the_more_exchanges_are_begun_by_intercepting() {
 #[test]
 fn t14_vonda_stands_still_unless_she_is_called() {
     let mut hall = Hall::new(scenario(THREE, 1, &[]));
-    let (at, emotion, behavior) = (hall.at("Vonda"), hall.emotion("Vonda"), hall.behavior("Vonda"));
+    let (at, emotion, behavior) = (
+        hall.at("Vonda"),
+        hall.emotion("Vonda"),
+        hall.behavior("Vonda"),
+    );
     for _ in 0..hall.simulation.scenario().ticks {
         hall.step();
         assert_eq!(
-            (hall.at("Vonda"), hall.emotion("Vonda"), hall.behavior("Vonda")),
+            (
+                hall.at("Vonda"),
+                hall.emotion("Vonda"),
+                hall.behavior("Vonda")
+            ),
             (at, emotion.clone(), behavior.clone())
         );
     }
-    assert!(hall.number("Butler", "exchanges") > 3.0, "Leguin works meanwhile");
+    assert!(
+        hall.number("Butler", "exchanges") > 3.0,
+        "Leguin works meanwhile"
+    );
 }
 
 /// Item 27.
@@ -304,7 +406,10 @@ fn t14_vonda_comes_in_leguins_place_when_butlers_parameter_names_her() {
     let mut vonda_worked = false;
     for _ in 0..hall.simulation.scenario().ticks {
         hall.step();
-        assert_eq!((hall.at("Leguin"), hall.behavior("Leguin")), (at, "WAIT".into()));
+        assert_eq!(
+            (hall.at("Leguin"), hall.behavior("Leguin")),
+            (at, "WAIT".into())
+        );
         vonda_worked |= hall.behavior("Vonda") == "EXCHANGE";
     }
     assert!(vonda_worked && hall.number("Butler", "exchanges") > 3.0);
@@ -316,12 +421,19 @@ fn t15_the_state_of_figure_6_is_reached() {
     type Found = Vec<(u64, u64, f64)>;
     let notes = watch(HALL, &[], |found: &mut Found, change| {
         let hall = change.hall;
-        let is_concerned = ["Butler", "Leguin"].iter().all(|robot| hall.emotion(robot) == "CONCERNED");
+        let is_concerned = ["Butler", "Leguin"]
+            .iter()
+            .all(|robot| hall.emotion(robot) == "CONCERNED");
         let works = (change.butler.1, change.leguin.1) == ("SERVE", "REFILL");
         if !(is_concerned && works && hall.number("Butler", "treats") == 7.0) {
             return;
         }
-        let table = hall.simulation.scenario().robots.iter().find(|(name, _)| name.as_str() == "Leguin");
+        let table = hall
+            .simulation
+            .scenario()
+            .robots
+            .iter()
+            .find(|(name, _)| name.as_str() == "Leguin");
         let from_m = hall.at("Leguin").distance_m(table.unwrap().1.at);
         let to_m = hall.at("Leguin").distance_m(hall.at("Butler"));
         let part = from_m / (from_m + to_m);
@@ -349,13 +461,19 @@ fn lossy(loss: f64, arm: &[&str]) -> Losses {
     let set: Vec<&str> = arm.iter().copied().chain([loss.as_str()]).collect();
     let runs = for_each_seed(|seed| {
         let (_, hall) = play(HALL, seed, &set, &|(): &mut (), _| {});
-        (hall.number("Butler", "exchanges"), hall.number("Butler", "empty_s"))
+        (
+            hall.number("Butler", "exchanges"),
+            hall.number("Butler", "empty_s"),
+        )
     });
     let (exchanges, empty_s) = runs.into_iter().unzip();
     Losses { exchanges, empty_s }
 }
 
-const AFFECTLESS: [&str; 2] = ["robot.Butler.params.affect=off", "robot.Leguin.params.affect=off"];
+const AFFECTLESS: [&str; 2] = [
+    "robot.Butler.params.affect=off",
+    "robot.Leguin.params.affect=off",
+];
 const TIMER: &str = "robot.Butler.params.resend=on";
 
 /// The four teams, by name: affectless, timer repeat, affect only, both.
@@ -367,7 +485,10 @@ fn arms(loss: f64) -> BTreeMap<&'static str, Losses> {
         ("affect only", &[]),
         ("both", &[TIMER]),
     ];
-    let arms: BTreeMap<_, _> = arms.into_iter().map(|(name, arm)| (name, lossy(loss, arm))).collect();
+    let arms: BTreeMap<_, _> = arms
+        .into_iter()
+        .map(|(name, arm)| (name, lossy(loss, arm)))
+        .collect();
     for (name, Losses { exchanges, empty_s }) in &arms {
         let (least, most) = (
             exchanges.iter().copied().fold(f64::INFINITY, f64::min),
@@ -386,7 +507,11 @@ fn arms(loss: f64) -> BTreeMap<&'static str, Losses> {
 fn t20_without_any_command_emotions_keep_the_team_at_work() {
     let arms = arms(1.0);
     for with in ["affect only", "both"] {
-        let least = arms[with].exchanges.iter().copied().fold(f64::INFINITY, f64::min);
+        let least = arms[with]
+            .exchanges
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
         assert!(least >= 3.0, "{with}: {least} exchanges in some seed");
     }
     for without in ["affectless", "timer repeat"] {
@@ -400,8 +525,14 @@ fn t21_with_a_quarter_of_commands_lost_emotions_do_better_than_a_timer() {
     let arms = arms(0.25);
     let empty_s = |arm| mean(&arms[arm].empty_s);
     let (affect, timer) = (empty_s("affect only"), empty_s("timer repeat"));
-    assert!(affect < timer / 2.0, "{affect} s, and {timer} s with the timer");
-    assert!(timer < empty_s("affectless"), "a timer is better than nothing");
+    assert!(
+        affect < timer / 2.0,
+        "{affect} s, and {timer} s with the timer"
+    );
+    assert!(
+        timer < empty_s("affectless"),
+        "a timer is better than nothing"
+    );
 }
 
 /// Robots that act in another order than that of their names.
@@ -410,8 +541,13 @@ struct Reordered(LocalHost);
 impl Barrier for Reordered {
     type Interrupt = RobotError;
     fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
-        let reports = self.0.exchange(&clock, &mut |name| simulation.percept(name))?;
-        Ok(Exchange { reports, membership: Vec::new() })
+        let reports = self
+            .0
+            .exchange(&clock, &mut |name| simulation.percept(name))?;
+        Ok(Exchange {
+            reports,
+            membership: Vec::new(),
+        })
     }
 }
 
@@ -422,7 +558,10 @@ fn events_in_order(order: [&str; 3]) -> Vec<Event> {
         Simulation::new(scenario(THREE, 5, &["network.commands={ loss = 0.1 }"]), 1).unwrap();
     let seats = order.map(|robot| {
         let name = robot.parse().unwrap();
-        (robots::make(robot).unwrap(), simulation.welcome(&run, &name, 1).unwrap())
+        (
+            robots::make(robot).unwrap(),
+            simulation.welcome(&run, &name, 1).unwrap(),
+        )
     });
     let mut robots = Reordered(LocalHost::new(seats.into()));
     let mut events = simulation.init(&mut robots).unwrap().events;
@@ -447,9 +586,12 @@ fn the_readable_log_tells_the_story() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--run", "story", "--duration", "300 s"]);
     let log = std::fs::read_to_string(lab.file("story", "cars.log")).unwrap();
-    for part in
-        ["emotion HAPPY -> CONFIDENT", "-> Leguin: refill", "behavior WAIT -> REFILL", "-> Leguin: go home"]
-    {
+    for part in [
+        "emotion HAPPY -> CONFIDENT",
+        "-> Leguin: refill",
+        "behavior WAIT -> REFILL",
+        "-> Leguin: go home",
+    ] {
         assert!(log.contains(part), "no {part:?} in\n{log}");
     }
 }
@@ -464,18 +606,36 @@ fn shown<'a>(page: &'a str, file: &str) -> &'a str {
 /// Vera, whom `crates/robots/tests/new_robot.rs` plays in memory, as somebody starts her who follows the page.
 #[test]
 fn the_robot_of_the_documentation_runs_as_a_process() {
-    let (lab, page) = (Lab::new(), std::fs::read_to_string(root().join("docs/new-robot.md")).unwrap());
+    let (lab, page) = (
+        Lab::new(),
+        std::fs::read_to_string(root().join("docs/new-robot.md")).unwrap(),
+    );
     for folder in ["configs", "launch"] {
         std::fs::create_dir(lab.out().join(folder)).unwrap();
         let file = format!("{folder}/vera.toml");
         let text = shown(&page, &file);
         let program = programs().join("examples/vera");
-        lab.write(&file, &text.replace("../target/release/examples/vera", program.to_str().unwrap()));
+        lab.write(
+            &file,
+            &text.replace("../target/release/examples/vera", program.to_str().unwrap()),
+        );
     }
     let launch = lab.out().join("launch/vera.toml");
-    lab.ok(&["launch", launch.to_str().unwrap(), "--speed", "max", "--no-console", "--run", "party"]);
+    lab.ok(&[
+        "launch",
+        launch.to_str().unwrap(),
+        "--speed",
+        "max",
+        "--no-console",
+        "--run",
+        "party",
+    ]);
     let log = std::fs::read_to_string(lab.file("party", "cars.log")).unwrap();
-    for part in ["emotion CALM -> SHY", "behavior MINGLE -> HIDE", "behavior HIDE -> MINGLE"] {
+    for part in [
+        "emotion CALM -> SHY",
+        "behavior MINGLE -> HIDE",
+        "behavior HIDE -> MINGLE",
+    ] {
         assert!(log.contains(part), "no {part:?} in\n{log}");
     }
 }
@@ -489,7 +649,9 @@ fn numbers_in(folder: &Path) -> BTreeSet<u32> {
             numbers.extend(numbers_in(&path));
         } else if path.extension().is_some_and(|extension| extension == "rs") {
             let text = std::fs::read_to_string(&path).unwrap();
-            let names = text.lines().filter_map(|line| line.trim_start().strip_prefix("fn t"));
+            let names = text
+                .lines()
+                .filter_map(|line| line.trim_start().strip_prefix("fn t"));
             numbers.extend(names.filter_map(|name| name.split_once('_')?.0.parse::<u32>().ok()));
         }
     }
@@ -498,7 +660,15 @@ fn numbers_in(folder: &Path) -> BTreeSet<u32> {
 
 #[test]
 fn every_documented_behavior_has_its_test() {
-    let folders = ["crates/affect/tests", "crates/robots/tests", "tests/tests/system", "crates/cars/tests"];
-    let found: BTreeSet<u32> = folders.iter().flat_map(|folder| numbers_in(&root().join(folder))).collect();
+    let folders = [
+        "crates/affect/tests",
+        "crates/robots/tests",
+        "tests/tests/system",
+        "crates/cars/tests",
+    ];
+    let found: BTreeSet<u32> = folders
+        .iter()
+        .flat_map(|folder| numbers_in(&root().join(folder)))
+        .collect();
     assert_eq!(found, (1..=25).collect());
 }

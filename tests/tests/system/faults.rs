@@ -20,34 +20,58 @@ fn launch_file(lab: &Lab, leguin: &str) -> String {
 }
 
 fn nobody_is_left(run: &str) {
-    eventually("the last process to be gone", || find(run).is_empty().then_some(()));
+    eventually("the last process to be gone", || {
+        find(run).is_empty().then_some(())
+    });
 }
 
 #[test]
 fn a_stopped_robot_holds_the_clock_costs_nothing_and_changes_nothing() {
     let lab = Lab::new();
-    let mut launch = lab.start("hang", &["launch", FILE, "--duration", "60 s", "--speed", "10"]);
+    let mut launch = lab.start(
+        "hang",
+        &["launch", FILE, "--duration", "60 s", "--speed", "10"],
+    );
     launch.prints("behavior");
     let leguin = launch.process("cars-leguin");
     let stopped = Instant::now();
     send(leguin, Signal::SIGSTOP);
     let said = launch.prints("waiting for");
-    println!("the terminal named whom it waits for after {:?}", said - stopped);
-    assert!(launch.printed().contains("Leguin ("), "{}", launch.printed());
+    println!(
+        "the terminal named whom it waits for after {:?}",
+        said - stopped
+    );
+    assert!(
+        launch.printed().contains("Leguin ("),
+        "{}",
+        launch.printed()
+    );
 
     // Long enough that its link is given up, too.
     std::thread::sleep(Duration::from_secs(1));
     let (before_s, begun) = (launch.cpu_s(), Instant::now());
     std::thread::sleep(Duration::from_secs(4));
     let share = (launch.cpu_s() - before_s) / begun.elapsed().as_secs_f64();
-    println!("all processes together used {:.2} % of a core while the clock was held", share * 100.0);
-    assert!(share < 0.02, "waiting used {:.1} % of a core", share * 100.0);
+    println!(
+        "all processes together used {:.2} % of a core while the clock was held",
+        share * 100.0
+    );
+    assert!(
+        share < 0.02,
+        "waiting used {:.1} % of a core",
+        share * 100.0
+    );
 
     send(leguin, Signal::SIGCONT);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "no-hang", "--duration", "60 s"]);
-    assert_same(("stopped and continued", &lab.bytes("hang")), ("undisturbed", &lab.bytes("no-hang")));
-    let held = lab.summary("hang")["wall"]["held_up_by"]["Leguin"]["longest_s"].as_f64().unwrap();
+    assert_same(
+        ("stopped and continued", &lab.bytes("hang")),
+        ("undisturbed", &lab.bytes("no-hang")),
+    );
+    let held = lab.summary("hang")["wall"]["held_up_by"]["Leguin"]["longest_s"]
+        .as_f64()
+        .unwrap();
     assert!(held > 1.0, "the summary says who held up the run: {held}");
     nobody_is_left("hang");
 }
@@ -71,14 +95,22 @@ fn a_killed_robot_that_is_required_ends_the_launch_with_its_status() {
 fn a_killed_robot_that_is_restarted_takes_part_again() {
     let lab = Lab::new();
     let file = launch_file(&lab, "restart = \"on-failure\"\nbackoff = \"0.1 s\"");
-    let mut launch = lab.start("restart", &["launch", &file, "--speed", "20", "--duration", "120 s"]);
+    let mut launch = lab.start(
+        "restart",
+        &["launch", &file, "--speed", "20", "--duration", "120 s"],
+    );
     launch.prints("behavior");
     send(launch.process("cars-leguin"), Signal::SIGKILL);
     launch.finish();
     nobody_is_left("restart");
     let events = lab.events("restart");
-    let joined = events.iter().find(|event| event["event"] == "joined" && event["generation"] == 2);
-    assert_eq!(joined.expect("the second incarnation joined")["robot"], "Leguin");
+    let joined = events
+        .iter()
+        .find(|event| event["event"] == "joined" && event["generation"] == 2);
+    assert_eq!(
+        joined.expect("the second incarnation joined")["robot"],
+        "Leguin"
+    );
     assert_eq!(events.last().unwrap()["reason"], "finished");
     assert_eq!(lab.summary("restart")["robots"]["Leguin"]["returns"], 1);
 }
@@ -105,7 +137,10 @@ fn a_crash_of_the_simulator_loses_at_most_the_current_tick() {
     nobody_is_left("crash");
     let record = lab.bytes("crash");
     lab.ok(&["run", FILE, "--run", "no-crash"]);
-    assert!(record.ends_with(b"\n") && lab.bytes("no-crash").starts_with(&record), "the record is whole");
+    assert!(
+        record.ends_with(b"\n") && lab.bytes("no-crash").starts_with(&record),
+        "the record is whole"
+    );
 }
 
 #[test]
@@ -139,7 +174,12 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
         let status = launch.wait();
         assert_eq!(status.success(), mode == "continue", "{}", launch.printed());
         let events = lab.events(&run);
-        assert_eq!(events.last().unwrap()["reason"], end, "{}", launch.printed());
+        assert_eq!(
+            events.last().unwrap()["reason"],
+            end,
+            "{}",
+            launch.printed()
+        );
         nobody_is_left(&run);
     }
 }
@@ -147,7 +187,14 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
 #[test]
 fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
     let lab = Lab::new();
-    let set = ["--set", "robot.Leguin.on_late=continue", "--set", "deadline=0.2 s", "--set", "lose_after=3"];
+    let set = [
+        "--set",
+        "robot.Leguin.on_late=continue",
+        "--set",
+        "deadline=0.2 s",
+        "--set",
+        "lose_after=3",
+    ];
     let mut args = vec!["launch", FILE, "--speed", "20", "--duration", "200 s"];
     args.extend(set);
     let mut launch = lab.start("late-own", &args);
@@ -159,13 +206,21 @@ fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
     launch.finish();
     let events = lab.events("late-own");
     let of = |kind: &str| -> Vec<u64> {
-        let own = events.iter().filter(|event| event["event"] == kind && event["robot"] == "Leguin");
+        let own = events
+            .iter()
+            .filter(|event| event["event"] == kind && event["robot"] == "Leguin");
         own.map(|event| event["tick"].as_u64().unwrap()).collect()
     };
     let (missed, lost, joined) = (of("missed"), of("lost"), of("joined"));
     assert_eq!(lost.len(), 1, "{lost:?}");
-    assert!(missed.len() >= 3 && missed[2] == lost[0], "lost after three in a row: {missed:?} {lost:?}");
-    assert!(joined.len() == 2 && joined[1] > lost[0], "it returned: {joined:?}");
+    assert!(
+        missed.len() >= 3 && missed[2] == lost[0],
+        "lost after three in a row: {missed:?} {lost:?}"
+    );
+    assert!(
+        joined.len() == 2 && joined[1] > lost[0],
+        "it returned: {joined:?}"
+    );
     // It missed every tick in between, and none after.
     assert_eq!(*missed.last().unwrap() + 1, joined[1]);
     assert_eq!(missed.len() as u64, joined[1] - missed[0]);
@@ -174,7 +229,14 @@ fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
 #[test]
 fn a_robot_that_is_stuck_does_not_freeze_the_others() {
     let lab = Lab::new();
-    let set = ["--set", "on_late=continue", "--set", "deadline=0.1 s", "--set", "lose_after=2"];
+    let set = [
+        "--set",
+        "on_late=continue",
+        "--set",
+        "deadline=0.1 s",
+        "--set",
+        "lose_after=2",
+    ];
     let mut args = vec!["launch", FILE, "--speed", "10", "--duration", "20000 s"];
     args.extend(set);
     let mut launch = lab.start("late-stuck", &args);
@@ -194,18 +256,43 @@ fn a_robot_that_is_stuck_does_not_freeze_the_others() {
 #[test]
 fn what_the_clock_does_about_late_robots_changes_while_it_is_held() {
     let lab = Lab::new();
-    let mut launch = lab.start("late-change", &["launch", FILE, "--speed", "20", "--duration", "60 s"]);
+    let mut launch = lab.start(
+        "late-change",
+        &["launch", FILE, "--speed", "20", "--duration", "60 s"],
+    );
     launch.prints("behavior");
     send(launch.process("cars-leguin"), Signal::SIGSTOP);
     launch.prints("waiting for");
     let status = lab.ok(&["ctl", "status", "--run", "late-change"]);
     assert!(status.contains("Leguin"), "{status}");
-    let (code, text) = lab.fails(&["ctl", "late", "continue", "--robot", "Nobody", "--run", "late-change"]);
-    assert!(code == 1 && text.contains("no robot of this run is called Nobody"), "{text}");
-    lab.ok(&["ctl", "late", "continue", "--deadline", "0.1 s", "--run", "late-change"]);
+    let (code, text) = lab.fails(&[
+        "ctl",
+        "late",
+        "continue",
+        "--robot",
+        "Nobody",
+        "--run",
+        "late-change",
+    ]);
+    assert!(
+        code == 1 && text.contains("no robot of this run is called Nobody"),
+        "{text}"
+    );
+    lab.ok(&[
+        "ctl",
+        "late",
+        "continue",
+        "--deadline",
+        "0.1 s",
+        "--run",
+        "late-change",
+    ]);
     launch.prints("is lost");
     launch.finish();
-    assert_eq!(lab.events("late-change").last().unwrap()["reason"], "finished");
+    assert_eq!(
+        lab.events("late-change").last().unwrap()["reason"],
+        "finished"
+    );
     nobody_is_left("late-change");
 }
 
@@ -213,20 +300,35 @@ fn what_the_clock_does_about_late_robots_changes_while_it_is_held() {
 fn a_crash_of_the_scenario_happens_at_its_tick_and_is_the_same_every_time() {
     let lab = Lab::new();
     let fault = "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"40 s\", until = \"70 s\" }]";
-    let set = ["--set", fault, "--set", "on_late=continue", "--set", "deadline=30 s"];
+    let set = [
+        "--set",
+        fault,
+        "--set",
+        "on_late=continue",
+        "--set",
+        "deadline=30 s",
+    ];
     for run in ["fault-crash", "fault-again"] {
         let mut args = vec!["launch", FILE, "--speed", "max", "--duration", "120 s"];
         args.extend(set);
         lab.start(run, &args).finish();
         nobody_is_left(run);
     }
-    assert_same(("once", &lab.bytes("fault-crash")), ("again", &lab.bytes("fault-again")));
+    assert_same(
+        ("once", &lab.bytes("fault-crash")),
+        ("again", &lab.bytes("fault-again")),
+    );
     let events = lab.events("fault-crash");
     let of = |kind: &str| -> Vec<u64> {
-        let own = events.iter().filter(|event| event["event"] == kind && event["robot"] == "Leguin");
+        let own = events
+            .iter()
+            .filter(|event| event["event"] == kind && event["robot"] == "Leguin");
         own.map(|event| event["tick"].as_u64().unwrap()).collect()
     };
-    assert_eq!((of("fault"), of("lost"), of("joined")), (vec![80, 140], vec![80], vec![0, 140]));
+    assert_eq!(
+        (of("fault"), of("lost"), of("joined")),
+        (vec![80, 140], vec![80], vec![0, 140])
+    );
     assert_eq!(of("missed"), (80..140).collect::<Vec<_>>());
     assert_eq!(lab.summary("fault-crash")["robots"]["Leguin"]["returns"], 1);
 }
@@ -236,17 +338,39 @@ fn where_the_clock_waits_hanging_and_slow_processes_change_nothing_in_the_record
     let lab = Lab::new();
     let faults = "fault=[{ robot = \"Leguin\", do = \"hang\", at = \"10 s\", for = \"1 s\" }, \
                   { robot = \"Butler\", do = \"slow\", at = \"20 s\", until = \"22 s\" }]";
-    lab.start("fault-hang", &["launch", FILE, "--speed", "max", "--duration", "40 s", "--set", faults])
-        .finish();
+    lab.start(
+        "fault-hang",
+        &[
+            "launch",
+            FILE,
+            "--speed",
+            "max",
+            "--duration",
+            "40 s",
+            "--set",
+            faults,
+        ],
+    )
+    .finish();
     lab.ok(&["run", FILE, "--run", "fault-none", "--duration", "40 s"]);
     let without_faults = |run: &str| -> Vec<u8> {
         let text = String::from_utf8(lab.bytes(run)).unwrap();
-        let lines = text.lines().filter(|line| !line.contains("\"event\":\"fault\""));
-        lines.flat_map(|line| format!("{line}\n").into_bytes()).collect()
+        let lines = text
+            .lines()
+            .filter(|line| !line.contains("\"event\":\"fault\""));
+        lines
+            .flat_map(|line| format!("{line}\n").into_bytes())
+            .collect()
     };
-    assert_same(("with", &without_faults("fault-hang")), ("without", &without_faults("fault-none")));
+    assert_same(
+        ("with", &without_faults("fault-hang")),
+        ("without", &without_faults("fault-none")),
+    );
     let held = &lab.summary("fault-hang")["wall"]["held_up_by"];
-    assert!(held["Leguin"]["longest_s"].as_f64().unwrap() > 0.5, "{held}");
+    assert!(
+        held["Leguin"]["longest_s"].as_f64().unwrap() > 0.5,
+        "{held}"
+    );
     nobody_is_left("fault-hang");
 }
 
@@ -254,12 +378,30 @@ fn where_the_clock_waits_hanging_and_slow_processes_change_nothing_in_the_record
 fn impossible_faults_are_refused_where_they_stand() {
     let lab = Lab::new();
     for (fault, reason) in [
-        ("{ robot = \"Nobody\", do = \"crash\", at = \"4 s\", for = \"1 s\" }", "called Nobody"),
-        ("{ robot = \"Leguin\", do = \"melt\", at = \"4 s\" }", "melt"),
-        ("{ robot = \"Leguin\", do = \"crash\", at = \"4 s\" }", "for ever"),
-        ("{ robot = \"Leguin\", do = \"hang\", at = \"4 s\", until = \"5 s\" }", "for ever"),
-        ("{ robot = \"Leguin\", do = \"hang\", at = \"4 s\", until = \"5 s\", for = \"1 s\" }", "say one"),
-        ("{ robot = \"Leguin\", do = \"slow\", at = \"4 s\", until = \"3 s\" }", "before it begins"),
+        (
+            "{ robot = \"Nobody\", do = \"crash\", at = \"4 s\", for = \"1 s\" }",
+            "called Nobody",
+        ),
+        (
+            "{ robot = \"Leguin\", do = \"melt\", at = \"4 s\" }",
+            "melt",
+        ),
+        (
+            "{ robot = \"Leguin\", do = \"crash\", at = \"4 s\" }",
+            "for ever",
+        ),
+        (
+            "{ robot = \"Leguin\", do = \"hang\", at = \"4 s\", until = \"5 s\" }",
+            "for ever",
+        ),
+        (
+            "{ robot = \"Leguin\", do = \"hang\", at = \"4 s\", until = \"5 s\", for = \"1 s\" }",
+            "say one",
+        ),
+        (
+            "{ robot = \"Leguin\", do = \"slow\", at = \"4 s\", until = \"3 s\" }",
+            "before it begins",
+        ),
     ] {
         let set = format!("fault=[{fault}]");
         let (_, text) = lab.fails(&["launch", FILE, "--set", &set]);

@@ -1,6 +1,10 @@
 //! The whole system: real processes, real zenoh, the shipped files.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot set up its subject fails"
+)]
 
 mod boundaries;
 mod chaos;

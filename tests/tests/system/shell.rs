@@ -5,10 +5,22 @@ use system_tests::{Lab, eventually};
 #[test]
 fn a_robot_can_be_asked_and_commanded_from_a_shell() {
     let lab = Lab::new();
-    let mut launch =
-        lab.start("shell", &["launch", "launch/hors_doeuvres.toml", "--paused", "--duration", "60 s"]);
+    let mut launch = lab.start(
+        "shell",
+        &[
+            "launch",
+            "launch/hors_doeuvres.toml",
+            "--paused",
+            "--duration",
+            "60 s",
+        ],
+    );
     eventually("the run", || {
-        lab.cars(&["ctl", "step", "--run", "shell"]).status().unwrap().success().then_some(())
+        lab.cars(&["ctl", "step", "--run", "shell"])
+            .status()
+            .unwrap()
+            .success()
+            .then_some(())
     });
     let ask = |what| lab.ok(&["query", "Leguin", what, "--run", "shell"]);
     assert_eq!(ask("emotion_state").trim(), "HAPPY");
@@ -20,18 +32,34 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
     let sent = lab.ok(&["command", "Leguin", "refill", "--run", "shell"]);
     assert!(sent.contains("Leguin receives"), "{sent}");
     lab.ok(&["ctl", "step", "3", "--run", "shell"]);
-    assert_eq!(ask("behavior_state").trim(), "REFILL", "the command took effect");
+    assert_eq!(
+        ask("behavior_state").trim(),
+        "REFILL",
+        "the command took effect"
+    );
     let (_, text) = lab.fails(&["command", "Nobody", "refill", "--run", "shell"]);
-    assert!(text.contains("no robot of this run is called Nobody"), "{text}");
+    assert!(
+        text.contains("no robot of this run is called Nobody"),
+        "{text}"
+    );
 
     lab.ok(&["ctl", "stop", "--run", "shell"]);
     launch.finish();
     let events = lab.events("shell");
     let find = |kind: &str| {
-        events.iter().find(|event| event["event"] == kind && event["from"] == "operator").cloned()
+        events
+            .iter()
+            .find(|event| event["event"] == kind && event["from"] == "operator")
+            .cloned()
     };
-    assert_eq!(find("command_sent").expect("it is recorded")["command"], "refill");
-    assert_eq!(find("command_delivered").expect("it is recorded")["to"], "Leguin");
+    assert_eq!(
+        find("command_sent").expect("it is recorded")["command"],
+        "refill"
+    );
+    assert_eq!(
+        find("command_delivered").expect("it is recorded")["to"],
+        "Leguin"
+    );
     let log = lab.ok(&["log", "--run", "shell"]);
     assert!(log.contains("operator     -> Leguin: refill"), "{log}");
 }
@@ -39,10 +67,22 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
 #[test]
 fn the_log_can_be_followed_to_the_end() {
     let lab = Lab::new();
-    let mut launch =
-        lab.start("follow", &["launch", "launch/hors_doeuvres.toml", "--paused", "--duration", "60 s"]);
+    let mut launch = lab.start(
+        "follow",
+        &[
+            "launch",
+            "launch/hors_doeuvres.toml",
+            "--paused",
+            "--duration",
+            "60 s",
+        ],
+    );
     eventually("the run", || {
-        lab.cars(&["ctl", "step", "--run", "follow"]).status().unwrap().success().then_some(())
+        lab.cars(&["ctl", "step", "--run", "follow"])
+            .status()
+            .unwrap()
+            .success()
+            .then_some(())
     });
     let mut log = lab.start("follow", &["log", "-f"]);
     log.prints("initialized");
@@ -56,7 +96,11 @@ fn the_log_can_be_followed_to_the_end() {
 #[test]
 fn files_are_checked_with_line_and_place() {
     let lab = Lab::new();
-    let good = lab.cars_without_out(&["check", "launch/hors_doeuvres.toml", "configs/three_robots.toml"]);
+    let good = lab.cars_without_out(&[
+        "check",
+        "launch/hors_doeuvres.toml",
+        "configs/three_robots.toml",
+    ]);
     assert!(good.0 == 0 && good.1.contains("ok"), "{}", good.1);
     let bad = lab.write("bad.toml", "seed = 1\n[guests]\ncuont = 5\n");
     let (code, text) = lab.cars_without_out(&["check", bad.to_str().unwrap()]);
@@ -89,7 +133,13 @@ fn a_plain_roster_plays() {
 #[test]
 fn a_dry_run_says_what_it_would_start_and_starts_nothing() {
     let lab = Lab::new();
-    let printed = lab.ok(&["launch", "launch/hors_doeuvres.toml", "--dry-run", "--run", "dry"]);
+    let printed = lab.ok(&[
+        "launch",
+        "launch/hors_doeuvres.toml",
+        "--dry-run",
+        "--run",
+        "dry",
+    ]);
     for program in ["cars-sim", "cars-butler", "cars-leguin"] {
         assert!(printed.contains(program), "no {program} in\n{printed}");
     }
@@ -99,13 +149,28 @@ fn a_dry_run_says_what_it_would_start_and_starts_nothing() {
 #[test]
 fn a_run_is_three_processes_and_leaves_a_whole_folder() {
     let lab = Lab::new();
-    let mut launch =
-        lab.start("folder", &["launch", "launch/hors_doeuvres.toml", "--duration", "60 s", "--speed", "20"]);
+    let mut launch = lab.start(
+        "folder",
+        &[
+            "launch",
+            "launch/hors_doeuvres.toml",
+            "--duration",
+            "60 s",
+            "--speed",
+            "20",
+        ],
+    );
     for program in ["cars-sim", "cars-butler", "cars-leguin"] {
         assert!(launch.process(program) > 0);
     }
     launch.finish();
-    for file in ["scenario.toml", "events.jsonl", "cars.log", "summary.json", "logs"] {
+    for file in [
+        "scenario.toml",
+        "events.jsonl",
+        "cars.log",
+        "summary.json",
+        "logs",
+    ] {
         assert!(lab.file("folder", file).exists(), "no {file}");
     }
     assert!(
@@ -114,21 +179,34 @@ fn a_run_is_three_processes_and_leaves_a_whole_folder() {
         launch.printed()
     );
     let summary = lab.summary("folder");
-    assert_eq!((&summary["ticks"], &summary["end"]), (&120.into(), &"finished".into()));
+    assert_eq!(
+        (&summary["ticks"], &summary["end"]),
+        (&120.into(), &"finished".into())
+    );
     let last = lab.events("folder").pop().unwrap();
     assert_eq!(last["digest"], summary["digest"]);
     for event in lab.events("folder") {
         let text = event.to_string();
-        assert!(!text.contains("127.0.0.1") && !text.contains("pid"), "a simulated fact only: {text}");
+        assert!(
+            !text.contains("127.0.0.1") && !text.contains("pid"),
+            "a simulated fact only: {text}"
+        );
     }
 }
 
 #[test]
 fn a_run_in_progress_is_not_overwritten() {
     let lab = Lab::new();
-    let mut launch = lab.start("twice", &["launch", "launch/hors_doeuvres.toml", "--paused"]);
+    let mut launch = lab.start(
+        "twice",
+        &["launch", "launch/hors_doeuvres.toml", "--paused"],
+    );
     eventually("the run", || {
-        lab.cars(&["ctl", "step", "--run", "twice"]).status().unwrap().success().then_some(())
+        lab.cars(&["ctl", "step", "--run", "twice"])
+            .status()
+            .unwrap()
+            .success()
+            .then_some(())
     });
     for how in ["launch", "run"] {
         let (_, text) = lab.fails(&[how, "launch/hors_doeuvres.toml", "--run", "twice"]);
@@ -166,30 +244,48 @@ fn the_deadlock_experiment_gives_the_same_table_for_any_number_of_jobs() {
     assert_eq!(all["runs"].as_array().unwrap().len(), 2 * 4 * 8);
     let exchanges = |loss: &str, arm: &str| {
         let cells = all["estimates"].as_array().unwrap().iter();
-        let cell = cells.filter(|cell| cell["condition"] == loss && cell["arm"] == arm).collect::<Vec<_>>();
+        let cell = cells
+            .filter(|cell| cell["condition"] == loss && cell["arm"] == arm)
+            .collect::<Vec<_>>();
         cell[0]["exchanges"]["mean"].as_f64().unwrap()
     };
     // Every command lost: who has no emotions never gets treats, timer or not.
     assert!(exchanges("1", "affectless") < 1.0 && exchanges("1", "timer repeat") < 1.0);
-    assert!(exchanges("1", "affect only") > 1.5, "{}", exchanges("1", "affect only"));
+    assert!(
+        exchanges("1", "affect only") > 1.5,
+        "{}",
+        exchanges("1", "affect only")
+    );
     assert!(exchanges("0", "affectless") > 1.5);
 }
 
 #[test]
 fn with_emotions_the_team_works_on_while_it_is_cut_off_and_recovers() {
     let lab = Lab::new();
-    let args = ["experiment", "partition", "--seeds", "8", "--lasting", "0 s,240 s", "--json"];
+    let args = [
+        "experiment",
+        "partition",
+        "--seeds",
+        "8",
+        "--lasting",
+        "0 s,240 s",
+        "--json",
+    ];
     let (code, text) = lab.cars_without_out(&args);
     assert_eq!(code, 0, "{text}");
     let all: serde_json::Value = serde_json::from_str(&text).unwrap();
     let mean = |condition: &str, arm: &str, what: &str| {
         let cells = all["estimates"].as_array().unwrap().iter();
-        let cell =
-            cells.filter(|cell| cell["condition"] == condition && cell["arm"] == arm).collect::<Vec<_>>();
+        let cell = cells
+            .filter(|cell| cell["condition"] == condition && cell["arm"] == arm)
+            .collect::<Vec<_>>();
         cell[0][what]["mean"].as_f64().unwrap()
     };
     let uncut = mean("0 s", "affectless", "after");
-    let (without, with) = (mean("240 s", "affectless", "after"), mean("240 s", "affect only", "after"));
+    let (without, with) = (
+        mean("240 s", "affectless", "after"),
+        mean("240 s", "affect only", "after"),
+    );
     println!(
         "exchanges after 120 s uncut, without emotions: {uncut}; after a cut of 240 s: {without} without, {with} with"
     );

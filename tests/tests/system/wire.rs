@@ -35,25 +35,46 @@ impl Wire {
     fn new(run: &str) -> Self {
         let lab = Lab::new();
         let scenario = lab.write("two.toml", SCENARIO);
-        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let port = std::net::TcpListener::bind("127.0.0.1:0")
+            .unwrap()
+            .local_addr()
+            .unwrap()
+            .port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
         let mut command = Command::new(programs().join("cars-sim"));
-        command.arg(scenario).args(["--run", run, "--listen", &endpoint, "--paused", "--out"]).arg(lab.out());
+        command
+            .arg(scenario)
+            .args(["--run", run, "--listen", &endpoint, "--paused", "--out"])
+            .arg(lab.out());
         let simulator = Running::start(command, run, lab.out().join(run));
-        let role = Role::Client { connect: endpoint.clone(), patience: Duration::from_secs(20) };
+        let role = Role::Client {
+            connect: endpoint.clone(),
+            patience: Duration::from_secs(20),
+        };
         let bus = Bus::open(&role, None).unwrap();
         let run = RunName::new(run).unwrap();
         let keys = Keys::new(&run);
-        Self { lab, simulator, endpoint, run, bus, keys }
+        Self {
+            lab,
+            simulator,
+            endpoint,
+            run,
+            bus,
+            keys,
+        }
     }
 
     fn ask(&self, key: &str, parameters: &str, body: &[u8]) -> Result<Vec<u8>, String> {
-        let answer = eventually("an answer", || self.bus.ask(key, parameters, Some(body.to_vec())).unwrap());
+        let answer = eventually("an answer", || {
+            self.bus.ask(key, parameters, Some(body.to_vec())).unwrap()
+        });
         answer.result
     }
 
     fn join(&self, request: &Value) -> JoinAnswer {
-        let bytes = self.ask(&self.keys.join(), "", request.to_string().as_bytes()).unwrap();
+        let bytes = self
+            .ask(&self.keys.join(), "", request.to_string().as_bytes())
+            .unwrap();
         decode("join", "simulator", &bytes).unwrap()
     }
 
@@ -63,13 +84,18 @@ impl Wire {
 
     fn refused(&self, request: &Value) -> (Refusal, String) {
         match self.join(request) {
-            JoinAnswer::Refused { reason, explanation } => (reason, explanation),
+            JoinAnswer::Refused {
+                reason,
+                explanation,
+            } => (reason, explanation),
             JoinAnswer::Welcome(_) => panic!("welcomed: {request}"),
         }
     }
 
     fn control(&self, control: &Control) -> Result<Status, String> {
-        let bytes = self.ask(&self.keys.control(), "", &encode(control)).unwrap();
+        let bytes = self
+            .ask(&self.keys.control(), "", &encode(control))
+            .unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Done(status) => Ok(*status),
             ControlAnswer::Setup(setup) => panic!("not asked for: {setup:?}"),
@@ -94,7 +120,10 @@ struct Hand {
 
 impl Hand {
     fn join(wire: &Wire, robot: &str) -> Self {
-        let role = Role::Client { connect: wire.endpoint.clone(), patience: Duration::from_secs(20) };
+        let role = Role::Client {
+            connect: wire.endpoint.clone(),
+            patience: Duration::from_secs(20),
+        };
         let bus = Bus::open(&role, None).unwrap();
         let (sender, clocks) = channel();
         let subscribed = bus.subscribe(&wire.keys.clock(), move |key, bytes| {
@@ -106,7 +135,14 @@ impl Hand {
         let name = name(robot);
         let token = bus.token(&wire.keys.alive_robot(&name)).unwrap();
         let declared = vec![subscribed.unwrap(), token];
-        Self { bus, keys: wire.keys.clone(), name, welcome: *welcome, clocks, _declared: declared }
+        Self {
+            bus,
+            keys: wire.keys.clone(),
+            name,
+            welcome: *welcome,
+            clocks,
+            _declared: declared,
+        }
     }
 
     fn clock(&self) -> Clock {
@@ -131,7 +167,9 @@ impl Hand {
     }
 
     fn put(&self, report: &Report) {
-        self.bus.put(&self.keys.report(&self.name), encode(report)).unwrap();
+        self.bus
+            .put(&self.keys.report(&self.name), encode(report))
+            .unwrap();
     }
 }
 
@@ -143,7 +181,9 @@ fn ready(run: &str) -> (Wire, Hand, Hand) {
         assert_eq!(hand.clock().tick, 0);
         hand.put(&hand.report(0));
     }
-    eventually("tick 0", || (wire.status().phase == protocol::messages::Phase::Ready).then_some(()));
+    eventually("tick 0", || {
+        (wire.status().phase == protocol::messages::Phase::Ready).then_some(())
+    });
     (wire, a, b)
 }
 
@@ -152,25 +192,43 @@ fn a_robot_is_refused_with_a_reason() {
     let wire = Wire::new("wire-refuse");
     let mut unknown = wire.request("Zed", "1");
     let (reason, text) = wire.refused(&unknown);
-    assert!(reason == Refusal::UnknownName && text.contains("A, B"), "{text}");
+    assert!(
+        reason == Refusal::UnknownName && text.contains("A, B"),
+        "{text}"
+    );
     unknown["name"] = "A/B".into();
     let (reason, text) = wire.refused(&unknown);
-    assert!(reason == Refusal::Malformed && text.contains("field name"), "{text}");
+    assert!(
+        reason == Refusal::Malformed && text.contains("field name"),
+        "{text}"
+    );
 
     let mut other = wire.request("A", "1");
     other["protocol"] = 99.into();
     let (reason, text) = wire.refused(&other);
-    assert!(reason == Refusal::OtherProtocol && text.contains("99"), "{text}");
+    assert!(
+        reason == Refusal::OtherProtocol && text.contains("99"),
+        "{text}"
+    );
 
     let mut other = wire.request("A", "1");
     other["run"] = "elsewhere".into();
     let (reason, text) = wire.refused(&other);
-    assert!(reason == Refusal::OtherRun && text.contains("elsewhere"), "{text}");
+    assert!(
+        reason == Refusal::OtherRun && text.contains("elsewhere"),
+        "{text}"
+    );
 
     let a = Hand::join(&wire, "A");
-    assert_eq!((a.welcome.location, a.welcome.generation), (Point::new(2.0, 2.0), 1));
+    assert_eq!(
+        (a.welcome.location, a.welcome.generation),
+        (Point::new(2.0, 2.0), 1)
+    );
     let (reason, text) = wire.refused(&wire.request("A", "somebody else"));
-    assert!(reason == Refusal::NameTaken && text.contains("another living process"), "{text}");
+    assert!(
+        reason == Refusal::NameTaken && text.contains("another living process"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -190,11 +248,21 @@ fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
     }
     let report = a.keys.report(&a.name);
     a.bus.put(&report, b"not json".to_vec()).unwrap();
-    a.bus.put(&report, br#"{"epoch":1,"tick":1}"#.to_vec()).unwrap();
+    a.bus
+        .put(&report, br#"{"epoch":1,"tick":1}"#.to_vec())
+        .unwrap();
     a.put(&a.report(7));
-    a.put(&Report { generation: 9, ..a.report(1) });
-    a.put(&Report { epoch: 5, ..a.report(1) });
-    a.bus.put(&a.keys.report(&name("Nobody")), encode(&a.report(1))).unwrap();
+    a.put(&Report {
+        generation: 9,
+        ..a.report(1)
+    });
+    a.put(&Report {
+        epoch: 5,
+        ..a.report(1)
+    });
+    a.bus
+        .put(&a.keys.report(&name("Nobody")), encode(&a.report(1)))
+        .unwrap();
     let status = eventually("the counts", || {
         let status = wire.status();
         (status.ignored.values().sum::<u64>() == 6).then_some(status)
@@ -202,7 +270,12 @@ fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
     assert_eq!(status.tick, 0, "the tick is still open");
     assert_eq!(
         status.ignored,
-        [("malformed".into(), 2), ("stale".into(), 3), ("unknown robot".into(), 1)].into()
+        [
+            ("malformed".into(), 2),
+            ("stale".into(), 3),
+            ("unknown robot".into(), 1)
+        ]
+        .into()
     );
     // The tick goes on as if nothing had happened.
     a.put(&a.report(1));
@@ -217,9 +290,17 @@ fn a_second_report_for_the_same_tick_changes_nothing() {
     wire.control(&Control::Start).unwrap();
     a.clock();
     a.put(&a.report(1));
-    a.put(&Report { proposal: Point::new(2.2, 2.0), ..a.report(1) });
+    a.put(&Report {
+        proposal: Point::new(2.2, 2.0),
+        ..a.report(1)
+    });
     b.put(&b.report(1));
-    assert!(a.clock().news.get(&a.name).is_none_or(|news| news.correction.is_none()));
+    assert!(
+        a.clock()
+            .news
+            .get(&a.name)
+            .is_none_or(|news| news.correction.is_none())
+    );
     let lines = eventually("tick 1", || {
         let text = std::fs::read_to_string(wire.lab.file("wire-twice", "events.jsonl")).unwrap();
         text.contains("\"tick\":1,").then_some(text)
@@ -244,8 +325,14 @@ fn malformed_and_impossible_controls_are_refused_with_a_reason() {
         ("{\"do\":\"step\",\"n\":0}", "1 to"),
         ("{\"do\":\"step\",\"n\":10000000}", "1 to"),
         ("{\"do\":\"speed\",\"factor\":-1}", "more than zero"),
-        ("{\"do\":\"init\",\"seed\":9007199254740992}", "a seed is at most"),
-        ("{\"do\":\"command\",\"to\":\"Zed\",\"command\":\"x\"}", "no robot of this run is called Zed"),
+        (
+            "{\"do\":\"init\",\"seed\":9007199254740992}",
+            "a seed is at most",
+        ),
+        (
+            "{\"do\":\"command\",\"to\":\"Zed\",\"command\":\"x\"}",
+            "no robot of this run is called Zed",
+        ),
     ] {
         let explanation = raw(text);
         assert!(explanation.contains(reason), "{text}: {explanation}");
@@ -273,12 +360,17 @@ fn a_newcomer_is_told_all_that_others_may_still_ask_for() {
     // A does tick 1 and is gone; B is still in it, and may ask for what A reported for tick 0.
     a.put(&a.report(1));
     drop(a);
-    let welcome = eventually("the place of A to be free", || match wire.join(&wire.request("A", "next")) {
-        JoinAnswer::Welcome(welcome) => Some(welcome),
-        JoinAnswer::Refused { .. } => None,
+    let welcome = eventually("the place of A to be free", || {
+        match wire.join(&wire.request("A", "next")) {
+            JoinAnswer::Welcome(welcome) => Some(welcome),
+            JoinAnswer::Refused { .. } => None,
+        }
     });
     let tick = |state: &Option<PublicState>| state.as_ref().map(|state| state.tick);
-    assert_eq!((tick(&welcome.last_state), tick(&welcome.state_before)), (Some(1), Some(0)));
+    assert_eq!(
+        (tick(&welcome.last_state), tick(&welcome.state_before)),
+        (Some(1), Some(0))
+    );
     assert_eq!((welcome.generation, welcome.tick), (2, 0));
     drop(b);
 }
@@ -287,17 +379,35 @@ fn a_newcomer_is_told_all_that_others_may_still_ask_for() {
 fn queries_answer_with_the_tick_before() {
     // A real robot asked by hand: Leguin, in a run that is stepped.
     let lab = Lab::new();
-    let mut launch = lab.start("wire-query", &["launch", "launch/hors_doeuvres.toml", "--paused"]);
+    let mut launch = lab.start(
+        "wire-query",
+        &["launch", "launch/hors_doeuvres.toml", "--paused"],
+    );
     let endpoint = eventually("the endpoint", || {
-        std::fs::read_to_string(lab.file("wire-query", "endpoint")).ok().map(|text| text.trim().to_owned())
+        std::fs::read_to_string(lab.file("wire-query", "endpoint"))
+            .ok()
+            .map(|text| text.trim().to_owned())
     });
-    let bus = Bus::open(&Role::Client { connect: endpoint, patience: PATIENCE }, None).unwrap();
+    let bus = Bus::open(
+        &Role::Client {
+            connect: endpoint,
+            patience: PATIENCE,
+        },
+        None,
+    )
+    .unwrap();
     let keys = Keys::new(&RunName::new("wire-query").unwrap());
     eventually("the run", || {
-        lab.cars(&["ctl", "step", "7", "--run", "wire-query"]).status().unwrap().success().then_some(())
+        lab.cars(&["ctl", "step", "7", "--run", "wire-query"])
+            .status()
+            .unwrap()
+            .success()
+            .then_some(())
     });
     let ask = |what: &str, parameters: &str| {
-        let answer = bus.ask(&keys.query(&name("Leguin"), what), parameters, None).unwrap();
+        let answer = bus
+            .ask(&keys.query(&name("Leguin"), what), parameters, None)
+            .unwrap();
         answer.expect("Leguin answers").result
     };
     let state = |parameters: &str| {
@@ -307,10 +417,16 @@ fn queries_answer_with_the_tick_before() {
     assert_eq!(state("tick=8;epoch=1").tick, 7);
     assert_eq!(state("tick=7;epoch=1").tick, 6);
     assert!(ask("state", "tick=3;epoch=1").unwrap_err().contains("over"));
-    assert!(ask("state", "tick=x").unwrap_err().contains("not a whole number"));
-    for (what, expected) in
-        [("behavior_state", json!("WAIT")), ("emotion_state", json!("HAPPY")), ("speed", json!(0.0))]
-    {
+    assert!(
+        ask("state", "tick=x")
+            .unwrap_err()
+            .contains("not a whole number")
+    );
+    for (what, expected) in [
+        ("behavior_state", json!("WAIT")),
+        ("emotion_state", json!("HAPPY")),
+        ("speed", json!(0.0)),
+    ] {
         let answer: Value = serde_json::from_slice(&ask(what, "").unwrap()).unwrap();
         assert_eq!((&answer["value"], &answer["tick"]), (&expected, &json!(7)));
     }

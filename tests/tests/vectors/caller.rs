@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex};
 use protocol::bus::{Bus, Declared};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Clock, Command, JoinAnswer, JoinRequest, Performative, Point, PublicState, Report, SentCommand, Welcome,
+    Clock, Command, JoinAnswer, JoinRequest, Performative, Point, PublicState, Report, SentCommand,
+    Welcome,
 };
 use protocol::{Epoch, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
 
@@ -29,7 +30,10 @@ pub(super) fn script(tick: Tick) -> Vec<(String, Fate)> {
     match tick {
         0 => vec![],
         3 => vec![("late".to_owned(), Fate::PutLate)],
-        6 => vec![("never".to_owned(), Fate::Lost), ("after never".to_owned(), Fate::Put)],
+        6 => vec![
+            ("never".to_owned(), Fate::Lost),
+            ("after never".to_owned(), Fate::Put),
+        ],
         9 => vec![("again".to_owned(), Fate::PutTwice)],
         tick if tick % 3 == 1 => vec![(format!("ping {tick}"), Fate::Put)],
         _ => vec![],
@@ -59,7 +63,11 @@ impl Caller {
         });
         let shown = states.clone();
         let served = bus.serve(&keys.query(name, STATE), move |question| {
-            let number = |name: &str| question.parameter(name).and_then(|text| text.parse::<u64>().ok());
+            let number = |name: &str| {
+                question
+                    .parameter(name)
+                    .and_then(|text| text.parse::<u64>().ok())
+            };
             let (epoch, tick) = (number("epoch").unwrap() as Epoch, number("tick").unwrap());
             match shown.lock().unwrap().get(&(epoch, tick - 1)) {
                 Some(state) => question.answer(question.key(), encode(state)),
@@ -68,7 +76,17 @@ impl Caller {
         });
         let declared = vec![heard.unwrap(), served.unwrap()];
         let (run, name, target) = (run.clone(), name.clone(), target.clone());
-        Self { bus, keys, run, name, target, clocks, states, late: Vec::new(), _declared: declared }
+        Self {
+            bus,
+            keys,
+            run,
+            name,
+            target,
+            clocks,
+            states,
+            late: Vec::new(),
+            _declared: declared,
+        }
     }
 
     fn join(&self) -> Welcome {
@@ -94,7 +112,8 @@ impl Caller {
     pub(super) fn run(mut self) {
         let mut welcome = self.join();
         let _token = self.bus.token(&self.keys.alive_robot(&self.name)).unwrap();
-        let (mut at, mut proposal, mut done, mut seq) = (welcome.location, welcome.location, None, 0);
+        let (mut at, mut proposal, mut done, mut seq) =
+            (welcome.location, welcome.location, None, 0);
         while let Ok(clock) = self.clocks.recv() {
             if clock.end.is_some() {
                 break;
@@ -108,7 +127,9 @@ impl Caller {
             }
             if clock.tick > 0 {
                 let news = clock.news.get(&self.name).cloned().unwrap_or_default();
-                at = news.correction.map_or(proposal, |correction| correction.location);
+                at = news
+                    .correction
+                    .map_or(proposal, |correction| correction.location);
             }
             proposal = walk(at, clock.tick);
             self.put_late(&clock);
@@ -120,14 +141,25 @@ impl Caller {
     }
 
     fn put(&self, command: &Command) {
-        self.bus.put(&self.keys.command(&self.target, &self.name), encode(command)).unwrap();
+        self.bus
+            .put(
+                &self.keys.command(&self.target, &self.name),
+                encode(command),
+            )
+            .unwrap();
     }
 
     /// Commands that a clock names now and that were held back.
     fn put_late(&mut self, clock: &Clock) {
-        let named = clock.news.get(&self.target).map(|news| news.commands.clone()).unwrap_or_default();
+        let named = clock
+            .news
+            .get(&self.target)
+            .map(|news| news.commands.clone())
+            .unwrap_or_default();
         let is_named = |command: &Command| named.iter().any(|id| id.seq == command.seq);
-        let (due, later) = std::mem::take(&mut self.late).into_iter().partition(is_named);
+        let (due, later) = std::mem::take(&mut self.late)
+            .into_iter()
+            .partition(is_named);
         self.late = later;
         let due: Vec<Command> = due;
         due.iter().for_each(|command| self.put(command));
@@ -138,14 +170,27 @@ impl Caller {
         let mut sent = Vec::new();
         for (text, fate) in script(tick) {
             *seq += 1;
-            let command = Command { epoch, tick, seq: *seq, performative, command: text.clone() };
+            let command = Command {
+                epoch,
+                tick,
+                seq: *seq,
+                performative,
+                command: text.clone(),
+            };
             match fate {
                 Fate::Put => self.put(&command),
-                Fate::PutTwice => [&command, &command].into_iter().for_each(|command| self.put(command)),
+                Fate::PutTwice => [&command, &command]
+                    .into_iter()
+                    .for_each(|command| self.put(command)),
                 Fate::PutLate => self.late.push(command),
                 Fate::Lost => {}
             }
-            sent.push(SentCommand { to: self.target.clone(), seq: *seq, performative, command: text });
+            sent.push(SentCommand {
+                to: self.target.clone(),
+                seq: *seq,
+                performative,
+                command: text,
+            });
         }
         sent
     }
@@ -165,7 +210,9 @@ impl Caller {
             behavior_state: behavior_state.clone(),
         };
         // Always put, so that whoever listens in has all of them.
-        self.bus.put(&self.keys.query(&self.name, STATE), encode(&state)).unwrap();
+        self.bus
+            .put(&self.keys.query(&self.name, STATE), encode(&state))
+            .unwrap();
         self.states.lock().unwrap().insert((epoch, tick), state);
         let report = Report {
             epoch,
@@ -181,7 +228,9 @@ impl Caller {
             missing: vec![],
             log: vec![],
         };
-        self.bus.put(&self.keys.report(&self.name), encode(&report)).unwrap();
+        self.bus
+            .put(&self.keys.report(&self.name), encode(&report))
+            .unwrap();
     }
 }
 

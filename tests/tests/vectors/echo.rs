@@ -25,7 +25,10 @@ pub(super) struct Echo {
 
 impl Robot for Echo {
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
-        *self = Self { tick_s: cars.tick_s(), ..Self::default() };
+        *self = Self {
+            tick_s: cars.tick_s(),
+            ..Self::default()
+        };
         Ok(())
     }
 
@@ -51,7 +54,8 @@ impl Robot for Echo {
             return;
         }
         if let Ok(percept) = cars.percept() {
-            self.variables.insert("near".into(), (percept.bodies.len() as f64).into());
+            self.variables
+                .insert("near".into(), (percept.bodies.len() as f64).into());
         }
         let mut others = cars.welcome().roster.clone();
         others.retain(|other| other != cars.name());
@@ -83,7 +87,11 @@ impl Robot for Echo {
     }
 
     fn direction(&self) -> f64 {
-        if self.step_m < 0.0 { std::f64::consts::PI } else { 0.0 }
+        if self.step_m < 0.0 {
+            std::f64::consts::PI
+        } else {
+            0.0
+        }
     }
 
     fn state_variables(&self) -> StateVariables {
@@ -103,7 +111,9 @@ impl Robot for Echo {
     }
 
     fn resume(&mut self, _: &mut Cars<'_>, last: &StateVariables) {
-        self.heard =
-            last.get("heard").and_then(protocol::messages::Variable::as_f64).unwrap_or_default() as u32;
+        self.heard = last
+            .get("heard")
+            .and_then(protocol::messages::Variable::as_f64)
+            .unwrap_or_default() as u32;
     }
 }

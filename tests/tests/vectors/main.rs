@@ -3,7 +3,11 @@
 //! Set `CARS_UPDATE=1` to write the files anew. They are transcripts of the real simulator and the real robots' loop over
 //! a network in this process, and a run writes the same bytes whatever its schedule.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot set up its subject fails")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot set up its subject fails"
+)]
 
 mod caller;
 mod echo;
@@ -37,7 +41,10 @@ fn check(file: &str, text: &str) {
         std::fs::write(&path, text).unwrap();
     }
     let on_file = std::fs::read_to_string(&path).unwrap_or_default();
-    let differs = on_file.lines().zip(text.lines()).position(|(old, new)| old != new);
+    let differs = on_file
+        .lines()
+        .zip(text.lines())
+        .position(|(old, new)| old != new);
     let at = differs.unwrap_or_else(|| on_file.lines().count().min(text.lines().count()));
     assert!(
         on_file == text,
@@ -52,8 +59,14 @@ fn check(file: &str, text: &str) {
 /// The last clock of a story, as it was on the wire.
 fn last_clock(story: &str) -> String {
     let is_clock = |line: &&str| line.contains(r#""key":"cars/vectors/clock""#);
-    let line = story.lines().rev().find(is_clock).expect("a clock has come");
-    let (_, message) = line.split_once(r#""message":"#).expect("a line with a message");
+    let line = story
+        .lines()
+        .rev()
+        .find(is_clock)
+        .expect("a clock has come");
+    let (_, message) = line
+        .split_once(r#""message":"#)
+        .expect("a line with a message");
     message.strip_suffix('}').expect("a whole line").to_owned()
 }
 
@@ -74,9 +87,14 @@ fn echo_through_everything_that_a_network_does() {
     stage.seat("Echo", || Box::<echo::Echo>::default());
     stage.begin(1);
     stage.step_to(28);
-    for parameters in
-        ["", "tick=29;epoch=1", "tick=28;epoch=1", "tick=27;epoch=1", "tick=99;epoch=1", "tick=x"]
-    {
+    for parameters in [
+        "",
+        "tick=29;epoch=1",
+        "tick=28;epoch=1",
+        "tick=27;epoch=1",
+        "tick=99;epoch=1",
+        "tick=x",
+    ] {
         stage.ask("state", parameters);
     }
     for what in protocol::keys::QUERIES {
@@ -84,9 +102,15 @@ fn echo_through_everything_that_a_network_does() {
     }
     let clock = last_clock(&stage.transcript.text());
     stage.repeat_clock(clock.as_bytes());
-    stage.order(&Control::Command { to: name("Echo"), command: "hello".to_owned() });
+    stage.order(&Control::Command {
+        to: name("Echo"),
+        command: "hello".to_owned(),
+    });
     stage.step_to(30);
-    stage.order(&Control::Init { seed: Some(8), setup: None });
+    stage.order(&Control::Init {
+        seed: Some(8),
+        setup: None,
+    });
     stage.begin(2);
     stage.step_to(4);
     check("echo.jsonl", &stage.end());
@@ -108,7 +132,12 @@ fn echo_returns() {
 
 #[test]
 fn streams() {
-    let streams = [(0, "guests"), (42, "robot/Butler"), (2002, "robot/Leguin#2"), (MAX_SEED, "robot/Echo")];
+    let streams = [
+        (0, "guests"),
+        (42, "robot/Butler"),
+        (2002, "robot/Leguin#2"),
+        (MAX_SEED, "robot/Echo"),
+    ];
     let vectors: Vec<_> = streams
         .into_iter()
         .map(|(seed, name)| {
@@ -118,19 +147,36 @@ fn streams() {
             serde_json::json!({ "seed": seed, "stream": name, "draws": draws, "units": units })
         })
         .collect();
-    check("streams.json", &(serde_json::to_string_pretty(&vectors).unwrap() + "\n"));
+    check(
+        "streams.json",
+        &(serde_json::to_string_pretty(&vectors).unwrap() + "\n"),
+    );
 }
 
 /// What the transcript of the hall says is what goes over zenoh between processes, byte for byte.
 #[test]
 fn leguin_in_the_hall_as_processes() {
     let (lab, run) = (Lab::new(), "vectors");
-    let mut args = vec!["launch", "launch/hors_doeuvres.toml", "--paused", "--speed", "max"];
+    let mut args = vec![
+        "launch",
+        "launch/hors_doeuvres.toml",
+        "--paused",
+        "--speed",
+        "max",
+    ];
     args.extend(EARLY.iter().flat_map(|change| ["--set", *change]));
     let mut launch = lab.start(run, &args);
-    let endpoint = eventually("the endpoint", || std::fs::read_to_string(lab.file(run, "endpoint")).ok());
-    let role = Role::Client { connect: endpoint.trim().to_owned(), patience: PATIENCE };
-    let (bus, keys) = (Bus::open(&role, None).unwrap(), Keys::new(&RunName::new(run).unwrap()));
+    let endpoint = eventually("the endpoint", || {
+        std::fs::read_to_string(lab.file(run, "endpoint")).ok()
+    });
+    let role = Role::Client {
+        connect: endpoint.trim().to_owned(),
+        patience: PATIENCE,
+    };
+    let (bus, keys) = (
+        Bus::open(&role, None).unwrap(),
+        Keys::new(&RunName::new(run).unwrap()),
+    );
     let leguin = name("Leguin");
     let (sender, heard) = std::sync::mpsc::channel();
     let listen = |key: &str| {
@@ -150,20 +196,30 @@ fn leguin_in_the_hall_as_processes() {
     // An answer shows that what was declared before the question is in effect.
     let step = encode(&Control::Step { n: LEGUIN_TICKS });
     eventually("tick 0", || {
-        let answer =
-            bus.ask_within(&keys.control(), "", Some(step.clone()), PATIENCE).unwrap()?.result.unwrap();
+        let answer = bus
+            .ask_within(&keys.control(), "", Some(step.clone()), PATIENCE)
+            .unwrap()?
+            .result
+            .unwrap();
         let answer: ControlAnswer = decode("control", "simulator", &answer).unwrap();
         matches!(answer, ControlAnswer::Done(_)).then_some(())
     });
     let text = std::fs::read_to_string(root().join("docs/vectors/leguin.jsonl")).unwrap();
-    let is_put =
-        |line: &&str| line.contains(r#""message":"#) && !line.contains("/join") && !line.contains("/state\"");
-    let from_tick_1 = text.lines().skip_while(|line| !line.contains(r#""message":{"epoch":1,"tick":1"#));
-    let wanted = from_tick_1.filter(is_put).filter(|line| !line.contains(r#""end""#));
+    let is_put = |line: &&str| {
+        line.contains(r#""message":"#) && !line.contains("/join") && !line.contains("/state\"")
+    };
+    let from_tick_1 = text
+        .lines()
+        .skip_while(|line| !line.contains(r#""message":{"epoch":1,"tick":1"#));
+    let wanted = from_tick_1
+        .filter(is_put)
+        .filter(|line| !line.contains(r#""end""#));
     let mut wanted: Vec<&str> = wanted.map(|line| line.split_once(',').unwrap().1).collect();
     assert!(wanted.len() > 2 * LEGUIN_TICKS as usize, "{}", wanted.len());
     while !wanted.is_empty() {
-        let line = heard.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("never came: {wanted:#?}"));
+        let line = heard
+            .recv_timeout(PATIENCE)
+            .unwrap_or_else(|_| panic!("never came: {wanted:#?}"));
         // A clock that is repeated on a slow machine is there no more.
         wanted.retain(|wanted| *wanted != line);
     }

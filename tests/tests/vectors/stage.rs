@@ -44,13 +44,24 @@ impl Stage {
     pub(super) fn new(scenario: &str, set: &[&str], robot: &str) -> Self {
         let (run, robot) = (RunName::new("vectors").unwrap(), name(robot));
         let keys = Keys::new(&run);
-        let set = set.iter().map(|change| change.parse().expect("a legal change")).collect();
-        let changes = Changes { set, ..Changes::default() };
+        let set = set
+            .iter()
+            .map(|change| change.parse().expect("a legal change"))
+            .collect();
+        let changes = Changes {
+            set,
+            ..Changes::default()
+        };
         let loaded = Scenario::load(&root().join(Path::new(scenario)), &changes)
             .unwrap_or_else(|error| panic!("{error}"));
         let network = MemoryNetwork::new(0, Faults::default());
         let (folder, router) = (tempfile::tempdir().unwrap(), network.router());
-        let options = Options { run: run.clone(), speed: None, is_paused: true, repeat_after: NEVER };
+        let options = Options {
+            run: run.clone(),
+            speed: None,
+            is_paused: true,
+            repeat_after: NEVER,
+        };
         let server = Server::open(router, &loaded, options).unwrap();
         let run_folder = RunFolder::new(folder.path(), &run);
         let lock = run_folder.create(&loaded).unwrap();
@@ -61,12 +72,18 @@ impl Stage {
         let observer = network.client();
         // Who follows everything from the beginning has everything that a robot could ever ask for.
         let watch = |key: String| observer.subscribe(&key, |_, _| {}).unwrap();
-        let watching =
-            vec![watch(keys.query(&robot, STATE).replace(robot.as_str(), "*")), watch(keys.percepts())];
+        let watching = vec![
+            watch(keys.query(&robot, STATE).replace(robot.as_str(), "*")),
+            watch(keys.percepts()),
+        ];
         let transcript = Transcript::new(keys.clone(), robot.clone(), scenario);
         // Who is answered knows that the simulator is there, and that what it declared before it asked is in effect.
         let status = encode(&Control::Status);
-        eventually("the simulator", || observer.ask(&keys.control(), "", Some(status.clone())).unwrap());
+        eventually("the simulator", || {
+            observer
+                .ask(&keys.control(), "", Some(status.clone()))
+                .unwrap()
+        });
         let _ = network.overhear(); // The story begins here.
         Self {
             network,
@@ -106,7 +123,12 @@ impl Stage {
 
     /// Echo's partner takes part.
     pub(super) fn seat_caller(&mut self) {
-        let caller = Caller::new(self.network.client(), &self.run, &name("Caller"), &self.robot);
+        let caller = Caller::new(
+            self.network.client(),
+            &self.run,
+            &name("Caller"),
+            &self.robot,
+        );
         self.threads.push(std::thread::spawn(move || caller.run()));
     }
 
@@ -114,25 +136,38 @@ impl Stage {
     pub(super) fn kill(&mut self) {
         let process = self.process.take().expect("it has been seated");
         self.network.kill(&process);
-        self.wait_until("it is gone", |status| self.presence(status) == Presence::Gone);
+        self.wait_until("it is gone", |status| {
+            self.presence(status) == Presence::Gone
+        });
         self.write();
     }
 
     /// Waits until the process of the robot is there, and as this incarnation.
     pub(super) fn wait_for(&self, generation: u32) {
         self.wait_until("it is there", |status| {
-            let robot =
-                status.robots.iter().find(|robot| robot.name == self.robot).expect("it is of the roster");
+            let robot = status
+                .robots
+                .iter()
+                .find(|robot| robot.name == self.robot)
+                .expect("it is of the roster");
             (robot.generation, robot.presence) == (generation, Presence::Here)
         });
     }
 
     fn presence(&self, status: &Status) -> Presence {
-        status.robots.iter().find(|robot| robot.name == self.robot).expect("it is of the roster").presence
+        status
+            .robots
+            .iter()
+            .find(|robot| robot.name == self.robot)
+            .expect("it is of the roster")
+            .presence
     }
 
     fn control(&self, control: &Control) -> Status {
-        let answer = self.observer.ask(&self.keys.control(), "", Some(encode(control))).unwrap();
+        let answer = self
+            .observer
+            .ask(&self.keys.control(), "", Some(encode(control)))
+            .unwrap();
         let bytes = answer.expect("the simulator answers").result.unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Done(status) => *status,
@@ -141,7 +176,9 @@ impl Stage {
     }
 
     fn wait_until(&self, what: &str, is_so: impl Fn(&Status) -> bool) {
-        eventually(what, || is_so(&self.control(&Control::Status)).then_some(()));
+        eventually(what, || {
+            is_so(&self.control(&Control::Status)).then_some(())
+        });
     }
 
     /// Files what has been said since the last time.
@@ -151,7 +188,9 @@ impl Stage {
 
     /// Waits for tick 0 of an epoch.
     pub(super) fn begin(&mut self, epoch: u32) {
-        self.wait_until("tick 0", |status| (status.epoch, status.phase) == (epoch, Phase::Ready));
+        self.wait_until("tick 0", |status| {
+            (status.epoch, status.phase) == (epoch, Phase::Ready)
+        });
         self.write();
     }
 
@@ -163,7 +202,9 @@ impl Stage {
                 return;
             }
             self.control(&Control::Step { n: 1 });
-            self.wait_until("the step", |status| status.tick == tick + 1 && status.pending_steps == 0);
+            self.wait_until("the step", |status| {
+                status.tick == tick + 1 && status.pending_steps == 0
+            });
             self.write();
         }
     }
@@ -175,12 +216,15 @@ impl Stage {
 
     /// Says the last clock again, and waits for the robot's answer.
     pub(super) fn repeat_clock(&mut self, clock: &[u8]) {
-        self.observer.put(&self.keys.clock(), clock.to_vec()).unwrap();
+        self.observer
+            .put(&self.keys.clock(), clock.to_vec())
+            .unwrap();
         let report = self.keys.report(&self.robot);
         let mut heard = Vec::new();
         eventually("the report again", || {
             heard.extend(self.network.overhear());
-            let is_report = |one: &Overheard| matches!(one, Overheard::Put { key, .. } if *key == report);
+            let is_report =
+                |one: &Overheard| matches!(one, Overheard::Put { key, .. } if *key == report);
             heard.iter().any(is_report).then_some(())
         });
         self.transcript.add(&heard);

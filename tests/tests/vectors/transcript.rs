@@ -41,7 +41,10 @@ fn text(bytes: &[u8]) -> &str {
 }
 
 fn put(way: &str, key: &str, message: &[u8]) -> Line {
-    Line(format!(r#"{{"way":"{way}","key":"{key}","message":{}}}"#, text(message)))
+    Line(format!(
+        r#"{{"way":"{way}","key":"{key}","message":{}}}"#,
+        text(message)
+    ))
 }
 
 /// A question and what came back. `way` is `ask` where the robot asks and `asked` where it is asked.
@@ -61,7 +64,10 @@ fn question(
     }
     line += &match result {
         Ok(answer) => format!(r#","answer":{}}}"#, text(answer)),
-        Err(reason) => format!(r#","refused":{}}}"#, serde_json::Value::from(reason.as_str())),
+        Err(reason) => format!(
+            r#","refused":{}}}"#,
+            serde_json::Value::from(reason.as_str())
+        ),
     };
     Line(line)
 }
@@ -72,7 +78,12 @@ impl Transcript {
             r#"{{"way":"start","robot":"{robot}","scenario":{}}}"#,
             serde_json::Value::from(scenario)
         );
-        Self { keys, robot, states: Vec::new(), lines: vec![Line(start)] }
+        Self {
+            keys,
+            robot,
+            states: Vec::new(),
+            lines: vec![Line(start)],
+        }
     }
 
     /// The lines of a tick, or of what happened between two.
@@ -88,14 +99,24 @@ impl Transcript {
                         states.push((key.clone(), message.clone()));
                     }
                 }
-                Overheard::Asked { question: number, key, body, .. } if self.is_own_join(key, body) => {
+                Overheard::Asked {
+                    question: number,
+                    key,
+                    body,
+                    ..
+                } if self.is_own_join(key, body) => {
                     let is_answer = |later: &&Overheard| matches!(later, Overheard::Answered { question, .. } if question == number);
-                    if let Some(Overheard::Answered { result, .. }) = heard[at..].iter().find(is_answer) {
+                    if let Some(Overheard::Answered { result, .. }) =
+                        heard[at..].iter().find(is_answer)
+                    {
                         placed.push((Place::Join, question("ask", key, "", Some(body), result)));
                     }
                 }
                 Overheard::Token { key } if *key == self.keys.alive_robot(&self.robot) => {
-                    placed.push((Place::Token, Line(format!(r#"{{"way":"token","key":"{key}"}}"#))));
+                    placed.push((
+                        Place::Token,
+                        Line(format!(r#"{{"way":"token","key":"{key}"}}"#)),
+                    ));
                 }
                 _ => {}
             }
@@ -116,11 +137,15 @@ impl Transcript {
 
     /// A question to the robot, and what it answered.
     pub(super) fn asked(&mut self, key: &str, parameters: &str, result: &Result<Vec<u8>, String>) {
-        self.lines.push(question("asked", key, parameters, None, result));
+        self.lines
+            .push(question("asked", key, parameters, None, result));
     }
 
     pub(super) fn text(&self) -> String {
-        self.lines.iter().map(|line| line.0.clone() + "\n").collect()
+        self.lines
+            .iter()
+            .map(|line| line.0.clone() + "\n")
+            .collect()
     }
 
     fn clock(&self, heard: &Overheard) -> Option<Clock> {
@@ -161,7 +186,10 @@ impl Transcript {
         if own(Keys::percept) {
             let Percept { epoch, tick, .. } = serde_json::from_slice(message).expect("a percept");
             let parameters = format!("tick={tick};epoch={epoch}");
-            return Some((Place::Ask, question("ask", key, &parameters, None, &Ok(message.to_vec()))));
+            return Some((
+                Place::Ask,
+                question("ask", key, &parameters, None, &Ok(message.to_vec())),
+            ));
         }
         let (before, sender) = key.rsplit_once('/')?;
         if !before.ends_with("/command") {
@@ -174,9 +202,13 @@ impl Transcript {
             return None;
         }
         let seq = serde_json::from_slice::<serde_json::Value>(message).ok()?["seq"].as_u64();
-        let named = clock.and_then(|clock| clock.news.get(&self.robot)).map(|news| &news.commands);
-        let is_named =
-            named.is_some_and(|ids| ids.iter().any(|id| id.from.as_str() == sender && Some(id.seq) == seq));
+        let named = clock
+            .and_then(|clock| clock.news.get(&self.robot))
+            .map(|news| &news.commands);
+        let is_named = named.is_some_and(|ids| {
+            ids.iter()
+                .any(|id| id.from.as_str() == sender && Some(id.seq) == seq)
+        });
         to(if is_named { Place::Named } else { Place::Held })
     }
 
@@ -187,15 +219,21 @@ impl Transcript {
             return Vec::new();
         };
         let parameters = format!("tick={};epoch={}", clock.tick, clock.epoch);
-        let unreachable =
-            clock.news.get(&self.robot).map(|news| news.unreachable.clone()).unwrap_or_default();
+        let unreachable = clock
+            .news
+            .get(&self.robot)
+            .map(|news| news.unreachable.clone())
+            .unwrap_or_default();
         let mut asks = Vec::new();
         for (key, state) in &self.states {
             let of = Keys::robot_of(key).unwrap_or_default();
             let reported: PublicState = serde_json::from_slice(state).expect("a state");
             let is_last = (reported.epoch, reported.tick + 1) == (clock.epoch, clock.tick);
             if is_last && unreachable.iter().all(|name| name.as_str() != of) {
-                asks.push((Place::Ask, question("ask", key, &parameters, None, &Ok(state.clone()))));
+                asks.push((
+                    Place::Ask,
+                    question("ask", key, &parameters, None, &Ok(state.clone())),
+                ));
             }
         }
         asks

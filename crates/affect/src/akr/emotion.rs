@@ -89,7 +89,11 @@ pub struct Account {
 impl Account {
     /// The chain as one sentence for a voice or a panel.
     pub fn spoken(&self) -> String {
-        let texts: Vec<&str> = self.clauses.iter().map(|clause| clause.text.as_str()).collect();
+        let texts: Vec<&str> = self
+            .clauses
+            .iter()
+            .map(|clause| clause.text.as_str())
+            .collect();
         let mut sentence = texts.join("; ");
         if let Some(first) = sentence.chars().next() {
             let capital: String = first.to_uppercase().collect();
@@ -173,7 +177,11 @@ impl Emotion {
         }
         let (face, valence) = (components.facial_expression, components.valence);
         if face.valence().is_some_and(|shown| shown != valence) {
-            return Err(Refusal::FaceContradictsValence { name: name(), valence, face });
+            return Err(Refusal::FaceContradictsValence {
+                name: name(),
+                valence,
+                face,
+            });
         }
         Ok(Self { components })
     }
@@ -190,7 +198,10 @@ impl Emotion {
 
     /// Its coarse part.
     pub fn affect(&self) -> Affect {
-        Affect { valence: self.components.valence, intensity: self.components.intensity }
+        Affect {
+            valence: self.components.valence,
+            intensity: self.components.intensity,
+        }
     }
 }
 

@@ -63,7 +63,10 @@ impl TryFrom<RawMood> for Mood {
             None | Some(Focality::Global) => {}
             Some(_) => return Err(Refusal::MoodFocality),
         }
-        Ok(Self::new(Affect { valence: raw.valence, intensity: raw.intensity }))
+        Ok(Self::new(Affect {
+            valence: raw.valence,
+            intensity: raw.intensity,
+        }))
     }
 }
 

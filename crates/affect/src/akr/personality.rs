@@ -104,7 +104,10 @@ impl Default for Personality {
 impl Personality {
     /// An otherwise ordinary personality of this caution.
     pub fn with_caution(caution: Caution) -> Self {
-        Self { caution, ..Self::default() }
+        Self {
+            caution,
+            ..Self::default()
+        }
     }
 
     /// A lifetime.
@@ -120,7 +123,9 @@ impl Personality {
     /// Whether it has a preference about affect of this valence: to have the positive, to be spared the
     /// negative.
     pub fn cares_about(&self, valence: Valence) -> bool {
-        self.preferences.iter().any(|preference| preference.valence() == valence)
+        self.preferences
+            .iter()
+            .any(|preference| preference.valence() == valence)
     }
 }
 
@@ -151,9 +156,20 @@ impl TryFrom<RawPersonality> for Personality {
             None | Some(Focality::Global) => {}
             Some(_) => return Err(Refusal::PersonalityFocality),
         }
-        let RawPersonality { caution, traits, strategy, preferences, .. } = raw;
+        let RawPersonality {
+            caution,
+            traits,
+            strategy,
+            preferences,
+            ..
+        } = raw;
         let preferences = preferences.unwrap_or_else(|| Self::default().preferences);
-        Ok(Self { caution, traits, strategy, preferences })
+        Ok(Self {
+            caution,
+            traits,
+            strategy,
+            preferences,
+        })
     }
 }
 

@@ -35,7 +35,10 @@ pub enum ActionTendency {
 impl ActionTendency {
     /// What the tendency is good for, as in Table 1; none for the others.
     pub fn function(self) -> Option<&'static str> {
-        TABLE_1.iter().find(|row| row.tendency == self).map(|row| row.function)
+        TABLE_1
+            .iter()
+            .find(|row| row.tendency == self)
+            .map(|row| row.function)
     }
 
     /// The item of EmotionML's vocabulary `frijda-action-tendencies` that means this [D: W]; none where that
@@ -81,7 +84,12 @@ pub const TABLE_1: [PrimaryTendency; 6] = {
     use ActionTendency::{Agonistic, Approach, Avoid, Inactivity, Prepare, Reject};
     [
         row_1(Avoid, "protect", "fear", Some("avoidance")),
-        row_1(Approach, "permit consummatory activity", "desire", Some("approach")),
+        row_1(
+            Approach,
+            "permit consummatory activity",
+            "desire",
+            Some("approach"),
+        ),
         row_1(Agonistic, "regain control", "anger", Some("agonistic")),
         row_1(Reject, "protect", "disgust", Some("rejecting")),
         row_1(Prepare, "caution", "anxiety", Some("attending")),
@@ -95,7 +103,12 @@ const fn row_1(
     emotion: &'static str,
     emotionml: Option<&'static str>,
 ) -> PrimaryTendency {
-    PrimaryTendency { tendency, function, emotion, emotionml }
+    PrimaryTendency {
+        tendency,
+        function,
+        emotion,
+        emotionml,
+    }
 }
 
 /// A row of Table 2.
@@ -122,9 +135,24 @@ pub const TABLE_2: [TaskTendency; 4] = {
     use StandardEmotion::{Concerned, Confident, Frustrated, Happy};
     [
         row_2(FreeActivate, &["serve"], &["joke"], Happy),
-        row_2(ContinueNormalActivity, &["serve", "call for refill"], &["serve"], Confident),
-        row_2(MonitorProgressClosely, &["ask to hurry"], &["increase speed"], Concerned),
-        row_2(ChangeCurrentStrategy, &["intercept"], &["go home"], Frustrated),
+        row_2(
+            ContinueNormalActivity,
+            &["serve", "call for refill"],
+            &["serve"],
+            Confident,
+        ),
+        row_2(
+            MonitorProgressClosely,
+            &["ask to hurry"],
+            &["increase speed"],
+            Concerned,
+        ),
+        row_2(
+            ChangeCurrentStrategy,
+            &["intercept"],
+            &["go home"],
+            Frustrated,
+        ),
     ]
 };
 
@@ -134,7 +162,12 @@ const fn row_2(
     refiller: &'static [&'static str],
     emotion: StandardEmotion,
 ) -> TaskTendency {
-    TaskTendency { tendency, waiter, refiller, emotion }
+    TaskTendency {
+        tendency,
+        waiter,
+        refiller,
+        emotion,
+    }
 }
 
 #[cfg(test)]
@@ -143,8 +176,15 @@ mod tests {
 
     #[test]
     fn the_name_is_the_serialized_form() {
-        for row in TABLE_1.iter().map(|row| row.tendency).chain(TABLE_2.iter().map(|row| row.tendency)) {
-            assert_eq!(serde_json::to_string(&row).unwrap(), format!("\"{}\"", row.name()));
+        for row in TABLE_1
+            .iter()
+            .map(|row| row.tendency)
+            .chain(TABLE_2.iter().map(|row| row.tendency))
+        {
+            assert_eq!(
+                serde_json::to_string(&row).unwrap(),
+                format!("\"{}\"", row.name())
+            );
         }
     }
 

@@ -101,7 +101,11 @@ impl<A> Candidate<A> {
         if sum > 1.0 + Self::SLACK {
             return Err(CandidateError::Sum(sum));
         }
-        Ok(Self { action, tendency, outcomes })
+        Ok(Self {
+            action,
+            tendency,
+            outcomes,
+        })
     }
 
     /// The action.
@@ -133,7 +137,9 @@ pub struct Memory<E, A> {
 
 impl<E, A> Default for Memory<E, A> {
     fn default() -> Self {
-        Self { experiences: Vec::new() }
+        Self {
+            experiences: Vec::new(),
+        }
     }
 }
 
@@ -146,13 +152,20 @@ impl<E: EmotionLabel, A: Clone + PartialEq> Memory<E, A> {
             experience.mean += (felt.signed() - experience.mean) / f64::from(experience.times);
         } else {
             let action = action.clone();
-            self.experiences.push(Experience { emotion, action, mean: felt.signed(), times: 1 });
+            self.experiences.push(Experience {
+                emotion,
+                action,
+                mean: felt.signed(),
+                times: 1,
+            });
         }
     }
 
     /// What is remembered of an action under an emotion.
     pub fn recall(&self, emotion: E, action: &A) -> Option<&Experience<E, A>> {
-        self.experiences.iter().find(|one| one.emotion == emotion && one.action == *action)
+        self.experiences
+            .iter()
+            .find(|one| one.emotion == emotion && one.action == *action)
     }
 }
 
@@ -179,7 +192,10 @@ pub struct Conceptual {
 
 impl Conceptual {
     /// A level for an agent of this personality: affect of which it has no preference has no value to it.
-    pub fn new(parameters: ConceptualParameters, personality: &Personality) -> Result<Self, ParameterError> {
+    pub fn new(
+        parameters: ConceptualParameters,
+        personality: &Personality,
+    ) -> Result<Self, ParameterError> {
         not_negative("negligible", parameters.negligible)?;
         not_negative("horizon_s", parameters.horizon_s)?;
         not_negative("pressed_horizon_s", parameters.pressed_horizon_s)?;
@@ -206,7 +222,11 @@ impl Conceptual {
         let pressure = pressure(feeling.affect());
         let readiness = |candidate: &Candidate<A>| {
             let follows = tendency.is_some() && candidate.tendency == tendency;
-            if follows { self.parameters.readiness * feeling.intensity.value() } else { 0.0 }
+            if follows {
+                self.parameters.readiness * feeling.intensity.value()
+            } else {
+                0.0
+            }
         };
         let glance = |candidate: &Candidate<A>| {
             let experience = memory.recall(feeling.emotion, &candidate.action);
@@ -226,7 +246,12 @@ impl Conceptual {
             }
         }
         let (action, value) = first_best(&weighed)?;
-        Some(Choice { action, value, weighed, dropped })
+        Some(Choice {
+            action,
+            value,
+            weighed,
+            dropped,
+        })
     }
 
     /// How many of `count` actions an agent under this pressure weighs: all, down to `pressed_actions`.
@@ -242,7 +267,12 @@ impl Conceptual {
     /// An outcome that is dropped as negligible leaves its probability to the others; one beyond the horizon
     /// is not foreseen, and counts as no change.
     fn prospect<A>(&self, candidate: &Candidate<A>, pressure: f64) -> f64 {
-        let ConceptualParameters { negligible, horizon_s, pressed_horizon_s, .. } = self.parameters;
+        let ConceptualParameters {
+            negligible,
+            horizon_s,
+            pressed_horizon_s,
+            ..
+        } = self.parameters;
         let least = negligible * pressure;
         let horizon_s = horizon_s + (pressed_horizon_s - horizon_s) * pressure;
         let (mut all, mut kept, mut sum) = (0.0, 0.0, 0.0);
@@ -269,7 +299,9 @@ impl Conceptual {
 
     /// Anticipation, corrected by what was experienced.
     fn temper<E, A>(&self, anticipated: f64, experience: Option<&Experience<E, A>>) -> f64 {
-        let Some(experience) = experience else { return anticipated };
+        let Some(experience) = experience else {
+            return anticipated;
+        };
         let (times, prior_n) = (f64::from(experience.times), self.parameters.anticipation_n);
         (times * experience.mean + prior_n * anticipated) / (times + prior_n)
     }

@@ -15,7 +15,8 @@ mod schematic;
 mod sensory_motor;
 
 pub use conceptual::{
-    Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Experience, Memory, Outcome,
+    Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Experience, Memory,
+    Outcome,
 };
 pub use schematic::Schematic;
 pub use sensory_motor::{SensoryMotor, SensoryMotorParameters};
@@ -38,7 +39,11 @@ pub struct Levels {
 
 impl Default for Levels {
     fn default() -> Self {
-        Self { sensory_motor: true, schematic: true, conceptual: true }
+        Self {
+            sensory_motor: true,
+            schematic: true,
+            conceptual: true,
+        }
     }
 }
 
@@ -79,20 +84,31 @@ impl<E: EmotionLabel, B: Clone + PartialEq> MultilevelProcess<E, B> {
         candidates: &[Candidate<B>],
         memory: &Memory<E, B>,
     ) -> Influence<B> {
-        let motor_gain =
-            if self.levels.sensory_motor { self.sensory_motor.gain(feeling.affect()) } else { 1.0 };
+        let motor_gain = if self.levels.sensory_motor {
+            self.sensory_motor.gain(feeling.affect())
+        } else {
+            1.0
+        };
         let active = if self.levels.schematic {
             self.schematic.active(feeling.emotion)
         } else {
             self.schematic.neutral()
         };
         let choice = if self.levels.conceptual {
-            let possible: Vec<Candidate<B>> =
-                candidates.iter().filter(|candidate| active.contains(candidate.action())).cloned().collect();
-            self.conceptual.deliberate(feeling, tendency, &possible, memory)
+            let possible: Vec<Candidate<B>> = candidates
+                .iter()
+                .filter(|candidate| active.contains(candidate.action()))
+                .cloned()
+                .collect();
+            self.conceptual
+                .deliberate(feeling, tendency, &possible, memory)
         } else {
             None
         };
-        Influence { motor_gain, active: active.to_vec(), choice }
+        Influence {
+            motor_gain,
+            active: active.to_vec(),
+            choice,
+        }
     }
 }

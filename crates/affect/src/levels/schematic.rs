@@ -20,7 +20,10 @@ pub struct Schematic<E, B> {
 impl<E: EmotionLabel, B> Schematic<E, B> {
     /// No prototype yet: every emotion makes the neutral set active.
     pub fn new(neutral: Vec<B>) -> Self {
-        Self { neutral, prototypes: Vec::new() }
+        Self {
+            neutral,
+            prototypes: Vec::new(),
+        }
     }
 
     /// Adds the prototype of an emotion, or replaces it.

@@ -21,7 +21,12 @@ pub struct SensoryMotorParameters {
 
 impl Default for SensoryMotorParameters {
     fn default() -> Self {
-        Self { negative_gain: 1.5, positive_gain: 1.0, onset: 0.45, full: 0.45 }
+        Self {
+            negative_gain: 1.5,
+            positive_gain: 1.0,
+            onset: 0.45,
+            full: 0.45,
+        }
     }
 }
 
@@ -52,13 +57,21 @@ impl SensoryMotor {
         if ascends {
             Ok(Self { parameters })
         } else {
-            Err(ParameterError::NotAscending { lower: onset, upper: full })
+            Err(ParameterError::NotAscending {
+                lower: onset,
+                upper: full,
+            })
         }
     }
 
     /// The factor: 1 below the onset, the gain of the valence from `full`, and linear in between.
     pub fn gain(&self, affect: Affect) -> f64 {
-        let SensoryMotorParameters { negative_gain, positive_gain, onset, full } = self.parameters;
+        let SensoryMotorParameters {
+            negative_gain,
+            positive_gain,
+            onset,
+            full,
+        } = self.parameters;
         let gain = match affect.valence {
             Valence::Positive => positive_gain,
             Valence::Negative => negative_gain,

@@ -6,11 +6,12 @@
 use affect::StandardEmotion::{self, Concerned, Confident};
 use affect::behavior::{BehaviorGenerator, Row, Then::Stay};
 use affect::progress::{
-    ApproachEstimator, ApproachParameters, RateEstimator, RateParameters, need_ratio, time_to_empty_s,
+    ApproachEstimator, ApproachParameters, RateEstimator, RateParameters, need_ratio,
+    time_to_empty_s,
 };
 use affect::{
-    Caution, DynamicGenerator, Dynamics, DynamicsParameters, EmotionGenerator, EmotionState, Feeling,
-    Stimulus,
+    Caution, DynamicGenerator, Dynamics, DynamicsParameters, EmotionGenerator, EmotionState,
+    Feeling, Stimulus,
 };
 use serde::{Deserialize, Serialize};
 
@@ -110,11 +111,14 @@ impl Waiter {
     pub(crate) fn tick(&mut self, closing_mps: f64) {
         self.tick += 1;
         self.update_state_variables(closing_mps);
-        let measures = Measures { need_ratio: self.need_ratio() };
+        let measures = Measures {
+            need_ratio: self.need_ratio(),
+        };
         let before = self.esg.feeling().emotion;
         let feeling = self.esg.update(&measures, self.bsg.current(), DT_S);
         if feeling.emotion != before {
-            self.changes.push((self.time_s(), feeling.emotion, self.treats));
+            self.changes
+                .push((self.time_s(), feeling.emotion, self.treats));
         }
         self.update_behavior(feeling);
     }
@@ -133,11 +137,19 @@ impl Waiter {
     fn need_ratio(&self) -> f64 {
         let per_second = self.rate.per_second();
         let empty_s = time_to_empty_s(f64::from(self.treats), per_second);
-        need_ratio(self.approach.arrival_s(REACH_M).unwrap(), empty_s, per_second)
+        need_ratio(
+            self.approach.arrival_s(REACH_M).unwrap(),
+            empty_s,
+            per_second,
+        )
     }
 
     fn update_behavior(&mut self, feeling: Feeling<StandardEmotion>) {
-        let context = Context { feeling, is_called: self.is_called, is_hurried: self.is_hurried };
+        let context = Context {
+            feeling,
+            is_called: self.is_called,
+            is_hurried: self.is_hurried,
+        };
         for act in self.bsg.update(&context).actions {
             self.is_called = true;
             self.is_hurried |= act == Act::Hurry;

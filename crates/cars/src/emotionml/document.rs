@@ -89,11 +89,21 @@ impl Kind {
 
 impl Descriptor {
     fn of_w3c(kind: Kind, term: Term, scale: Scale) -> Self {
-        Self { kind, set: term.set(), name: term.name.to_owned(), scale }
+        Self {
+            kind,
+            set: term.set(),
+            name: term.name.to_owned(),
+            scale,
+        }
     }
 
     fn own(kind: Kind, vocabulary: &str, name: String, scale: Scale) -> Self {
-        Self { kind, set: format!("#{vocabulary}"), name, scale }
+        Self {
+            kind,
+            set: format!("#{vocabulary}"),
+            name,
+            scale,
+        }
     }
 
     fn dimension(term: Term, value: f64) -> Self {
@@ -115,12 +125,22 @@ impl<W: Write> Document<W> {
     ) -> io::Result<Self> {
         let mut xml = Writer::new_with_indent(out, b' ', 2);
         xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
-        let root = BytesStart::new(ROOT).with_attributes([("version", "1.0"), ("xmlns", NAMESPACE)]);
+        let root =
+            BytesStart::new(ROOT).with_attributes([("version", "1.0"), ("xmlns", NAMESPACE)]);
         xml.write_event(Event::Start(root))?;
         let keys = Keys::new(&facts.run);
         write_info(&mut xml, &about(&facts, &keys))?;
         let (emotions, tendencies, left_out) = Default::default();
-        Ok(Self { xml, facts, keys, roster, is_standard, emotions, tendencies, left_out })
+        Ok(Self {
+            xml,
+            facts,
+            keys,
+            roster,
+            is_standard,
+            emotions,
+            tendencies,
+            left_out,
+        })
     }
 
     /// Writes an episode.
@@ -134,23 +154,36 @@ impl<W: Write> Document<W> {
         }
         if !self.is_standard {
             self.emotions.insert(emotion.clone());
-            self.tendencies.extend(schema.map(|schema| schema.action_tendency));
+            self.tendencies
+                .extend(schema.map(|schema| schema.action_tendency));
         }
         let told = schema.map(|schema| Told::new(schema, episode, &self.facts));
         let experienced_by = self.robot_uri(&episode.begun.name);
-        let targeted_at = told.as_ref().and_then(|told| self.target(told.other.as_deref()?));
+        let targeted_at = told
+            .as_ref()
+            .and_then(|told| self.target(told.other.as_deref()?));
         let trace = episode.intensity.values().map(samples);
         let frequency = format!("{}Hz", 1.0 / self.facts.tick_s);
 
         let element = self.xml.create_element("emotion").with_attributes([
-            ("id", format!("emotion.{}.{}", episode.begun.name, episode.first).as_str()),
+            (
+                "id",
+                format!("emotion.{}.{}", episode.begun.name, episode.first).as_str(),
+            ),
             ("time-ref-uri", &self.keys.clock()),
-            ("offset-to-start", &milliseconds(episode.first, self.facts.tick_s).to_string()),
-            ("duration", &duration_ms(episode, self.facts.tick_s).to_string()),
+            (
+                "offset-to-start",
+                &milliseconds(episode.first, self.facts.tick_s).to_string(),
+            ),
+            (
+                "duration",
+                &duration_ms(episode, self.facts.tick_s).to_string(),
+            ),
         ]);
         let element = element.with_attributes(sets(&descriptors));
         // A neutral face expresses nothing.
-        let is_seen = schema.is_some_and(|schema| schema.facial_expression != FacialExpression::Neutral);
+        let is_seen =
+            schema.is_some_and(|schema| schema.facial_expression != FacialExpression::Neutral);
         let element = element.with_attributes(is_seen.then_some(("expressed-through", "face")));
         element.write_inner_content(|xml| {
             if let Some(told) = &told {
@@ -168,14 +201,22 @@ impl<W: Write> Document<W> {
 
     /// Ends the document: the vocabularies, and what could not be said.
     pub(super) fn end(mut self) -> io::Result<()> {
-        let emotions: Vec<_> =
-            self.emotions.iter().map(|name| (terms::token(name), describe_emotion(name))).collect();
+        let emotions: Vec<_> = self
+            .emotions
+            .iter()
+            .map(|name| (terms::token(name), describe_emotion(name)))
+            .collect();
         write_vocabulary(&mut self.xml, "category", EMOTIONS, emotions)?;
-        let tendencies = self.tendencies.iter().map(|t| (t.name().to_owned(), describe_tendency(*t)));
+        let tendencies = self
+            .tendencies
+            .iter()
+            .map(|t| (t.name().to_owned(), describe_tendency(*t)));
         let tendencies: Vec<_> = tendencies.collect();
         write_vocabulary(&mut self.xml, "action-tendency", TENDENCIES, tendencies)?;
         for (name, count) in &self.left_out {
-            note(&format!("{count} episodes of {name:?} are left out: no standard vocabulary can say it"));
+            note(&format!(
+                "{count} episodes of {name:?} are left out: no standard vocabulary can say it"
+            ));
         }
         self.xml.write_event(Event::End(BytesEnd::new(ROOT)))?;
         self.xml.get_mut().write_all(b"\n")
@@ -187,13 +228,22 @@ impl<W: Write> Document<W> {
         let mut descriptors = Vec::new();
         descriptors.extend(self.category(episode));
         if let Some(schema) = schema {
-            let value = mean_intensity.zip(sign(schema.valence)).map(|(mean, sign)| 0.5 + 0.5 * sign * mean);
+            let value = mean_intensity
+                .zip(sign(schema.valence))
+                .map(|(mean, sign)| 0.5 + 0.5 * sign * mean);
             descriptors.extend(value.map(|value| Descriptor::dimension(terms::VALENCE, value)));
             let unpredictability = terms::unpredictability(schema.certainty);
-            descriptors.push(Descriptor::dimension(terms::UNPREDICTABILITY, unpredictability));
+            descriptors.push(Descriptor::dimension(
+                terms::UNPREDICTABILITY,
+                unpredictability,
+            ));
             descriptors.extend(components(schema));
         } else if self.is_standard && mean_intensity.is_some() {
-            descriptors.push(Descriptor::of_w3c(Kind::Dimension, terms::INTENSITY, Scale::Trace));
+            descriptors.push(Descriptor::of_w3c(
+                Kind::Dimension,
+                terms::INTENSITY,
+                Scale::Trace,
+            ));
         }
         if let Some(urgency) = self.urgency(episode) {
             descriptors.push(Descriptor::appraisal(terms::URGENCY, urgency));
@@ -205,31 +255,54 @@ impl<W: Write> Document<W> {
 
     fn category(&self, episode: &Episode) -> Option<Descriptor> {
         let emotion = &episode.begun.emotion;
-        let scale = if episode.intensity.values().is_some() { Scale::Trace } else { Scale::Unsaid };
+        let scale = if episode.intensity.values().is_some() {
+            Scale::Trace
+        } else {
+            Scale::Unsaid
+        };
         if self.is_standard {
             let term = terms::nearest_category(emotion)?;
             return Some(Descriptor::of_w3c(Kind::Category, term, scale));
         }
-        Some(Descriptor::own(Kind::Category, EMOTIONS, terms::token(emotion), scale))
+        Some(Descriptor::own(
+            Kind::Category,
+            EMOTIONS,
+            terms::token(emotion),
+            scale,
+        ))
     }
 
     fn tendency(&self, tendency: ActionTendency) -> Option<Descriptor> {
         if self.is_standard {
             let term = terms::nearest_tendency(tendency)?;
-            return Some(Descriptor::of_w3c(Kind::ActionTendency, term, Scale::Unsaid));
+            return Some(Descriptor::of_w3c(
+                Kind::ActionTendency,
+                term,
+                Scale::Unsaid,
+            ));
         }
         let name = tendency.name().to_owned();
-        Some(Descriptor::own(Kind::ActionTendency, TENDENCIES, name, Scale::Unsaid))
+        Some(Descriptor::own(
+            Kind::ActionTendency,
+            TENDENCIES,
+            name,
+            Scale::Unsaid,
+        ))
     }
 
     /// How much the need pressed, on the average: 1 is the need that saturates the robot's emotion.
     fn urgency(&self, episode: &Episode) -> Option<f64> {
         let parameters = self.facts.parameters.get(&episode.begun.name);
         let rho_max = parameters.and_then(|own| own.get("dynamics")?.get("rho_max")?.as_f64());
-        let rho_max =
-            rho_max.filter(|rho| *rho > 0.0).unwrap_or_else(|| DynamicsParameters::default().rho_max);
-        let urgencies: Vec<f64> =
-            episode.need_ratio.values()?.iter().map(|rho| (rho / rho_max).min(1.0)).collect();
+        let rho_max = rho_max
+            .filter(|rho| *rho > 0.0)
+            .unwrap_or_else(|| DynamicsParameters::default().rho_max);
+        let urgencies: Vec<f64> = episode
+            .need_ratio
+            .values()?
+            .iter()
+            .map(|rho| (rho / rho_max).min(1.0))
+            .collect();
         mean(&urgencies)
     }
 
@@ -259,14 +332,24 @@ impl Told {
         let parameter = |name: &str| parameters.and_then(|own| own.get(name)?.as_str());
         let goods = parameter("goods").unwrap_or("treats");
         let waiter = begun.text("waiter");
-        let other = begun.text("refiller").or(waiter.map(|waiter| blamed(before, waiter)));
+        let other = begun
+            .text("refiller")
+            .or(waiter.map(|waiter| blamed(before, waiter)));
         let goal = parameter("goal").map(str::to_owned);
         let goal = goal.or(waiter.map(|waiter| format!("to bring {goods} to {waiter}")));
-        let amount = begun.number_in_words("treats").map(|treats| format!("{treats} {goods}"));
-        let circumstances =
-            Circumstances { other, goal: goal.as_deref(), amount: amount.as_deref(), valence: None };
+        let amount = begun
+            .number_in_words("treats")
+            .map(|treats| format!("{treats} {goods}"));
+        let circumstances = Circumstances {
+            other,
+            goal: goal.as_deref(),
+            amount: amount.as_deref(),
+            valence: None,
+        };
         let account = schema.account(&circumstances).spoken();
-        let other = other.filter(|_| schema.agency == AgencyRole::Other).map(str::to_owned);
+        let other = other
+            .filter(|_| schema.agency == AgencyRole::Other)
+            .map(str::to_owned);
         Self { account, other }
     }
 }
@@ -286,7 +369,10 @@ fn components(schema: &Schema) -> [Descriptor; 4] {
     [
         Descriptor::appraisal(terms::AGENCY, agency),
         Descriptor::appraisal(terms::UNEXPECTEDNESS, terms::unexpectedness(schema.novelty)),
-        Descriptor::appraisal(terms::CONTROLLABILITY, terms::degree(schema.controllability)),
+        Descriptor::appraisal(
+            terms::CONTROLLABILITY,
+            terms::degree(schema.controllability),
+        ),
         Descriptor::appraisal(terms::CHANGEABILITY, terms::degree(schema.modifiability)),
     ]
 }
@@ -319,16 +405,26 @@ fn duration_ms(episode: &Episode, tick_s: f64) -> u64 {
 
 /// The `*-set` attributes: one for each kind that occurs.
 fn sets(descriptors: &[Descriptor]) -> Vec<(&'static str, &str)> {
-    let mut sets: Vec<(&'static str, &str)> =
-        descriptors.iter().map(|one| (one.kind.set_attribute(), one.set.as_str())).collect();
+    let mut sets: Vec<(&'static str, &str)> = descriptors
+        .iter()
+        .map(|one| (one.kind.set_attribute(), one.set.as_str()))
+        .collect();
     sets.dedup();
     sets
 }
 
 /// What a reader of the document has to know.
 fn about(facts: &Facts, keys: &Keys) -> String {
-    let Facts { run, seed, tick_s, file, .. } = facts;
-    let epoch = facts.epoch.map_or_else(String::new, |epoch| format!(", epoch {epoch}"));
+    let Facts {
+        run,
+        seed,
+        tick_s,
+        file,
+        ..
+    } = facts;
+    let epoch = facts
+        .epoch
+        .map_or_else(String::new, |epoch| format!(", epoch {epoch}"));
     format!(
         "Emotions of robots in the simulated run {run}{epoch}, seed {seed}, from its {file}, by cars {}. \
          Times are simulated milliseconds since tick 0 of {}; a tick lasts {tick_s} s and a trace has one sample a tick. \
@@ -343,20 +439,30 @@ fn describe_emotion(name: &str) -> String {
     let mut parts = vec![format!("emotion state {name}")];
     parts.extend(terms::nearest_category(name).map(|term| format!("nearest: {}", term.in_words())));
     if let Some(schema) = Schemata::standard().get(name) {
-        parts.push(format!("face: {}", format!("{:?}", schema.facial_expression).to_lowercase()));
+        parts.push(format!(
+            "face: {}",
+            format!("{:?}", schema.facial_expression).to_lowercase()
+        ));
     }
     parts.join("; ")
 }
 
 fn describe_tendency(tendency: ActionTendency) -> String {
     let mut parts = vec![format!("action tendency {}", tendency.name())];
-    parts.extend(tendency.function().map(|function| format!("function: {function}")));
-    parts.extend(terms::nearest_tendency(tendency).map(|term| format!("nearest: {}", term.in_words())));
+    parts.extend(
+        tendency
+            .function()
+            .map(|function| format!("function: {function}")),
+    );
+    parts.extend(
+        terms::nearest_tendency(tendency).map(|term| format!("nearest: {}", term.in_words())),
+    );
     parts.join("; ")
 }
 
 fn write_info<W: Write>(xml: &mut Writer<W>, text: &str) -> io::Result<()> {
-    xml.create_element("info").write_text_content(BytesText::new(&terms::text(text)))?;
+    xml.create_element("info")
+        .write_text_content(BytesText::new(&terms::text(text)))?;
     Ok(())
 }
 
@@ -369,12 +475,15 @@ fn write_descriptor<W: Write>(
     let element = xml.create_element(descriptor.kind.element());
     let element = element.with_attribute(("name", descriptor.name.as_str()));
     match (&descriptor.scale, trace) {
-        (Scale::Value(value), _) => {
-            element.with_attribute(("value", terms::scale_value(*value).as_str())).write_empty()?
-        }
+        (Scale::Value(value), _) => element
+            .with_attribute(("value", terms::scale_value(*value).as_str()))
+            .write_empty()?,
         (Scale::Trace, Some(samples)) => element.write_inner_content(|xml| {
             let trace = xml.create_element("trace");
-            trace.with_attributes([("freq", frequency), ("samples", samples)]).write_empty().map(drop)
+            trace
+                .with_attributes([("freq", frequency), ("samples", samples)])
+                .write_empty()
+                .map(drop)
         })?,
         (Scale::Unsaid, _) | (Scale::Trace, None) => element.write_empty()?,
     };
@@ -382,7 +491,9 @@ fn write_descriptor<W: Write>(
 }
 
 fn write_reference<W: Write>(xml: &mut Writer<W>, uri: &str, role: &str) -> io::Result<()> {
-    xml.create_element("reference").with_attributes([("uri", uri), ("role", role)]).write_empty()?;
+    xml.create_element("reference")
+        .with_attributes([("uri", uri), ("role", role)])
+        .write_empty()?;
     Ok(())
 }
 
@@ -396,14 +507,16 @@ fn write_vocabulary<W: Write>(
     if items.is_empty() {
         return Ok(());
     }
-    xml.create_element("vocabulary").with_attributes([("type", kind), ("id", id)]).write_inner_content(
-        |xml| {
+    xml.create_element("vocabulary")
+        .with_attributes([("type", kind), ("id", id)])
+        .write_inner_content(|xml| {
             for (name, text) in items {
-                let item = xml.create_element("item").with_attribute(("name", name.as_str()));
+                let item = xml
+                    .create_element("item")
+                    .with_attribute(("name", name.as_str()));
                 item.write_inner_content(|xml| write_info(xml, &text))?;
             }
             Ok(())
-        },
-    )?;
+        })?;
     Ok(())
 }

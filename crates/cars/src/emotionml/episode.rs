@@ -39,7 +39,10 @@ impl Seen {
 
     /// A flag that it published.
     pub(super) fn flag(&self, name: &str) -> bool {
-        self.variables.as_ref().and_then(|variables| variables.get(name)?.as_bool()).unwrap_or(false)
+        self.variables
+            .as_ref()
+            .and_then(|variables| variables.get(name)?.as_bool())
+            .unwrap_or(false)
     }
 
     /// A number that it published, as people write it.
@@ -94,8 +97,14 @@ pub(super) struct Episode {
 impl Episode {
     fn begin(tick: Tick, before: Seen, begun: Seen) -> Self {
         let trace = || Trace(Some(Vec::new()));
-        let mut episode =
-            Self { begun, before, first: tick, last: tick, intensity: trace(), need_ratio: trace() };
+        let mut episode = Self {
+            begun,
+            before,
+            first: tick,
+            last: tick,
+            intensity: trace(),
+            need_ratio: trace(),
+        };
         let (intensity, need_ratio) = measures(&episode.begun);
         episode.intensity.push(intensity);
         episode.need_ratio.push(need_ratio);
@@ -105,7 +114,10 @@ impl Episode {
     fn go_on(&mut self, tick: Tick, seen: &Seen) {
         let unheard = tick.saturating_sub(self.last + 1);
         let (intensity, need_ratio) = measures(seen);
-        for (trace, value) in [(&mut self.intensity, intensity), (&mut self.need_ratio, need_ratio)] {
+        for (trace, value) in [
+            (&mut self.intensity, intensity),
+            (&mut self.need_ratio, need_ratio),
+        ] {
             trace.hold(unheard);
             trace.push(value);
         }
@@ -115,7 +127,9 @@ impl Episode {
 
 /// Intensity and need ratio. A number outside of its range means something else than it does here.
 fn measures(seen: &Seen) -> (Option<f64>, Option<f64>) {
-    let intensity = seen.number(INTENSITY).filter(|value| (0.0..=1.0).contains(value));
+    let intensity = seen
+        .number(INTENSITY)
+        .filter(|value| (0.0..=1.0).contains(value));
     let need_ratio = seen.number(NEED_RATIO).filter(|value| *value >= 0.0);
     (intensity, need_ratio)
 }
@@ -169,7 +183,10 @@ impl Episodes {
         }
         let name = &seen.name;
         if is_without {
-            note(&format!("{name} has a state without emotion, {:?}, which is left out", seen.emotion));
+            note(&format!(
+                "{name} has a state without emotion, {:?}, which is left out",
+                seen.emotion
+            ));
         } else {
             note(&format!(
                 "{name} does not publish `{INTENSITY}` between 0 and 1 in every tick; its emotions have no intensity then"
@@ -194,7 +211,10 @@ mod tests {
     }
 
     fn missed(emotion: &str) -> Seen {
-        Seen { missed: true, ..seen(emotion, 0.0) }
+        Seen {
+            missed: true,
+            ..seen(emotion, 0.0)
+        }
     }
 
     /// Emotion, first and last tick, intensities.
@@ -202,19 +222,30 @@ mod tests {
 
     fn episodes(ticks: Vec<Seen>) -> Vec<Short> {
         let mut episodes = Episodes::default();
-        let mut all: Vec<Episode> =
-            (0..).zip(ticks).filter_map(|(tick, seen)| episodes.see(tick, seen)).collect();
+        let mut all: Vec<Episode> = (0..)
+            .zip(ticks)
+            .filter_map(|(tick, seen)| episodes.see(tick, seen))
+            .collect();
         all.extend(episodes.end());
         let short = |episode: Episode| {
             let intensity = episode.intensity.values().map(<[f64]>::to_vec);
-            (episode.begun.emotion, episode.first, episode.last, intensity)
+            (
+                episode.begun.emotion,
+                episode.first,
+                episode.last,
+                intensity,
+            )
         };
         all.into_iter().map(short).collect()
     }
 
     #[test]
     fn an_episode_lasts_as_long_as_the_emotion() {
-        let found = episodes(vec![seen("HAPPY", 0.0), seen("HAPPY", 0.1), seen("CONFIDENT", 0.3)]);
+        let found = episodes(vec![
+            seen("HAPPY", 0.0),
+            seen("HAPPY", 0.1),
+            seen("CONFIDENT", 0.3),
+        ]);
         let expected = [
             ("HAPPY".to_owned(), 0, 1, Some(vec![0.0, 0.1])),
             ("CONFIDENT".to_owned(), 2, 2, Some(vec![0.3])),
@@ -224,16 +255,42 @@ mod tests {
 
     #[test]
     fn what_was_not_heard_is_held_between_reports_and_not_made_up_after_the_last() {
-        let found = episodes(vec![seen("A", 0.1), missed("A"), missed("A"), seen("A", 0.4), missed("A")]);
-        assert_eq!(found, [("A".to_owned(), 0, 3, Some(vec![0.1, 0.1, 0.1, 0.4]))]);
+        let found = episodes(vec![
+            seen("A", 0.1),
+            missed("A"),
+            missed("A"),
+            seen("A", 0.4),
+            missed("A"),
+        ]);
+        assert_eq!(
+            found,
+            [("A".to_owned(), 0, 3, Some(vec![0.1, 0.1, 0.1, 0.4]))]
+        );
         let found = episodes(vec![seen("A", 0.1), missed("A"), seen("B", 0.4)]);
-        assert_eq!(found, [("A".to_owned(), 0, 0, Some(vec![0.1])), ("B".to_owned(), 2, 2, Some(vec![0.4]))]);
+        assert_eq!(
+            found,
+            [
+                ("A".to_owned(), 0, 0, Some(vec![0.1])),
+                ("B".to_owned(), 2, 2, Some(vec![0.4]))
+            ]
+        );
     }
 
     #[test]
     fn a_trace_has_no_holes_and_no_numbers_of_another_scale() {
-        let found = episodes(vec![seen("A", 0.1), seen("A", 70.0), seen("A", 0.2), seen("B", 1.0)]);
-        assert_eq!(found, [("A".to_owned(), 0, 2, None), ("B".to_owned(), 3, 3, Some(vec![1.0]))]);
+        let found = episodes(vec![
+            seen("A", 0.1),
+            seen("A", 70.0),
+            seen("A", 0.2),
+            seen("B", 1.0),
+        ]);
+        assert_eq!(
+            found,
+            [
+                ("A".to_owned(), 0, 2, None),
+                ("B".to_owned(), 3, 3, Some(vec![1.0]))
+            ]
+        );
     }
 
     #[test]

@@ -69,7 +69,10 @@ impl Source {
             return Self::events(folder, Lines::open(events)?);
         }
         let folder = folder.path().display();
-        Err(miette!(help = "is it the folder of a run?", "{folder} has neither {RECORDING} nor {EVENTS}"))
+        Err(miette!(
+            help = "is it the folder of a run?",
+            "{folder} has neither {RECORDING} nor {EVENTS}"
+        ))
     }
 
     fn recording(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
@@ -86,19 +89,42 @@ impl Source {
     }
 
     fn events(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
-        let Line { event: Event::Init { seed, tick_s, .. }, .. } = lines.first()? else {
-            return Err(miette!("{} does not begin with `init`", lines.path.display()));
+        let Line {
+            event: Event::Init { seed, tick_s, .. },
+            ..
+        } = lines.first()?
+        else {
+            return Err(miette!(
+                "{} does not begin with `init`",
+                lines.path.display()
+            ));
         };
         let (run, file) = (name(folder)?, EVENTS);
-        let facts = Facts { run, epoch: None, seed, tick_s, file, parameters: parameters(folder) };
+        let facts = Facts {
+            run,
+            epoch: None,
+            seed,
+            tick_s,
+            file,
+            parameters: parameters(folder),
+        };
         Self::begin(lines, facts, Some(Replay::default()))
     }
 
     fn begin(lines: Lines, facts: Facts, replay: Option<Replay>) -> miette::Result<Self> {
         if facts.tick_s > 0.0 && facts.tick_s.is_finite() {
-            return Ok(Self { lines, facts, due: 0, replay });
+            return Ok(Self {
+                lines,
+                facts,
+                due: 0,
+                replay,
+            });
         }
-        Err(miette!("{}: a tick of {} s cannot be", lines.path.display(), facts.tick_s))
+        Err(miette!(
+            "{}: a tick of {} s cannot be",
+            lines.path.display(),
+            facts.tick_s
+        ))
     }
 
     /// What holds for the whole run.
@@ -116,10 +142,16 @@ impl Source {
     /// # Errors
     /// A line that is no record, or a tick that is not the next one.
     pub(super) fn next(&mut self) -> miette::Result<Option<Moment>> {
-        let Some(moment) = self.read()? else { return Ok(None) };
+        let Some(moment) = self.read()? else {
+            return Ok(None);
+        };
         if moment.tick != self.due {
             let (path, line) = (self.path().display(), self.lines.number);
-            return Err(miette!("{path}, line {line}: tick {} where {} is due", moment.tick, self.due));
+            return Err(miette!(
+                "{path}, line {line}: tick {} where {} is due",
+                moment.tick,
+                self.due
+            ));
         }
         self.due += 1;
         Ok(Some(moment))
@@ -183,7 +215,9 @@ impl Replay {
                     ..robot.clone()
                 });
                 let shown = shown.collect();
-                self.robots.values_mut().for_each(|robot| robot.missed = false);
+                self.robots
+                    .values_mut()
+                    .for_each(|robot| robot.missed = false);
                 return Some(shown);
             }
             _ => {}
@@ -206,17 +240,29 @@ impl Replay {
 /// The run's name, which is that of its folder.
 fn name(folder: &RunFolder) -> miette::Result<RunName> {
     let path = folder.path().canonicalize().into_diagnostic()?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    RunName::new(&name).map_err(|error| miette!("{} has not the name of a run: {error}", path.display()))
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    RunName::new(&name)
+        .map_err(|error| miette!("{} has not the name of a run: {error}", path.display()))
 }
 
 /// What each robot was told about itself; a run without its scenario says less of its robots.
 fn parameters(folder: &RunFolder) -> BTreeMap<RobotName, Parameters> {
     let file = folder.file(SCENARIO);
     match Scenario::load(&file, &Changes::default()) {
-        Ok(scenario) => scenario.robots.into_iter().map(|(name, robot)| (name, robot.parameters)).collect(),
+        Ok(scenario) => scenario
+            .robots
+            .into_iter()
+            .map(|(name, robot)| (name, robot.parameters))
+            .collect(),
         Err(error) => {
-            note(&format!("{}: goals and the scale of needs are not known", error.in_words()));
+            note(&format!(
+                "{}: goals and the scale of needs are not known",
+                error.in_words()
+            ));
             BTreeMap::new()
         }
     }
@@ -231,20 +277,30 @@ struct Lines {
 
 impl Lines {
     fn open(path: PathBuf) -> miette::Result<Self> {
-        let file = File::open(&path).map_err(|error| miette!("cannot read {}: {error}", path.display()))?;
-        Ok(Self { reader: BufReader::new(file), path, number: 0 })
+        let file = File::open(&path)
+            .map_err(|error| miette!("cannot read {}: {error}", path.display()))?;
+        Ok(Self {
+            reader: BufReader::new(file),
+            path,
+            number: 0,
+        })
     }
 
     /// The line with which the file has to begin.
     fn first<T: DeserializeOwned>(&mut self) -> miette::Result<T> {
-        self.next()?.ok_or_else(|| miette!("{} holds no run yet", self.path.display()))
+        self.next()?
+            .ok_or_else(|| miette!("{} holds no run yet", self.path.display()))
     }
 
     /// The next line; `None` at the end. A last line without its end was being written when the run broke off, or is
     /// being written now.
     fn next<T: DeserializeOwned>(&mut self) -> miette::Result<Option<T>> {
         let mut bytes = Vec::new();
-        let read = self.reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes);
+        let read = self
+            .reader
+            .by_ref()
+            .take(MAX_LINE_BYTES)
+            .read_until(b'\n', &mut bytes);
         read.map_err(|error| miette!("cannot read {}: {error}", self.path.display()))?;
         self.number += 1;
         let is_whole = bytes.ends_with(b"\n") || bytes.len() as u64 == MAX_LINE_BYTES;
@@ -252,10 +308,17 @@ impl Lines {
             Ok(value) => Ok(Some(value)),
             Err(_) if bytes.is_empty() => Ok(None),
             Err(_) if !is_whole => {
-                note(&format!("the last line of {} is incomplete and left out", self.path.display()));
+                note(&format!(
+                    "the last line of {} is incomplete and left out",
+                    self.path.display()
+                ));
                 Ok(None)
             }
-            Err(error) => Err(miette!("{}, line {}: {error}", self.path.display(), self.number)),
+            Err(error) => Err(miette!(
+                "{}, line {}: {error}",
+                self.path.display(),
+                self.number
+            )),
         }
     }
 }
@@ -268,15 +331,27 @@ mod tests {
     fn heard(events: Vec<Event>) -> Vec<Option<String>> {
         let mut replay = Replay::default();
         let ticks = events.into_iter().filter_map(|event| replay.take(event));
-        ticks.map(|robots| (!robots[0].missed).then(|| robots[0].emotion.clone())).collect()
+        ticks
+            .map(|robots| (!robots[0].missed).then(|| robots[0].emotion.clone()))
+            .collect()
     }
 
     #[test]
     fn events_say_who_was_heard_in_which_tick() {
         let robot = || RobotName::new("Butler").unwrap();
-        let tick = || Event::Tick { digest: String::new() };
-        let emotion = |to: &str| Event::Emotion { robot: robot(), from: None, to: to.to_owned() };
-        let joined = |generation| Event::Joined { robot: robot(), generation, at: Default::default() };
+        let tick = || Event::Tick {
+            digest: String::new(),
+        };
+        let emotion = |to: &str| Event::Emotion {
+            robot: robot(),
+            from: None,
+            to: to.to_owned(),
+        };
+        let joined = |generation| Event::Joined {
+            robot: robot(),
+            generation,
+            at: Default::default(),
+        };
         let heard = heard(vec![
             joined(None),
             emotion("HAPPY"),
@@ -293,6 +368,17 @@ mod tests {
             tick(),
         ]);
         let (happy, concerned) = (Some("HAPPY".to_owned()), Some("CONCERNED".to_owned()));
-        assert_eq!(heard, [happy.clone(), happy.clone(), None, happy, None, None, concerned]);
+        assert_eq!(
+            heard,
+            [
+                happy.clone(),
+                happy.clone(),
+                None,
+                happy,
+                None,
+                None,
+                concerned
+            ]
+        );
     }
 }

@@ -60,7 +60,9 @@ pub(super) fn nearest_category(emotion: &str) -> Option<Term> {
 
 /// The action tendency that is nearest.
 pub(super) fn nearest_tendency(tendency: ActionTendency) -> Option<Term> {
-    tendency.emotionml().map(|name| term("frijda-action-tendencies", name))
+    tendency
+        .emotionml()
+        .map(|name| term("frijda-action-tendencies", name))
 }
 
 /// A degree on the scale of EmotionML: equal steps.
@@ -113,9 +115,16 @@ pub(super) fn token(name: &str) -> String {
 
 /// A text as a document may hold it: what is no character of XML 1.0 is shown as missing.
 pub(super) fn text(raw: &str) -> String {
-    let is_char =
-        |char: char| matches!(char, '\t' | '\n' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'..);
-    raw.chars().map(|char| if is_char(char) { char } else { char::REPLACEMENT_CHARACTER }).collect()
+    let is_char = |char: char| matches!(char, '\t' | '\n' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'..);
+    raw.chars()
+        .map(|char| {
+            if is_char(char) {
+                char
+            } else {
+                char::REPLACEMENT_CHARACTER
+            }
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -136,17 +145,36 @@ mod tests {
         assert_eq!(token("VERY_CONTENT-2.1"), "VERY_CONTENT-2.1");
         assert_eq!(token("si content!"), "si_x20_content_x21_");
         assert_eq!(token("ému"), "_xE9_mu");
-        let names =
-            ["a b", "a_x20_b", "a_x20_", "a ", "_x", "x", "_xx", "a_x5F_x20_b", "<&\">", "\u{1F600}", "\0"];
-        let tokens: std::collections::BTreeSet<String> = names.iter().map(|name| token(name)).collect();
+        let names = [
+            "a b",
+            "a_x20_b",
+            "a_x20_",
+            "a ",
+            "_x",
+            "x",
+            "_xx",
+            "a_x5F_x20_b",
+            "<&\">",
+            "\u{1F600}",
+            "\0",
+        ];
+        let tokens: std::collections::BTreeSet<String> =
+            names.iter().map(|name| token(name)).collect();
         assert_eq!(tokens.len(), names.len());
-        let is_plain = |token: &String| token.chars().all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c));
+        let is_plain = |token: &String| {
+            token
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c))
+        };
         assert!(tokens.iter().all(is_plain), "{tokens:?}");
     }
 
     #[test]
     fn a_document_holds_no_character_that_xml_forbids() {
-        assert_eq!(text("a\0\u{1b}\r\u{FFFE}\t\u{1F600}"), "a\u{FFFD}\u{FFFD}\u{FFFD}\u{FFFD}\t\u{1F600}");
+        assert_eq!(
+            text("a\0\u{1b}\r\u{FFFE}\t\u{1F600}"),
+            "a\u{FFFD}\u{FFFD}\u{FFFD}\u{FFFD}\t\u{1F600}"
+        );
     }
 
     #[test]

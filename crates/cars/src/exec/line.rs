@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use protocol::Message;
 use protocol::messages::{
-    End, MAX_TEXT_BYTES, Panel, Parameters, Performative, Point, PublicState, SensedRobot, StateVariables,
-    Variable,
+    End, MAX_TEXT_BYTES, Panel, Parameters, Performative, Point, PublicState, SensedRobot,
+    StateVariables, Variable,
 };
 use protocol::{RobotName, RunName, Tick};
 use robot::Welcome;
@@ -128,7 +128,10 @@ impl<'a> Told<'a> {
             roster: &welcome.roster,
             parameters: &welcome.parameters,
             sensed,
-            last_state_variables: welcome.last_state.as_ref().map(|state| &state.state_variables),
+            last_state_variables: welcome
+                .last_state
+                .as_ref()
+                .map(|state| &state.state_variables),
         }
     }
 
@@ -204,7 +207,8 @@ impl Said {
     /// # Errors
     /// What is wrong with the line, which is quoted, and what is expected.
     pub(super) fn read(line: &[u8]) -> Result<Self, String> {
-        parse(line).map_err(|reason| format!("its line {} is not understood: {reason}", quote(line)))
+        parse(line)
+            .map_err(|reason| format!("its line {} is not understood: {reason}", quote(line)))
     }
 
     /// Whether what it says becomes part of the report of the tick.
@@ -214,8 +218,8 @@ impl Said {
 }
 
 fn parse(line: &[u8]) -> Result<Said, String> {
-    let value: Value =
-        serde_json::from_slice(line).map_err(|error| format!("it is no JSON ({error}); {EXPECTED}"))?;
+    let value: Value = serde_json::from_slice(line)
+        .map_err(|error| format!("it is no JSON ({error}); {EXPECTED}"))?;
     let Some(kind) = value.get("type").and_then(Value::as_str) else {
         return Err(format!("it has no type; {EXPECTED}"));
     };
@@ -239,14 +243,18 @@ fn fields<T: DeserializeOwned>(value: &Value) -> Result<T, String> {
 }
 
 fn check<M: Message>(message: M) -> Result<M, String> {
-    message.check().map_err(|(field, reason)| format!("field {field}: {reason}"))?;
+    message
+        .check()
+        .map_err(|(field, reason)| format!("field {field}: {reason}"))?;
     Ok(message)
 }
 
 fn check_order(order: Order) -> Result<Order, String> {
     match order.command.len() {
         0..=MAX_TEXT_BYTES => Ok(order),
-        length => Err(format!("field command: {length} bytes, more than the {MAX_TEXT_BYTES} allowed")),
+        length => Err(format!(
+            "field command: {length} bytes, more than the {MAX_TEXT_BYTES} allowed"
+        )),
     }
 }
 
@@ -255,10 +263,15 @@ fn check_done(raw: RawDone) -> Result<Done, String> {
         Value::Bool(flag) => Ok((name, Variable::Flag(flag))),
         Value::String(text) => Ok((name, Variable::Text(text))),
         Value::Number(number) => Ok((name, Variable::Number(number.as_f64().unwrap_or(f64::NAN)))),
-        _ => Err(format!("field state_variables.{name}: a number, a text, true or false is expected")),
+        _ => Err(format!(
+            "field state_variables.{name}: a number, a text, true or false is expected"
+        )),
     };
-    let state_variables: StateVariables =
-        raw.state_variables.into_iter().map(variable).collect::<Result<_, _>>()?;
+    let state_variables: StateVariables = raw
+        .state_variables
+        .into_iter()
+        .map(variable)
+        .collect::<Result<_, _>>()?;
     // The limits are those of what others will read.
     let state = check(PublicState {
         epoch: 0,
@@ -284,7 +297,10 @@ fn check_done(raw: RawDone) -> Result<Done, String> {
 pub(super) fn quote(line: &[u8]) -> String {
     // A character has at most four bytes.
     let beginning = String::from_utf8_lossy(&line[..line.len().min(4 * QUOTED)]);
-    let shown: String = harmless(beginning.trim_end()).chars().take(QUOTED).collect();
+    let shown: String = harmless(beginning.trim_end())
+        .chars()
+        .take(QUOTED)
+        .collect();
     let is_whole = shown.len() >= String::from_utf8_lossy(line).trim_end().len();
     format!("`{shown}{}`", if is_whole { "" } else { "..." })
 }
@@ -308,43 +324,95 @@ mod tests {
              \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
         );
         let (tick, location) = (6, Point::new(1.0, 2.0));
-        let quiet = Told::Tick { tick, location, blocked: false, commands: &[], sensed: &[] };
-        assert_eq!(line(&quiet), "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0}}\n");
-        let (from, command) = (RobotName::new("B").unwrap(), "say \"x\":\n".to_owned());
-        let commands = [Arrived { from, performative: Performative::Achieve, command }];
-        let sensed = [SensedRobot { name: RobotName::new("B").unwrap(), location }];
+        let quiet = Told::Tick {
+            tick,
+            location,
+            blocked: false,
+            commands: &[],
+            sensed: &[],
+        };
         assert_eq!(
-            line(&Told::Tick { tick, location, blocked: true, commands: &commands, sensed: &sensed }),
+            line(&quiet),
+            "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0}}\n"
+        );
+        let (from, command) = (RobotName::new("B").unwrap(), "say \"x\":\n".to_owned());
+        let commands = [Arrived {
+            from,
+            performative: Performative::Achieve,
+            command,
+        }];
+        let sensed = [SensedRobot {
+            name: RobotName::new("B").unwrap(),
+            location,
+        }];
+        assert_eq!(
+            line(&Told::Tick {
+                tick,
+                location,
+                blocked: true,
+                commands: &commands,
+                sensed: &sensed
+            }),
             "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0},\"blocked\":true,\"commands\":[{\"from\":\"B\",\
              \"performative\":\"achieve\",\"command\":\"say \\\"x\\\":\\n\"}],\"sensed\":[{\"name\":\"B\",\"location\":\
              {\"x\":1.0,\"y\":2.0}}]}\n"
         );
         let answer = |result| line(&Told::Answer { result });
-        assert_eq!(answer(Answered::Value(0.1.into())), "{\"type\":\"answer\",\"value\":0.1}\n");
-        assert_eq!(answer(Answered::Error("too early")), "{\"type\":\"answer\",\"error\":\"too early\"}\n");
         assert_eq!(
-            line(&Told::End { reason: EndReason::Finished }),
+            answer(Answered::Value(0.1.into())),
+            "{\"type\":\"answer\",\"value\":0.1}\n"
+        );
+        assert_eq!(
+            answer(Answered::Error("too early")),
+            "{\"type\":\"answer\",\"error\":\"too early\"}\n"
+        );
+        assert_eq!(
+            line(&Told::End {
+                reason: EndReason::Finished
+            }),
             "{\"type\":\"end\",\"reason\":\"finished\"}\n"
         );
     }
 
     #[test]
     fn a_tick_may_end_with_no_more_than_its_type() {
-        let Said::Done(done) = Said::read(b"{\"type\":\"done\"}\n").unwrap() else { panic!("it is done") };
-        assert_eq!((done.proposal, done.speed_mps, done.emotion_state.as_str()), (None, 0.0, ""));
+        let Said::Done(done) = Said::read(b"{\"type\":\"done\"}\n").unwrap() else {
+            panic!("it is done")
+        };
+        assert_eq!(
+            (done.proposal, done.speed_mps, done.emotion_state.as_str()),
+            (None, 0.0, "")
+        );
         let text = br#"{"type":"done","new":1,"proposal":{"x":1,"y":-0.1},"state_variables":{"a":7,"b":true,"c":"d"}}"#;
-        let Said::Done(done) = Said::read(text).unwrap() else { panic!("it is done") };
+        let Said::Done(done) = Said::read(text).unwrap() else {
+            panic!("it is done")
+        };
         assert_eq!(done.proposal, Some(Point::new(1.0, -0.1)));
         let expected = [("a", 7.0.into()), ("b", true.into()), ("c", "d".into())];
-        assert_eq!(done.state_variables, expected.map(|(name, value)| (name.to_owned(), value)).into());
+        assert_eq!(
+            done.state_variables,
+            expected
+                .map(|(name, value)| (name.to_owned(), value))
+                .into()
+        );
     }
 
     #[test]
     fn a_bad_line_is_quoted_in_part_and_harmless() {
-        let wrong = Said::read(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes()).unwrap_err();
-        assert!(wrong.starts_with("its line `\u{fffd}[2J\u{e9}\u{e9}"), "{wrong}");
-        assert!(wrong.contains("\u{e9}...` is not understood: it is no JSON"), "{wrong}");
-        assert!(wrong.chars().filter(|c| *c == '\u{e9}').count() < QUOTED, "{wrong}");
+        let wrong =
+            Said::read(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes()).unwrap_err();
+        assert!(
+            wrong.starts_with("its line `\u{fffd}[2J\u{e9}\u{e9}"),
+            "{wrong}"
+        );
+        assert!(
+            wrong.contains("\u{e9}...` is not understood: it is no JSON"),
+            "{wrong}"
+        );
+        assert!(
+            wrong.chars().filter(|c| *c == '\u{e9}').count() < QUOTED,
+            "{wrong}"
+        );
         assert_eq!(quote(b"short\r\n"), "`short`");
         assert_eq!(quote(&[0xff, b'x']), "`\u{fffd}x`");
     }

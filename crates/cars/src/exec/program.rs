@@ -65,7 +65,9 @@ impl Program {
         command: &[OsString],
         stopper: Arc<OnceLock<Stopper>>,
     ) -> miette::Result<(Arc<Self>, Receiver<Heard>)> {
-        let own = std::env::current_exe().into_diagnostic().wrap_err("this program does not find itself")?;
+        let own = std::env::current_exe()
+            .into_diagnostic()
+            .wrap_err("this program does not find itself")?;
         let mut child = Command::new(own)
             .args(["exec-start", &std::process::id().to_string(), "--"])
             .args(command)
@@ -76,8 +78,12 @@ impl Program {
             .into_diagnostic()
             .wrap_err("the program cannot be started")?;
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let (Some(stdin), Some(stdout), Some(stderr)) = pipes else { unreachable!("all three are piped") };
-        let pid = i32::try_from(child.id()).into_diagnostic().wrap_err("the system's process id")?;
+        let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
+            unreachable!("all three are piped")
+        };
+        let pid = i32::try_from(child.id())
+            .into_diagnostic()
+            .wrap_err("the system's process id")?;
         let (tell, heard) = std::sync::mpsc::sync_channel(QUEUE);
         let program = Arc::new(Self {
             child: Mutex::new(child),
@@ -142,7 +148,9 @@ impl Program {
 
     /// Waits for its end.
     pub(super) fn wait(&self, patience: Duration) -> Option<ExitStatus> {
-        let waited = self.ended.wait_timeout_while(lock(&self.status), patience, |status| status.is_none());
+        let waited = self
+            .ended
+            .wait_timeout_while(lock(&self.status), patience, |status| status.is_none());
         *waited.unwrap_or_else(PoisonError::into_inner).0
     }
 
@@ -155,11 +163,16 @@ impl Program {
 
     /// What became of a program that says no more: how it ended and what it complained of, or `otherwise`.
     pub(super) fn account_or(&self, otherwise: &str) -> String {
-        let Some(status) = self.wait(REST_OF_OUTPUT) else { return otherwise.to_owned() };
+        let Some(status) = self.wait(REST_OF_OUTPUT) else {
+            return otherwise.to_owned();
+        };
         let ended = format!("its program {} before the run did", Ended::Exited(status));
         match self.tail.lines() {
             lines if lines.is_empty() => format!("{ended}, and wrote no errors"),
-            lines => format!("{ended}; the last lines that it wrote as errors:\n  {}", lines.join("\n  ")),
+            lines => format!(
+                "{ended}; the last lines that it wrote as errors:\n  {}",
+                lines.join("\n  ")
+            ),
         }
     }
 
@@ -200,7 +213,10 @@ fn read_lines(stdout: ChildStdout, heard: &SyncSender<Heard>) {
     let mut stdout = BufReader::new(stdout);
     loop {
         let mut line = Vec::new();
-        let read = stdout.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line);
+        let read = stdout
+            .by_ref()
+            .take(MAX_LINE as u64 + 1)
+            .read_until(b'\n', &mut line);
         let (word, is_over) = match read {
             Ok(1..) if line.ends_with(b"\n") => (Heard::Line(line), false),
             Ok(1..) if line.len() > MAX_LINE => (Heard::TooLong(line), true),

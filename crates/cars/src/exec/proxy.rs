@@ -35,13 +35,22 @@ pub(super) struct Proxy {
 impl Proxy {
     pub(super) fn new(program: Arc<Program>, heard: Receiver<Heard>) -> Self {
         let (location, commands) = (Point::default(), Vec::new());
-        Self { program, heard, location, commands, done: Done::default(), panel: Panel::default() }
+        Self {
+            program,
+            heard,
+            location,
+            commands,
+            done: Done::default(),
+            panel: Panel::default(),
+        }
     }
 
     /// Tells the program something.
     fn tell(&self, told: &Told<'_>) -> Result<(), String> {
         self.program.tell(told).map_err(|error| {
-            self.program.account_or(&format!("its program has closed its standard input ({error})"))
+            self.program.account_or(&format!(
+                "its program has closed its standard input ({error})"
+            ))
         })
     }
 
@@ -79,14 +88,18 @@ impl Proxy {
                 return Ok(done);
             }
         }
-        Err(format!("its program said more than {MAX_LINES} lines in one tick and not done"))
+        Err(format!(
+            "its program said more than {MAX_LINES} lines in one tick and not done"
+        ))
     }
 
     fn heed(&mut self, cars: &mut Cars<'_>, said: Said) -> Result<Option<Done>, String> {
         match said {
             Said::Query(query) => self.answer(ask(cars, &query))?,
             Said::Percept => {
-                let bodies = cars.percept().map(|percept| serde_json::json!({ "bodies": percept.bodies }));
+                let bodies = cars
+                    .percept()
+                    .map(|percept| serde_json::json!({ "bodies": percept.bodies }));
                 self.answer(bodies.map_err(|error| word_for(&error)))?;
             }
             Said::Random => self.answer(Ok(unit(cars.random()).into()))?,
@@ -103,15 +116,21 @@ impl Proxy {
     }
 
     fn answer(&self, result: Result<Value, &'static str>) -> Result<(), String> {
-        self.tell(&Told::Answer { result: result.map_or_else(Answered::Error, Answered::Value) })
+        self.tell(&Told::Answer {
+            result: result.map_or_else(Answered::Error, Answered::Value),
+        })
     }
 
     /// Why the program cannot go on.
     fn mishap(&self, heard: Heard) -> String {
         match heard {
-            Heard::TooLong(line) => format!("its line {} is longer than {MAX_LINE} bytes", quote(&line)),
+            Heard::TooLong(line) => {
+                format!("its line {} is longer than {MAX_LINE} bytes", quote(&line))
+            }
             Heard::Interrupted => "it is asked to end".to_owned(),
-            Heard::Closed => self.program.account_or("its program has closed its standard output"),
+            Heard::Closed => self
+                .program
+                .account_or("its program has closed its standard output"),
             Heard::Line(_) | Heard::Ended => self.program.account_or("its program is over"),
         }
     }
@@ -127,11 +146,16 @@ impl Proxy {
 
 /// The answer to a question of the program.
 fn ask(cars: &mut Cars<'_>, query: &Query) -> Result<Value, &'static str> {
-    let state = cars.get_robot_state(&query.of).map_err(|error| word_for(&error))?;
+    let state = cars
+        .get_robot_state(&query.of)
+        .map_err(|error| word_for(&error))?;
     if query.what == protocol::keys::STATE {
         return Ok(serde_json::json!(*state));
     }
-    state.answer(&query.what).map(|answer| answer.value).ok_or("unknown query")
+    state
+        .answer(&query.what)
+        .map(|answer| answer.value)
+        .ok_or("unknown query")
 }
 
 fn word_for(error: &CallError) -> &'static str {
@@ -165,7 +189,11 @@ impl Robot for Proxy {
 
     fn set_command(&mut self, _: &mut Cars<'_>, from: &RobotName, command: &str) {
         let (from, command) = (from.clone(), command.to_owned());
-        self.commands.push(Arrived { from, performative: Performative::Achieve, command });
+        self.commands.push(Arrived {
+            from,
+            performative: Performative::Achieve,
+            command,
+        });
     }
 
     fn update_state_variables(&mut self, cars: &mut Cars<'_>) {

@@ -31,7 +31,9 @@ pub(crate) fn start(args: &StartArgs) -> ExitCode {
     if getppid().as_raw() != args.parent {
         return ExitCode::FAILURE;
     }
-    let Some((program, rest)) = args.command.split_first() else { return ExitCode::FAILURE };
+    let Some((program, rest)) = args.command.split_first() else {
+        return ExitCode::FAILURE;
+    };
     let error = std::process::Command::new(program).args(rest).exec();
     eprintln!("{} cannot be started: {error}", program.display());
     ExitCode::from(NOT_FOUND)

@@ -49,7 +49,12 @@ pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<S
         robot_service(&mut text, process, run, FIRST_HOST + 1 + index);
     }
     if let Some(console) = &file.console {
-        console_service(&mut text, console, run, FIRST_HOST + 1 + file.processes.len());
+        console_service(
+            &mut text,
+            console,
+            run,
+            FIRST_HOST + 1 + file.processes.len(),
+        );
     }
     let _infallible = write!(
         text,
@@ -69,7 +74,11 @@ fn simulator_service(
     speed: Speed,
 ) -> Result<(), FileError> {
     let no_file = || FileError::new(format!("{} names no file", file.scenario.display()));
-    let scenario = file.scenario.file_name().and_then(|name| name.to_str()).ok_or_else(no_file)?;
+    let scenario = file
+        .scenario
+        .file_name()
+        .and_then(|name| name.to_str())
+        .ok_or_else(no_file)?;
     let mut command = file.simulator.command.clone();
     command.extend([
         format!("/configs/{scenario}"),
@@ -81,11 +90,18 @@ fn simulator_service(
         format!("--speed={}", speed_arg(speed)),
     ]);
     let mut env = file.simulator.env.clone();
-    env.entry(RUNTIME_VARIABLE.to_owned()).or_insert_with(|| ONE_THREAD.to_owned());
+    env.entry(RUNTIME_VARIABLE.to_owned())
+        .or_insert_with(|| ONE_THREAD.to_owned());
     let mut service = Service::begin(text, SIMULATOR, &command);
     service.map("environment", env.iter());
     let folder = file.scenario.parent().unwrap_or(Path::new(""));
-    service.list("volumes", &[format!("{}:/configs:ro", here(folder)), "./runs:/runs".to_owned()]);
+    service.list(
+        "volumes",
+        &[
+            format!("{}:/configs:ro", here(folder)),
+            "./runs:/runs".to_owned(),
+        ],
+    );
     service.end(FIRST_HOST);
     Ok(())
 }
@@ -99,7 +115,10 @@ fn console_service(text: &mut String, process: &Process, run: &RunName, host: us
     let mut service = Service::begin(text, CONSOLE, &command);
     service.map("environment", guest_env(process, run).iter());
     service.list("depends_on", &[SIMULATOR.to_owned()]);
-    service.list("ports", &[format!("127.0.0.1:{CONSOLE_PORT}:{CONSOLE_PORT}")]);
+    service.list(
+        "ports",
+        &[format!("127.0.0.1:{CONSOLE_PORT}:{CONSOLE_PORT}")],
+    );
     service.end_in(host, "      browser: {}\n");
 }
 
@@ -107,8 +126,12 @@ fn console_service(text: &mut String, process: &Process, run: &RunName, host: us
 fn guest_env(process: &Process, run: &RunName) -> BTreeMap<String, String> {
     let mut env = process.env.clone();
     env.insert("CARS_RUN".to_owned(), run.to_string());
-    env.insert("CARS_CONNECT".to_owned(), format!("tcp/{NETWORK}.{FIRST_HOST}:{PORT}"));
-    env.entry(RUNTIME_VARIABLE.to_owned()).or_insert_with(|| ONE_THREAD.to_owned());
+    env.insert(
+        "CARS_CONNECT".to_owned(),
+        format!("tcp/{NETWORK}.{FIRST_HOST}:{PORT}"),
+    );
+    env.entry(RUNTIME_VARIABLE.to_owned())
+        .or_insert_with(|| ONE_THREAD.to_owned());
     env
 }
 
@@ -131,8 +154,13 @@ fn robot_service(text: &mut String, process: &Process, run: &RunName, host: usiz
 
 /// A folder as compose reads it: `./configs`, and not the name of a volume.
 fn here(folder: &Path) -> String {
-    let is_anchored = folder.is_absolute() || folder.components().next() == Some(Component::ParentDir);
-    let path = if is_anchored { folder.to_owned() } else { PathBuf::from(".").join(folder) };
+    let is_anchored =
+        folder.is_absolute() || folder.components().next() == Some(Component::ParentDir);
+    let path = if is_anchored {
+        folder.to_owned()
+    } else {
+        PathBuf::from(".").join(folder)
+    };
     path.display().to_string().trim_end_matches('/').to_owned()
 }
 
@@ -156,7 +184,9 @@ impl<'a> Service<'a> {
 
     fn list(&mut self, key: &str, values: &[String]) {
         self.line(&format!("{key}:"));
-        values.iter().for_each(|value| *self.text += &format!("      - {}\n", quote(value)));
+        values
+            .iter()
+            .for_each(|value| *self.text += &format!("      - {}\n", quote(value)));
     }
 
     fn map<'b>(&mut self, key: &str, values: impl Iterator<Item = (&'b String, &'b String)>) {
@@ -180,7 +210,8 @@ fn quote(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=".contains(c);
     let is_word = word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '/' || c == '.');
     let is_literal = ["yes", "no", "true", "false", "on", "off", "null", "y", "n"];
-    if is_word && word.chars().all(is_plain) && !is_literal.contains(&word.to_lowercase().as_str()) {
+    if is_word && word.chars().all(is_plain) && !is_literal.contains(&word.to_lowercase().as_str())
+    {
         return word.to_owned();
     }
     let escaped = serde_json::Value::from(word.replace('$', "$$"));
@@ -201,7 +232,10 @@ mod tests {
         let text = export(&file, &run, file.speed.unwrap()).unwrap();
         let committed = std::fs::read_to_string(root.join("docker-compose.yml")).unwrap();
         let how = "cars launch launch/hors_doeuvres.toml --export compose > docker-compose.yml";
-        assert_eq!(text, committed, "make it anew, at the top of the project: {how}");
+        assert_eq!(
+            text, committed,
+            "make it anew, at the top of the project: {how}"
+        );
     }
 
     #[test]

@@ -33,7 +33,10 @@ impl Ended {
             Self::Exited(status) => {
                 let signal = status.signal().and_then(|signal| u8::try_from(signal).ok());
                 let own = status.code().and_then(|code| u8::try_from(code).ok());
-                signal.map(|signal| SIGNALS.saturating_add(signal)).or(own).unwrap_or(1)
+                signal
+                    .map(|signal| SIGNALS.saturating_add(signal))
+                    .or(own)
+                    .unwrap_or(1)
             }
         }
     }
@@ -46,7 +49,11 @@ impl std::fmt::Display for Ended {
             Self::Exited(status) => match status.signal().map(Signal::try_from) {
                 Some(Ok(signal)) => write!(f, "was ended by {signal}"),
                 Some(Err(_)) => write!(f, "was ended by a signal"),
-                None => write!(f, "ended with exit status {}", status.code().unwrap_or_default()),
+                None => write!(
+                    f,
+                    "ended with exit status {}",
+                    status.code().unwrap_or_default()
+                ),
             },
         }
     }
@@ -72,7 +79,9 @@ impl std::fmt::Display for Failure {
             0 => writeln!(f, "it wrote no errors")?,
             _ => writeln!(f, "the last lines that it wrote as errors:")?,
         }
-        self.tail.iter().try_for_each(|line| writeln!(f, "  {line}"))?;
+        self.tail
+            .iter()
+            .try_for_each(|line| writeln!(f, "  {line}"))?;
         write!(f, "its log: {}", self.log.display())
     }
 }

@@ -6,7 +6,9 @@ use protocol::endpoint::TLS;
 
 /// A loopback port that is free at this moment.
 pub(crate) fn free_port() -> std::io::Result<u16> {
-    Ok(TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()?.port())
+    Ok(TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?
+        .local_addr()?
+        .port())
 }
 
 /// This port of the loopback interface.
@@ -17,7 +19,9 @@ pub(crate) fn loopback(port: u16, is_secured: bool) -> String {
 
 /// Whether somebody listens there now.
 pub(super) fn is_taken(endpoint: &str) -> bool {
-    let address: Option<SocketAddr> = endpoint.split_once('/').and_then(|(_, address)| address.parse().ok());
+    let address: Option<SocketAddr> = endpoint
+        .split_once('/')
+        .and_then(|(_, address)| address.parse().ok());
     let bound = address.map(TcpListener::bind);
     matches!(bound, Some(Err(error)) if error.kind() == std::io::ErrorKind::AddrInUse)
 }

@@ -116,7 +116,11 @@ struct RawConsole {
 
 impl Default for RawConsole {
     fn default() -> Self {
-        Self { enabled: true, bind: None, env: BTreeMap::new() }
+        Self {
+            enabled: true,
+            bind: None,
+            env: BTreeMap::new(),
+        }
     }
 }
 
@@ -151,7 +155,10 @@ impl LaunchFile {
     /// Reads the text of a launch file; `folder` is where its relative paths begin.
     pub(crate) fn parse(source: Source, folder: &Path) -> Result<Self, FileError> {
         let raw: RawFile = source.parse()?;
-        let speed = raw.speed.map(|speed| check_speed(&source, &speed)).transpose()?;
+        let speed = raw
+            .speed
+            .map(|speed| check_speed(&source, &speed))
+            .transpose()?;
         let simulator = check_simulator(&source, raw.simulator)?;
         let console = raw.console.enabled.then(|| console(raw.console));
         let mut names = BTreeSet::from([SIMULATOR, CONSOLE].map(str::to_owned));
@@ -167,14 +174,27 @@ impl LaunchFile {
         let scenario = tidy(&folder.join(raw.scenario.into_inner()));
         let secure = raw.secure.map(|secure| tidy(&folder.join(secure)));
         let folder = folder.to_owned();
-        Ok(Self { source, folder, scenario, scenario_span, speed, secure, simulator, console, processes })
+        Ok(Self {
+            source,
+            folder,
+            scenario,
+            scenario_span,
+            speed,
+            secure,
+            simulator,
+            console,
+            processes,
+        })
     }
 
     /// What a plain roster means: one process for each robot, its program called after its class.
     pub(crate) fn of_roster(roster: &Path, source: Source, scenario: &Scenario) -> Self {
         let process = |(name, spec): (&RobotName, &simulator::scenario::RobotSpec)| Process {
             robots: vec![name.clone()],
-            ..Process::new(name.as_str(), vec![format!("cars-{}", spec.class.to_lowercase())])
+            ..Process::new(
+                name.as_str(),
+                vec![format!("cars-{}", spec.class.to_lowercase())],
+            )
         };
         Self {
             source,
@@ -202,19 +222,25 @@ impl LaunchFile {
         let mut run_by: BTreeMap<&RobotName, &str> = BTreeMap::new();
         for process in &self.processes {
             for robot in &process.robots {
-                let refuse = |reason: &str| FileError::at(&self.source, process.robots_span.clone(), reason);
+                let refuse =
+                    |reason: &str| FileError::at(&self.source, process.robots_span.clone(), reason);
                 if !scenario.robots.contains_key(robot) {
-                    return Err(
-                        refuse(&format!("the scenario has no robot {robot}")).with_help(roster(scenario))
-                    );
+                    return Err(refuse(&format!("the scenario has no robot {robot}"))
+                        .with_help(roster(scenario)));
                 }
                 if let Some(other) = run_by.insert(robot, &process.name) {
                     let text = format!("robot {robot} is run by process {other} already");
-                    return Err(refuse(&text).with_help("every robot is run by exactly one process"));
+                    return Err(
+                        refuse(&text).with_help("every robot is run by exactly one process")
+                    );
                 }
             }
         }
-        match scenario.robots.keys().find(|robot| !run_by.contains_key(robot)) {
+        match scenario
+            .robots
+            .keys()
+            .find(|robot| !run_by.contains_key(robot))
+        {
             None => Ok(()),
             Some(robot) => Err(self.nobody_runs(robot, &scenario.robots[robot].class)),
         }
@@ -222,7 +248,11 @@ impl LaunchFile {
 
     /// Checks that every process of a secured run can show who it is.
     pub(crate) fn check_certificates(&self) -> Result<(), FileError> {
-        match self.processes.iter().find(|process| process.robots.len() > 1) {
+        match self
+            .processes
+            .iter()
+            .find(|process| process.robots.len() > 1)
+        {
             None => Ok(()),
             Some(process) => {
                 let text = "several robots in one process cannot take part in a secured run";
@@ -276,8 +306,12 @@ fn second_process(source: &Source, span: Range<usize>, name: &str) -> FileError 
         return FileError::at(source, Some(span), "this name is the console's own")
             .with_help("to change how the console starts, write a table [console]");
     }
-    FileError::at(source, Some(span), &format!("a second process called {name}"))
-        .with_help("each process has a name of its own: its log is called after it")
+    FileError::at(
+        source,
+        Some(span),
+        &format!("a second process called {name}"),
+    )
+    .with_help("each process has a name of its own: its log is called after it")
 }
 
 fn check_simulator(source: &Source, raw: RawSimulator) -> Result<Process, FileError> {
@@ -286,26 +320,40 @@ fn check_simulator(source: &Source, raw: RawSimulator) -> Result<Process, FileEr
         Some(command) => check_command(source, command)?,
         None => vec![SIMULATOR_PROGRAM.to_owned()],
     };
-    Ok(Process { span, env: raw.env, ..Process::new(SIMULATOR, command) })
+    Ok(Process {
+        span,
+        env: raw.env,
+        ..Process::new(SIMULATOR, command)
+    })
 }
 
 fn console(raw: RawConsole) -> Process {
     let mut command = vec![CONSOLE_PROGRAM.to_owned()];
     command.extend(raw.bind.map(|bind| format!("--bind={bind}")));
-    Process { env: raw.env, is_required: false, ..Process::new(CONSOLE, command) }
+    Process {
+        env: raw.env,
+        is_required: false,
+        ..Process::new(CONSOLE, command)
+    }
 }
 
 fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError> {
     let span = raw.name.span();
     // A process is named like a robot, and mostly as its robot: the name is that of a file, too.
     let name = RobotName::new(raw.name.get_ref());
-    let name = name.map_err(|error| FileError::at(source, Some(span.clone()), &error.to_string()))?;
+    let name =
+        name.map_err(|error| FileError::at(source, Some(span.clone()), &error.to_string()))?;
     let robots_span = Some(raw.robots.as_ref().map_or(span, Spanned::span));
-    let backoff = raw.backoff.map(|backoff| check_backoff(source, &backoff)).transpose()?;
+    let backoff = raw
+        .backoff
+        .map(|backoff| check_backoff(source, &backoff))
+        .transpose()?;
     let command_span = raw.command.span();
     Ok(Process {
         span: Some(command_span),
-        robots: raw.robots.map_or_else(|| vec![name.clone()], Spanned::into_inner),
+        robots: raw
+            .robots
+            .map_or_else(|| vec![name.clone()], Spanned::into_inner),
         robots_span,
         env: raw.env,
         restart: raw.restart,
@@ -318,8 +366,12 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
 
 fn check_command(source: &Source, command: Spanned<Vec<String>>) -> Result<Vec<String>, FileError> {
     if command.get_ref().first().is_none_or(String::is_empty) {
-        return Err(FileError::at(source, Some(command.span()), "a command names at least a program")
-            .with_help("for example: command = [\"cars-butler\"]"));
+        return Err(FileError::at(
+            source,
+            Some(command.span()),
+            "a command names at least a program",
+        )
+        .with_help("for example: command = [\"cars-butler\"]"));
     }
     Ok(command.into_inner())
 }
@@ -329,11 +381,15 @@ fn check_speed(source: &Source, speed: &Spanned<RawSpeed>) -> Result<Speed, File
         RawSpeed::Factor(factor) => factor.to_string(),
         RawSpeed::Text(text) => text.clone(),
     };
-    parse_speed(&text).map(Speed).map_err(|reason| FileError::at(source, Some(speed.span()), &reason))
+    parse_speed(&text)
+        .map(Speed)
+        .map_err(|reason| FileError::at(source, Some(speed.span()), &reason))
 }
 
 fn check_backoff(source: &Source, backoff: &Spanned<Time>) -> Result<Duration, FileError> {
-    let time = Duration::try_from_secs_f64(backoff.get_ref().0).ok().filter(|time| !time.is_zero());
+    let time = Duration::try_from_secs_f64(backoff.get_ref().0)
+        .ok()
+        .filter(|time| !time.is_zero());
     time.ok_or_else(|| FileError::at(source, Some(backoff.span()), "a back-off is more than zero"))
 }
 

@@ -29,13 +29,23 @@ impl Lines {
 
     fn take(&mut self) -> String {
         let line = std::mem::take(&mut self.rest);
-        String::from_utf8_lossy(&line).trim_end_matches(['\n', '\r']).to_owned()
+        String::from_utf8_lossy(&line)
+            .trim_end_matches(['\n', '\r'])
+            .to_owned()
     }
 }
 
 /// A text from outside without what would steer a terminal.
 pub(crate) fn harmless(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
+    text.chars()
+        .map(|c| {
+            if c.is_control() {
+                char::REPLACEMENT_CHARACTER
+            } else {
+                c
+            }
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -44,14 +54,19 @@ mod tests {
 
     fn lines(pieces: &[&[u8]]) -> Vec<String> {
         let (mut lines, mut got) = (Lines::default(), Vec::new());
-        pieces.iter().for_each(|piece| lines.push(piece, |line| got.push(line)));
+        pieces
+            .iter()
+            .for_each(|piece| lines.push(piece, |line| got.push(line)));
         lines.finish(|line| got.push(line));
         got
     }
 
     #[test]
     fn lines_are_lines_however_the_pipe_cuts_them() {
-        assert_eq!(lines(&[b"on", b"e\ntwo\r\n\nth", b"ree"]), ["one", "two", "", "three"]);
+        assert_eq!(
+            lines(&[b"on", b"e\ntwo\r\n\nth", b"ree"]),
+            ["one", "two", "", "three"]
+        );
         assert_eq!(lines(&[b"\xff\n"]), ["\u{fffd}"]);
         assert_eq!(lines(&[]), [""; 0]);
     }

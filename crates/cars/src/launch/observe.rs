@@ -47,7 +47,9 @@ impl Observer {
             Ok(_watching) => loop {
                 std::thread::park();
             },
-            Err(error) => watch.tell.notice(format!("the run cannot be watched: {error}")),
+            Err(error) => watch
+                .tell
+                .notice(format!("the run cannot be watched: {error}")),
         });
         Self { ended }
     }
@@ -60,7 +62,10 @@ impl Observer {
 
 impl Watch {
     fn open(&self, end: Sender<()>) -> Result<(Bus, Vec<Declared>), BusError> {
-        let role = Role::Client { connect: self.endpoint.clone(), patience: PATIENCE };
+        let role = Role::Client {
+            connect: self.endpoint.clone(),
+            patience: PATIENCE,
+        };
         let bus = Bus::open(&role, self.config.as_ref())?;
         let keys = Keys::new(&self.run);
         let tell = self.tell.clone();
@@ -79,8 +84,12 @@ impl Watch {
                 }
             })?);
         }
-        declared
-            .extend(self.faults.as_ref().map(|queue| hear_faults(&bus, &keys, queue.clone())).transpose()?);
+        declared.extend(
+            self.faults
+                .as_ref()
+                .map(|queue| hear_faults(&bus, &keys, queue.clone()))
+                .transpose()?,
+        );
         // Dropping the sender is the message.
         let end = std::sync::Mutex::new(Some(end));
         declared.push(bus.watch(&keys.alive_sim(), move |_, is_there| {
@@ -107,7 +116,9 @@ impl Watch {
         let Some(answer) = bus.ask(&keys.control(), "", Some(encode(&Control::Status)))? else {
             return Ok(None);
         };
-        let Ok(body) = answer.result else { return Ok(None) };
+        let Ok(body) = answer.result else {
+            return Ok(None);
+        };
         let Ok(ControlAnswer::Done(status)) = decode(&answer.key, "the simulator", &body) else {
             return Ok(None);
         };
@@ -131,7 +142,10 @@ fn hear_faults(
         };
         let (asking, control) = (asking.clone(), control.clone());
         let done = move || {
-            let done = Control::FaultsDone { epoch: order.epoch, tick: order.tick };
+            let done = Control::FaultsDone {
+                epoch: order.epoch,
+                tick: order.tick,
+            };
             // On a thread of its own: the answer takes as long as the simulator takes.
             std::thread::spawn(move || {
                 if let Err(error) = asking.ask(&control, "", Some(encode(&done))) {

@@ -81,13 +81,26 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
     let places = Places::new(&file.folder);
     let mut planned = vec![simulator(file, execution, &places)?];
     for process in &file.processes {
-        let command = guest(file, process, name_args(&process.robots), execution, &places)?;
+        let command = guest(
+            file,
+            process,
+            name_args(&process.robots),
+            execution,
+            &places,
+        )?;
         planned.push(prepare(process, command));
     }
     if let Some(process) = file.console.as_ref().filter(|_| execution.has_console) {
-        let args = execution.opens_browser.then(|| "--open".to_owned()).into_iter().collect();
+        let args = execution
+            .opens_browser
+            .then(|| "--open".to_owned())
+            .into_iter()
+            .collect();
         let command = guest(file, process, args, execution, &places)?;
-        planned.push(Planned { part: Part::Observer, ..prepare(process, command) });
+        planned.push(Planned {
+            part: Part::Observer,
+            ..prepare(process, command)
+        });
     }
     Ok(planned)
 }
@@ -104,10 +117,14 @@ fn guest(
     env.insert("CARS_RUN".to_owned(), execution.run.to_string());
     env.insert("CARS_CONNECT".to_owned(), connectable(execution.endpoint));
     // A process is let in as its robot; only the console is none.
-    let name =
-        if process.name == CONSOLE { Some(CONSOLE) } else { process.robots.first().map(RobotName::as_str) };
+    let name = if process.name == CONSOLE {
+        Some(CONSOLE)
+    } else {
+        process.robots.first().map(RobotName::as_str)
+    };
     if let (Some(secured), Some(name)) = (execution.secured, name) {
-        env.entry(ZENOH_CONFIG.to_owned()).or_insert_with(|| secured.config_of(name).display().to_string());
+        env.entry(ZENOH_CONFIG.to_owned())
+            .or_insert_with(|| secured.config_of(name).display().to_string());
     }
     let program = program(file, process, &process.command[0], places)?;
     let args = with_own_args(&process.command[1..], args);
@@ -117,8 +134,16 @@ fn guest(
 
 /// The arguments of a process with those that the launcher adds: what stands after a `--` is not the process's own.
 pub(super) fn with_own_args(command: &[String], own: Vec<String>) -> Vec<String> {
-    let end = command.iter().position(|arg| arg == "--").unwrap_or(command.len());
-    command[..end].iter().cloned().chain(own).chain(command[end..].iter().cloned()).collect()
+    let end = command
+        .iter()
+        .position(|arg| arg == "--")
+        .unwrap_or(command.len());
+    command[..end]
+        .iter()
+        .cloned()
+        .chain(own)
+        .chain(command[end..].iter().cloned())
+        .collect()
 }
 
 /// A program after a `--`, as in `cars exec -- ./robot.sh`, is a path from the launch file's folder if it has a `/`, as
@@ -138,15 +163,24 @@ fn locate_inner(
 
 /// How a program is told which robots it runs.
 pub(super) fn name_args(robots: &[RobotName]) -> Vec<String> {
-    robots.iter().flat_map(|robot| ["--name".to_owned(), robot.to_string()]).collect()
+    robots
+        .iter()
+        .flat_map(|robot| ["--name".to_owned(), robot.to_string()])
+        .collect()
 }
 
 /// How the clock's speed is written on a command line.
 pub(super) fn speed_arg(speed: Speed) -> String {
-    speed.0.map_or_else(|| "max".to_owned(), |factor| factor.to_string())
+    speed
+        .0
+        .map_or_else(|| "max".to_owned(), |factor| factor.to_string())
 }
 
-fn simulator(file: &LaunchFile, execution: &Execution, places: &Places) -> Result<Planned, FileError> {
+fn simulator(
+    file: &LaunchFile,
+    execution: &Execution,
+    places: &Places,
+) -> Result<Planned, FileError> {
     let process = &file.simulator;
     let scenario = RunFolder::new(execution.out, execution.run).file(SCENARIO);
     let mut args: Vec<String> = process.command.iter().skip(1).cloned().collect();
@@ -161,21 +195,34 @@ fn simulator(file: &LaunchFile, execution: &Execution, places: &Places) -> Resul
     args.extend(execution.is_insecure.then(|| "--insecure".to_owned()));
     let mut env = process.env.clone();
     if let Some(secured) = execution.secured {
-        env.insert(ZENOH_CONFIG.to_owned(), secured.config_of(SIMULATOR).display().to_string());
-        args.push(format!("--operator-config={}", secured.operator().display()));
+        env.insert(
+            ZENOH_CONFIG.to_owned(),
+            secured.config_of(SIMULATOR).display().to_string(),
+        );
+        args.push(format!(
+            "--operator-config={}",
+            secured.operator().display()
+        ));
     }
     let program = program(file, process, &process.command[0], places)?;
     let command = CommandLine { program, args, env };
-    Ok(Planned { part: Part::Simulator, ..prepare(process, command) })
+    Ok(Planned {
+        part: Part::Simulator,
+        ..prepare(process, command)
+    })
 }
 
 fn prepare(process: &Process, mut command: CommandLine) -> Planned {
     let runtime = protocol::runtime::RUNTIME_VARIABLE;
-    let chosen = std::env::var(runtime).unwrap_or_else(|_| protocol::runtime::ONE_THREAD.to_owned());
+    let chosen =
+        std::env::var(runtime).unwrap_or_else(|_| protocol::runtime::ONE_THREAD.to_owned());
     command.env.entry(runtime.to_owned()).or_insert(chosen);
     if !process.is_extern {
         // Its output goes into a file, too, and files have no colors.
-        command.env.entry("NO_COLOR".to_owned()).or_insert_with(|| "1".to_owned());
+        command
+            .env
+            .entry("NO_COLOR".to_owned())
+            .or_insert_with(|| "1".to_owned());
     }
     Planned {
         name: process.name.clone(),
@@ -190,7 +237,12 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
 }
 
 /// The program of a process. What somebody else starts need not be here.
-fn program(file: &LaunchFile, process: &Process, name: &str, places: &Places) -> Result<PathBuf, FileError> {
+fn program(
+    file: &LaunchFile,
+    process: &Process,
+    name: &str,
+    places: &Places,
+) -> Result<PathBuf, FileError> {
     match places.find(name) {
         Ok(program) => Ok(program),
         Err(_) if process.is_extern => Ok(PathBuf::from(name)),
@@ -217,7 +269,9 @@ impl std::fmt::Display for CommandLine {
             write!(f, "{name}={} ", quote(value))?;
         }
         f.write_str(&quote(&self.program.display().to_string()))?;
-        self.args.iter().try_for_each(|arg| write!(f, " {}", quote(arg)))
+        self.args
+            .iter()
+            .try_for_each(|arg| write!(f, " {}", quote(arg)))
     }
 }
 
@@ -240,7 +294,10 @@ mod tests {
     fn what_stands_after_two_dashes_is_not_told_the_robots_name() {
         let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
         let with_name = |text| with_own_args(&words(text), words("--name Rosie")).join(" ");
-        assert_eq!(with_name("exec -- ./robot.sh -- -v"), "exec --name Rosie -- ./robot.sh -- -v");
+        assert_eq!(
+            with_name("exec -- ./robot.sh -- -v"),
+            "exec --name Rosie -- ./robot.sh -- -v"
+        );
         assert_eq!(with_name("--loud"), "--loud --name Rosie");
     }
 
@@ -249,15 +306,24 @@ mod tests {
         let text = "scenario = \"x.toml\"\n[[process]]\nname = \"Rosie\"\n\
                     command = [\"sh\", \"-c\", \"./sh\", \"--\", \"./sh\", \"./sh\"]";
         let file = |text: &str| {
-            let source = Source { name: "launch.toml".to_owned(), text: text.to_owned() };
+            let source = Source {
+                name: "launch.toml".to_owned(),
+                text: text.to_owned(),
+            };
             LaunchFile::parse(source, Path::new("/usr/../bin")).unwrap()
         };
         let located = |file: &LaunchFile| {
             let (process, places) = (&file.processes[0], Places::new(&file.folder));
             locate_inner(file, process, process.command[1..].to_vec(), &places)
         };
-        assert_eq!(located(&file(text)).unwrap(), ["-c", "./sh", "--", "/usr/../bin/sh", "./sh"]);
-        let wrong = located(&file(&text.replace("\"--\", \"./sh\"", "\"--\", \"./nobody\""))).unwrap_err();
+        assert_eq!(
+            located(&file(text)).unwrap(),
+            ["-c", "./sh", "--", "/usr/../bin/sh", "./sh"]
+        );
+        let wrong = located(&file(
+            &text.replace("\"--\", \"./sh\"", "\"--\", \"./nobody\""),
+        ))
+        .unwrap_err();
         let wrong = format!("{:?}", miette::Report::from(wrong));
         assert!(wrong.contains("there is no program ./nobody"), "{wrong}");
     }

@@ -59,7 +59,12 @@ impl Tail {
 
     /// The lines, oldest first.
     pub(crate) fn lines(&self) -> Vec<String> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .iter()
+            .cloned()
+            .collect()
     }
 }
 
@@ -86,13 +91,23 @@ pub(super) struct Started {
 pub(super) fn start(command: &CommandLine) -> std::io::Result<Started> {
     let mut wrapped = CommandWrap::with_new(&command.program, |inner| {
         inner.args(&command.args).envs(&command.env);
-        inner.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        inner
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
     });
-    let child = wrapped.wrap(ProcessGroup::leader()).wrap(KillOnDrop).spawn()?;
+    let child = wrapped
+        .wrap(ProcessGroup::leader())
+        .wrap(KillOnDrop)
+        .spawn()?;
     let pid = child.id().and_then(|id| i32::try_from(id).ok());
     let pid = pid.ok_or_else(|| std::io::Error::other("the system gave no process id"))?;
     let group = Group(Pid::from_raw(pid));
-    Ok(Started { group, child, kill: KillGroup(group) })
+    Ok(Started {
+        group,
+        child,
+        kill: KillGroup(group),
+    })
 }
 
 impl Started {
@@ -104,7 +119,11 @@ impl Started {
             .stdout()
             .take()
             .map(|pipe| tokio::spawn(copy(pipe, file.clone(), output.clone(), false)));
-        let err = self.child.stderr().take().map(|pipe| tokio::spawn(copy(pipe, file, output, true)));
+        let err = self
+            .child
+            .stderr()
+            .take()
+            .map(|pipe| tokio::spawn(copy(pipe, file, output, true)));
         let status = self.child.wait().await;
         // What the leader left behind would hold the pipes, and the run.
         drop(self.kill);

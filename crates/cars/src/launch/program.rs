@@ -33,25 +33,39 @@ impl Places {
     pub(super) fn find(&self, program: &str) -> Result<PathBuf, NotFound> {
         if program.contains('/') {
             let file = self.launch_file.join(program);
-            let found =
-                Some(&file).filter(|file| is_program(file)).and_then(|file| std::path::absolute(file).ok());
-            return found
-                .ok_or_else(|| NotFound(vec![format!("at {} (from the launch file)", file.display())]));
+            let found = Some(&file)
+                .filter(|file| is_program(file))
+                .and_then(|file| std::path::absolute(file).ok());
+            return found.ok_or_else(|| {
+                NotFound(vec![format!(
+                    "at {} (from the launch file)",
+                    file.display()
+                )])
+            });
         }
         let beside = self.beside.iter().map(|folder| folder.join(program));
         let mut candidates = beside.chain(self.path.iter().map(|folder| folder.join(program)));
-        let found = candidates.find(|file| is_program(file)).and_then(|file| std::path::absolute(file).ok());
+        let found = candidates
+            .find(|file| is_program(file))
+            .and_then(|file| std::path::absolute(file).ok());
         found.ok_or_else(|| {
-            let beside =
-                self.beside.iter().map(|folder| format!("in {} (beside this program)", folder.display()));
-            NotFound(beside.chain(["in the folders of PATH".to_owned()]).collect())
+            let beside = self
+                .beside
+                .iter()
+                .map(|folder| format!("in {} (beside this program)", folder.display()));
+            NotFound(
+                beside
+                    .chain(["in the folders of PATH".to_owned()])
+                    .collect(),
+            )
         })
     }
 }
 
 fn is_program(file: &Path) -> bool {
     use std::os::unix::fs::PermissionsExt;
-    file.metadata().is_ok_and(|metadata| metadata.is_file() && metadata.permissions().mode() & 0o111 != 0)
+    file.metadata()
+        .is_ok_and(|metadata| metadata.is_file() && metadata.permissions().mode() & 0o111 != 0)
 }
 
 #[cfg(test)]
@@ -67,9 +81,15 @@ mod tests {
         };
         assert_eq!(places.find("sh").unwrap(), Path::new("/bin/sh"));
         assert_eq!(places.find("./sh").unwrap(), Path::new("/usr/../bin/sh"));
-        let elsewhere = Places { beside: Some("/nowhere".into()), ..places.clone() };
+        let elsewhere = Places {
+            beside: Some("/nowhere".into()),
+            ..places.clone()
+        };
         assert_eq!(elsewhere.find("sh").unwrap(), Path::new("/usr/bin/sh"));
         let NotFound(places) = places.find("no-such-program").unwrap_err();
-        assert_eq!(places, ["in /bin (beside this program)", "in the folders of PATH"]);
+        assert_eq!(
+            places,
+            ["in /bin (beside this program)", "in the folders of PATH"]
+        );
     }
 }

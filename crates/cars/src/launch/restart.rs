@@ -46,21 +46,30 @@ pub(super) struct Budget {
 impl Budget {
     /// A full budget; `backoff` is the first wait.
     pub(super) fn new(backoff: Duration) -> Self {
-        Self { backoff, recent: VecDeque::new() }
+        Self {
+            backoff,
+            recent: VecDeque::new(),
+        }
     }
 
     /// Spends one restart: how long to wait before it and its number among the recent ones, or `None` if the budget is
     /// used up.
     pub(super) fn spend(&mut self, now: Instant) -> Option<(Duration, usize)> {
-        while self.recent.front().is_some_and(|then| now.duration_since(*then) > WINDOW) {
+        while self
+            .recent
+            .front()
+            .is_some_and(|then| now.duration_since(*then) > WINDOW)
+        {
             self.recent.pop_front();
         }
         if self.recent.len() >= BUDGET {
             return None;
         }
         let doublings = u32::try_from(self.recent.len()).unwrap_or(u32::MAX);
-        let wait =
-            self.backoff.saturating_mul(2_u32.saturating_pow(doublings)).min(MAX_BACKOFF.max(self.backoff));
+        let wait = self
+            .backoff
+            .saturating_mul(2_u32.saturating_pow(doublings))
+            .min(MAX_BACKOFF.max(self.backoff));
         self.recent.push_back(now);
         Some((wait, self.recent.len()))
     }
@@ -71,14 +80,22 @@ mod tests {
     use super::*;
 
     fn waits_s(budget: &mut Budget, now: Instant) -> Vec<u64> {
-        std::iter::from_fn(|| budget.spend(now)).map(|(wait, _)| wait.as_secs()).collect()
+        std::iter::from_fn(|| budget.spend(now))
+            .map(|(wait, _)| wait.as_secs())
+            .collect()
     }
 
     #[test]
     fn the_wait_doubles_until_the_budget_is_used_up() {
         let now = Instant::now();
-        assert_eq!(waits_s(&mut Budget::new(Duration::from_secs(1)), now), [1, 2, 4, 8, 16]);
-        assert_eq!(waits_s(&mut Budget::new(Duration::from_secs(10)), now), [10, 20, 30, 30, 30]);
+        assert_eq!(
+            waits_s(&mut Budget::new(Duration::from_secs(1)), now),
+            [1, 2, 4, 8, 16]
+        );
+        assert_eq!(
+            waits_s(&mut Budget::new(Duration::from_secs(10)), now),
+            [10, 20, 30, 30, 30]
+        );
     }
 
     #[test]
@@ -86,6 +103,9 @@ mod tests {
         let mut budget = Budget::new(Duration::from_secs(1));
         let now = Instant::now();
         assert_eq!(waits_s(&mut budget, now).len(), BUDGET);
-        assert_eq!(waits_s(&mut budget, now + WINDOW + Duration::from_secs(1)), [1, 2, 4, 8, 16]);
+        assert_eq!(
+            waits_s(&mut budget, now + WINDOW + Duration::from_secs(1)),
+            [1, 2, 4, 8, 16]
+        );
     }
 }

@@ -120,15 +120,34 @@ impl Screen {
     /// Begins to show things on standard output and the error output.
     pub(super) fn open(look: Look) -> Self {
         let bar = look.has_bar.then(|| Bar::new(look.has_colors_err));
-        Self::to(look, Box::new(std::io::stdout()), Box::new(std::io::stderr()), bar)
+        Self::to(
+            look,
+            Box::new(std::io::stdout()),
+            Box::new(std::io::stderr()),
+            bar,
+        )
     }
 
     fn to(look: Look, out: Writer, err: Writer, bar: Option<Bar>) -> Self {
         let (queue, shows) = std::sync::mpsc::channel();
         let (waiting, dropped) = (Arc::<AtomicUsize>::default(), Arc::<AtomicUsize>::default());
-        let tell = Tell { queue, waiting, dropped, is_quiet: look.is_quiet };
-        let painter = Painter { look, out, err, bar, tell: tell.clone() };
-        Self { tell, thread: std::thread::spawn(move || painter.paint(&shows)) }
+        let tell = Tell {
+            queue,
+            waiting,
+            dropped,
+            is_quiet: look.is_quiet,
+        };
+        let painter = Painter {
+            look,
+            out,
+            err,
+            bar,
+            tell: tell.clone(),
+        };
+        Self {
+            tell,
+            thread: std::thread::spawn(move || painter.paint(&shows)),
+        }
     }
 
     /// Where to hand things over.
@@ -228,7 +247,9 @@ impl Painter {
             for piece in pieces {
                 let to = if piece.is_out { &mut *out } else { &mut *err };
                 // A reader that has gone away (`| head`) does not end the run.
-                let _unread = to.write_all(piece.text.as_bytes()).and_then(|()| to.flush());
+                let _unread = to
+                    .write_all(piece.text.as_bytes())
+                    .and_then(|()| to.flush());
             }
         };
         match &self.bar {
@@ -240,16 +261,23 @@ impl Painter {
     fn say_dropped(&mut self) {
         let count = self.tell.dropped.swap(0, Ordering::Relaxed);
         if count > 0 {
-            let text = format!("{count} lines came too fast to be shown; the run's folder has them all");
+            let text =
+                format!("{count} lines came too fast to be shown; the run's folder has them all");
             let text = self.notice_line(&text);
-            self.write(&[Piece { is_out: false, text }]);
+            self.write(&[Piece {
+                is_out: false,
+                text,
+            }]);
         }
     }
 
     fn log_line(&self, record: &LogRecord) -> String {
         // What a robot says is its own affair; what it does to a terminal is not.
-        let record =
-            LogRecord { text: harmless(&record.text), source: harmless(&record.source), ..record.clone() };
+        let record = LogRecord {
+            text: harmless(&record.text),
+            source: harmless(&record.source),
+            ..record.clone()
+        };
         let line = log_line(&record);
         if !self.look.has_colors_out {
             return line + "\n";
@@ -259,15 +287,29 @@ impl Painter {
     }
 
     fn output_line(&self, index: usize, line: &str) -> String {
-        let width = self.look.names.iter().map(String::len).max().unwrap_or_default();
+        let width = self
+            .look
+            .names
+            .iter()
+            .map(String::len)
+            .max()
+            .unwrap_or_default();
         let name = self.look.names.get(index).map_or("", String::as_str);
         let head = format!("{name:<width$} |");
-        let head = if self.look.has_colors_err { color(index, &head) } else { head };
+        let head = if self.look.has_colors_err {
+            color(index, &head)
+        } else {
+            head
+        };
         format!("{head} {line}\n")
     }
 
     fn notice_line(&self, text: &str) -> String {
-        if self.look.has_colors_err { format!("\u{1b}[1m{text}\u{1b}[0m\n") } else { format!("{text}\n") }
+        if self.look.has_colors_err {
+            format!("\u{1b}[1m{text}\u{1b}[0m\n")
+        } else {
+            format!("{text}\n")
+        }
     }
 
     /// The color of a process is also that of the robot with its name.
@@ -319,7 +361,14 @@ mod tests {
 
     fn record(text: &str) -> LogRecord {
         let (source, kind) = ("Leguin".to_owned(), LogKind::Say);
-        LogRecord { epoch: 1, tick: 3, time_s: 1.5, source, kind, text: text.to_owned() }
+        LogRecord {
+            epoch: 1,
+            tick: 3,
+            time_s: 1.5,
+            source,
+            kind,
+            text: text.to_owned(),
+        }
     }
 
     fn shown(look: Look, tell: impl FnOnce(&Tell)) -> (String, String) {
@@ -338,7 +387,10 @@ mod tests {
             tell.log(record("going home"));
             tell.notice("Leguin has left");
         });
-        assert_eq!(err, "simulator | ready\nLeguin    | here\nLeguin has left\n");
+        assert_eq!(
+            err,
+            "simulator | ready\nLeguin    | here\nLeguin has left\n"
+        );
         assert_eq!(out, "      1.5 s  Leguin       going home\n");
     }
 
@@ -349,15 +401,24 @@ mod tests {
             tell.log(record("\u{1b}[2Jhello"));
         });
         assert_eq!(err, "\u{1b}[33mLeguin    |\u{1b}[0m here\n");
-        assert_eq!(out, "\u{1b}[33m      1.5 s  Leguin       \u{1b}[0m\u{fffd}[2Jhello\n");
+        assert_eq!(
+            out,
+            "\u{1b}[33m      1.5 s  Leguin       \u{1b}[0m\u{fffd}[2Jhello\n"
+        );
     }
 
     #[test]
     fn quiet_shows_errors_only() {
-        let (_, err) = shown(Look { is_quiet: true, ..look(false) }, |tell| {
-            tell.output(1, "chatter".to_owned(), false);
-            tell.output(1, "trouble".to_owned(), true);
-        });
+        let (_, err) = shown(
+            Look {
+                is_quiet: true,
+                ..look(false)
+            },
+            |tell| {
+                tell.output(1, "chatter".to_owned(), false);
+                tell.output(1, "trouble".to_owned(), true);
+            },
+        );
         assert_eq!(err, "Leguin    | trouble\n");
     }
 
@@ -378,11 +439,20 @@ mod tests {
     fn a_terminal_that_is_stuck_costs_lines_and_nothing_else() {
         let (terminal, err) = (Arc::new(Mutex::new(())), Buffer::default());
         let stop = terminal.lock().unwrap();
-        let screen = Screen::to(look(false), Box::new(Stuck(terminal.clone())), Box::new(err.clone()), None);
+        let screen = Screen::to(
+            look(false),
+            Box::new(Stuck(terminal.clone())),
+            Box::new(err.clone()),
+            None,
+        );
         let tell = screen.tell();
         (0..3 * MAX_WAITING).for_each(|_| tell.log(record("busy")));
         drop(stop);
         screen.finish();
-        assert!(err.text().contains("lines came too fast to be shown"), "{}", err.text());
+        assert!(
+            err.text().contains("lines came too fast to be shown"),
+            "{}",
+            err.text()
+        );
     }
 }

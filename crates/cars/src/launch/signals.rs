@@ -7,7 +7,12 @@ use tokio::sync::mpsc::UnboundedSender;
 use super::supervise::Event;
 
 /// Ctrl-C, `kill`, a closed terminal, and Ctrl-\.
-const ASKING: [Signal; 4] = [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP, Signal::SIGQUIT];
+const ASKING: [Signal; 4] = [
+    Signal::SIGINT,
+    Signal::SIGTERM,
+    Signal::SIGHUP,
+    Signal::SIGQUIT,
+];
 
 /// From now on these signals are events, and none of them ends the launcher by itself.
 pub(super) fn listen(queue: &UnboundedSender<Event>) -> std::io::Result<()> {
@@ -28,6 +33,8 @@ pub(super) fn listen(queue: &UnboundedSender<Event>) -> std::io::Result<()> {
 fn is_ignored(signal: Signal) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or_default();
+    let mask = ignored
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+        .unwrap_or_default();
     mask & (1 << (signal as i32 - 1)) != 0
 }

@@ -99,7 +99,14 @@ impl Supervisor {
         let (queue, events) = tokio::sync::mpsc::unbounded_channel();
         let keep = |planned: Planned| {
             let budget = Budget::new(planned.backoff);
-            Kept { planned, budget, group: None, tail: Tail::default(), is_down: false, is_slow: false }
+            Kept {
+                planned,
+                budget,
+                group: None,
+                tail: Tail::default(),
+                is_down: false,
+                is_slow: false,
+            }
         };
         Self {
             kept: planned.into_iter().map(keep).collect(),
@@ -109,7 +116,10 @@ impl Supervisor {
             queue,
             events,
             stage: Stage::Running,
-            outcome: Outcome { failure: None, asked: None },
+            outcome: Outcome {
+                failure: None,
+                asked: None,
+            },
         }
     }
 
@@ -127,7 +137,9 @@ impl Supervisor {
                 self.start(index);
             }
         }
-        while self.stage < Stage::GivenUp && (self.stage == Stage::Running || self.is_anybody_there()) {
+        while self.stage < Stage::GivenUp
+            && (self.stage == Stage::Running || self.is_anybody_there())
+        {
             match self.events.recv().await {
                 Some(event) => self.handle(event),
                 None => unreachable!("the supervisor holds a sender of its own queue"),
@@ -155,8 +167,9 @@ impl Supervisor {
 
     fn announce_extern(&self, index: usize) {
         let Planned { name, command, .. } = &self.kept[index].planned;
-        self.tell
-            .notice(format!("{name} is yours to start, in another terminal or a debugger:\n  {command}"));
+        self.tell.notice(format!(
+            "{name} is yours to start, in another terminal or a debugger:\n  {command}"
+        ));
     }
 
     fn start(&mut self, index: usize) {
@@ -172,7 +185,12 @@ impl Supervisor {
         };
         kept.group = Some(started.group);
         let (tell, tail) = (self.tell.clone(), kept.tail.clone());
-        let output = Output { tell, index, log: log_of(&self.logs, &kept.planned.name), tail };
+        let output = Output {
+            tell,
+            index,
+            log: log_of(&self.logs, &kept.planned.name),
+            tail,
+        };
         tokio::spawn(async move {
             let ended = match started.run(output).await {
                 Ok(status) => Ended::Exited(status),
@@ -187,11 +205,17 @@ impl Supervisor {
         if self.kept[index].planned.part == Part::Simulator {
             self.on_simulator_ended(index, ended);
         } else if self.kept[index].is_down {
-            tracing::debug!("{} was killed by the scenario", self.kept[index].planned.name);
+            tracing::debug!(
+                "{} was killed by the scenario",
+                self.kept[index].planned.name
+            );
         } else if self.stage == Stage::Running {
             self.on_other_ended(index, ended);
         } else if ended.has_failed() && self.stage <= Stage::Leaving {
-            self.tell.notice(format!("{} {ended} at the end of the run", self.kept[index].planned.name));
+            self.tell.notice(format!(
+                "{} {ended} at the end of the run",
+                self.kept[index].planned.name
+            ));
         }
     }
 
@@ -203,15 +227,23 @@ impl Supervisor {
                 self.terminate();
             }
             (true, Stage::Stopping) => {
-                self.tell.notice(format!("{} {ended} while ending the run", self.kept[index].planned.name));
+                self.tell.notice(format!(
+                    "{} {ended} while ending the run",
+                    self.kept[index].planned.name
+                ));
                 self.terminate();
             }
             // A failure after the signal that asked for the end is the end that was asked for.
             _ => {
                 self.enter(Stage::Leaving);
                 // Robots hear that the run is over; who watches would go on watching.
-                let observers = self.kept.iter().filter(|kept| kept.planned.part == Part::Observer);
-                observers.filter_map(|kept| kept.group).for_each(|group| group.signal(Signal::SIGTERM));
+                let observers = self
+                    .kept
+                    .iter()
+                    .filter(|kept| kept.planned.part == Part::Observer);
+                observers
+                    .filter_map(|kept| kept.group)
+                    .for_each(|group| group.signal(Signal::SIGTERM));
             }
         }
     }
@@ -223,10 +255,14 @@ impl Supervisor {
         if kept.planned.restart.applies(has_failed) {
             if let Some((wait, number)) = kept.budget.spend(Instant::now()) {
                 let wait_s = wait.as_secs_f64();
-                self.tell.notice(format!("{name} {ended}; restart {number} of {BUDGET} in {wait_s:.1} s"));
+                self.tell.notice(format!(
+                    "{name} {ended}; restart {number} of {BUDGET} in {wait_s:.1} s"
+                ));
                 return self.after(wait, Event::RestartDue(index));
             }
-            self.tell.notice(format!("{name} {ended}, and has been restarted {BUDGET} times already"));
+            self.tell.notice(format!(
+                "{name} {ended}, and has been restarted {BUDGET} times already"
+            ));
         }
         if !has_failed {
             // Robots leave when they hear that the run is over, often before the simulator does.
@@ -236,14 +272,19 @@ impl Supervisor {
             self.stop();
         } else {
             let log = log_of(&self.logs, &name);
-            let text = format!("{name} {ended}; it is not required, and the run goes on without it");
-            self.tell.notice(format!("{text} (its log: {})", log.display()));
+            let text =
+                format!("{name} {ended}; it is not required, and the run goes on without it");
+            self.tell
+                .notice(format!("{text} (its log: {})", log.display()));
         }
     }
 
     fn on_restart_due(&mut self, index: usize) {
         if self.stage == Stage::Running {
-            self.tell.notice(format!("{} is started again", self.kept[index].planned.name));
+            self.tell.notice(format!(
+                "{} is started again",
+                self.kept[index].planned.name
+            ));
             self.start(index);
         }
     }
@@ -254,7 +295,8 @@ impl Supervisor {
             self.tell.notice("killing all processes");
             self.kill();
         } else {
-            self.tell.notice("ending all processes; once more to kill them");
+            self.tell
+                .notice("ending all processes; once more to kill them");
             self.terminate();
         }
     }
@@ -294,14 +336,23 @@ impl Supervisor {
         let name = kept.planned.name.clone();
         self.tell.notice(format!("{name} {ended}: ending the run"));
         let log = log_of(&self.logs, &name);
-        let failure =
-            Failure { text: format!("{name} {ended}"), code: ended.code(), tail: kept.tail.lines(), log };
+        let failure = Failure {
+            text: format!("{name} {ended}"),
+            code: ended.code(),
+            tail: kept.tail.lines(),
+            log,
+        };
         self.outcome.failure.get_or_insert(failure);
     }
 
     /// Lets the simulator end the run in good order: it writes its record, and the robots leave.
     fn stop(&mut self) {
-        match self.kept.iter().find(|kept| kept.planned.part == Part::Simulator).and_then(|kept| kept.group) {
+        match self
+            .kept
+            .iter()
+            .find(|kept| kept.planned.part == Part::Simulator)
+            .and_then(|kept| kept.group)
+        {
             Some(simulator) => {
                 simulator.signal(Signal::SIGTERM);
                 self.enter(Stage::Stopping);
@@ -323,7 +374,10 @@ impl Supervisor {
     }
 
     fn signal_all(&self, signal: Signal) {
-        self.kept.iter().filter_map(|kept| kept.group).for_each(|group| group.signal(signal));
+        self.kept
+            .iter()
+            .filter_map(|kept| kept.group)
+            .for_each(|group| group.signal(signal));
     }
 
     fn enter(&mut self, stage: Stage) {

@@ -36,20 +36,39 @@ impl Compose {
             execution.seed.is_none() && execution.duration.is_none() && execution.set.is_empty();
         if !is_as_it_is || execution.out != Path::new("runs") || !start.more.is_empty() {
             let help = "containers read the scenario file as it is: change it there; runs are kept in ./runs";
-            return Err(miette!(help = help, "with --via compose only --run and --speed can be chosen"));
+            return Err(miette!(
+                help = help,
+                "with --via compose only --run and --speed can be chosen"
+            ));
         }
         let project = format!("carsnet{}", std::process::id());
         let file = std::env::temp_dir().join(format!("{project}.yml"));
         let own = std::env::current_exe().into_diagnostic()?;
-        let text = output(Command::new(own).args(start.args(&[])).args(["--export", "compose"]))?;
-        std::fs::write(&file, text).into_diagnostic().wrap_err_with(|| file.display().to_string())?;
-        Ok(Self { tool: tool()?, project, file, away: BTreeMap::new() })
+        let text = output(
+            Command::new(own)
+                .args(start.args(&[]))
+                .args(["--export", "compose"]),
+        )?;
+        std::fs::write(&file, text)
+            .into_diagnostic()
+            .wrap_err_with(|| file.display().to_string())?;
+        Ok(Self {
+            tool: tool()?,
+            project,
+            file,
+            away: BTreeMap::new(),
+        })
     }
 
     /// Compose, for this project; paths in the file are relative to the current folder.
     fn compose(&self, args: &[&str]) -> Command {
         let mut command = Command::new(self.tool[0]);
-        command.args(&self.tool[1..]).args(["--project-name", &self.project, "--project-directory", "."]);
+        command.args(&self.tool[1..]).args([
+            "--project-name",
+            &self.project,
+            "--project-directory",
+            ".",
+        ]);
         command.arg("--file").arg(&self.file).args(args);
         command
     }
@@ -80,14 +99,18 @@ impl Links for Compose {
         let mut docker = Command::new("docker");
         docker.arg("network");
         if shape.flow == Flow::Open {
-            let Some(Away { container, address }) = self.away.remove(process) else { return Ok(()) };
+            let Some(Away { container, address }) = self.away.remove(process) else {
+                return Ok(());
+            };
             output(docker.args(["connect", "--ip", &address, &network, &container]))?;
         } else {
             let container = output(&mut self.compose(&["ps", "-q", &process.to_lowercase()]))?;
             let format = format!("{{{{(index .NetworkSettings.Networks {network:?}).IPAddress}}}}");
-            let address = output(Command::new("docker").args(["inspect", "-f", &format, &container]))?;
+            let address =
+                output(Command::new("docker").args(["inspect", "-f", &format, &container]))?;
             output(docker.args(["disconnect", &network, &container]))?;
-            self.away.insert(process.to_owned(), Away { container, address });
+            self.away
+                .insert(process.to_owned(), Away { container, address });
         }
         Ok(())
     }
@@ -98,7 +121,11 @@ fn tool() -> miette::Result<&'static [&'static str]> {
     let tools: [&[&str]; 2] = [&["docker-compose"], &["docker", "compose"]];
     let is_there = |tool: &&&[&str]| {
         let mut command = Command::new(tool[0]);
-        command.args(&tool[1..]).arg("version").stdout(Stdio::null()).stderr(Stdio::null());
+        command
+            .args(&tool[1..])
+            .arg("version")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
         command.status().is_ok_and(|status| status.success())
     };
     let help = "install docker and docker-compose (Debian: apt install docker.io docker-compose)";
@@ -112,9 +139,18 @@ fn tool() -> miette::Result<&'static [&'static str]> {
 /// What a command prints; it must succeed.
 fn output(command: &mut Command) -> miette::Result<String> {
     let said = format!("{command:?}");
-    let output = command.stdin(Stdio::null()).output().into_diagnostic().wrap_err_with(|| said.clone())?;
+    let output = command
+        .stdin(Stdio::null())
+        .output()
+        .into_diagnostic()
+        .wrap_err_with(|| said.clone())?;
     if !output.status.success() {
-        return Err(miette!("{said}: {}", String::from_utf8_lossy(&output.stderr).trim()));
+        return Err(miette!(
+            "{said}: {}",
+            String::from_utf8_lossy(&output.stderr).trim()
+        ));
     }
-    Ok(String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
+    Ok(String::from_utf8_lossy(&output.stdout)
+        .trim_end()
+        .to_owned())
 }

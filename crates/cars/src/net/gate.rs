@@ -47,7 +47,12 @@ impl Gate {
         loop {
             match state.first_use {
                 Some(at) => return at,
-                None => state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner),
+                None => {
+                    state = self
+                        .changed
+                        .wait(state)
+                        .unwrap_or_else(PoisonError::into_inner)
+                }
             }
         }
     }
@@ -56,7 +61,10 @@ impl Gate {
     pub(super) fn pass(&self) {
         let mut state = self.state();
         while state.shape.flow == Flow::Cut {
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            state = self
+                .changed
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
         }
     }
 }
@@ -69,12 +77,16 @@ pub(super) struct Pace {
 
 impl Pace {
     pub(super) fn new() -> Self {
-        Self { last: Instant::now() }
+        Self {
+            last: Instant::now(),
+        }
     }
 
     /// When what came at `now` may leave a link with this shape; `luck` is from 0 to 1. Nothing overtakes anything.
     pub(super) fn due(&mut self, now: Instant, shape: Shape, luck: f64) -> Instant {
-        self.last = self.last.max(now + shape.delay + shape.jitter.mul_f64(luck));
+        self.last = self
+            .last
+            .max(now + shape.delay + shape.jitter.mul_f64(luck));
         self.last
     }
 
@@ -90,7 +102,10 @@ fn transmission(shape: Shape, bytes: usize) -> Duration {
     let bits = u64::try_from(bytes).unwrap_or(u64::MAX).saturating_mul(8);
     // A bandwidth so small that this overflows sends nothing in anybody's lifetime.
     let nanos = |bps: u64| bits.saturating_mul(1_000_000_000).checked_div(bps);
-    shape.bandwidth_bps.and_then(nanos).map_or(Duration::ZERO, Duration::from_nanos)
+    shape
+        .bandwidth_bps
+        .and_then(nanos)
+        .map_or(Duration::ZERO, Duration::from_nanos)
 }
 
 #[cfg(test)]
@@ -101,18 +116,38 @@ mod tests {
     fn pieces_are_late_and_in_order() {
         let ms = Duration::from_millis;
         let mut pace = Pace::new();
-        let (now, shape) = (pace.last, Shape { delay: ms(50), jitter: ms(10), ..Shape::default() });
+        let (now, shape) = (
+            pace.last,
+            Shape {
+                delay: ms(50),
+                jitter: ms(10),
+                ..Shape::default()
+            },
+        );
         assert_eq!(pace.due(now, shape, 1.0), now + ms(60));
-        assert_eq!(pace.due(now + ms(5), shape, 0.0), now + ms(60), "nothing overtakes anything");
+        assert_eq!(
+            pace.due(now + ms(5), shape, 0.0),
+            now + ms(60),
+            "nothing overtakes anything"
+        );
         assert_eq!(pace.due(now + ms(20), shape, 0.0), now + ms(70));
     }
 
     #[test]
     fn a_narrow_link_takes_its_time_for_each_byte() {
         let mut pace = Pace::new();
-        let (now, shape) = (pace.last, Shape { bandwidth_bps: Some(8000), ..Shape::default() });
+        let (now, shape) = (
+            pace.last,
+            Shape {
+                bandwidth_bps: Some(8000),
+                ..Shape::default()
+            },
+        );
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_millis(500));
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_secs(1));
-        assert_eq!(pace.sent(now + Duration::from_secs(9), shape, 1), now + Duration::from_millis(9001));
+        assert_eq!(
+            pace.sent(now + Duration::from_secs(9), shape, 1),
+            now + Duration::from_millis(9001)
+        );
     }
 }

@@ -41,14 +41,25 @@ pub(super) struct Namespaces {
 impl Namespaces {
     pub(super) fn new(processes: &[Process]) -> miette::Result<Self> {
         if processes.len() > MAX_PROCESSES {
-            return Err(miette!("more than {MAX_PROCESSES} processes do not fit into one network"));
+            return Err(miette!(
+                "more than {MAX_PROCESSES} processes do not fit into one network"
+            ));
         }
         remove_abandoned();
-        let processes = processes.iter().map(|process| process.name.clone()).collect();
+        let processes = processes
+            .iter()
+            .map(|process| process.name.clone())
+            .collect();
         // From here on whatever was made is removed, also if the rest cannot be made.
-        let namespaces = Self { prefix: format!("{PREFIX}{}-", std::process::id()), processes };
+        let namespaces = Self {
+            prefix: format!("{PREFIX}{}-", std::process::id()),
+            processes,
+        };
         namespaces.make().map_err(|error| {
-            miette!(help = "network namespaces need root and `ip` (Debian: apt install iproute2)", "{error}")
+            miette!(
+                help = "network namespaces need root and `ip` (Debian: apt install iproute2)",
+                "{error}"
+            )
         })?;
         Ok(namespaces)
     }
@@ -56,7 +67,18 @@ impl Namespaces {
     fn make(&self) -> Result<(), String> {
         let switch = self.switch();
         ip(&["netns", "add", &switch])?;
-        ip(&["-n", &switch, "link", "add", "name", "hub", "type", "bridge", "forward_delay", "0"])?;
+        ip(&[
+            "-n",
+            &switch,
+            "link",
+            "add",
+            "name",
+            "hub",
+            "type",
+            "bridge",
+            "forward_delay",
+            "0",
+        ])?;
         ip(&["-n", &switch, "link", "set", "hub", "up"])?;
         (0..=self.processes.len()).try_for_each(|index| self.cable(&switch, index))
     }
@@ -66,13 +88,28 @@ impl Namespaces {
         let (host, port) = (self.host(index), port(index));
         ip(&["netns", "add", &host])?;
         ip(&["-n", &host, "link", "set", "lo", "up"])?;
-        ip(&["-n", switch, "link", "add", &port, "type", "veth", "peer", "name", "eth0", "netns", &host])?;
+        ip(&[
+            "-n", switch, "link", "add", &port, "type", "veth", "peer", "name", "eth0", "netns",
+            &host,
+        ])?;
         ip(&["-n", switch, "link", "set", &port, "master", "hub", "up"])?;
-        ip(&["-n", &host, "addr", "add", &format!("{}/24", address(index)), "dev", "eth0"])?;
+        ip(&[
+            "-n",
+            &host,
+            "addr",
+            "add",
+            &format!("{}/24", address(index)),
+            "dev",
+            "eth0",
+        ])?;
         ip(&["-n", &host, "link", "set", "eth0", "up"])?;
         let retrans = ["retrans", ASK_FOR_ADDRESS_AGAIN_MS];
-        ip(&[["-n", &host, "ntable", "change"].as_slice(), &["name", "arp_cache", "dev", "eth0"], &retrans]
-            .concat())
+        ip(&[
+            ["-n", &host, "ntable", "change"].as_slice(),
+            &["name", "arp_cache", "dev", "eth0"],
+            &retrans,
+        ]
+        .concat())
     }
 
     fn switch(&self) -> String {
@@ -106,11 +143,18 @@ impl Links for Namespaces {
             namespace: Some(self.host(index + 1)),
         };
         let links: Vec<Link> = self.processes.iter().enumerate().map(link).collect();
-        let own = std::env::current_exe().into_diagnostic().wrap_err("where this program is")?;
+        let own = std::env::current_exe()
+            .into_diagnostic()
+            .wrap_err("where this program is")?;
         let mut command = Command::new("ip");
-        command.args(["netns", "exec", &self.host(0)]).arg(own).args(start.args(&links));
+        command
+            .args(["netns", "exec", &self.host(0)])
+            .arg(own)
+            .args(start.args(&links));
         // Nobody else is in this network.
-        command.arg(format!("--listen={endpoint}")).arg("--insecure");
+        command
+            .arg(format!("--listen={endpoint}"))
+            .arg("--insecure");
         if !start.more.iter().any(|arg| arg == NO_CONSOLE) {
             // A browser would not reach it there.
             command.arg(NO_CONSOLE);
@@ -121,7 +165,11 @@ impl Links for Namespaces {
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
         let index = self.processes.iter().position(|name| name == process);
         let index = index.ok_or_else(|| miette!("no link of {process}"))?;
-        let state = if shape.flow == Flow::Open { "up" } else { "down" };
+        let state = if shape.flow == Flow::Open {
+            "up"
+        } else {
+            "down"
+        };
         ip(&["-n", &self.switch(), "link", "set", &port(index + 1), state])
             .map_err(|error| miette!("{error}"))
     }
@@ -137,11 +185,24 @@ fn address(index: usize) -> String {
 
 /// Namespaces whose maker was killed before it could remove them.
 fn remove_abandoned() {
-    let listed = Command::new("ip").args(["netns", "list"]).output().map(|output| output.stdout);
+    let listed = Command::new("ip")
+        .args(["netns", "list"])
+        .output()
+        .map(|output| output.stdout);
     let listed = String::from_utf8_lossy(&listed.unwrap_or_default()).into_owned();
-    let maker = |name: &str| name.strip_prefix(PREFIX)?.split_once('-')?.0.parse::<u32>().ok();
-    for name in listed.lines().filter_map(|line| line.split_whitespace().next()) {
-        let is_abandoned = maker(name).is_some_and(|pid| !Path::new(&format!("/proc/{pid}")).exists());
+    let maker = |name: &str| {
+        name.strip_prefix(PREFIX)?
+            .split_once('-')?
+            .0
+            .parse::<u32>()
+            .ok()
+    };
+    for name in listed
+        .lines()
+        .filter_map(|line| line.split_whitespace().next())
+    {
+        let is_abandoned =
+            maker(name).is_some_and(|pid| !Path::new(&format!("/proc/{pid}")).exists());
         if is_abandoned && let Err(error) = ip(&["netns", "del", name]) {
             tracing::warn!("{error}");
         }
@@ -155,5 +216,8 @@ fn ip(args: &[&str]) -> Result<(), String> {
     if output.status.success() {
         return Ok(());
     }
-    Err(format!("{said}: {}", String::from_utf8_lossy(&output.stderr).trim()))
+    Err(format!(
+        "{said}: {}",
+        String::from_utf8_lossy(&output.stderr).trim()
+    ))
 }

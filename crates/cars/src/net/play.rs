@@ -106,7 +106,11 @@ impl Proxies {
         let port = endpoint::free_port().into_diagnostic()?;
         let endpoint = endpoint::loopback(port, file.secure.is_some());
         let proxy = |process: &Process| Ok((process.name.clone(), proxy::on_loopback(&endpoint)?));
-        let proxies = file.processes.iter().map(proxy).collect::<miette::Result<_>>()?;
+        let proxies = file
+            .processes
+            .iter()
+            .map(proxy)
+            .collect::<miette::Result<_>>()?;
         Ok(Self { endpoint, proxies })
     }
 }
@@ -121,12 +125,17 @@ impl Links for Proxies {
         };
         let links: Vec<Link> = self.proxies.iter().map(link).collect();
         let mut command = Command::new(std::env::current_exe().into_diagnostic()?);
-        command.args(start.args(&links)).arg(format!("--listen={}", self.endpoint));
+        command
+            .args(start.args(&links))
+            .arg(format!("--listen={}", self.endpoint));
         Ok(command)
     }
 
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
-        self.proxies.get(process).map(|proxy| proxy.set(shape)).ok_or_else(|| miette!("no link of {process}"))
+        self.proxies
+            .get(process)
+            .map(|proxy| proxy.set(shape))
+            .ok_or_else(|| miette!("no link of {process}"))
     }
 }
 
@@ -138,7 +147,12 @@ pub(crate) fn play(args: &PlayArgs) -> miette::Result<ExitCode> {
     let process_of: BTreeMap<RobotName, String> = file
         .processes
         .iter()
-        .flat_map(|process| process.robots.iter().map(|robot| (robot.clone(), process.name.clone())))
+        .flat_map(|process| {
+            process
+                .robots
+                .iter()
+                .map(|robot| (robot.clone(), process.name.clone()))
+        })
         .collect();
     let mut execution = args.execution.clone();
     let plan = match &args.plan {
@@ -147,12 +161,21 @@ pub(crate) fn play(args: &PlayArgs) -> miette::Result<ExitCode> {
             let plan = partitions(&file, &execution)?;
             // Containers read the scenario as it is.
             if args.via != Via::Compose {
-                execution.set.push(WITHOUT_PARTITIONS.parse().map_err(|error| miette!("{error}"))?);
+                execution.set.push(
+                    WITHOUT_PARTITIONS
+                        .parse()
+                        .map_err(|error| miette!("{error}"))?,
+                );
             }
             plan
         }
     };
-    let start = Start { file: &args.file, run: &run, execution: &execution, more: &args.launch_args };
+    let start = Start {
+        file: &args.file,
+        run: &run,
+        execution: &execution,
+        more: &args.launch_args,
+    };
     let signals = Signals::forward()?;
     let mut links: Box<dyn Links> = match args.via {
         Via::Proxy => Box::new(Proxies::new(&file)?),
@@ -171,7 +194,11 @@ pub(crate) fn play(args: &PlayArgs) -> miette::Result<ExitCode> {
     let begun = SystemTime::now();
     let mut launch = signals.spawn(links.command(&start)?)?;
     let played = wait_for_clock(&mut launch, &folder.file(EVENTS), begun).and_then(|runs| {
-        if runs { faults(&plan, &process_of, links.as_mut(), &folder, &mut launch) } else { Ok(()) }
+        if runs {
+            faults(&plan, &process_of, links.as_mut(), &folder, &mut launch)
+        } else {
+            Ok(())
+        }
     });
     if played.is_err() {
         signals.end();
@@ -182,9 +209,13 @@ pub(crate) fn play(args: &PlayArgs) -> miette::Result<ExitCode> {
 
 /// Certificates name the hosts by which a simulator is reached, and those of these links are made anew each time.
 fn check_not_secured(file: &LaunchFile) -> miette::Result<()> {
-    let help = "play it --via proxy, or leave out `secure`: nobody else is in the network of these links";
+    let help =
+        "play it --via proxy, or leave out `secure`: nobody else is in the network of these links";
     if file.secure.is_some() {
-        Err(miette!(help = help, "a secured launch has no certificate there"))
+        Err(miette!(
+            help = help,
+            "a secured launch has no certificate there"
+        ))
     } else {
         Ok(())
     }
@@ -198,14 +229,22 @@ fn partitions(file: &LaunchFile, execution: &ExecutionArgs) -> miette::Result<Pl
     let scenario = file.load_scenario(&execution.changes())?;
     let Some(speed) = execution.speed.or(file.speed).and_then(|speed| speed.0) else {
         let help = "say --speed 20, for example";
-        return Err(miette!(help = help, "as fast as it goes, nobody knows when a partition would come"));
+        return Err(miette!(
+            help = help,
+            "as fast as it goes, nobody knows when a partition would come"
+        ));
     };
     Ok(Plan::of_partitions(&scenario, speed)?)
 }
 
 /// Waits until the first tick is in the record. Returns whether it came before the end of the launch.
 fn wait_for_clock(launch: &mut Child, events: &Path, begun: SystemTime) -> miette::Result<bool> {
-    let is_new = || events.metadata().and_then(|file| file.modified()).is_ok_and(|at| at >= begun);
+    let is_new = || {
+        events
+            .metadata()
+            .and_then(|file| file.modified())
+            .is_ok_and(|at| at >= begun)
+    };
     loop {
         if is_new() && last_tick(events).is_some_and(|tick| tick > 0) {
             return Ok(true);
@@ -221,11 +260,19 @@ fn wait_for_clock(launch: &mut Child, events: &Path, begun: SystemTime) -> miett
 fn last_tick(events: &Path) -> Option<u64> {
     let mut file = File::open(events).ok()?;
     let length = file.metadata().ok()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES))).ok()?;
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES)))
+        .ok()?;
     let mut tail = Vec::new();
     file.read_to_end(&mut tail).ok()?;
-    let line = tail.strip_suffix(b"\n").unwrap_or(&tail).rsplit(|byte| *byte == b'\n').next()?;
-    serde_json::from_slice::<serde_json::Value>(line).ok()?.get("tick")?.as_u64()
+    let line = tail
+        .strip_suffix(b"\n")
+        .unwrap_or(&tail)
+        .rsplit(|byte| *byte == b'\n')
+        .next()?;
+    serde_json::from_slice::<serde_json::Value>(line)
+        .ok()?
+        .get("tick")?
+        .as_u64()
 }
 
 /// A line of what was done.
@@ -249,20 +296,35 @@ fn faults(
 ) -> miette::Result<()> {
     let begun = std::time::Instant::now();
     let path = folder.file(LINKS);
-    let mut record = File::create(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+    let mut record = File::create(&path)
+        .into_diagnostic()
+        .wrap_err_with(|| path.display().to_string())?;
     let apply = |robot: &RobotName, shape: Shape, _| {
         links.set(&process_of[robot], shape)?;
-        let (time_s, tick) = (begun.elapsed().as_secs_f64(), last_tick(&folder.file(EVENTS)));
+        let (time_s, tick) = (
+            begun.elapsed().as_secs_f64(),
+            last_tick(&folder.file(EVENTS)),
+        );
         eprintln!("{time_s:.3} s: the link of {robot} is {shape}");
-        let line = serde_json::to_string(&Done { time_s, robot, link: shape, tick }).into_diagnostic()?;
-        writeln!(record, "{line}").into_diagnostic().wrap_err_with(|| path.display().to_string())
+        let line = serde_json::to_string(&Done {
+            time_s,
+            robot,
+            link: shape,
+            tick,
+        })
+        .into_diagnostic()?;
+        writeln!(record, "{line}")
+            .into_diagnostic()
+            .wrap_err_with(|| path.display().to_string())
     };
     // A launch that cannot be asked is over.
     plan.play(begun, apply, || !matches!(launch.try_wait(), Ok(None)))
 }
 
 fn exit_code(status: ExitStatus) -> ExitCode {
-    let code = status.code().or_else(|| status.signal().map(|signal| 128 + signal));
+    let code = status
+        .code()
+        .or_else(|| status.signal().map(|signal| 128 + signal));
     ExitCode::from(code.and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
 }
 
@@ -274,7 +336,10 @@ struct Signals {
 
 impl Signals {
     fn forward() -> miette::Result<Self> {
-        let signals = Self { launch: Arc::default(), is_asked: Arc::default() };
+        let signals = Self {
+            launch: Arc::default(),
+            is_asked: Arc::default(),
+        };
         let (launch, is_asked) = (signals.launch.clone(), signals.is_asked.clone());
         ctrlc::set_handler(move || {
             is_asked.store(true, Ordering::SeqCst);
@@ -288,8 +353,13 @@ impl Signals {
         // In a group of its own: Ctrl-C reaches it once, by way of this process.
         let program = command.get_program().to_owned();
         let child = command.process_group(0).spawn();
-        let child = child.into_diagnostic().wrap_err_with(|| format!("starting {}", program.display()))?;
-        self.launch.store(i32::try_from(child.id()).into_diagnostic()?, Ordering::SeqCst);
+        let child = child
+            .into_diagnostic()
+            .wrap_err_with(|| format!("starting {}", program.display()))?;
+        self.launch.store(
+            i32::try_from(child.id()).into_diagnostic()?,
+            Ordering::SeqCst,
+        );
         if self.is_asked.load(Ordering::SeqCst) {
             self.end();
         }

@@ -53,14 +53,18 @@ pub(crate) struct ProxyArgs {
 
 fn address(endpoint: &str) -> Result<SocketAddr, String> {
     let bad = || format!("{endpoint:?} is no address such as tcp/127.0.0.1:7447");
-    let address = endpoint.split_once('/').filter(|(protocol, _)| ["tcp", TLS].contains(protocol));
+    let address = endpoint
+        .split_once('/')
+        .filter(|(protocol, _)| ["tcp", TLS].contains(protocol));
     address.ok_or_else(bad)?.1.parse().map_err(|_| bad())
 }
 
 /// Forwards until the process is ended, and does what the plan and the standard input say.
 pub(super) fn run(args: &ProxyArgs) -> miette::Result<ExitCode> {
     let plan = args.plan.as_ref().zip(args.robot.as_ref());
-    let plan = plan.map(|(file, robot)| Plan::load(file, &BTreeSet::from([robot.clone()]))).transpose()?;
+    let plan = plan
+        .map(|(file, robot)| Plan::load(file, &BTreeSet::from([robot.clone()])))
+        .transpose()?;
     let proxy = Proxy::start(args.listen, args.to)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot listen at {}", args.listen))?;
@@ -94,7 +98,11 @@ pub(super) fn run(args: &ProxyArgs) -> miette::Result<ExitCode> {
 }
 
 fn closing(shape: Shape, closes: bool) -> Shape {
-    let flow = if closes && shape.flow == Flow::Cut { Flow::Closed } else { shape.flow };
+    let flow = if closes && shape.flow == Flow::Cut {
+        Flow::Closed
+    } else {
+        shape.flow
+    };
     Shape { flow, ..shape }
 }
 
@@ -120,7 +128,11 @@ impl Proxy {
     /// Begins to forward from one address to the other.
     pub(super) fn start(listen: SocketAddr, to: SocketAddr) -> std::io::Result<Self> {
         let listener = TcpListener::bind(listen)?;
-        let proxy = Self { local: listener.local_addr()?, gate: Arc::default(), open: Arc::default() };
+        let proxy = Self {
+            local: listener.local_addr()?,
+            gate: Arc::default(),
+            open: Arc::default(),
+        };
         let (gate, open) = (proxy.gate.clone(), proxy.open.clone());
         std::thread::spawn(move || accept(&listener, to, &gate, &open));
         Ok(proxy)
@@ -139,7 +151,8 @@ impl Proxy {
     pub(super) fn set(&self, shape: Shape) {
         self.gate.set(shape);
         if shape.flow == Flow::Closed {
-            self.open.with(|open| open.values().flatten().for_each(close));
+            self.open
+                .with(|open| open.values().flatten().for_each(close));
         }
     }
 }
@@ -165,7 +178,9 @@ fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<C
             continue; // Dropped, and so closed.
         }
         gate.touch();
-        let Ok(own) = client.try_clone() else { continue };
+        let Ok(own) = client.try_clone() else {
+            continue;
+        };
         open.with(|open| open.insert(id, vec![own]));
         let (gate, open) = (gate.clone(), open.clone());
         std::thread::spawn(move || {
@@ -195,7 +210,12 @@ fn forward(
     if !is_open || gate.shape().flow == Flow::Closed {
         return Ok(());
     }
-    let there = pipe(client.try_clone()?, server.try_clone()?, gate.clone(), id.wrapping_mul(2));
+    let there = pipe(
+        client.try_clone()?,
+        server.try_clone()?,
+        gate.clone(),
+        id.wrapping_mul(2),
+    );
     let back = pipe(server, client, gate.clone(), id.wrapping_mul(2) + 1);
     for writer in [there, back] {
         drop(writer.join());
@@ -207,7 +227,12 @@ fn forward(
 type Piece = (Instant, Vec<u8>);
 
 /// One direction: one thread reads, one writes, and between them is the length of the link. Returns the writer.
-fn pipe(from: TcpStream, to: TcpStream, gate: Arc<Gate>, number: u64) -> std::thread::JoinHandle<()> {
+fn pipe(
+    from: TcpStream,
+    to: TcpStream,
+    gate: Arc<Gate>,
+    number: u64,
+) -> std::thread::JoinHandle<()> {
     let (send, pieces) = sync_channel(MAX_PIECES);
     let reader = gate.clone();
     std::thread::spawn(move || read(from, &send, &reader, number));
@@ -220,7 +245,9 @@ fn read(mut from: TcpStream, send: &SyncSender<Piece>, gate: &Gate, number: u64)
     loop {
         gate.pass();
         // An error is an end, too: the other side is told by closing.
-        let Ok(bytes @ 1..) = from.read(&mut buffer) else { return };
+        let Ok(bytes @ 1..) = from.read(&mut buffer) else {
+            return;
+        };
         let due = pace.due(Instant::now(), gate.shape(), unit(&mut luck));
         if send.send((due, buffer[..bytes].to_vec())).is_err() {
             return; // The writer has gone: nobody listens on the other side.
@@ -233,7 +260,9 @@ fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
     let is_whole = pieces.iter().all(|(due, piece)| {
         sleep_until(due);
         let bps = gate.shape().bandwidth_bps.unwrap_or(u64::MAX);
-        let slice = usize::try_from(bps / 8 / SLICES_PER_S).unwrap_or(usize::MAX).max(1);
+        let slice = usize::try_from(bps / 8 / SLICES_PER_S)
+            .unwrap_or(usize::MAX)
+            .max(1);
         piece.chunks(slice).all(|slice| {
             gate.pass();
             sleep_until(pace.sent(Instant::now(), gate.shape(), slice.len()));
@@ -243,7 +272,11 @@ fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
     });
     gate.pass();
     // The end of one direction leaves the other one open; a failure ends both.
-    let _gone = to.shutdown(if is_whole { Shutdown::Write } else { Shutdown::Both });
+    let _gone = to.shutdown(if is_whole {
+        Shutdown::Write
+    } else {
+        Shutdown::Both
+    });
 }
 
 fn sleep_until(due: Instant) {
@@ -267,11 +300,13 @@ mod tests {
     /// A server, a proxy before it, and a client: what each side of the link holds.
     fn link() -> (Proxy, TcpStream, TcpStream) {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
-        let proxy = Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
+        let proxy =
+            Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
         let client = TcpStream::connect(proxy.local).unwrap();
         let (server, _) = listener.accept().unwrap();
         for side in [&client, &server] {
-            side.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+            side.set_read_timeout(Some(Duration::from_secs(20)))
+                .unwrap();
         }
         (proxy, client, server)
     }
@@ -285,7 +320,8 @@ mod tests {
     fn is_silent(side: &mut TcpStream) -> bool {
         side.set_read_timeout(Some(SHORT)).unwrap();
         let read = side.read(&mut [0]);
-        side.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        side.set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
         matches!(read, Err(error) if error.kind() == std::io::ErrorKind::WouldBlock)
     }
 
@@ -294,21 +330,38 @@ mod tests {
         let (proxy, mut client, mut server) = link();
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
-        proxy.set(Shape { flow: Flow::Cut, ..Shape::default() });
+        proxy.set(Shape {
+            flow: Flow::Cut,
+            ..Shape::default()
+        });
         client.write_all(b"two").unwrap();
         server.write_all(b"back").unwrap();
-        assert!(is_silent(&mut server) && is_silent(&mut client), "nothing comes through a cut");
+        assert!(
+            is_silent(&mut server) && is_silent(&mut client),
+            "nothing comes through a cut"
+        );
         proxy.set(Shape::default());
-        assert_eq!((receive(&mut server, 3), receive(&mut client, 4)), (b"two".to_vec(), b"back".to_vec()));
+        assert_eq!(
+            (receive(&mut server, 3), receive(&mut client, 4)),
+            (b"two".to_vec(), b"back".to_vec())
+        );
         drop(client);
-        assert_eq!(server.read(&mut [0]).unwrap(), 0, "the end comes through, too");
+        assert_eq!(
+            server.read(&mut [0]).unwrap(),
+            0,
+            "the end comes through, too"
+        );
     }
 
     #[test]
     fn who_connects_into_a_cut_gets_through_when_it_heals() {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
-        let proxy = Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
-        proxy.set(Shape { flow: Flow::Cut, ..Shape::default() });
+        let proxy =
+            Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
+        proxy.set(Shape {
+            flow: Flow::Cut,
+            ..Shape::default()
+        });
         let mut client = TcpStream::connect(proxy.local).unwrap();
         client.write_all(b"hello").unwrap();
         listener.set_nonblocking(true).unwrap();
@@ -324,10 +377,21 @@ mod tests {
         let (proxy, mut client, mut server) = link();
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
-        proxy.set(Shape { flow: Flow::Closed, ..Shape::default() });
-        assert_eq!((server.read(&mut [0]).unwrap(), client.read(&mut [0]).unwrap()), (0, 0));
+        proxy.set(Shape {
+            flow: Flow::Closed,
+            ..Shape::default()
+        });
+        assert_eq!(
+            (
+                server.read(&mut [0]).unwrap(),
+                client.read(&mut [0]).unwrap()
+            ),
+            (0, 0)
+        );
         let mut newcomer = TcpStream::connect(proxy.local).unwrap();
-        newcomer.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        newcomer
+            .set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
         assert!(matches!(newcomer.read(&mut [0]), Ok(0) | Err(_)) && !is_silent(&mut newcomer));
     }
 
@@ -335,25 +399,42 @@ mod tests {
     fn a_slow_link_is_slow_and_a_narrow_one_narrow() {
         let (proxy, mut client, mut server) = link();
         let delay = Duration::from_millis(80);
-        proxy.set(Shape { delay, jitter: delay / 8, ..Shape::default() });
+        proxy.set(Shape {
+            delay,
+            jitter: delay / 8,
+            ..Shape::default()
+        });
         let sent = Instant::now();
         client.write_all(b"ping").unwrap();
         receive(&mut server, 4);
         server.write_all(b"pong").unwrap();
         receive(&mut client, 4);
-        assert!(sent.elapsed() >= 2 * delay, "there and back took {:?}", sent.elapsed());
+        assert!(
+            sent.elapsed() >= 2 * delay,
+            "there and back took {:?}",
+            sent.elapsed()
+        );
         // 4,000 bytes at 80 kbit/s: 0.4 s.
-        proxy.set(Shape { bandwidth_bps: Some(80_000), ..Shape::default() });
+        proxy.set(Shape {
+            bandwidth_bps: Some(80_000),
+            ..Shape::default()
+        });
         let sent = Instant::now();
         client.write_all(&[7; 4000]).unwrap();
         assert_eq!(receive(&mut server, 4000), [7; 4000]);
-        assert!(sent.elapsed() >= Duration::from_millis(390), "it took {:?}", sent.elapsed());
+        assert!(
+            sent.elapsed() >= Duration::from_millis(390),
+            "it took {:?}",
+            sent.elapsed()
+        );
     }
 
     #[test]
     fn megabytes_come_through_whole_although_buffers_are_bounded() {
         let (_proxy, mut client, mut server) = link();
-        let sent: Vec<u8> = (0..9_000_000_u32).map(|i| i.to_le_bytes()[i as usize % 3]).collect();
+        let sent: Vec<u8> = (0..9_000_000_u32)
+            .map(|i| i.to_le_bytes()[i as usize % 3])
+            .collect();
         let copy = sent.clone();
         let sender = std::thread::spawn(move || {
             client.write_all(&copy).unwrap();

@@ -37,13 +37,20 @@ impl Shape {
             flow: self.flow.max(other.flow),
             delay: self.delay + other.delay,
             jitter: self.jitter + other.jitter,
-            bandwidth_bps: self.bandwidth_bps.into_iter().chain(other.bandwidth_bps).min(),
+            bandwidth_bps: self
+                .bandwidth_bps
+                .into_iter()
+                .chain(other.bandwidth_bps)
+                .min(),
         }
     }
 
     /// Whether it is nothing but open or cut.
     pub(super) fn is_plain_cut(self) -> bool {
-        self == Self { flow: self.flow, ..Self::default() } && self.flow != Flow::Closed
+        self == Self {
+            flow: self.flow,
+            ..Self::default()
+        } && self.flow != Flow::Closed
     }
 }
 
@@ -61,7 +68,10 @@ impl std::fmt::Display for Shape {
         if !self.jitter.is_zero() {
             parts.push(format!("jitter {:?}", self.jitter));
         }
-        parts.extend(self.bandwidth_bps.map(|bps| format!("bandwidth {bps} bit/s")));
+        parts.extend(
+            self.bandwidth_bps
+                .map(|bps| format!("bandwidth {bps} bit/s")),
+        );
         f.write_str(if parts.is_empty() { "whole" } else { "" })?;
         f.write_str(&parts.join(", "))
     }
@@ -90,8 +100,15 @@ impl Order {
     pub(super) fn apply(self, shape: Shape) -> Shape {
         match self {
             Self::Flow(flow) => Shape { flow, ..shape },
-            Self::Delay { delay, jitter } => Shape { delay, jitter, ..shape },
-            Self::Bandwidth(bandwidth_bps) => Shape { bandwidth_bps, ..shape },
+            Self::Delay { delay, jitter } => Shape {
+                delay,
+                jitter,
+                ..shape
+            },
+            Self::Bandwidth(bandwidth_bps) => Shape {
+                bandwidth_bps,
+                ..shape
+            },
             Self::Status => shape,
         }
     }
@@ -106,12 +123,20 @@ impl FromStr for Order {
             ["cut"] => Ok(Self::Flow(Flow::Cut)),
             ["close"] => Ok(Self::Flow(Flow::Closed)),
             ["heal"] => Ok(Self::Flow(Flow::Open)),
-            ["delay", delay] => Ok(Self::Delay { delay: time(delay)?, jitter: Duration::ZERO }),
-            ["delay", delay, jitter] => Ok(Self::Delay { delay: time(delay)?, jitter: time(jitter)? }),
+            ["delay", delay] => Ok(Self::Delay {
+                delay: time(delay)?,
+                jitter: Duration::ZERO,
+            }),
+            ["delay", delay, jitter] => Ok(Self::Delay {
+                delay: time(delay)?,
+                jitter: time(jitter)?,
+            }),
             ["bandwidth", "off"] => Ok(Self::Bandwidth(None)),
             ["bandwidth", bps] => match bps.parse() {
                 Ok(bps @ 1..) => Ok(Self::Bandwidth(Some(bps))),
-                _ => Err(format!("{bps:?} is not a number of bits per second above zero")),
+                _ => Err(format!(
+                    "{bps:?} is not a number of bits per second above zero"
+                )),
             },
             ["status"] => Ok(Self::Status),
             _ => Err(format!("{line:?} is none of: {ORDERS}")),
@@ -140,8 +165,14 @@ mod tests {
         for (line, shown) in [
             ("delay 50ms 10ms", "delay 50ms, jitter 10ms"),
             ("cut", "cut, delay 50ms, jitter 10ms"),
-            ("bandwidth 64000", "cut, delay 50ms, jitter 10ms, bandwidth 64000 bit/s"),
-            ("status", "cut, delay 50ms, jitter 10ms, bandwidth 64000 bit/s"),
+            (
+                "bandwidth 64000",
+                "cut, delay 50ms, jitter 10ms, bandwidth 64000 bit/s",
+            ),
+            (
+                "status",
+                "cut, delay 50ms, jitter 10ms, bandwidth 64000 bit/s",
+            ),
             ("heal", "delay 50ms, jitter 10ms, bandwidth 64000 bit/s"),
             ("bandwidth off", "delay 50ms, jitter 10ms"),
             ("delay 0s", "whole"),
@@ -150,18 +181,47 @@ mod tests {
             shape = line.parse::<Order>().unwrap().apply(shape);
             assert_eq!(shape.to_string(), shown, "after {line}");
         }
-        for line in ["", "cut it", "delay", "delay -1s", "delay 5", "bandwidth 0", "bandwidth -1"] {
+        for line in [
+            "",
+            "cut it",
+            "delay",
+            "delay -1s",
+            "delay 5",
+            "bandwidth 0",
+            "bandwidth -1",
+        ] {
             assert!(line.parse::<Order>().is_err(), "{line:?}");
         }
     }
 
     #[test]
     fn of_two_faults_at_once_both_are_felt() {
-        let slow = Shape { delay: 50 * MS, bandwidth_bps: Some(1000), ..Shape::default() };
-        let cut = Shape { flow: Flow::Cut, delay: MS, bandwidth_bps: Some(10), ..Shape::default() };
-        let both = Shape { flow: Flow::Cut, delay: 51 * MS, bandwidth_bps: Some(10), ..Shape::default() };
+        let slow = Shape {
+            delay: 50 * MS,
+            bandwidth_bps: Some(1000),
+            ..Shape::default()
+        };
+        let cut = Shape {
+            flow: Flow::Cut,
+            delay: MS,
+            bandwidth_bps: Some(10),
+            ..Shape::default()
+        };
+        let both = Shape {
+            flow: Flow::Cut,
+            delay: 51 * MS,
+            bandwidth_bps: Some(10),
+            ..Shape::default()
+        };
         assert_eq!(slow.and(cut), both);
         assert_eq!(cut.and(slow), both);
-        assert!(!both.is_plain_cut() && Shape { flow: Flow::Cut, ..Shape::default() }.is_plain_cut());
+        assert!(
+            !both.is_plain_cut()
+                && Shape {
+                    flow: Flow::Cut,
+                    ..Shape::default()
+                }
+                .is_plain_cut()
+        );
     }
 }

@@ -30,14 +30,21 @@ impl Lab {
 
     fn cars(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_cars"));
-        command.current_dir(self.0.path()).args(args).arg("--out").arg(self.0.path()).env("NO_COLOR", "1");
+        command
+            .current_dir(self.0.path())
+            .args(args)
+            .arg("--out")
+            .arg(self.0.path())
+            .env("NO_COLOR", "1");
         command
     }
 
     /// Runs one of the project's scenarios under a name.
     #[track_caller]
     fn run(&self, scenario: &str, name: &str, changes: &[&str]) {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs").join(scenario);
+        let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../configs")
+            .join(scenario);
         let mut command = self.cars(&["run", "--quiet", "--run", name]);
         command.arg(file);
         for change in changes {
@@ -58,7 +65,11 @@ impl Lab {
         assert!(output.status.success(), "{}", stderr(&output));
         let document = String::from_utf8(output.stdout.clone()).unwrap();
         assert_eq!(rules::broken(&document), [].into(), "{args:?}: {document}");
-        assert_ne!(schema::is_valid(&document, self.0.path()), Some(false), "{args:?}");
+        assert_ne!(
+            schema::is_valid(&document, self.0.path()),
+            Some(false),
+            "{args:?}"
+        );
         (document, stderr(&output))
     }
 
@@ -78,7 +89,9 @@ impl Lab {
 
     fn lines(&self, run: &str, file: &str) -> Vec<Value> {
         let text = std::fs::read_to_string(self.path(run).join(file)).unwrap();
-        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+        text.lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
     }
 }
 
@@ -106,32 +119,54 @@ struct Emotion {
 
 fn emotions(document: &str) -> Vec<Emotion> {
     let document = Document::parse(document).unwrap();
-    let nodes = document.root_element().children().filter(|node| node.tag_name().name() == "emotion");
+    let nodes = document
+        .root_element()
+        .children()
+        .filter(|node| node.tag_name().name() == "emotion");
     nodes.map(emotion).collect()
 }
 
 fn emotion(node: Node) -> Emotion {
-    let named = |name: &'static str| node.children().filter(move |child| child.tag_name().name() == name);
+    let named = |name: &'static str| {
+        node.children()
+            .filter(move |child| child.tag_name().name() == name)
+    };
     let reference = |role: &str| {
-        let found = named("reference").find(|reference| reference.attribute("role") == Some(role))?;
-        found.attribute("uri")?.rsplit('/').next().map(str::to_owned)
+        let found =
+            named("reference").find(|reference| reference.attribute("role") == Some(role))?;
+        found
+            .attribute("uri")?
+            .rsplit('/')
+            .next()
+            .map(str::to_owned)
     };
     let own = |node: Node| node.attribute("name").unwrap().to_owned();
     let values = named("dimension")
         .chain(named("appraisal"))
         .filter_map(|node| Some((own(node), node.attribute("value")?.parse().unwrap())));
-    let trace = node.descendants().find_map(|node| node.attribute("samples"));
+    let trace = node
+        .descendants()
+        .find_map(|node| node.attribute("samples"));
     Emotion {
         id: node.attribute("id").unwrap().to_owned(),
         robot: reference("experiencedBy").unwrap(),
         category: named("category").next().map(own),
         offset_ms: node.attribute("offset-to-start").unwrap().parse().unwrap(),
         duration_ms: node.attribute("duration").unwrap().parse().unwrap(),
-        trace: trace.map(|samples| samples.split(' ').map(|sample| sample.parse().unwrap()).collect()),
+        trace: trace.map(|samples| {
+            samples
+                .split(' ')
+                .map(|sample| sample.parse().unwrap())
+                .collect()
+        }),
         values: values.collect(),
         tendency: named("action-tendency").next().map(own),
         target: reference("targetedAt"),
-        info: named("info").next().and_then(|info| info.text()).unwrap_or("").to_owned(),
+        info: named("info")
+            .next()
+            .and_then(|info| info.text())
+            .unwrap_or("")
+            .to_owned(),
         face: node.attribute("expressed-through") == Some("face"),
     }
 }
@@ -144,16 +179,26 @@ fn category<'a>(emotions: &'a [Emotion], robot: &str, name: &str) -> Vec<&'a Emo
 /// The runs of test 24: name, scenario, changes.
 const RUNS: [(&str, &str, &[&str]); 4] = [
     ("hall", "hors_doeuvres.toml", &[]),
-    ("three", "three_robots.toml", &["robot.Butler.params.refiller=Vonda"]),
+    (
+        "three",
+        "three_robots.toml",
+        &["robot.Butler.params.refiller=Vonda"],
+    ),
     (
         "affectless",
         "hors_doeuvres.toml",
-        &["robot.Butler.params.affect=off", "robot.Leguin.params.affect=off"],
+        &[
+            "robot.Butler.params.affect=off",
+            "robot.Leguin.params.affect=off",
+        ],
     ),
     (
         "lossy",
         "hors_doeuvres.toml",
-        &["network.commands.loss=0.8", "robot.Butler.params.dynamics.state_set=akr4"],
+        &[
+            "network.commands.loss=0.8",
+            "robot.Butler.params.dynamics.state_set=akr4",
+        ],
     ),
 ];
 
@@ -168,7 +213,11 @@ fn t24_exports_of_real_runs_keep_the_rules_and_say_what_the_record_says() {
         // The other view has the same episodes, told in other words.
         let (document, _) = lab.export(&[run, "--standard"]);
         let told = |emotions: &[Emotion]| -> Vec<Emotion> {
-            let no_words = |one: &Emotion| Emotion { category: None, tendency: None, ..one.clone() };
+            let no_words = |one: &Emotion| Emotion {
+                category: None,
+                tendency: None,
+                ..one.clone()
+            };
             emotions.iter().map(no_words).collect()
         };
         let standard = emotions(&document);
@@ -184,30 +233,47 @@ fn t24_exports_of_real_runs_keep_the_rules_and_say_what_the_record_says() {
 #[track_caller]
 fn says_what_the_record_says(lab: &Lab, run: &str, emotions: &[Emotion]) {
     let mut begun: BTreeMap<(u64, String), String> = BTreeMap::new();
-    for event in lab.lines(run, "events.jsonl").iter().filter(|event| event["event"] == "emotion") {
+    for event in lab
+        .lines(run, "events.jsonl")
+        .iter()
+        .filter(|event| event["event"] == "emotion")
+    {
         let robot = event["robot"].as_str().unwrap().to_owned();
         let name = event["to"].as_str().unwrap().to_owned();
         begun.insert((event["tick"].as_u64().unwrap() * 500, robot), name);
     }
     begun.retain(|_, name| name != "NEUTRAL");
-    let found =
-        emotions.iter().map(|one| ((one.offset_ms, one.robot.clone()), one.category.clone().unwrap()));
+    let found = emotions.iter().map(|one| {
+        (
+            (one.offset_ms, one.robot.clone()),
+            one.category.clone().unwrap(),
+        )
+    });
     assert_eq!(found.collect::<BTreeMap<_, _>>(), begun, "{run}");
 
     let mut recorded: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for robot in
-        lab.lines(run, "recording.jsonl")[1..].iter().flat_map(|tick| tick["robots"].as_array().unwrap())
+    for robot in lab.lines(run, "recording.jsonl")[1..]
+        .iter()
+        .flat_map(|tick| tick["robots"].as_array().unwrap())
     {
         if robot["emotion_state"] != "NEUTRAL" {
             let intensity = robot["state_variables"]["intensity"].as_f64().unwrap();
             let rounded = (intensity * 1e6).round() / 1e6;
-            recorded.entry(robot["name"].as_str().unwrap().to_owned()).or_default().push(rounded);
+            recorded
+                .entry(robot["name"].as_str().unwrap().to_owned())
+                .or_default()
+                .push(rounded);
         }
     }
     let mut exported: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for one in emotions {
         let trace = exported.entry(one.robot.clone()).or_default();
-        assert_eq!(one.offset_ms, trace.len() as u64 * 500, "{run}: a gap before {}", one.id);
+        assert_eq!(
+            one.offset_ms,
+            trace.len() as u64 * 500,
+            "{run}: a gap before {}",
+            one.id
+        );
         trace.extend(one.trace.as_ref().unwrap());
     }
     assert_eq!(exported, recorded, "{run}");
@@ -216,30 +282,58 @@ fn says_what_the_record_says(lab: &Lab, run: &str, emotions: &[Emotion]) {
 #[test]
 fn an_emotion_carries_its_components() {
     let lab = Lab::new();
-    lab.run("hors_doeuvres.toml", "hall", &["robot.Butler.params.dynamics.rho_max=4.0"]);
+    lab.run(
+        "hors_doeuvres.toml",
+        "hall",
+        &["robot.Butler.params.dynamics.rho_max=4.0"],
+    );
     let all = emotions(&lab.export(&["hall"]).0);
     let standard = emotions(&lab.export(&["hall", "--standard"]).0);
 
     let happy = category(&all, "Butler", "HAPPY")[0];
-    assert_eq!((happy.target.as_deref(), happy.values["agency"], happy.face), (None, 1.0, true));
+    assert_eq!(
+        (happy.target.as_deref(), happy.values["agency"], happy.face),
+        (None, 1.0, true)
+    );
     assert_eq!(happy.tendency.as_deref(), Some("free-activate"));
     assert!(happy.values["valence"] > 0.5);
     assert_eq!(
         happy.info,
         "Something good is happening; I wanted this: to serve the guests; because of this I feel good."
     );
-    assert!(!category(&all, "Butler", "CONFIDENT")[0].face, "a neutral face expresses nothing");
+    assert!(
+        !category(&all, "Butler", "CONFIDENT")[0].face,
+        "a neutral face expresses nothing"
+    );
 
     let concerned = category(&all, "Butler", "CONCERNED")[0];
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let close = |a: f64, b: f64| (a - b).abs() < 2e-6;
     let valence = 0.5 - 0.5 * mean(concerned.trace.as_ref().unwrap());
     assert!(close(concerned.values["valence"], valence), "{concerned:?}");
-    let constant = ["agency", "unexpectedness", "unpredictability", "controllability", "changeability"];
-    assert_eq!(constant.map(|name| concerned.values[name]), [0.0, 1.0, 1.0, 0.666667, 1.0]);
+    let constant = [
+        "agency",
+        "unexpectedness",
+        "unpredictability",
+        "controllability",
+        "changeability",
+    ];
+    assert_eq!(
+        constant.map(|name| concerned.values[name]),
+        [0.0, 1.0, 1.0, 0.666667, 1.0]
+    );
     assert_eq!(concerned.target.as_deref(), Some("Leguin"));
-    assert!(concerned.info.contains("treats are left; Leguin is not here"), "{}", concerned.info);
-    assert_eq!(category(&standard, "Butler", "worried").len(), category(&all, "Butler", "CONCERNED").len());
+    assert!(
+        concerned
+            .info
+            .contains("treats are left; Leguin is not here"),
+        "{}",
+        concerned.info
+    );
+    assert_eq!(
+        category(&standard, "Butler", "worried").len(),
+        category(&all, "Butler", "CONCERNED").len()
+    );
     assert_eq!(
         category(&standard, "Butler", "irritation").len(),
         category(&all, "Butler", "FRUSTRATED").len()
@@ -253,10 +347,15 @@ fn an_emotion_carries_its_components() {
         (butler["state_variables"]["need_ratio"].as_f64().unwrap() / 4.0).min(1.0)
     };
     let urgency = mean(&span.map(urgency).collect::<Vec<_>>());
-    assert!(close(concerned.values["urgency"], urgency), "{concerned:?}, {urgency}");
+    assert!(
+        close(concerned.values["urgency"], urgency),
+        "{concerned:?}, {urgency}"
+    );
     assert!(close(concerned.values["desirability"], 1.0 - urgency));
     assert!(
-        !category(&all, "Leguin", "CONCERNED")[0].values.contains_key("urgency"),
+        !category(&all, "Leguin", "CONCERNED")[0]
+            .values
+            .contains_key("urgency"),
         "she publishes no need"
     );
 }
@@ -265,20 +364,32 @@ fn an_emotion_carries_its_components() {
 fn a_refiller_blames_the_crowd_for_the_way_and_the_waiter_for_the_wait() {
     let robots = |behavior: &str, emotion: &str, hurried: bool| {
         let leguin = json!({"intensity": 1.0, "waiter": "Butler", "hurried": hurried});
-        json!([robot("Butler", "HAPPY", "SERVE", &json!({})), robot("Leguin", emotion, behavior, &leguin)])
+        json!([
+            robot("Butler", "HAPPY", "SERVE", &json!({})),
+            robot("Leguin", emotion, behavior, &leguin)
+        ])
     };
     // She turns back in the tick in which she is frustrated: what she did before counts.
-    for (during, hurried, target) in
-        [("REFILL", false, None), ("REFILL", true, Some("Butler")), ("AWAIT_GO_HOME", false, Some("Butler"))]
-    {
+    for (during, hurried, target) in [
+        ("REFILL", false, None),
+        ("REFILL", true, Some("Butler")),
+        ("AWAIT_GO_HOME", false, Some("Butler")),
+    ] {
         let lab = Lab::new();
-        let ticks = [robots(during, "CONFIDENT", hurried), robots("GO_HOME", "FRUSTRATED", false)];
+        let ticks = [
+            robots(during, "CONFIDENT", hurried),
+            robots("GO_HOME", "FRUSTRATED", false),
+        ];
         lab.record("way", &recording(&ticks));
         let all = emotions(&lab.export(&["way"]).0);
         let frustrated = category(&all, "Leguin", "FRUSTRATED")[0];
         assert_eq!(frustrated.target.as_deref(), target, "{during}");
         let who = target.unwrap_or("the crowd");
-        assert!(frustrated.info.contains(&format!("{who} is not here")), "{}", frustrated.info);
+        assert!(
+            frustrated.info.contains(&format!("{who} is not here")),
+            "{}",
+            frustrated.info
+        );
     }
 }
 
@@ -298,7 +409,10 @@ fn tick(tick: usize, robots: &Value) -> Value {
 }
 
 fn recording(ticks: &[Value]) -> String {
-    let ticks = ticks.iter().enumerate().map(|(at, robots)| tick(at, robots).to_string() + "\n");
+    let ticks = ticks
+        .iter()
+        .enumerate()
+        .map(|(at, robots)| tick(at, robots).to_string() + "\n");
     header().to_string() + "\n" + &ticks.collect::<String>()
 }
 
@@ -308,28 +422,46 @@ fn the_same_run_gives_the_same_document() {
     for lab in [&first, &second] {
         lab.run("hors_doeuvres.toml", "hall", &[]);
     }
-    for view in [&["hall"][..], &["hall", "--standard"], &["hall", "--robot", "Leguin"]] {
+    for view in [
+        &["hall"][..],
+        &["hall", "--standard"],
+        &["hall", "--robot", "Leguin"],
+    ] {
         assert_eq!(first.export(view).0, second.export(view).0, "{view:?}");
     }
     // By its folder, as the latest run, and into a file, it is the same document.
     let (document, notes) = first.export(&["hall"]);
     assert_eq!(notes, "");
-    assert_eq!(first.export(&[first.path("hall").to_str().unwrap()]).0, document);
+    assert_eq!(
+        first.export(&[first.path("hall").to_str().unwrap()]).0,
+        document
+    );
     assert_eq!(first.export(&[]).0, document);
     let output = first.output(&["hall", "--output", "hall.xml"]);
     assert!(output.status.success() && output.stdout.is_empty());
-    assert_eq!(std::fs::read_to_string(first.path("hall.xml")).unwrap(), document);
+    assert_eq!(
+        std::fs::read_to_string(first.path("hall.xml")).unwrap(),
+        document
+    );
 }
 
 #[test]
 fn one_robot_alone_can_be_exported() {
     let lab = Lab::new();
     lab.run("hors_doeuvres.toml", "hall", &[]);
-    let of_leguin: Vec<Emotion> =
-        emotions(&lab.export(&["hall"]).0).into_iter().filter(|one| one.robot == "Leguin").collect();
-    assert_eq!(emotions(&lab.export(&["hall", "--robot", "Leguin"]).0), of_leguin);
+    let of_leguin: Vec<Emotion> = emotions(&lab.export(&["hall"]).0)
+        .into_iter()
+        .filter(|one| one.robot == "Leguin")
+        .collect();
+    assert_eq!(
+        emotions(&lab.export(&["hall", "--robot", "Leguin"]).0),
+        of_leguin
+    );
     let refusal = lab.refusal(&["hall", "--robot", "Nobody"]);
-    assert!(refusal.contains("no robot of this run is called Nobody; there are Butler, Leguin"), "{refusal}");
+    assert!(
+        refusal.contains("no robot of this run is called Nobody; there are Butler, Leguin"),
+        "{refusal}"
+    );
 }
 
 #[test]
@@ -339,11 +471,24 @@ fn without_recording_the_events_say_when_but_not_how_strongly() {
     let recorded = emotions(&lab.export(&["hall"]).0);
     std::fs::remove_file(lab.path("hall").join("recording.jsonl")).unwrap();
     let (document, notes) = lab.export(&["hall"]);
-    assert!(notes.contains("has no recording.jsonl") && notes.contains("without intensities"), "{notes}");
+    assert!(
+        notes.contains("has no recording.jsonl") && notes.contains("without intensities"),
+        "{notes}"
+    );
     let told = emotions(&document);
-    assert!(told.iter().all(|one| one.trace.is_none() && !one.values.contains_key("valence")));
+    assert!(
+        told.iter()
+            .all(|one| one.trace.is_none() && !one.values.contains_key("valence"))
+    );
     let times = |emotions: &[Emotion]| -> Vec<(String, Option<String>, u64, u64)> {
-        let time = |one: &Emotion| (one.id.clone(), one.category.clone(), one.offset_ms, one.duration_ms);
+        let time = |one: &Emotion| {
+            (
+                one.id.clone(),
+                one.category.clone(),
+                one.offset_ms,
+                one.duration_ms,
+            )
+        };
         emotions.iter().map(time).collect()
     };
     assert_eq!(times(&told), times(&recorded));
@@ -353,15 +498,27 @@ fn without_recording_the_events_say_when_but_not_how_strongly() {
 #[test]
 fn robots_without_emotions_are_left_out_and_named() {
     let lab = Lab::new();
-    lab.run("hors_doeuvres.toml", "half", &["robot.Butler.params.affect=off"]);
+    lab.run(
+        "hors_doeuvres.toml",
+        "half",
+        &["robot.Butler.params.affect=off"],
+    );
     let (document, notes) = lab.export(&["half"]);
     assert!(emotions(&document).iter().all(|one| one.robot == "Leguin"));
-    assert!(notes.contains("Butler has a state without emotion, \"NEUTRAL\""), "{notes}");
+    assert!(
+        notes.contains("Butler has a state without emotion, \"NEUTRAL\""),
+        "{notes}"
+    );
 }
 
 #[test]
 fn emotions_of_foreign_robots_are_told_whatever_their_names() {
-    const NAMES: [&str; 4] = ["tr\u{e8}s content & <\"happy\">", "a_x20_b", "a b", "\u{0}\u{1F600}"];
+    const NAMES: [&str; 4] = [
+        "tr\u{e8}s content & <\"happy\">",
+        "a_x20_b",
+        "a b",
+        "\u{0}\u{1F600}",
+    ];
     let lab = Lab::new();
     lab.run("hors_doeuvres.toml", "hall", &[]);
     let file = lab.path("hall").join("recording.jsonl");
@@ -375,19 +532,36 @@ fn emotions_of_foreign_robots_are_told_whatever_their_names() {
     let (document, _) = lab.export(&["hall", "--robot", "Leguin"]);
     let (all, tree) = (emotions(&document), Document::parse(&document).unwrap());
     let token = |at: usize| all[at].category.clone().unwrap();
-    assert_eq!(token(0), "tr_xE8_s_x20_content_x20__x26__x20__x3C__x22_happy_x22__x3E_");
-    assert_eq!([token(1), token(2), token(3)], ["a_x5F_x20_b", "a_x20_b", "_x0__x1F600_"]);
+    assert_eq!(
+        token(0),
+        "tr_xE8_s_x20_content_x20__x26__x20__x3C__x22_happy_x22__x3E_"
+    );
+    assert_eq!(
+        [token(1), token(2), token(3)],
+        ["a_x5F_x20_b", "a_x20_b", "_x0__x1F600_"]
+    );
     assert_eq!(all[4].category, all[0].category);
-    assert!(all[0].values.is_empty() && all[0].trace.as_ref().unwrap().len() == 10 && all[0].info.is_empty());
+    assert!(
+        all[0].values.is_empty()
+            && all[0].trace.as_ref().unwrap().len() == 10
+            && all[0].info.is_empty()
+    );
     let infos: Vec<&str> = tree
         .descendants()
         .filter(|node| node.tag_name().name() == "info")
         .filter_map(|node| node.text())
         .collect();
-    assert!(infos.contains(&format!("emotion state {}", NAMES[0]).as_str()), "{infos:?}");
+    assert!(
+        infos.contains(&format!("emotion state {}", NAMES[0]).as_str()),
+        "{infos:?}"
+    );
     // In W3C's words they have no category, and their intensity is a dimension.
     let all = emotions(&lab.export(&["hall", "--standard", "--robot", "Leguin"]).0);
-    assert!(all.iter().all(|one| one.category.is_none() && one.trace.is_some()) && !all.is_empty());
+    assert!(
+        all.iter()
+            .all(|one| one.category.is_none() && one.trace.is_some())
+            && !all.is_empty()
+    );
 }
 
 #[test]
@@ -396,10 +570,17 @@ fn a_robot_that_publishes_no_intensity_has_emotions_without() {
     let foreign = json!([robot("Ada", "CURIOUS", "LOOK", &json!({"intensity": 70.0}))]);
     lab.record("made", &recording(&[foreign]));
     let (document, notes) = lab.export(&["made"]);
-    assert!(notes.contains("Ada does not publish `intensity` between 0 and 1"), "{notes}");
+    assert!(
+        notes.contains("Ada does not publish `intensity` between 0 and 1"),
+        "{notes}"
+    );
     let all = emotions(&document);
     assert_eq!(
-        (all[0].category.as_deref(), &all[0].trace, all[0].duration_ms),
+        (
+            all[0].category.as_deref(),
+            &all[0].trace,
+            all[0].duration_ms
+        ),
         (Some("CURIOUS"), &None, 500)
     );
     let (document, notes) = lab.export(&["made", "--standard"]);
@@ -421,30 +602,51 @@ fn a_last_line_that_broke_off_is_left_out_and_any_other_is_an_error() {
     for left in [2, 40, 100] {
         lab.record("broken", &whole[..whole.len() - left]);
         let (document, notes) = lab.export(&["broken"]);
-        assert!(notes.contains("the last line of") && notes.contains("incomplete"), "{notes}");
+        assert!(
+            notes.contains("the last line of") && notes.contains("incomplete"),
+            "{notes}"
+        );
         assert_eq!(emotions(&document)[0].duration_ms, 1500);
     }
     let lines: Vec<&str> = whole.lines().collect();
-    lab.record("garbled", &[lines[0], lines[1], "{\"tick\": 1,", lines[3], ""].join("\n"));
+    lab.record(
+        "garbled",
+        &[lines[0], lines[1], "{\"tick\": 1,", lines[3], ""].join("\n"),
+    );
     assert!(lab.refusal(&["garbled"]).contains("line 3"));
     lab.record("gap", &[lines[0], lines[1], lines[3], ""].join("\n"));
-    assert!(lab.refusal(&["gap"]).contains("line 3: tick 2 where 1 is due"));
+    assert!(
+        lab.refusal(&["gap"])
+            .contains("line 3: tick 2 where 1 is due")
+    );
     lab.record("empty", "");
     assert!(lab.refusal(&["empty"]).contains("holds no run yet"));
     lab.record("begun", &(lines[0].to_owned() + "\n"));
     assert!(lab.refusal(&["begun"]).contains("holds no tick yet"));
-    lab.record("timeless", &whole.replacen("\"tick_s\":0.5", "\"tick_s\":0.0", 1));
-    assert!(lab.refusal(&["timeless"]).contains("a tick of 0 s cannot be"));
+    lab.record(
+        "timeless",
+        &whole.replacen("\"tick_s\":0.5", "\"tick_s\":0.0", 1),
+    );
+    assert!(
+        lab.refusal(&["timeless"])
+            .contains("a tick of 0 s cannot be")
+    );
 }
 
 #[test]
 fn what_cannot_be_exported_is_refused_with_a_reason() {
     let lab = Lab::new();
     let refusal = lab.refusal(&["nope"]);
-    assert!(refusal.contains("there is no run nope") && refusal.contains("help:"), "{refusal}");
+    assert!(
+        refusal.contains("there is no run nope") && refusal.contains("help:"),
+        "{refusal}"
+    );
     assert!(lab.refusal(&[]).contains("no run is known in"));
     std::fs::create_dir(lab.path("bare")).unwrap();
-    assert!(lab.refusal(&["bare"]).contains("has neither recording.jsonl nor events.jsonl"));
+    assert!(
+        lab.refusal(&["bare"])
+            .contains("has neither recording.jsonl nor events.jsonl")
+    );
     lab.run("hors_doeuvres.toml", "hall", &[]);
     let file = lab.path("hall").join("recording.jsonl");
     let before = std::fs::read(&file).unwrap();
@@ -464,11 +666,25 @@ fn a_huge_run_is_exported_as_it_is_read() {
     lab.record("huge", "");
     let pipe = lab.path("huge").join("recording.jsonl");
     std::fs::remove_file(&pipe).unwrap();
-    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let mut child =
-        lab.cars(&["emotionml", "huge"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
+    let mut child = lab
+        .cars(&["emotionml", "huge"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     // Open for both, so that neither side waits for the other; the child sees the end when this is closed.
-    let mut feed = std::fs::File::options().read(true).write(true).open(&pipe).unwrap();
+    let mut feed = std::fs::File::options()
+        .read(true)
+        .write(true)
+        .open(&pipe)
+        .unwrap();
     let (sender, received) = std::sync::mpsc::channel();
     let stdout = child.stdout.take().unwrap();
     let reader = std::thread::spawn(move || {
@@ -491,20 +707,42 @@ fn a_huge_run_is_exported_as_it_is_read() {
         writeln!(feed, "{}", header()).unwrap();
         for at in 0..ticks {
             let variables = json!({"intensity": 0.5, "padding": padding});
-            let emotion = if at / 5 % 2 == 0 { "HAPPY" } else { "CONCERNED" };
-            writeln!(feed, "{}", tick(at, &json!([robot("Ada", emotion, "", &variables)]))).unwrap();
+            let emotion = if at / 5 % 2 == 0 {
+                "HAPPY"
+            } else {
+                "CONCERNED"
+            };
+            writeln!(
+                feed,
+                "{}",
+                tick(at, &json!([robot("Ada", emotion, "", &variables)]))
+            )
+            .unwrap();
         }
         feed
     });
     // The last episode is still open, and the line of the one before ends with what follows it.
     let (episodes, begun) = (ticks / 5, Instant::now());
-    while received.recv_timeout(PATIENCE.saturating_sub(begun.elapsed())).unwrap() < episodes - 2 {}
+    while received
+        .recv_timeout(PATIENCE.saturating_sub(begun.elapsed()))
+        .unwrap()
+        < episodes - 2
+    {}
     let mut status = String::new();
     let file = format!("/proc/{}/status", child.id());
-    std::fs::File::open(file).unwrap().read_to_string(&mut status).unwrap();
-    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+    std::fs::File::open(file)
+        .unwrap()
+        .read_to_string(&mut status)
+        .unwrap();
+    let peak = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))
+        .unwrap();
     let peak_kib: u64 = peak.trim().trim_end_matches(" kB").parse().unwrap();
-    assert!(peak_kib < 32 * 1024, "{peak_kib} KiB for a recording of 100 MB");
+    assert!(
+        peak_kib < 32 * 1024,
+        "{peak_kib} KiB for a recording of 100 MB"
+    );
     drop(feeder.join().unwrap());
     assert_eq!(reader.join().unwrap(), episodes);
     assert!(child.wait().unwrap().success());
@@ -532,33 +770,138 @@ const BREAKS: [(&str, &str, &str, bool); 44] = [
     ("xml", "</emotionml>", "", true),
     ("101", "2009/10/emotionml\"", "2009/10/other\"", true),
     ("111", "version=\"1.0\" xmlns", "xmlns", true),
-    ("111", "version=\"1.0\" xmlns", "version=\"1.1\" xmlns", true),
-    ("114", " dimension-set=", " category-set=\"#acts\" dimension-set=", false),
+    (
+        "111",
+        "version=\"1.0\" xmlns",
+        "version=\"1.1\" xmlns",
+        true,
+    ),
+    (
+        "114",
+        " dimension-set=",
+        " category-set=\"#acts\" dimension-set=",
+        false,
+    ),
     ("117", "#fsre-dimensions", "#ema-appraisals", false),
-    ("120", " dimension-set=", " appraisal-set=\"#own\" dimension-set=", false),
-    ("123", " dimension-set=", " action-tendency-set=\"#gone\" dimension-set=", false),
-    ("161", " category-set=\"#own\"", " category-set=\"#acts\"", false),
-    ("161", " category-set=\"#own\"", " category-set=\"#gone\"", false),
-    ("164", " category-set=", " dimension-set=\"#own\" category-set=", false),
+    (
+        "120",
+        " dimension-set=",
+        " appraisal-set=\"#own\" dimension-set=",
+        false,
+    ),
+    (
+        "123",
+        " dimension-set=",
+        " action-tendency-set=\"#gone\" dimension-set=",
+        false,
+    ),
+    (
+        "161",
+        " category-set=\"#own\"",
+        " category-set=\"#acts\"",
+        false,
+    ),
+    (
+        "161",
+        " category-set=\"#own\"",
+        " category-set=\"#gone\"",
+        false,
+    ),
+    (
+        "164",
+        " category-set=",
+        " dimension-set=\"#own\" category-set=",
+        false,
+    ),
     ("167", "#ema-appraisals", "#fsre-dimensions", false),
-    ("170", "action-tendency-set=\"#acts\"", "action-tendency-set=\"#own\"", false),
+    (
+        "170",
+        "action-tendency-set=\"#acts\"",
+        "action-tendency-set=\"#own\"",
+        false,
+    ),
     ("210", " category-set=\"#own\"", "", false),
-    ("220", " dimension-set=\"http://www.w3.org/TR/emotion-voc/xml#fsre-dimensions\"", "", false),
-    ("230", " appraisal-set=\"http://www.w3.org/TR/emotion-voc/xml#ema-appraisals\"", "", false),
+    (
+        "220",
+        " dimension-set=\"http://www.w3.org/TR/emotion-voc/xml#fsre-dimensions\"",
+        "",
+        false,
+    ),
+    (
+        "230",
+        " appraisal-set=\"http://www.w3.org/TR/emotion-voc/xml#ema-appraisals\"",
+        "",
+        false,
+    ),
     ("240", " action-tendency-set=\"#acts\"", "", false),
-    ("212", "<category name=\"BORED\">", "<category name=\"bored\">", false),
+    (
+        "212",
+        "<category name=\"BORED\">",
+        "<category name=\"bored\">",
+        false,
+    ),
     ("222", "name=\"valence\"", "name=\"pleasure\"", false),
     ("232", "name=\"urgency\"", "name=\"suddenness\"", false),
-    ("242", "<action-tendency name=\"leave\"", "<action-tendency name=\"stay\"", false),
-    ("213", "<dimension", "<category name=\"BORED\"/><dimension", true),
-    ("223", "<appraisal", "<dimension name=\"valence\" value=\"0\"/><appraisal", true),
-    ("233", "<action", "<appraisal name=\"urgency\"/><action", true),
-    ("243", "<reference", "<action-tendency name=\"leave\"/><reference", true),
-    ("156", "</emotionml>", "<emotion time-ref-uri=\"clock\"><info/></emotion></emotionml>", true),
-    ("216", "<category name=\"BORED\">", "<category name=\"BORED\" value=\"1\">", false),
-    ("226", "value=\"0.5\"/>", "value=\"0.5\"><trace freq=\"1Hz\" samples=\"1\"/></dimension>", false),
-    ("236", "value=\"0.25\"/>", "value=\"0.25\"><trace freq=\"1Hz\" samples=\"1\"/></appraisal>", false),
-    ("246", "value=\"1\"/>", "value=\"1\"><trace freq=\"1Hz\" samples=\"1\"/></action-tendency>", false),
+    (
+        "242",
+        "<action-tendency name=\"leave\"",
+        "<action-tendency name=\"stay\"",
+        false,
+    ),
+    (
+        "213",
+        "<dimension",
+        "<category name=\"BORED\"/><dimension",
+        true,
+    ),
+    (
+        "223",
+        "<appraisal",
+        "<dimension name=\"valence\" value=\"0\"/><appraisal",
+        true,
+    ),
+    (
+        "233",
+        "<action",
+        "<appraisal name=\"urgency\"/><action",
+        true,
+    ),
+    (
+        "243",
+        "<reference",
+        "<action-tendency name=\"leave\"/><reference",
+        true,
+    ),
+    (
+        "156",
+        "</emotionml>",
+        "<emotion time-ref-uri=\"clock\"><info/></emotion></emotionml>",
+        true,
+    ),
+    (
+        "216",
+        "<category name=\"BORED\">",
+        "<category name=\"BORED\" value=\"1\">",
+        false,
+    ),
+    (
+        "226",
+        "value=\"0.5\"/>",
+        "value=\"0.5\"><trace freq=\"1Hz\" samples=\"1\"/></dimension>",
+        false,
+    ),
+    (
+        "236",
+        "value=\"0.25\"/>",
+        "value=\"0.25\"><trace freq=\"1Hz\" samples=\"1\"/></appraisal>",
+        false,
+    ),
+    (
+        "246",
+        "value=\"1\"/>",
+        "value=\"1\"><trace freq=\"1Hz\" samples=\"1\"/></action-tendency>",
+        false,
+    ),
     ("224", " value=\"0.5\"", "", false),
     ("304", "<info>b</info>", "<info><info/></info>", true),
     ("410", " uri=\"robot\"", "", true),
@@ -568,7 +911,12 @@ const BREAKS: [(&str, &str, &str, bool); 44] = [
     ("schema samples", "0.5 1\"", "0.5 1.5\"", true),
     ("schema samples", "0.5 1\"", "\"", true),
     ("schema time", "duration=\"1000\"", "duration=\"1.5\"", true),
-    ("schema order", "<info>b</info>", "<reference uri=\"x\"/>", true),
+    (
+        "schema order",
+        "<info>b</info>",
+        "<reference uri=\"x\"/>",
+        true,
+    ),
     ("schema item", "KEEN", "VERY KEEN", true),
     ("schema vocabulary", "<item name=\"leave\"/>", "", true),
     ("schema id", "id=\"acts\"", "id=\"own\"", true),
@@ -589,6 +937,9 @@ fn every_rule_can_be_broken() {
             continue;
         }
         let valid = schema::is_valid(&document, lab.0.path());
-        assert!(valid.is_none_or(|valid| valid != by_schema), "{rule} by {to:?}: the schema says {valid:?}");
+        assert!(
+            valid.is_none_or(|valid| valid != by_schema),
+            "{rule} by {to:?}: the schema says {valid:?}"
+        );
     }
 }

@@ -34,7 +34,11 @@ const W3C: [(&str, &str, &str); 8] = [
         "admiration anger disappointment distress fear fears-confirmed gloating gratification gratitude happy-for hate hope \
          joy love pity pride relief remorse reproach resentment satisfaction shame",
     ),
-    ("dimension", "fsre-dimensions", "valence potency arousal unpredictability"),
+    (
+        "dimension",
+        "fsre-dimensions",
+        "valence potency arousal unpredictability",
+    ),
     ("dimension", "intensity-dimension", "intensity"),
     (
         "appraisal",
@@ -54,7 +58,9 @@ type Vocabularies<'a> = BTreeMap<String, (&'a str, BTreeSet<&'a str>)>;
 
 /// The rules that a document breaks, by number; empty is what is wanted.
 pub(crate) fn broken(text: &str) -> BTreeSet<String> {
-    let Ok(document) = Document::parse(text) else { return ["xml".to_owned()].into() };
+    let Ok(document) = Document::parse(text) else {
+        return ["xml".to_owned()].into();
+    };
     let mut rules = Rules::default();
     let root = document.root_element();
     rules.demand("101", root.has_tag_name((NAMESPACE, "emotionml")));
@@ -69,7 +75,9 @@ pub(crate) fn broken(text: &str) -> BTreeSet<String> {
         }
         if node.has_tag_name((NAMESPACE, "info")) {
             let inner = node.descendants().skip(1).filter(Node::is_element);
-            let has_own = inner.map(|inner| inner.tag_name().namespace()).any(|name| name == Some(NAMESPACE));
+            let has_own = inner
+                .map(|inner| inner.tag_name().namespace())
+                .any(|name| name == Some(NAMESPACE));
             rules.demand("304", !has_own);
         }
     }
@@ -99,7 +107,10 @@ impl Rules {
             all.insert(uri, (kind, items.split_whitespace().collect()));
         }
         for vocabulary in elements(root, "vocabulary") {
-            let (kind, id) = (vocabulary.attribute("type").unwrap_or(""), vocabulary.attribute("id"));
+            let (kind, id) = (
+                vocabulary.attribute("type").unwrap_or(""),
+                vocabulary.attribute("id"),
+            );
             self.demand("schema vocabulary", KINDS.contains(&kind) && id.is_some());
             let mut items = BTreeSet::new();
             for item in elements(vocabulary, "item") {
@@ -116,7 +127,12 @@ impl Rules {
     fn sets(&mut self, of: Node, vocabularies: &Vocabularies, rules: &str) {
         for (kind, rule) in KINDS.into_iter().zip(rules.split(' ')) {
             if let Some(set) = of.attribute(format!("{kind}-set").as_str()) {
-                self.demand(rule, vocabularies.get(set).is_some_and(|(known, _)| *known == kind));
+                self.demand(
+                    rule,
+                    vocabularies
+                        .get(set)
+                        .is_some_and(|(known, _)| *known == kind),
+                );
             }
         }
     }
@@ -128,8 +144,12 @@ impl Rules {
             let name = child.tag_name().name();
             let groups = [first, middle, last];
             let group = groups.iter().position(|group| group.contains(&name));
-            let is_ordered = group.is_some_and(|group| group >= reached && (group > 0 || reached == 0));
-            self.demand("schema order", is_ordered && child.tag_name().namespace() == Some(NAMESPACE));
+            let is_ordered =
+                group.is_some_and(|group| group >= reached && (group > 0 || reached == 0));
+            self.demand(
+                "schema order",
+                is_ordered && child.tag_name().namespace() == Some(NAMESPACE),
+            );
             reached = group.unwrap_or(reached).max(reached);
         }
         self.demand("schema order", elements(of, "info").count() <= 1);
@@ -138,13 +158,18 @@ impl Rules {
     fn emotion(&mut self, root: Node, emotion: Node, vocabularies: &Vocabularies) {
         self.children(emotion, &["info"], &KINDS, &["reference"]);
         self.sets(emotion, vocabularies, "161 164 167 170");
-        let descriptors: Vec<Node> = KINDS.iter().flat_map(|kind| elements(emotion, kind)).collect();
+        let descriptors: Vec<Node> = KINDS
+            .iter()
+            .flat_map(|kind| elements(emotion, kind))
+            .collect();
         self.demand("156", !descriptors.is_empty());
         for (kind, hundred) in KINDS.into_iter().zip([210, 220, 230, 240]) {
             let mut names = BTreeSet::new();
             for descriptor in elements(emotion, kind) {
                 let attribute = format!("{kind}-set");
-                let set = emotion.attribute(attribute.as_str()).or(root.attribute(attribute.as_str()));
+                let set = emotion
+                    .attribute(attribute.as_str())
+                    .or(root.attribute(attribute.as_str()));
                 self.demand(&hundred.to_string(), set.is_some());
                 let name = descriptor.attribute("name").unwrap_or("");
                 let known = set.and_then(|set| vocabularies.get(set));
@@ -155,15 +180,28 @@ impl Rules {
             }
         }
         for reference in elements(emotion, "reference") {
-            self.demand("410", reference.attribute("uri").is_some_and(|uri| !uri.is_empty()));
-            self.demand("schema role", reference.attribute("role").is_none_or(|role| ROLES.contains(&role)));
+            self.demand(
+                "410",
+                reference
+                    .attribute("uri")
+                    .is_some_and(|uri| !uri.is_empty()),
+            );
+            self.demand(
+                "schema role",
+                reference
+                    .attribute("role")
+                    .is_none_or(|role| ROLES.contains(&role)),
+            );
         }
         self.times(emotion);
     }
 
     /// A value or a trace, never both; a dimension has one of them.
     fn scale(&mut self, emotion: Node, descriptor: Node, hundred: u32) {
-        let (value, traces) = (descriptor.attribute("value"), elements(descriptor, "trace").count());
+        let (value, traces) = (
+            descriptor.attribute("value"),
+            elements(descriptor, "trace").count(),
+        );
         self.demand(&(hundred + 6).to_string(), value.is_none() || traces == 0);
         self.demand("schema order", traces <= 1);
         if hundred == 220 {
@@ -173,13 +211,29 @@ impl Rules {
         for trace in elements(descriptor, "trace") {
             let frequency_hz = frequency_hz(trace.attribute("freq").unwrap_or(""));
             self.demand("schema freq", frequency_hz.is_some());
-            let samples: Vec<&str> = trace.attribute("samples").unwrap_or("").split_whitespace().collect();
-            self.demand("schema samples", !samples.is_empty() && samples.into_iter().all(is_scale_value));
-            let count = trace.attribute("samples").unwrap_or("").split_whitespace().count() as f64;
-            let duration_ms = emotion.attribute("duration").and_then(|text| text.parse::<f64>().ok());
+            let samples: Vec<&str> = trace
+                .attribute("samples")
+                .unwrap_or("")
+                .split_whitespace()
+                .collect();
+            self.demand(
+                "schema samples",
+                !samples.is_empty() && samples.into_iter().all(is_scale_value),
+            );
+            let count = trace
+                .attribute("samples")
+                .unwrap_or("")
+                .split_whitespace()
+                .count() as f64;
+            let duration_ms = emotion
+                .attribute("duration")
+                .and_then(|text| text.parse::<f64>().ok());
             if let (Some(frequency_hz), Some(duration_ms)) = (frequency_hz, duration_ms) {
                 // To the rounding of the times.
-                self.demand("trace", (count / frequency_hz * 1000.0 - duration_ms).abs() <= 1.0);
+                self.demand(
+                    "trace",
+                    (count / frequency_hz * 1000.0 - duration_ms).abs() <= 1.0,
+                );
             }
         }
     }
@@ -191,31 +245,47 @@ impl Rules {
             self.demand("schema time", emotion.attribute(name).is_none_or(is_whole));
         }
         let offset = emotion.attribute("offset-to-start");
-        self.demand("schema time", offset.is_none_or(|text| text.parse::<i64>().is_ok()));
+        self.demand(
+            "schema time",
+            offset.is_none_or(|text| text.parse::<i64>().is_ok()),
+        );
         let is_absolute = emotion.has_attribute("start") || emotion.has_attribute("end");
-        self.demand("trace", !is_absolute && emotion.has_attribute("time-ref-uri"));
+        self.demand(
+            "trace",
+            !is_absolute && emotion.has_attribute("time-ref-uri"),
+        );
     }
 }
 
-fn elements<'a, 'input>(of: Node<'a, 'input>, name: &str) -> impl Iterator<Item = Node<'a, 'input>> {
+fn elements<'a, 'input>(
+    of: Node<'a, 'input>,
+    name: &str,
+) -> impl Iterator<Item = Node<'a, 'input>> {
     let name = name.to_owned();
-    of.children().filter(move |child| child.has_tag_name((NAMESPACE, name.as_str())))
+    of.children()
+        .filter(move |child| child.has_tag_name((NAMESPACE, name.as_str())))
 }
 
 fn is_scale_value(text: &str) -> bool {
-    text.parse::<f64>().is_ok_and(|value| (0.0..=1.0).contains(&value))
+    text.parse::<f64>()
+        .is_ok_and(|value| (0.0..=1.0).contains(&value))
 }
 
 fn frequency_hz(text: &str) -> Option<f64> {
     let number = text.strip_suffix("Hz")?.trim_end();
     let is_plain = number.starts_with(|char: char| char.is_ascii_digit())
-        && number.chars().all(|char| char.is_ascii_digit() || char == '.');
+        && number
+            .chars()
+            .all(|char| char.is_ascii_digit() || char == '.');
     number.parse().ok().filter(|_| is_plain)
 }
 
 /// An `NMTOKEN` of ASCII.
 fn is_token(name: &str) -> bool {
-    !name.is_empty() && name.chars().all(|char| char.is_ascii_alphanumeric() || ".-_:".contains(char))
+    !name.is_empty()
+        && name
+            .chars()
+            .all(|char| char.is_ascii_alphanumeric() || ".-_:".contains(char))
 }
 
 /// An `NCName` of ASCII.

@@ -20,17 +20,27 @@ pub(crate) fn is_valid(document: &str, folder: &Path) -> Option<bool> {
     let file = folder.join("document.xml");
     std::fs::write(&file, document).unwrap();
     let args = ["--noout", "--nonet", "--schema"];
-    let output = Command::new("xmllint").args(args).arg(schema).arg(file).output().unwrap();
+    let output = Command::new("xmllint")
+        .args(args)
+        .arg(schema)
+        .arg(file)
+        .output()
+        .unwrap();
     // 3 and 4: not valid. Anything else says nothing about the document.
     let code = output.status.code();
-    assert!(matches!(code, Some(0 | 3 | 4)), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        matches!(code, Some(0 | 3 | 4)),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     Some(code == Some(0))
 }
 
 fn schema() -> Option<PathBuf> {
     const VARIABLE: &str = "CARS_EMOTIONML_XSD";
     let told = std::env::var_os(VARIABLE).map(PathBuf::from);
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/emotionml/emotionml.xsd");
+    let beside =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/emotionml/emotionml.xsd");
     let schema = told.unwrap_or(beside);
     if schema.exists() {
         return Some(schema);

@@ -18,7 +18,14 @@ const MISSING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(25)
 
 /// The command `text` with number `seq`, put before the clock of tick `sent`.
 fn delivery(kit: &Kit, seq: u64, text: &str, sent: Tick) -> Delivery {
-    Delivery { from: kit.sender(), seq, text: text.to_owned(), sent: Some(sent), named: NAMED, times: 1 }
+    Delivery {
+        from: kit.sender(),
+        seq,
+        text: text.to_owned(),
+        sent: Some(sent),
+        named: NAMED,
+        times: 1,
+    }
 }
 
 fn script(deliveries: Vec<Delivery>) -> Script {
@@ -27,18 +34,28 @@ fn script(deliveries: Vec<Delivery>) -> Script {
 
 /// What was named and had been put is not missing.
 fn demand_none_missing(transcript: &Transcript) -> Result<(), Failure> {
-    let missing = transcript.iter().find(|entry| !entry.report.missing.is_empty());
+    let missing = transcript
+        .iter()
+        .find(|entry| !entry.report.missing.is_empty());
     match missing {
         None => Ok(()),
         Some(entry) => {
-            let expected = format!("nothing is missing in tick {}: all had been sent", entry.clock.tick);
-            Err(Failure::new(expected, format!("{:?}", names(&entry.report.missing))))
+            let expected = format!(
+                "nothing is missing in tick {}: all had been sent",
+                entry.clock.tick
+            );
+            Err(Failure::new(
+                expected,
+                format!("{:?}", names(&entry.report.missing)),
+            ))
         }
     }
 }
 
 fn names(ids: &[CommandId]) -> Vec<String> {
-    ids.iter().map(|id| format!("{} {}", id.from, id.seq)).collect()
+    ids.iter()
+        .map(|id| format!("{} {}", id.from, id.seq))
+        .collect()
 }
 
 /// Two commands that arrive in one order and in the other are executed as the clock names them.
@@ -49,9 +66,17 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
         let crossed = played(kit, &script(vec![second, first]))?;
         demand_none_missing(&straight)?;
         demand_none_missing(&crossed)?;
-        demand_same(kit, "the order in which two commands arrive", &straight, &crossed)?;
+        demand_same(
+            kit,
+            "the order in which two commands arrive",
+            &straight,
+            &crossed,
+        )?;
         // Whether the robot would show it at all.
-        let swapped = played(kit, &script(vec![delivery(kit, 1, &two, 5), delivery(kit, 2, &one, 5)]))?;
+        let swapped = played(
+            kit,
+            &script(vec![delivery(kit, 1, &two, 5), delivery(kit, 2, &one, 5)]),
+        )?;
         if !is_same(&straight, &swapped) {
             return Ok(());
         }
@@ -66,7 +91,11 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
 
 /// The pairs of commands that were tried.
 fn shown(kit: &Kit) -> String {
-    kit.pairs().iter().map(|[one, two]| format!("{one:?} and {two:?}")).collect::<Vec<_>>().join(", ")
+    kit.pairs()
+        .iter()
+        .map(|[one, two]| format!("{one:?} and {two:?}"))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// A command that comes long before it is named does what one does that comes just in time.
@@ -76,19 +105,35 @@ pub(super) fn held(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let early = played(kit, &script(vec![delivery(kit, 1, &text, 1)]))?;
     demand_none_missing(&in_time)?;
     demand_none_missing(&early)?;
-    demand_same(kit, "that a command comes some ticks before it is named", &in_time, &early)
+    demand_same(
+        kit,
+        "that a command comes some ticks before it is named",
+        &in_time,
+        &early,
+    )
 }
 
 /// One command that is named twice does what two do.
 pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
     for [text, _] in kit.pairs() {
         let once = played(kit, &script(vec![delivery(kit, 1, &text, 5)]))?;
-        let two = played(kit, &script(vec![delivery(kit, 1, &text, 5), delivery(kit, 2, &text, 5)]))?;
-        let doubled = played(kit, &script(vec![Delivery { times: 2, ..delivery(kit, 1, &text, 5) }]))?;
+        let two = played(
+            kit,
+            &script(vec![delivery(kit, 1, &text, 5), delivery(kit, 2, &text, 5)]),
+        )?;
+        let doubled = played(
+            kit,
+            &script(vec![Delivery {
+                times: 2,
+                ..delivery(kit, 1, &text, 5)
+            }]),
+        )?;
         demand_none_missing(&doubled)?;
         if kit.is_deterministic.get() == Some(&false) {
-            findings
-                .skip("command.twice", "the robot does not repeat itself, so that nothing can be compared");
+            findings.skip(
+                "command.twice",
+                "the robot does not repeat itself, so that nothing can be compared",
+            );
             return Ok(());
         }
         if is_same(&once, &two) {
@@ -96,12 +141,16 @@ pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
         }
         if is_same(&once, &doubled) {
             let (wanted, came) = difference(&two, &doubled).unwrap_or_default();
-            let expected = format!("a command that is named twice in a row is executed twice: {wanted}");
+            let expected =
+                format!("a command that is named twice in a row is executed twice: {wanted}");
             return Err(Failure::new(expected, came));
         }
         return Ok(());
     }
-    let reason = format!("the robot reports the same for one command and for two of them, of {}", shown(kit));
+    let reason = format!(
+        "the robot reports the same for one command and for two of them, of {}",
+        shown(kit)
+    );
     findings.skip("command.twice", &reason);
     Ok(())
 }
@@ -114,18 +163,40 @@ pub(super) fn missing(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut twist = Straight;
     play(&mut stage, &welcome, &Script::quiet(NAMED - 1), &mut twist)?;
     let from = kit.sender();
-    let id = |seq| CommandId { from: from.clone(), seq };
+    let id = |seq| CommandId {
+        from: from.clone(),
+        seq,
+    };
     stage.put_command(&from, 1, (1, NAMED - 1), &text)?;
-    let news = protocol::messages::News { commands: vec![id(1), id(99)], ..Default::default() };
+    let news = protocol::messages::News {
+        commands: vec![id(1), id(99)],
+        ..Default::default()
+    };
     let news = std::collections::BTreeMap::from([(kit.subject(), news)]);
-    let clock = protocol::messages::Clock { epoch: 1, tick: NAMED, news, end: None };
+    let clock = protocol::messages::Clock {
+        epoch: 1,
+        tick: NAMED,
+        news,
+        end: None,
+    };
     let (index, _) = stage.tick_within(&clock, MISSING_PATIENCE)?;
-    let missing = stage.seen.answers.get(index).map(|answer| answer.reading.report.missing.clone());
+    let missing = stage
+        .seen
+        .answers
+        .get(index)
+        .map(|answer| answer.reading.report.missing.clone());
     let missing = missing.unwrap_or_default();
     if missing != [id(99)] {
         let expected = format!("missing: {:?}", names(&[id(99)]));
-        return Err(Failure::new(expected, format!("missing: {:?}", names(&missing))));
+        return Err(Failure::new(
+            expected,
+            format!("missing: {:?}", names(&missing)),
+        ));
     }
-    let next = protocol::messages::Clock { epoch: 1, tick: NAMED + 1, ..Default::default() };
+    let next = protocol::messages::Clock {
+        epoch: 1,
+        tick: NAMED + 1,
+        ..Default::default()
+    };
     stage.tick(&next).map(drop)
 }

@@ -24,7 +24,10 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let joining = stage.next_join(START_PATIENCE)?;
     stage.settle(HELD_BACK);
     if stage.is_present() {
-        return Err(Failure::new("its liveliness token after the welcome", "it came before"));
+        return Err(Failure::new(
+            "its liveliness token after the welcome",
+            "it came before",
+        ));
     }
     let welcome = stage.welcome();
     stage.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
@@ -34,7 +37,10 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     for (what, key) in [("clocks", stage.keys.clock()), ("commands", commands)] {
         if !stage.is_heard(&kit.bus, &key)? {
             let expected = format!("{what} are subscribed to before the token is declared");
-            return Err(Failure::new(expected, format!("the token is there, and nobody hears {key}")));
+            return Err(Failure::new(
+                expected,
+                format!("the token is there, and nobody hears {key}"),
+            ));
         }
     }
     play(&mut stage, &welcome, &Script::quiet(2), &mut Straight).map(drop)
@@ -55,10 +61,17 @@ fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
     let expected = "its process ends when it is refused with unknown_name";
     let status = stage.until_ended(expected, PATIENCE)?;
     if status.success() {
-        return Err(Failure::new("an exit status other than 0 when it is refused", format!("{status}")));
+        return Err(Failure::new(
+            "an exit status other than 0 when it is refused",
+            format!("{status}"),
+        ));
     }
     // Programs break long lines, and draw frames around them.
-    let bare = |text: &str| text.chars().filter(char::is_ascii_graphic).collect::<String>();
+    let bare = |text: &str| {
+        text.chars()
+            .filter(char::is_ascii_graphic)
+            .collect::<String>()
+    };
     if !bare(&stage.process.errors()).contains(&bare(&explanation)) {
         let expected = format!("the explanation on its standard error: {explanation}");
         return Err(Failure::new(expected, stage.process.fate()));
@@ -71,11 +84,18 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
     stage.prepare()?;
     for _ in 0..TAKEN {
         let joining = stage.next_join(START_PATIENCE)?;
-        stage.refuse_join(&joining, Refusal::NameTaken, "another living process is it already");
+        stage.refuse_join(
+            &joining,
+            Refusal::NameTaken,
+            "another living process is it already",
+        );
     }
     let welcome = stage.welcome();
     let joining = stage.next_join(PATIENCE).map_err(|failure| {
-        Failure::new("another request to join after its place was taken (name_taken)", failure.came)
+        Failure::new(
+            "another request to join after its place was taken (name_taken)",
+            failure.came,
+        )
     })?;
     stage.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
     stage.until_ready()?;
@@ -83,7 +103,10 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
 }
 
 fn taken_for_ever(kit: &Kit) -> Result<(), Failure> {
-    let options = Options { patience_s: 2, ..Options::default() };
+    let options = Options {
+        patience_s: 2,
+        ..Options::default()
+    };
     let patience = Duration::from_secs(u64::from(options.patience_s)) + GRACE;
     let mut stage = Stage::open(kit, options)?;
     let explanation = "another living process is it already";
@@ -98,7 +121,10 @@ fn taken_for_ever(kit: &Kit) -> Result<(), Failure> {
     }
     let status = stage.until_ended(expected, Duration::ZERO)?;
     if status.success() {
-        return Err(Failure::new("an exit status other than 0 when it gives up", format!("{status}")));
+        return Err(Failure::new(
+            "an exit status other than 0 when it gives up",
+            format!("{status}"),
+        ));
     }
     Ok(())
 }

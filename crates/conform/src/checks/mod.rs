@@ -50,7 +50,9 @@ impl Findings {
 
     /// This robot gives no occasion to see it.
     fn skip(&mut self, rule: &'static str, reason: &str) {
-        self.0.entry(rule).or_insert_with(|| Verdict::Skipped { reason: reason.to_owned() });
+        self.0.entry(rule).or_insert_with(|| Verdict::Skipped {
+            reason: reason.to_owned(),
+        });
     }
 
     /// A check of these rules came to its end, or broke off: then the first rule tells why, and nothing is known of the
@@ -74,7 +76,10 @@ struct Check {
     run: fn(&Kit, &mut Findings) -> Result<(), Failure>,
 }
 
-const fn check(rules: &'static [&'static str], run: fn(&Kit, &mut Findings) -> Result<(), Failure>) -> Check {
+const fn check(
+    rules: &'static [&'static str],
+    run: fn(&Kit, &mut Findings) -> Result<(), Failure>,
+) -> Check {
     Check { rules, run }
 }
 
@@ -85,7 +90,15 @@ const CHECKS: [Check; 18] = [
     check(&["query.early"], queries::early),
     check(&["return.numbers"], returns::numbers),
     check(&["join.ready-last"], joining::ready_last),
-    check(&["query.tick", "tick.initial", "tick.correction", "tick.state-first"], queries::by_tick),
+    check(
+        &[
+            "query.tick",
+            "tick.initial",
+            "tick.correction",
+            "tick.state-first",
+        ],
+        queries::by_tick,
+    ),
     check(&["query.unknown"], queries::unknown),
     check(&["command.order"], commands::order),
     check(&["command.held"], commands::held),
@@ -112,14 +125,17 @@ pub(crate) fn all(
     findings.close(&ticks::USUAL, end);
     if !goes_on {
         let reason = "the robot does not get through the usual ticks, see tick.answer";
-        RULES.iter().for_each(|rule| findings.skip(rule.name, reason));
+        RULES
+            .iter()
+            .for_each(|rule| findings.skip(rule.name, reason));
         return Ok((findings.0, times));
     }
     let again = epochs::same_seed(kit, &mut findings);
     findings.close(&["determinism.seed"], again);
 
-    let is_wanted =
-        |check: &&Check| wanted.is_empty() || wanted.iter().any(|rule| check.rules.contains(&rule.name));
+    let is_wanted = |check: &&Check| {
+        wanted.is_empty() || wanted.iter().any(|rule| check.rules.contains(&rule.name))
+    };
     let due: Vec<&Check> = CHECKS.iter().filter(is_wanted).collect();
     let (next, all) = (AtomicUsize::new(0), Mutex::new(findings));
     std::thread::scope(|scope| {
@@ -129,12 +145,18 @@ pub(crate) fn all(
                     let mut own = Findings::default();
                     let end = (check.run)(kit, &mut own);
                     own.close(check.rules, end);
-                    all.lock().unwrap_or_else(PoisonError::into_inner).0.extend(own.0);
+                    all.lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0
+                        .extend(own.0);
                 }
             });
         }
     });
-    Ok((all.into_inner().unwrap_or_else(PoisonError::into_inner).0, times))
+    Ok((
+        all.into_inner().unwrap_or_else(PoisonError::into_inner).0,
+        times,
+    ))
 }
 
 /// A robot that has joined a run of its own, ready for its first clock.
@@ -164,8 +186,11 @@ mod tests {
 
     #[test]
     fn each_rule_has_one_check() {
-        let checked =
-            CHECKS.iter().flat_map(|check| check.rules).chain(&ticks::USUAL).chain(&["determinism.seed"]);
+        let checked = CHECKS
+            .iter()
+            .flat_map(|check| check.rules)
+            .chain(&ticks::USUAL)
+            .chain(&["determinism.seed"]);
         let mut checked: Vec<&str> = checked.copied().collect();
         checked.sort_unstable();
         let mut rules: Vec<&str> = RULES.iter().map(|rule| rule.name).collect();

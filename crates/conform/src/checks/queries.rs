@@ -36,14 +36,27 @@ struct Asker {
 
 /// What a robot shows in every tick: the tick before, and where it stands.
 pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options { is_followed: true, ..Options::default() })?;
+    let mut stage = seated(
+        kit,
+        Options {
+            is_followed: true,
+            ..Options::default()
+        },
+    )?;
     let welcome = stage.welcome();
-    let mut asker = Asker { findings: Findings::default(), before: None, location: welcome.location };
+    let mut asker = Asker {
+        findings: Findings::default(),
+        before: None,
+        location: welcome.location,
+    };
     let played = play(&mut stage, &welcome, &Script::usual(kit), &mut asker);
     findings.0.extend(asker.findings.0);
     if stage.seen.states.is_empty() {
         let came = "in none of the ticks, although somebody subscribes";
-        findings.fail("tick.state-first", Failure::new("its state is put for those who follow it", came));
+        findings.fail(
+            "tick.state-first",
+            Failure::new("its state is put for those who follow it", came),
+        );
     }
     played.map(drop)
 }
@@ -55,12 +68,17 @@ fn state_of(
     tick: Tick,
     expected: &str,
 ) -> Result<Result<PublicState, Failure>, Failure> {
-    Ok(state(stage.state_in(epoch, tick + 1)?, expected).and_then(|now| {
-        if (now.epoch, now.tick) == (epoch, tick) {
-            return Ok(now);
-        }
-        Err(Failure::new(expected, format!("the state of tick {} of epoch {}", now.tick, now.epoch)))
-    }))
+    Ok(
+        state(stage.state_in(epoch, tick + 1)?, expected).and_then(|now| {
+            if (now.epoch, now.tick) == (epoch, tick) {
+                return Ok(now);
+            }
+            Err(Failure::new(
+                expected,
+                format!("the state of tick {} of epoch {}", now.tick, now.epoch),
+            ))
+        }),
+    )
 }
 
 /// The same, for a robot that shows it after its report.
@@ -84,12 +102,14 @@ fn late_state_of(
 pub(super) fn state(answer: Option<AnswerOf>, expected: &str) -> Result<PublicState, Failure> {
     match answer {
         None => Err(Failure::new(expected, "no answer")),
-        Some(AnswerOf { result: Err(reason), .. }) => {
-            Err(Failure::new(expected, format!("refused: {reason}")))
-        }
-        Some(AnswerOf { result: Ok(bytes), .. }) => {
-            decode(STATE, "the robot", &bytes).map_err(|error| Failure::new(expected, error.to_string()))
-        }
+        Some(AnswerOf {
+            result: Err(reason),
+            ..
+        }) => Err(Failure::new(expected, format!("refused: {reason}"))),
+        Some(AnswerOf {
+            result: Ok(bytes), ..
+        }) => decode(STATE, "the robot", &bytes)
+            .map_err(|error| Failure::new(expected, error.to_string())),
     }
 }
 
@@ -102,10 +122,18 @@ impl Twist for Asker {
         if let Err(failure) = came {
             // Too late, or never?
             came = late_state_of(stage, epoch, tick, &expected)?;
-            self.findings.fail(if came.is_ok() { "tick.state-first" } else { "query.tick" }, failure);
+            self.findings.fail(
+                if came.is_ok() {
+                    "tick.state-first"
+                } else {
+                    "query.tick"
+                },
+                failure,
+            );
         }
         let Ok(now) = came else { return Ok(()) };
-        self.findings.settle("tick.state-first", check_followed(stage, entry, &now));
+        self.findings
+            .settle("tick.state-first", check_followed(stage, entry, &now));
         self.check_location(entry, &now);
         let matched = check_state(entry, &now)
             .and_then(|()| self.check_before(stage, epoch, tick))
@@ -128,36 +156,67 @@ impl Asker {
         }
         if tick == 0 {
             let expected = format!("it stands where its welcome says, at {:?}", self.location);
-            return self.findings.fail("tick.initial", Failure::new(expected, came));
+            return self
+                .findings
+                .fail("tick.initial", Failure::new(expected, came));
         }
-        let is_corrected = entry.clock.news.values().any(|news| news.correction.is_some());
-        let why = if is_corrected { "as the clock corrects it" } else { "as it proposed" };
+        let is_corrected = entry
+            .clock
+            .news
+            .values()
+            .any(|news| news.correction.is_some());
+        let why = if is_corrected {
+            "as the clock corrects it"
+        } else {
+            "as it proposed"
+        };
         let expected = format!("it stands at {:?}, {why}", self.location);
-        self.findings.fail("tick.correction", Failure::new(expected, came));
+        self.findings
+            .fail("tick.correction", Failure::new(expected, came));
     }
 
     /// The tick before is still told to whoever asks late.
     fn check_before(&self, stage: &Stage<'_>, epoch: Epoch, tick: Tick) -> Result<(), Failure> {
-        let Some(before) = &self.before else { return Ok(()) };
-        let expected = format!("asked with tick={tick}, still the state of tick {}", before.tick);
+        let Some(before) = &self.before else {
+            return Ok(());
+        };
+        let expected = format!(
+            "asked with tick={tick}, still the state of tick {}",
+            before.tick
+        );
         let came = state(stage.state_in(epoch, tick)?, &expected)?;
-        if came == *before { Ok(()) } else { Err(Failure::new(expected, format!("{came:?}"))) }
+        if came == *before {
+            Ok(())
+        } else {
+            Err(Failure::new(expected, format!("{came:?}")))
+        }
     }
 }
 
 /// What followers are sent comes before the report, in every tick once the robot knows that somebody follows.
 fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     let tick = entry.clock.tick;
-    let report = stage.seen.answers.get(entry.index).map_or(usize::MAX, |answer| answer.order);
-    let mut before = stage.seen.states.iter().filter(|(order, _)| *order < report);
-    let Some((_, last)) = before.next_back() else { return Ok(()) };
+    let report = stage
+        .seen
+        .answers
+        .get(entry.index)
+        .map_or(usize::MAX, |answer| answer.order);
+    let mut before = stage
+        .seen
+        .states
+        .iter()
+        .filter(|(order, _)| *order < report);
+    let Some((_, last)) = before.next_back() else {
+        return Ok(());
+    };
     let expected = format!("the state of tick {tick}, put before the report of tick {tick}");
     match last {
         Err(error) => Err(Failure::new(expected, error)),
         Ok(last) if last == now => Ok(()),
-        Ok(last) => {
-            Err(Failure::new(expected, format!("before it, the state of tick {} was put last", last.tick)))
-        }
+        Ok(last) => Err(Failure::new(
+            expected,
+            format!("before it, the state of tick {} was put last", last.tick),
+        )),
     }
 }
 
@@ -177,7 +236,10 @@ fn check_state(entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     if shown == *now {
         return Ok(());
     }
-    Err(Failure::new(format!("the state shows what is reported: {shown:?}"), format!("{now:?}")))
+    Err(Failure::new(
+        format!("the state shows what is reported: {shown:?}"),
+        format!("{now:?}"),
+    ))
 }
 
 /// Asked without an epoch, or without anything, it says the same.
@@ -186,7 +248,8 @@ fn check_newest(stage: &Stage<'_>, tick: Tick, now: &PublicState) -> Result<(), 
         return Ok(());
     }
     for parameters in [String::new(), format!("tick={}", tick + 1)] {
-        let expected = format!("asked with {parameters:?} after tick {tick}, the state of tick {tick}");
+        let expected =
+            format!("asked with {parameters:?} after tick {tick}, the state of tick {tick}");
         let came = state(stage.ask(STATE, &parameters)?, &expected)?;
         if came != *now {
             return Err(Failure::new(expected, format!("{came:?}")));
@@ -196,20 +259,34 @@ fn check_newest(stage: &Stage<'_>, tick: Tick, now: &PublicState) -> Result<(), 
 }
 
 /// The six queries say the same, each its part.
-fn check_six(stage: &Stage<'_>, epoch: Epoch, tick: Tick, now: &PublicState) -> Result<(), Failure> {
+fn check_six(
+    stage: &Stage<'_>,
+    epoch: Epoch,
+    tick: Tick,
+    now: &PublicState,
+) -> Result<(), Failure> {
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
     for what in QUERIES {
-        let expected = format!("the answer to {what} for tick {tick}: {:?}", now.answer(what));
+        let expected = format!(
+            "the answer to {what} for tick {tick}: {:?}",
+            now.answer(what)
+        );
         let came = match stage.ask(what, &format!("tick={};epoch={epoch}", tick + 1))? {
-            Some(AnswerOf { result: Ok(bytes), .. }) => decode::<Answer>(what, "the robot", &bytes)
+            Some(AnswerOf {
+                result: Ok(bytes), ..
+            }) => decode::<Answer>(what, "the robot", &bytes)
                 .map_err(|error| Failure::new(expected.clone(), error.to_string()))?,
-            Some(AnswerOf { result: Err(reason), .. }) => return Err(Failure::new(expected, reason)),
+            Some(AnswerOf {
+                result: Err(reason),
+                ..
+            }) => return Err(Failure::new(expected, reason)),
             None => return Err(Failure::new(expected, "no answer")),
         };
         let is_same = now.answer(what).is_some_and(|wanted| {
-            (wanted.epoch, wanted.tick) == (came.epoch, came.tick) && same_value(&wanted.value, &came.value)
+            (wanted.epoch, wanted.tick) == (came.epoch, came.tick)
+                && same_value(&wanted.value, &came.value)
         });
         if !is_same {
             return Err(Failure::new(expected, format!("{came:?}")));
@@ -240,10 +317,13 @@ type Pending = Receiver<Option<AnswerOf>>;
 fn ask_early(stage: &Stage<'_>, epoch: Epoch, tick: &str) -> Result<Pending, Failure> {
     let (sender, answer) = channel();
     let key = stage.keys.query(&stage.kit.subject(), STATE);
-    stage.kit.bus.ask_then(&key, &format!("tick={tick};epoch={epoch}"), move |came| {
-        // Nobody waits for it any more where this check is over.
-        let _ = sender.send(came);
-    })?;
+    stage
+        .kit
+        .bus
+        .ask_then(&key, &format!("tick={tick};epoch={epoch}"), move |came| {
+            // Nobody waits for it any more where this check is over.
+            let _ = sender.send(came);
+        })?;
     Ok(answer)
 }
 
@@ -263,39 +343,77 @@ pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     // Whether it is shown in time is another rule's matter.
     late_state_of(&stage, 1, LAST, "the state of the last tick")??;
     let pending = ask_early(&stage, 1, &(LAST + 2).to_string())?;
-    stage.tick(&Clock { epoch: 1, tick: LAST + 1, ..Clock::default() })?;
+    stage.tick(&Clock {
+        epoch: 1,
+        tick: LAST + 1,
+        ..Clock::default()
+    })?;
     demand_state(&stage, &pending, LAST + 1, &format!("after tick {LAST}"))?;
 
     let now = LAST + 1;
     late_state_of(&stage, 1, now, "the state of the last tick")??;
-    let never = [(1, 0), (1, now - 1), (1, 1), (1, now + 3), (1, now + 1000), (0, now + 1)];
+    let never = [
+        (1, 0),
+        (1, now - 1),
+        (1, 1),
+        (1, now + 3),
+        (1, now + 1000),
+        (0, now + 1),
+    ];
     let never = never.map(|(epoch, tick): (Epoch, Tick)| (epoch, tick.to_string()));
-    for (epoch, tick) in never.into_iter().chain([(1, "soon".to_owned()), (1, "-1".to_owned())]) {
-        let expected = format!("after tick {now}, an error reply in words to tick={tick};epoch={epoch}");
+    for (epoch, tick) in never
+        .into_iter()
+        .chain([(1, "soon".to_owned()), (1, "-1".to_owned())])
+    {
+        let expected =
+            format!("after tick {now}, an error reply in words to tick={tick};epoch={epoch}");
         match answer_to(&ask_early(&stage, epoch, &tick)?) {
-            Some(AnswerOf { result: Err(words), .. }) if !words.trim().is_empty() => {}
-            Some(AnswerOf { result: Err(_), .. }) => return Err(Failure::new(expected, "one without words")),
-            Some(AnswerOf { result: Ok(bytes), .. }) => {
+            Some(AnswerOf {
+                result: Err(words), ..
+            }) if !words.trim().is_empty() => {}
+            Some(AnswerOf { result: Err(_), .. }) => {
+                return Err(Failure::new(expected, "one without words"));
+            }
+            Some(AnswerOf {
+                result: Ok(bytes), ..
+            }) => {
                 return Err(Failure::new(expected, String::from_utf8_lossy(&bytes)));
             }
             None => return Err(Failure::new(expected, "no reply")),
         }
     }
-    stage.tick(&Clock { epoch: 1, tick: now + 1, ..Clock::default() }).map(drop)
+    stage
+        .tick(&Clock {
+            epoch: 1,
+            tick: now + 1,
+            ..Clock::default()
+        })
+        .map(drop)
 }
 
 /// A question that came early has its answer as soon as there is one.
-fn demand_state(stage: &Stage<'_>, pending: &Pending, tick: Tick, asked: &str) -> Result<(), Failure> {
+fn demand_state(
+    stage: &Stage<'_>,
+    pending: &Pending,
+    tick: Tick,
+    asked: &str,
+) -> Result<(), Failure> {
     // A robot that takes long for its tick answers when nobody waits for it any more.
     if stage.repeated.contains(&(1, tick)) {
         return Ok(());
     }
-    let expected = format!("asked with tick={} {asked}, the state of tick {tick} once it is there", tick + 1);
+    let expected = format!(
+        "asked with tick={} {asked}, the state of tick {tick} once it is there",
+        tick + 1
+    );
     let came = state(answer_to(pending), &expected)?;
     if (came.epoch, came.tick) == (1, tick) {
         return Ok(());
     }
-    Err(Failure::new(expected, format!("the state of tick {} of epoch {}", came.tick, came.epoch)))
+    Err(Failure::new(
+        expected,
+        format!("the state of tick {} of epoch {}", came.tick, came.epoch),
+    ))
 }
 
 /// Asked what nobody can answer, it gives no answer and goes on.
@@ -313,7 +431,10 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                 (STATE, "tick=-1;epoch=1"),
                 ("location", "tick=1;epoch=x"),
             ] {
-                if let Some(AnswerOf { result: Ok(bytes), .. }) = stage.ask(what, parameters)? {
+                if let Some(AnswerOf {
+                    result: Ok(bytes), ..
+                }) = stage.ask(what, parameters)?
+                {
                     let expected = format!("no answer to {what}?{parameters}: refused, or none");
                     return Err(Failure::new(expected, String::from_utf8_lossy(&bytes)));
                 }
@@ -324,5 +445,10 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
     let asked = play(&mut stage, &welcome, &Script::usual(kit), &mut Odd)?;
-    demand_same(kit, "a question that nobody can answer", usual(kit)?, &asked)
+    demand_same(
+        kit,
+        "a question that nobody can answer",
+        usual(kit)?,
+        &asked,
+    )
 }

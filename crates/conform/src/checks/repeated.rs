@@ -21,8 +21,10 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     impl Twist for Again {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
             let tick = entry.clock.tick;
-            self.0.retain(|(sent, _)| sent + stage.welcome().repeat_ticks > tick);
-            self.0.extend(entry.report.sent.iter().map(|sent| (tick, sent.seq)));
+            self.0
+                .retain(|(sent, _)| sent + stage.welcome().repeat_ticks > tick);
+            self.0
+                .extend(entry.report.sent.iter().map(|sent| (tick, sent.seq)));
             if !tick.is_multiple_of(EVERY) && self.0.is_empty() {
                 return Ok(());
             }
@@ -33,7 +35,9 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             let sent: Vec<usize> = self.0.iter().map(|sent| count_sent(stage, *sent)).collect();
             stage.put_clock(&entry.clock)?;
             let expected = format!("the report of tick {tick} again when its clock comes again");
-            stage.until(&expected, PATIENCE, |stage| (count(stage, tick) > before).then_some(()))?;
+            stage.until(&expected, PATIENCE, |stage| {
+                (count(stage, tick) > before).then_some(())
+            })?;
             // On one session, what was put before it has come before it.
             for (of, sent) in self.0.iter().zip(sent) {
                 if count_sent(stage, *of) == sent {
@@ -49,36 +53,60 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     }
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
-    let repeated = play(&mut stage, &welcome, &Script::usual(kit), &mut Again(Vec::new()))?;
+    let repeated = play(
+        &mut stage,
+        &welcome,
+        &Script::usual(kit),
+        &mut Again(Vec::new()),
+    )?;
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
 }
 
 fn count_of(stage: &Stage<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
     let is_of = |report: &Report| (report.epoch, report.tick) == (epoch, tick);
-    stage.seen.answers.iter().filter(|answer| is_of(&answer.reading.report)).count()
+    stage
+        .seen
+        .answers
+        .iter()
+        .filter(|answer| is_of(&answer.reading.report))
+        .count()
 }
 
 fn count(stage: &Stage<'_>, tick: Tick) -> usize {
-    stage.seen.answers.iter().filter(|answer| answer.reading.report.tick == tick).count()
+    stage
+        .seen
+        .answers
+        .iter()
+        .filter(|answer| answer.reading.report.tick == tick)
+        .count()
 }
 
 /// How often a command came so far.
 fn count_sent(stage: &Stage<'_>, of: (Tick, Seq)) -> usize {
     let is_it = |sent: &&crate::stage::Sent| {
-        sent.command.as_ref().is_ok_and(|command| (command.tick, command.seq) == of)
+        sent.command
+            .as_ref()
+            .is_ok_and(|command| (command.tick, command.seq) == of)
     };
     stage.seen.commands.iter().filter(is_it).count()
 }
 
 fn demand_same_bytes(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
-    let mut reports = stage.seen.answers.iter().filter(|answer| answer.reading.report.tick == tick);
+    let mut reports = stage
+        .seen
+        .answers
+        .iter()
+        .filter(|answer| answer.reading.report.tick == tick);
     let first = reports.next().map(|answer| &answer.bytes);
     match reports.find(|answer| Some(&answer.bytes) != first) {
         None => Ok(()),
         Some(other) => {
             let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
             let expected = first.map(|bytes| text(bytes)).unwrap_or_default();
-            Err(Failure::new(format!("the same report again: {expected}"), text(&other.bytes)))
+            Err(Failure::new(
+                format!("the same report again: {expected}"),
+                text(&other.bytes),
+            ))
         }
     }
 }
@@ -93,20 +121,40 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                 return Ok(());
             }
             // Would it heed them, it would stand elsewhere.
-            let correction = Some(Correction { location: Point::new(1.0, 1.0), blocked: true });
-            let news = News { correction, ..News::default() };
+            let correction = Some(Correction {
+                location: Point::new(1.0, 1.0),
+                blocked: true,
+            });
+            let news = News {
+                correction,
+                ..News::default()
+            };
             let news = std::collections::BTreeMap::from([(stage.kit.subject(), news)]);
-            let late = [(1, clock.tick - 2), (1, clock.tick - 5), (0, clock.tick), (0, clock.tick + 9)];
+            let late = [
+                (1, clock.tick - 2),
+                (1, clock.tick - 5),
+                (0, clock.tick),
+                (0, clock.tick + 9),
+            ];
             self.0 = late.map(|of| (of, count_of(stage, of))).into();
             for (epoch, tick) in late {
-                stage.put_clock(&Clock { epoch, tick, news: news.clone(), end: None })?;
+                stage.put_clock(&Clock {
+                    epoch,
+                    tick,
+                    news: news.clone(),
+                    end: None,
+                })?;
             }
             Ok(())
         }
 
         fn after(&mut self, stage: &mut Stage<'_>, _: &Entry) -> Result<(), Failure> {
             // In order on one link: an answer to a late clock would have come before that to this one.
-            match self.0.iter().find(|(of, before)| count_of(stage, *of) > *before) {
+            match self
+                .0
+                .iter()
+                .find(|(of, before)| count_of(stage, *of) > *before)
+            {
                 None => Ok(()),
                 Some(((epoch, tick), _)) => {
                     let came = format!("a report for tick {tick} of epoch {epoch}");
@@ -117,6 +165,16 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     }
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
-    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Late(Vec::new()))?;
-    demand_same(kit, "a clock of an earlier tick or epoch", usual(kit)?, &played)
+    let played = play(
+        &mut stage,
+        &welcome,
+        &Script::usual(kit),
+        &mut Late(Vec::new()),
+    )?;
+    demand_same(
+        kit,
+        "a clock of an earlier tick or epoch",
+        usual(kit)?,
+        &played,
+    )
 }

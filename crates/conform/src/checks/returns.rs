@@ -42,8 +42,14 @@ fn state_of(entry: &Entry) -> PublicState {
 /// A stage on which the robot has joined as a second incarnation.
 fn returned(kit: &Kit) -> Result<(Stage<'_>, Welcome), Failure> {
     let mut stage = Stage::open(kit, Options::default())?;
-    let state =
-        |tick| usual(kit).map(|usual| usual.iter().find(|entry| entry.clock.tick == tick).map(state_of));
+    let state = |tick| {
+        usual(kit).map(|usual| {
+            usual
+                .iter()
+                .find(|entry| entry.clock.tick == tick)
+                .map(state_of)
+        })
+    };
     let (before, last) = (state(LAST - 1)?, state(LAST)?);
     let welcome = stage.welcome();
     let welcome = Welcome {
@@ -65,27 +71,48 @@ fn returned(kit: &Kit) -> Result<(Stage<'_>, Welcome), Failure> {
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let (mut stage, welcome) = returned(kit)?;
     // The tick under way is its predecessor's, or goes on without it.
-    stage.put_clock(&Clock { epoch: 1, tick: LAST + 1, ..Clock::default() })?;
+    stage.put_clock(&Clock {
+        epoch: 1,
+        tick: LAST + 1,
+        ..Clock::default()
+    })?;
     stage.settle(QUIET);
     if let Some(answer) = stage.seen.answers.first() {
         let came = format!("a report for tick {}", answer.reading.report.tick);
-        return Err(Failure::new("no report before a clock names its generation", came));
+        return Err(Failure::new(
+            "no report before a clock names its generation",
+            came,
+        ));
     }
     for state in welcome.state_before.iter().chain(&welcome.last_state) {
-        let expected =
-            format!("asked before its first report, the state of tick {} of its welcome", state.tick);
+        let expected = format!(
+            "asked before its first report, the state of tick {} of its welcome",
+            state.tick
+        );
         let came = super::queries::state(stage.state_in(1, state.tick + 1)?, &expected)?;
         if came != *state {
-            return Err(Failure::new(expected, format!("the state of tick {}", came.tick)));
+            return Err(Failure::new(
+                expected,
+                format!("the state of tick {}", came.tick),
+            ));
         }
     }
-    let named = Welcome { tick: LAST + 1, ..welcome };
+    let named = Welcome {
+        tick: LAST + 1,
+        ..welcome
+    };
     let transcript = play(&mut stage, &named, &Script::quiet(5), &mut Straight)?;
-    match transcript.iter().find(|entry| entry.report.generation != GENERATION) {
+    match transcript
+        .iter()
+        .find(|entry| entry.report.generation != GENERATION)
+    {
         None => Ok(()),
         Some(entry) => {
             let came = format!("generation {}", entry.report.generation);
-            Err(Failure::new(format!("reports of generation {GENERATION}"), came))
+            Err(Failure::new(
+                format!("reports of generation {GENERATION}"),
+                came,
+            ))
         }
     }
 }
@@ -102,7 +129,8 @@ pub(super) fn numbers(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
     check_seqs(&transcript, LAST_SEQ)?;
     let shows_chance = chance(kit)?;
     if !shows_chance && transcript.iter().all(|entry| entry.report.sent.is_empty()) {
-        let reason = "the robot sent no command after it came back, and no chance is seen in how it moves";
+        let reason =
+            "the robot sent no command after it came back, and no chance is seen in how it moves";
         findings.skip("return.numbers", reason);
     }
     Ok(())
@@ -120,14 +148,28 @@ fn chance(kit: &Kit) -> Result<bool, Failure> {
     let (seed, stream) = (welcome.seed, welcome.stream.clone());
     play(&mut stage, &welcome, &Script::quiet(DRAWN), &mut Straight)?;
     let mut moves = |seed, stream: String| {
-        welcome = Welcome { epoch: welcome.epoch + 1, seed, stream, ..welcome.clone() };
+        welcome = Welcome {
+            epoch: welcome.epoch + 1,
+            seed,
+            stream,
+            ..welcome.clone()
+        };
         stage.rejoin = Some(welcome.clone());
         let asked = stage.seen.requests.len();
         let played = play(&mut stage, &welcome, &Script::quiet(DRAWN), &mut Straight);
         // A robot that does not start over shows nothing here; that is another rule's matter.
-        let played = if stage.seen.requests.len() == asked { Transcript::new() } else { played? };
-        let shown =
-            |entry: &Entry| (entry.report.proposal, entry.report.speed_mps, entry.report.direction_rad);
+        let played = if stage.seen.requests.len() == asked {
+            Transcript::new()
+        } else {
+            played?
+        };
+        let shown = |entry: &Entry| {
+            (
+                entry.report.proposal,
+                entry.report.speed_mps,
+                entry.report.direction_rad,
+            )
+        };
         Ok::<_, Failure>(played.iter().map(shown).collect::<Vec<_>>())
     };
     let (mut by_stream, mut by_seed) = (Vec::new(), Vec::new());
@@ -143,10 +185,16 @@ fn chance(kit: &Kit) -> Result<bool, Failure> {
     let is_rich = |moves: &[Vec<_>]| (1..moves.len()).all(|at| !moves[..at].contains(&moves[at]));
     let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
     if is_rich(&by_seed) && is_one(&by_stream) {
-        return Err(Failure::new(expected, "the name of the stream makes no difference, the seed does"));
+        return Err(Failure::new(
+            expected,
+            "the name of the stream makes no difference, the seed does",
+        ));
     }
     if is_rich(&by_stream) && is_one(&by_seed) {
-        return Err(Failure::new(expected, "the seed makes no difference, the name of the stream does"));
+        return Err(Failure::new(
+            expected,
+            "the seed makes no difference, the name of the stream does",
+        ));
     }
     Ok(is_rich(&by_stream) && is_rich(&by_seed))
 }
@@ -156,20 +204,33 @@ pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
     play(&mut stage, &welcome, &Script::quiet(3), &mut Straight)?;
-    let news = News { joined: Some(GENERATION), ..News::default() };
+    let news = News {
+        joined: Some(GENERATION),
+        ..News::default()
+    };
     let news = BTreeMap::from([(kit.subject(), news)]);
-    stage.put_clock(&Clock { epoch: 1, tick: 4, news, end: None })?;
-    let expected =
-        "its process ends, with an exit status other than 0, when a clock names a later incarnation of it";
+    stage.put_clock(&Clock {
+        epoch: 1,
+        tick: 4,
+        news,
+        end: None,
+    })?;
+    let expected = "its process ends, with an exit status other than 0, when a clock names a later incarnation of it";
     let status = stage.until_ended(expected, PATIENCE)?;
     if status.success() {
         return Err(Failure::new(expected, format!("{status}")));
     }
     stage.until_gone()?;
-    match stage.seen.answers.iter().find(|answer| answer.reading.report.tick == 4) {
+    match stage
+        .seen
+        .answers
+        .iter()
+        .find(|answer| answer.reading.report.tick == 4)
+    {
         None => Ok(()),
-        Some(_) => {
-            Err(Failure::new("no report for a clock that names a later incarnation", "one for tick 4"))
-        }
+        Some(_) => Err(Failure::new(
+            "no report for a clock that names a later incarnation",
+            "one for tick 4",
+        )),
     }
 }

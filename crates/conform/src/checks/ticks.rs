@@ -13,8 +13,14 @@ use crate::script::{Script, Straight, Transcript, play};
 use crate::stage::{Joining, Options, PATIENCE, START_PATIENCE, Stage};
 
 /// The rules that the usual ticks show.
-pub(super) const USUAL: [&str; 6] =
-    ["tick.answer", "join.request", "command.sent", "number.angles", "number.finite", "end.clock"];
+pub(super) const USUAL: [&str; 6] = [
+    "tick.answer",
+    "join.request",
+    "command.sent",
+    "number.angles",
+    "number.finite",
+    "end.clock",
+];
 
 /// A process that is told to end does so within this time. The page says 2 s; a busy machine may need more.
 const END_PATIENCE: Duration = Duration::from_secs(5);
@@ -30,8 +36,10 @@ pub(super) fn usual(
     kit: &Kit,
     findings: &mut Findings,
 ) -> Result<(Result<(), Failure>, Option<AnswerTimes>), CannotRun> {
-    let cannot = |failure: Failure| CannotRun::Robot(format!("{}: {}", failure.expected, failure.came));
-    let mut stage = Stage::open(kit, Options::default()).map_err(|failure| CannotRun::Robot(failure.came))?;
+    let cannot =
+        |failure: Failure| CannotRun::Robot(format!("{}: {}", failure.expected, failure.came));
+    let mut stage =
+        Stage::open(kit, Options::default()).map_err(|failure| CannotRun::Robot(failure.came))?;
     let joining = stage.next_join(START_PATIENCE).map_err(cannot)?;
     let request = joining.request.clone().map_err(CannotRun::Robot)?;
     kit.learn(&request)?;
@@ -46,13 +54,19 @@ pub(super) fn usual(
         Ok(transcript) => transcript,
         Err(failure) => return Ok((Err(failure), None)),
     };
-    let last = transcript.last().map(|entry| entry.clock.clone()).unwrap_or_default();
+    let last = transcript
+        .last()
+        .map(|entry| entry.clock.clone())
+        .unwrap_or_default();
     stage.settle(ECHO);
     findings.settle("end.clock", check_end(&mut stage, &last));
     findings.settle("tick.answer", check_answers(&stage, &transcript));
     check_sent(&stage, &transcript, findings);
     check_numbers(&stage, &transcript, findings);
-    let times = transcript.iter().map(|entry| entry.took.as_secs_f64() * 1e3).collect();
+    let times = transcript
+        .iter()
+        .map(|entry| entry.took.as_secs_f64() * 1e3)
+        .collect();
     if kit.usual.set(transcript).is_err() {
         unreachable!("the usual ticks are played once");
     }
@@ -61,9 +75,15 @@ pub(super) fn usual(
 
 /// What a request to join must say.
 fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
-    let Ok(request) = &joining.request else { return Ok(()) };
+    let Ok(request) = &joining.request else {
+        return Ok(());
+    };
     let expect = |holds: bool, expected: String, came: String| {
-        if holds { Ok(()) } else { Err(Failure::new(expected, came)) }
+        if holds {
+            Ok(())
+        } else {
+            Err(Failure::new(expected, came))
+        }
     };
     let version = request.protocol;
     expect(
@@ -77,9 +97,17 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
         format!("run {}", request.run),
     )?;
     let instance = "an instance that tells this process from all others";
-    expect(!request.instance.is_empty(), instance.to_owned(), "an empty one".to_owned())?;
+    expect(
+        !request.instance.is_empty(),
+        instance.to_owned(),
+        "an empty one".to_owned(),
+    )?;
     let own = stage.keys.join_as(&request.name);
-    expect(joining.key == own, format!("a request at {own}"), format!("one at {}", joining.key))
+    expect(
+        joining.key == own,
+        format!("a request at {own}"),
+        format!("one at {}", joining.key),
+    )
 }
 
 /// One report for each clock, and none else.
@@ -91,7 +119,10 @@ fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failu
     for (index, answer) in stage.seen.answers.iter().enumerate() {
         let report = &answer.reading.report;
         let (epoch, tick) = (report.epoch, report.tick);
-        let came = format!("epoch {epoch}, tick {tick}, generation {}", report.generation);
+        let came = format!(
+            "epoch {epoch}, tick {tick}, generation {}",
+            report.generation
+        );
         let Some(entry) = transcript.iter().find(|entry| entry.clock.tick == tick) else {
             return Err(Failure::new("reports for ticks that were granted", came));
         };
@@ -102,7 +133,10 @@ fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failu
         }
         // A clock that was repeated while it was awaited may have been answered twice.
         if entry.index != index && !stage.repeated.contains(&(wanted, tick)) {
-            return Err(Failure::new(format!("one report for tick {tick}"), "more than one"));
+            return Err(Failure::new(
+                format!("one report for tick {tick}"),
+                "more than one",
+            ));
         }
     }
     Ok(())
@@ -112,9 +146,15 @@ fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failu
 fn check_sent(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Findings) {
     let has_sent = transcript.iter().any(|entry| !entry.report.sent.is_empty());
     if !has_sent && stage.seen.commands.is_empty() {
-        return findings.skip("command.sent", "the robot sent no command in the usual ticks");
+        return findings.skip(
+            "command.sent",
+            "the robot sent no command in the usual ticks",
+        );
     }
-    findings.settle("command.sent", check_seqs(transcript, 0).and_then(|()| match_sent(stage, transcript)));
+    findings.settle(
+        "command.sent",
+        check_seqs(transcript, 0).and_then(|()| match_sent(stage, transcript)),
+    );
 }
 
 /// What reports list is numbered from `last_seq` on, without a gap.
@@ -137,7 +177,8 @@ fn match_sent(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure>
             came.command.as_ref().is_ok_and(|command| {
                 came.to == sent.to.as_str()
                     && (command.seq, command.tick) == (sent.seq, tick)
-                    && (command.performative, &command.command) == (sent.performative, &sent.command)
+                    && (command.performative, &command.command)
+                        == (sent.performative, &sent.command)
             })
         };
         if stage.seen.commands.iter().find(matches).is_none() {
@@ -145,20 +186,36 @@ fn match_sent(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure>
                 "command {} of tick {tick} on the key of {}, as the report lists it",
                 sent.seq, sent.to
             );
-            let came = stage.seen.commands.iter().map(describe).collect::<Vec<_>>().join("; ");
+            let came = stage
+                .seen
+                .commands
+                .iter()
+                .map(describe)
+                .collect::<Vec<_>>()
+                .join("; ");
             return Err(Failure::new(
                 expected,
-                if came.is_empty() { "no command at all".into() } else { came },
+                if came.is_empty() {
+                    "no command at all".into()
+                } else {
+                    came
+                },
             ));
         }
         listed.push((sent.to.as_str(), sent.seq));
     }
     let is_unlisted = |came: &&crate::stage::Sent| {
-        !came.command.as_ref().is_ok_and(|command| listed.contains(&(came.to.as_str(), command.seq)))
+        !came
+            .command
+            .as_ref()
+            .is_ok_and(|command| listed.contains(&(came.to.as_str(), command.seq)))
     };
     match stage.seen.commands.iter().find(is_unlisted) {
         None => Ok(()),
-        Some(came) => Err(Failure::new("a report that lists each command", describe(came))),
+        Some(came) => Err(Failure::new(
+            "a report that lists each command",
+            describe(came),
+        )),
     }
 }
 
@@ -170,14 +227,20 @@ struct Entry<'t> {
 
 impl<'t> Entry<'t> {
     fn of(entry: &'t crate::script::Entry) -> impl Iterator<Item = Self> {
-        entry.report.sent.iter().map(|sent| Self { tick: entry.clock.tick, sent })
+        entry.report.sent.iter().map(|sent| Self {
+            tick: entry.clock.tick,
+            sent,
+        })
     }
 }
 
 fn describe(sent: &crate::stage::Sent) -> String {
     match &sent.command {
         Ok(command) => {
-            format!("to {}: seq {} of tick {}: {:?}", sent.to, command.seq, command.tick, command.command)
+            format!(
+                "to {}: seq {} of tick {}: {:?}",
+                sent.to, command.seq, command.tick, command.command
+            )
         }
         Err(error) => error.clone(),
     }
@@ -206,11 +269,21 @@ fn check_numbers(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Find
 
 /// The end of the run: it goes, as it should.
 fn check_end(stage: &mut Stage<'_>, last: &Clock) -> Result<(), Failure> {
-    let end = Clock { end: Some(End::Finished), news: [].into(), ..last.clone() };
+    let end = Clock {
+        end: Some(End::Finished),
+        news: [].into(),
+        ..last.clone()
+    };
     stage.put_clock(&end)?;
-    let status = stage.until_ended("its process ends after the clock that ends the run", PATIENCE)?;
+    let status = stage.until_ended(
+        "its process ends after the clock that ends the run",
+        PATIENCE,
+    )?;
     if status.code() != Some(0) {
-        return Err(Failure::new("exit status 0 after the clock that ends the run", stage.process.fate()));
+        return Err(Failure::new(
+            "exit status 0 after the clock that ends the run",
+            stage.process.fate(),
+        ));
     }
     stage.until_gone()
 }

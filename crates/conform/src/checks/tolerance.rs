@@ -11,7 +11,13 @@ use crate::stage::{Options, Stage};
 
 /// Later versions of the contract add fields: everything the robot hears carries some.
 pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options { has_extras: true, ..Options::default() })?;
+    let mut stage = seated(
+        kit,
+        Options {
+            has_extras: true,
+            ..Options::default()
+        },
+    )?;
     let welcome = stage.welcome();
     let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight)?;
     demand_same(kit, "a field that nobody knows", usual(kit)?, &played)
@@ -39,12 +45,27 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
     let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Rubbish)?;
-    demand_same(kit, "a message that cannot be understood", usual(kit)?, &played)
+    demand_same(
+        kit,
+        "a message that cannot be understood",
+        usual(kit)?,
+        &played,
+    )
 }
 
 /// Not JSON, not an object, not all of it, not the right kinds.
 fn common() -> Vec<Vec<u8>> {
-    let texts = ["", "not json", "[]", "null", "7", "{", "{}", "{\"epoch\":1}", "\"clock\""];
+    let texts = [
+        "",
+        "not json",
+        "[]",
+        "null",
+        "7",
+        "{",
+        "{}",
+        "{\"epoch\":1}",
+        "\"clock\"",
+    ];
     let mut rubbish: Vec<Vec<u8>> = texts.iter().map(|text| text.as_bytes().to_vec()).collect();
     rubbish.push(vec![0xff, 0xfe, 0x00, 0x80]);
     rubbish
@@ -85,7 +106,9 @@ fn commands(tick: u64) -> Vec<Vec<u8>> {
             "{{\"epoch\":1,\"tick\":{tick},\"seq\":1,\"command\":\"{}\"}}",
             "x".repeat(MAX_TEXT_BYTES + 1)
         ),
-        format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":2,\"performative\":\"sing\",\"command\":\"x\"}}"),
+        format!(
+            "{{\"epoch\":1,\"tick\":{tick},\"seq\":2,\"performative\":\"sing\",\"command\":\"x\"}}"
+        ),
     ] {
         rubbish.push(text.into_bytes());
     }

@@ -1,6 +1,9 @@
 //! A console to test, and what a browser does to it.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot set up its subject fails")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot set up its subject fails"
+)]
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -20,10 +23,19 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// The program under test.
 pub(crate) fn program(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cars-console"));
-    for variable in ["CARS_RUN", "CARS_CONNECT", "CARS_ZENOH_CONFIG", "CARS_CONSOLE_BIND"] {
+    for variable in [
+        "CARS_RUN",
+        "CARS_CONNECT",
+        "CARS_ZENOH_CONFIG",
+        "CARS_CONSOLE_BIND",
+    ] {
         command.env_remove(variable);
     }
-    command.args(args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+        .args(args)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
     command
 }
 
@@ -50,18 +62,35 @@ impl Console {
     pub(crate) fn start(args: &[&str]) -> Self {
         let mut child = program(args).spawn().unwrap();
         let mut line = String::new();
-        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
-        let url = line.trim().strip_prefix("console: http://").unwrap_or_else(|| panic!("{line:?}"));
+        BufReader::new(child.stdout.as_mut().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        let url = line
+            .trim()
+            .strip_prefix("console: http://")
+            .unwrap_or_else(|| panic!("{line:?}"));
         let (address, token) = url.split_once('/').unwrap();
         let address: SocketAddr = address.parse().unwrap();
         let (port, token) = (address.port(), token.to_owned());
-        Self { child, line, port, token }
+        Self {
+            child,
+            line,
+            port,
+            token,
+        }
     }
 
     /// One that waits for a simulator that never comes.
     pub(crate) fn live() -> Self {
         // Nobody listens at port 1 of this machine.
-        Self::start(&["--bind", "127.0.0.1:0", "--connect", "tcp/127.0.0.1:1", "--run", "nobody"])
+        Self::start(&[
+            "--bind",
+            "127.0.0.1:0",
+            "--connect",
+            "tcp/127.0.0.1:1",
+            "--run",
+            "nobody",
+        ])
     }
 
     /// Where it expects to be called.
@@ -83,8 +112,15 @@ impl Console {
     /// Asks for a path with exactly these headers.
     pub(crate) fn get_with(&self, path: &str, headers: &[(&str, &str)]) -> Answer {
         let mut stream = self.connect();
-        let headers: String = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
-        write!(stream, "GET {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n").unwrap();
+        let headers: String = headers
+            .iter()
+            .map(|(name, value)| format!("{name}: {value}\r\n"))
+            .collect();
+        write!(
+            stream,
+            "GET {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n"
+        )
+        .unwrap();
         let mut text = Vec::new();
         stream.read_to_end(&mut text).unwrap();
         Answer::parse(&String::from_utf8_lossy(&text))
@@ -92,7 +128,8 @@ impl Console {
 
     /// A WebSocket as the page opens it.
     pub(crate) fn page(&self) -> Page {
-        self.page_of(Some(&format!("http://{}", self.host()))).unwrap_or_else(|status| panic!("{status}"))
+        self.page_of(Some(&format!("http://{}", self.host())))
+            .unwrap_or_else(|status| panic!("{status}"))
     }
 
     /// A WebSocket as a page of `origin` opens it; `Err` is the HTTP status of a refusal.
@@ -100,7 +137,9 @@ impl Console {
         let url = format!("ws://{}/ws{}", self.host(), self.token);
         let mut request = url.into_client_request().unwrap();
         if let Some(origin) = origin {
-            request.headers_mut().insert("Origin", HeaderValue::from_str(origin).unwrap());
+            request
+                .headers_mut()
+                .insert("Origin", HeaderValue::from_str(origin).unwrap());
         }
         match tungstenite::client(request, self.connect()) {
             Ok((socket, _)) => Ok(Page { socket }),
@@ -113,7 +152,11 @@ impl Console {
 
     /// Tells it to end.
     pub(crate) fn terminate(&self) {
-        kill(Pid::from_raw(self.child.id().try_into().unwrap()), Signal::SIGTERM).unwrap();
+        kill(
+            Pid::from_raw(self.child.id().try_into().unwrap()),
+            Signal::SIGTERM,
+        )
+        .unwrap();
     }
 
     /// Waits for its end.
@@ -131,7 +174,12 @@ impl Console {
     /// What it printed besides, after its end.
     pub(crate) fn errors(&mut self) -> String {
         let mut text = String::new();
-        self.child.stderr.take().unwrap().read_to_string(&mut text).unwrap();
+        self.child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut text)
+            .unwrap();
         text
     }
 }
@@ -153,20 +201,43 @@ pub(crate) struct Answer {
 
 impl Answer {
     fn parse(text: &str) -> Self {
-        let (head, body) = text.split_once("\r\n\r\n").unwrap_or_else(|| panic!("no HTTP: {text:?}"));
+        let (head, body) = text
+            .split_once("\r\n\r\n")
+            .unwrap_or_else(|| panic!("no HTTP: {text:?}"));
         let mut lines = head.lines();
-        let status = lines.next().unwrap().split(' ').nth(1).unwrap().parse().unwrap();
+        let status = lines
+            .next()
+            .unwrap()
+            .split(' ')
+            .nth(1)
+            .unwrap()
+            .parse()
+            .unwrap();
         let headers = lines.map(|line| line.split_once(": ").unwrap());
-        let headers = headers.map(|(name, value)| (name.to_ascii_lowercase(), value.to_owned())).collect();
-        Self { status, headers, body: body.to_owned() }
+        let headers = headers
+            .map(|(name, value)| (name.to_ascii_lowercase(), value.to_owned()))
+            .collect();
+        Self {
+            status,
+            headers,
+            body: body.to_owned(),
+        }
     }
 
     pub(crate) fn header(&self, name: &str) -> &str {
-        self.headers.iter().find(|(own, _)| own == name).map_or("", |(_, value)| value)
+        self.headers
+            .iter()
+            .find(|(own, _)| own == name)
+            .map_or("", |(_, value)| value)
     }
 
     pub(crate) fn json(&self) -> Value {
-        assert_eq!((self.status, self.header("content-type")), (200, "application/json"), "{}", self.body);
+        assert_eq!(
+            (self.status, self.header("content-type")),
+            (200, "application/json"),
+            "{}",
+            self.body
+        );
         serde_json::from_str(&self.body).unwrap()
     }
 }
@@ -191,12 +262,16 @@ impl Page {
     pub(crate) fn hear(&mut self) -> Heard {
         loop {
             match self.socket.read() {
-                Ok(Message::Text(text)) => return Heard::Said(serde_json::from_str(&text).unwrap()),
+                Ok(Message::Text(text)) => {
+                    return Heard::Said(serde_json::from_str(&text).unwrap());
+                }
                 Ok(Message::Close(Some(frame))) => {
                     return Heard::Closed(frame.code.into(), frame.reason.to_string());
                 }
                 Ok(_) => {}
-                Err(tungstenite::Error::Io(error)) if error.kind() == std::io::ErrorKind::WouldBlock => {
+                Err(tungstenite::Error::Io(error))
+                    if error.kind() == std::io::ErrorKind::WouldBlock =>
+                {
                     panic!("nothing for {PATIENCE:?}")
                 }
                 Err(_) => return Heard::Gone,

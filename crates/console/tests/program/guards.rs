@@ -9,27 +9,54 @@ use crate::client::{Console, fails};
 fn a_request_for_another_host_is_refused() {
     let console = Console::live();
     for path in ["/", "/ws", "/assets/app.js", "/recording"] {
-        for host in ["evil.example", &format!("evil.example:{}", console.port), "127.0.0.1", ""] {
+        for host in [
+            "evil.example",
+            &format!("evil.example:{}", console.port),
+            "127.0.0.1",
+            "",
+        ] {
             let answer = console.get_with(path, &[("Host", host)]);
             assert_eq!(answer.status, 403, "{path} of {host:?}");
             assert!(answer.body.contains(&console.host()), "{}", answer.body);
         }
-        assert_eq!(console.get_with(path, &[]).status, 403, "{path} without a host");
+        assert_eq!(
+            console.get_with(path, &[]).status,
+            403,
+            "{path} without a host"
+        );
     }
-    for host in [console.host(), format!("localhost:{}", console.port), format!("[::1]:{}", console.port)] {
-        assert_eq!(console.get_with("/nothing", &[("Host", &host)]).status, 404, "{host}");
+    for host in [
+        console.host(),
+        format!("localhost:{}", console.port),
+        format!("[::1]:{}", console.port),
+    ] {
+        assert_eq!(
+            console.get_with("/nothing", &[("Host", &host)]).status,
+            404,
+            "{host}"
+        );
     }
 }
 
 #[test]
 fn a_page_from_elsewhere_gets_no_socket() {
     let console = Console::live();
-    for origin in ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"] {
+    for origin in [
+        "http://evil.example",
+        "null",
+        "https://127.0.0.1",
+        "http://127.0.0.1:1",
+    ] {
         assert_eq!(console.page_of(Some(origin)).err(), Some(403), "{origin}");
     }
     assert_eq!(console.page().until("hello")["mode"], "live");
     // A program that is no browser names no origin.
-    assert_eq!(console.page_of(None).map(|mut page| page.until("hello")["run"].clone()), Ok("nobody".into()));
+    assert_eq!(
+        console
+            .page_of(None)
+            .map(|mut page| page.until("hello")["run"].clone()),
+        Ok("nobody".into())
+    );
 }
 
 #[test]
@@ -60,8 +87,14 @@ fn every_answer_forbids_what_the_page_does_not_need() {
 #[test]
 fn an_open_console_wants_its_token() {
     let console = Console::start(&["--bind", "0.0.0.0:0", "--connect", "tcp/127.0.0.1:1"]);
-    let token = console.token.strip_prefix("?token=").unwrap_or_else(|| panic!("no token: {}", console.line));
-    assert!(token.len() >= 32 && token.bytes().all(|byte| byte.is_ascii_hexdigit()), "{token}");
+    let token = console
+        .token
+        .strip_prefix("?token=")
+        .unwrap_or_else(|| panic!("no token: {}", console.line));
+    assert!(
+        token.len() >= 32 && token.bytes().all(|byte| byte.is_ascii_hexdigit()),
+        "{token}"
+    );
     for path in ["/", "/ws", "/recording", "/recording/ticks?from=0&count=1"] {
         for query in ["", "token=", "token=0", "token=0000", &token[1..]] {
             let glue = if path.contains('?') { '&' } else { '?' };
@@ -71,17 +104,32 @@ fn an_open_console_wants_its_token() {
         }
     }
     assert_ne!(console.get(&format!("/{}", console.token)).status, 403);
-    assert_eq!(console.get("/assets/nothing").status, 404, "the page's parts are no secret");
+    assert_eq!(
+        console.get("/assets/nothing").status,
+        404,
+        "the page's parts are no secret"
+    );
     assert_eq!(console.page().until("hello")["mode"], "live");
-    assert_ne!(Console::start(&["--bind", "0.0.0.0:0"]).token, console.token, "a new one every time");
+    assert_ne!(
+        Console::start(&["--bind", "0.0.0.0:0"]).token,
+        console.token,
+        "a new one every time"
+    );
 }
 
 #[test]
 fn the_page_is_served_with_all_its_parts() {
     let console = Console::live();
     let page = console.get("/");
-    assert_eq!((page.status, page.header("content-type")), (200, "text/html; charset=utf-8"));
-    let parts: Vec<&str> = page.body.split('"').filter(|text| text.starts_with("assets/")).collect();
+    assert_eq!(
+        (page.status, page.header("content-type")),
+        (200, "text/html; charset=utf-8")
+    );
+    let parts: Vec<&str> = page
+        .body
+        .split('"')
+        .filter(|text| text.starts_with("assets/"))
+        .collect();
     assert!(parts.len() > 2, "{parts:?}");
     for part in parts {
         let answer = console.get(&format!("/{part}"));
@@ -91,7 +139,11 @@ fn the_page_is_served_with_all_its_parts() {
             Some("svg") => "image/svg+xml",
             _ => panic!("what is {part}?"),
         };
-        assert_eq!((answer.status, answer.header("content-type")), (200, expected), "{part}");
+        assert_eq!(
+            (answer.status, answer.header("content-type")),
+            (200, expected),
+            "{part}"
+        );
     }
 }
 
@@ -111,17 +163,31 @@ fn nothing_but_the_page_can_be_read() {
         "/assets/..\\Cargo.toml",
     ] {
         let answer = console.get(path);
-        assert_eq!((answer.status, answer.body.as_str()), (404, "There is nothing here.\n"), "{path}");
+        assert_eq!(
+            (answer.status, answer.body.as_str()),
+            (404, "There is nothing here.\n"),
+            "{path}"
+        );
     }
     let answer = console.get("/recording");
-    assert_eq!(answer.status, 404, "a run in progress is no recording: {}", answer.body);
+    assert_eq!(
+        answer.status, 404,
+        "a run in progress is no recording: {}",
+        answer.body
+    );
 }
 
 #[test]
 fn requests_that_are_no_requests_do_no_harm() {
     let console = Console::live();
     let long = format!("GET /{} HTTP/1.1\r\n\r\n", "x".repeat(1 << 20));
-    for junk in ["\r\n\r\n\r\n", "\0\0\0\0\r\n\r\n", "GET\r\n\r\n", "POST / HTTP/9.9\r\n\r\n", &long] {
+    for junk in [
+        "\r\n\r\n\r\n",
+        "\0\0\0\0\r\n\r\n",
+        "GET\r\n\r\n",
+        "POST / HTTP/9.9\r\n\r\n",
+        &long,
+    ] {
         let mut stream = console.connect();
         // It may be shut before all is written.
         let _ = stream.write_all(junk.as_bytes());
@@ -143,6 +209,9 @@ fn a_taken_default_port_gives_way_and_a_wanted_one_does_not() {
     assert!(console.wait().success());
     assert!(console.errors().contains("127.0.0.1:7007 is taken"));
     let text = fails(&["--bind", "127.0.0.1:7007"]);
-    assert!(text.contains("cannot serve at 127.0.0.1:7007") && text.contains("--bind"), "{text}");
+    assert!(
+        text.contains("cannot serve at 127.0.0.1:7007") && text.contains("--bind"),
+        "{text}"
+    );
     drop(taken);
 }

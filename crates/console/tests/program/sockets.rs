@@ -20,12 +20,18 @@ fn without_a_simulator_it_says_so() {
     let console = Console::live();
     let mut page = console.page();
     let hello = page.until("hello");
-    assert_eq!((&hello["run"], &hello["version"]), (&"nobody".into(), &env!("CARGO_PKG_VERSION").into()));
+    assert_eq!(
+        (&hello["run"], &hello["version"]),
+        (&"nobody".into(), &env!("CARGO_PKG_VERSION").into())
+    );
     assert_eq!(page.until("simulator")["present"], false);
     page.say(&control(7, r#"{"do":"start"}"#));
     let answer = page.until("answer");
     let error = answer["error"].as_str().unwrap();
-    assert!(answer["id"] == 7 && error.contains("no simulator of run nobody answers"), "{error}");
+    assert!(
+        answer["id"] == 7 && error.contains("no simulator of run nobody answers"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -33,15 +39,27 @@ fn what_cannot_be_understood_is_answered_with_the_reason() {
     let console = Console::live();
     let mut page = console.page();
     for (text, id, reason) in [
-        (r#"{"type":"control","id":1,"control":{"do":"dance"}}"#, Some(1), "unknown variant `dance`"),
-        (r#"{"type":"control","id":2,"control":{"do":"step"}}"#, Some(2), "missing field `n`"),
+        (
+            r#"{"type":"control","id":1,"control":{"do":"dance"}}"#,
+            Some(1),
+            "unknown variant `dance`",
+        ),
+        (
+            r#"{"type":"control","id":2,"control":{"do":"step"}}"#,
+            Some(2),
+            "missing field `n`",
+        ),
         (
             r#"{"type":"control","id":3,"control":{"do":"speed","factor":1e999}}"#,
             Some(3),
             "number out of range",
         ),
         (r#"{"type":"dance","id":4}"#, Some(4), "unknown variant"),
-        (r#"{"type":"control","id":-5,"control":{"do":"start"}}"#, None, "invalid value"),
+        (
+            r#"{"type":"control","id":-5,"control":{"do":"start"}}"#,
+            None,
+            "invalid value",
+        ),
         ("{", None, "EOF"),
         ("", None, "EOF"),
         ("[[[[", None, "malformed"),
@@ -49,12 +67,24 @@ fn what_cannot_be_understood_is_answered_with_the_reason() {
         page.say(text);
         let answer = page.until("answer");
         assert_eq!(answer["id"].as_u64(), id, "{answer}");
-        assert!(answer["error"].as_str().unwrap().contains(reason), "{answer}");
+        assert!(
+            answer["error"].as_str().unwrap().contains(reason),
+            "{answer}"
+        );
     }
-    let long = format!(r#"{{"do":"command","to":"Butler","command":"{}"}}"#, "x".repeat(5000));
+    let long = format!(
+        r#"{{"do":"command","to":"Butler","command":"{}"}}"#,
+        "x".repeat(5000)
+    );
     page.say(&control(6, &long));
     let answer = page.until("answer");
-    assert!(answer["error"].as_str().unwrap().contains("command: 5000 bytes"), "{answer}");
+    assert!(
+        answer["error"]
+            .as_str()
+            .unwrap()
+            .contains("command: 5000 bytes"),
+        "{answer}"
+    );
 }
 
 /// Requests that are understood.
@@ -71,8 +101,11 @@ const GOOD: &[&str] = &[
 /// A good request with a few characters replaced, or anything.
 fn saying() -> impl Strategy<Value = String> {
     let slip = (any::<Index>(), prop_oneof!["[0-9{}\\[\\]\",:.e-]", "\\PC"]);
-    let damaged =
-        (prop::sample::select(GOOD), prop::collection::vec(slip, 0..4)).prop_map(|(good, slips)| {
+    let damaged = (
+        prop::sample::select(GOOD),
+        prop::collection::vec(slip, 0..4),
+    )
+        .prop_map(|(good, slips)| {
             let mut characters: Vec<String> = good.chars().map(String::from).collect();
             for (at, with) in slips {
                 *at.get_mut(&mut characters) = with;
@@ -91,25 +124,39 @@ fn whatever_is_said_is_answered() {
         let text = strategy.new_tree(&mut runner).unwrap().current();
         page.say(&text);
         let answer = page.until("answer");
-        assert!(answer["error"].as_str().is_some_and(|why| !why.is_empty()), "{text}: {answer}");
+        assert!(
+            answer["error"].as_str().is_some_and(|why| !why.is_empty()),
+            "{text}: {answer}"
+        );
     }
 }
 
 #[test]
 fn what_is_too_long_ends_the_conversation() {
     let console = Console::live();
-    let scenario = |bytes| control(1, &format!(r#"{{"do":"load","scenario":"{}"}}"#, "x".repeat(bytes)));
+    let scenario = |bytes| {
+        control(
+            1,
+            &format!(r#"{{"do":"load","scenario":"{}"}}"#, "x".repeat(bytes)),
+        )
+    };
     let mut page = console.page();
     page.say(&scenario(1 << 20));
     assert!(
-        page.until("answer")["error"].as_str().unwrap().contains("no simulator"),
+        page.until("answer")["error"]
+            .as_str()
+            .unwrap()
+            .contains("no simulator"),
         "a scenario may be long"
     );
     page.say(&scenario(2 << 20));
     assert_ne!(page.farewell().map(|(code, _)| code), Some(1000));
 
     let mut page = console.page();
-    let long = format!(r#"{{"do":"command","to":"Butler","command":"{}"}}"#, "x".repeat(70_000));
+    let long = format!(
+        r#"{{"do":"command","to":"Butler","command":"{}"}}"#,
+        "x".repeat(70_000)
+    );
     page.say(&control(1, &long));
     let (code, reason) = page.farewell().unwrap();
     assert!(code == 1009 && reason.contains("65536"), "{code} {reason}");
@@ -117,7 +164,11 @@ fn what_is_too_long_ends_the_conversation() {
     let mut page = console.page();
     page.send(Message::binary(vec![1, 2, 3]));
     assert_eq!(page.farewell().unwrap().0, 1003);
-    assert_eq!(console.page().until("hello")["mode"], "live", "others are served");
+    assert_eq!(
+        console.page().until("hello")["mode"],
+        "live",
+        "others are served"
+    );
 }
 
 #[test]
@@ -131,7 +182,11 @@ fn a_page_may_not_have_any_number_of_requests() {
     for _ in 0..100 {
         page.until("answer");
     }
-    assert!(begun.elapsed() > Duration::from_millis(900), "100 requests in {:?}", begun.elapsed());
+    assert!(
+        begun.elapsed() > Duration::from_millis(900),
+        "100 requests in {:?}",
+        begun.elapsed()
+    );
 }
 
 #[test]
@@ -142,12 +197,18 @@ fn the_33rd_browser_is_refused_with_the_reason() {
         page.until("hello");
     }
     let (code, reason) = console.page().farewell().unwrap();
-    assert!(code == 1013 && reason.contains("32 browsers watch already"), "{code} {reason}");
+    assert!(
+        code == 1013 && reason.contains("32 browsers watch already"),
+        "{code} {reason}"
+    );
     pages.pop();
     // Its place is free as soon as the console has noticed that it left.
     let begun = Instant::now();
     while !matches!(console.page().hear(), crate::client::Heard::Said(_)) {
-        assert!(begun.elapsed() < Duration::from_secs(5), "its place is not free again");
+        assert!(
+            begun.elapsed() < Duration::from_secs(5),
+            "its place is not free again"
+        );
     }
 }
 
@@ -175,11 +236,16 @@ fn somebody_who_never_says_goodbye_cannot_keep_it() {
 fn a_stuck_browser_and_a_request_that_never_ends_are_let_go() {
     let console = Console::live();
     let (stuck, mut silent, mut page) = (console.page(), console.connect(), console.page());
-    silent.set_read_timeout(Some(Duration::from_secs(40))).unwrap();
+    silent
+        .set_read_timeout(Some(Duration::from_secs(40)))
+        .unwrap();
     let begun = Instant::now();
     silent.read_to_end(&mut Vec::new()).unwrap();
     let let_go = begun.elapsed();
-    assert!(let_go > Duration::from_secs(15) && let_go < Duration::from_secs(30), "after {let_go:?}");
+    assert!(
+        let_go > Duration::from_secs(15) && let_go < Duration::from_secs(30),
+        "after {let_go:?}"
+    );
     page.say(&control(1, r#"{"do":"status"}"#));
     page.until("answer");
     // 30 s, and up to 5 s until it is looked after.

@@ -18,8 +18,7 @@ use super::{AnswerOf, BusError, Declared, Pending, QUERY_TIMEOUT, Role};
 use crate::endpoint::{is_local, is_tls};
 
 /// What else may be the matter with an encrypted endpoint.
-const TLS_HINT: &str =
-    " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
+const TLS_HINT: &str = " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
 
 /// A session of the middleware. Clones share it; the last one closes it.
 #[derive(Debug, Clone)]
@@ -28,13 +27,20 @@ pub(super) struct Session {
 }
 
 fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T, BusError> {
-    result.map_err(|error| BusError::Use { doing, key: key.to_owned(), reason: error.to_string() })
+    result.map_err(|error| BusError::Use {
+        doing,
+        key: key.to_owned(),
+        reason: error.to_string(),
+    })
 }
 
 impl Session {
     pub(super) fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
         let (doing, endpoint) = match role {
-            Role::Router { listen, trusts_network } => {
+            Role::Router {
+                listen,
+                trusts_network,
+            } => {
                 check_exposure(listen, overrides, *trusts_network)?;
                 ("listen at", listen.clone())
             }
@@ -44,20 +50,33 @@ impl Session {
                 }
                 ("reach the simulator at", connect.clone())
             }
-            Role::Relay { listen, trusts_network, .. } => {
-                let failed =
-                    |reason| BusError::Open { doing: "listen at", endpoint: listen.join(", "), reason };
+            Role::Relay {
+                listen,
+                trusts_network,
+                ..
+            } => {
+                let failed = |reason| BusError::Open {
+                    doing: "listen at",
+                    endpoint: listen.join(", "),
+                    reason,
+                };
                 for endpoint in relay_listens(listen, overrides).map_err(failed)? {
                     check_exposure(&endpoint, overrides, *trusts_network)?;
                 }
                 ("listen at", listen.join(", "))
             }
         };
-        let failed = |reason: String| BusError::Open { doing, endpoint: endpoint.clone(), reason };
+        let failed = |reason: String| BusError::Open {
+            doing,
+            endpoint: endpoint.clone(),
+            reason,
+        };
         let config = configuration(role, overrides).map_err(&failed)?;
         // The middleware tries again without a word when certificates do not fit.
         let hint = if is_tls(&endpoint) { TLS_HINT } else { "" };
-        let session = zenoh::open(config).wait().map_err(|error| failed(format!("{error}{hint}")))?;
+        let session = zenoh::open(config)
+            .wait()
+            .map_err(|error| failed(format!("{error}{hint}")))?;
         Ok(Self { session })
     }
 
@@ -74,8 +93,16 @@ impl Session {
         self.declare_publisher(key, CongestionControl::Drop)
     }
 
-    fn declare_publisher(&self, key: &str, congestion: CongestionControl) -> Result<Publisher, BusError> {
-        let declared = self.session.declare_publisher(key.to_owned()).congestion_control(congestion).wait();
+    fn declare_publisher(
+        &self,
+        key: &str,
+        congestion: CongestionControl,
+    ) -> Result<Publisher, BusError> {
+        let declared = self
+            .session
+            .declare_publisher(key.to_owned())
+            .congestion_control(congestion)
+            .wait();
         let inner = used("publish on", key, declared)?;
         let watched = Arc::new(AtomicBool::new(false));
         let seen = watched.clone();
@@ -85,13 +112,18 @@ impl Session {
             .background()
             .wait();
         used("watch subscribers of", key, listener)?;
-        let matching = used("watch subscribers of", key, inner.matching_status().wait())?.matching();
+        let matching =
+            used("watch subscribers of", key, inner.matching_status().wait())?.matching();
         watched.fetch_or(matching, Ordering::Relaxed);
         Ok(Publisher { inner, watched })
     }
 
     pub(super) fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
-        let put = self.session.put(key, message).congestion_control(CongestionControl::Block).wait();
+        let put = self
+            .session
+            .put(key, message)
+            .congestion_control(CongestionControl::Block)
+            .wait();
         used("put on", key, put)
     }
 
@@ -103,9 +135,13 @@ impl Session {
         let declared = self
             .session
             .declare_subscriber(keys)
-            .callback(move |sample: Sample| handle(sample.key_expr().as_str(), &sample.payload().to_bytes()))
+            .callback(move |sample: Sample| {
+                handle(sample.key_expr().as_str(), &sample.payload().to_bytes())
+            })
             .wait();
-        Ok(Declared { _inner: Box::new(used("subscribe to", keys, declared)?) })
+        Ok(Declared {
+            _inner: Box::new(used("subscribe to", keys, declared)?),
+        })
     }
 
     pub(super) fn serve(
@@ -117,10 +153,14 @@ impl Session {
             .session
             .declare_queryable(keys)
             .callback(move |query: Query| {
-                handle(super::Question { inner: super::Query::Middleware(Question { query }) });
+                handle(super::Question {
+                    inner: super::Query::Middleware(Question { query }),
+                });
             })
             .wait();
-        Ok(Declared { _inner: Box::new(used("serve", keys, declared)?) })
+        Ok(Declared {
+            _inner: Box::new(used("serve", keys, declared)?),
+        })
     }
 
     pub(super) fn ask_within(
@@ -133,7 +173,9 @@ impl Session {
         let replies: FifoChannelHandler<Reply> = used(
             "ask",
             key,
-            self.get(key, parameters, body, timeout)?.with(zenoh::handlers::FifoChannel::new(8)).wait(),
+            self.get(key, parameters, body, timeout)?
+                .with(zenoh::handlers::FifoChannel::new(8))
+                .wait(),
         )?;
         while let Ok(reply) = replies.recv() {
             if let Some(answer) = AnswerOf::read(reply) {
@@ -167,12 +209,17 @@ impl Session {
         parameters: &str,
         body: Option<Vec<u8>>,
         timeout: Duration,
-    ) -> Result<zenoh::session::SessionGetBuilder<'_, 'static, zenoh::handlers::DefaultHandler>, BusError>
-    {
+    ) -> Result<
+        zenoh::session::SessionGetBuilder<'_, 'static, zenoh::handlers::DefaultHandler>,
+        BusError,
+    > {
         let key_expr = used("ask", key, KeyExpr::new(key.to_owned()))?;
         Ok(self
             .session
-            .get(zenoh::query::Selector::owned(key_expr, parameters.to_owned()))
+            .get(zenoh::query::Selector::owned(
+                key_expr,
+                parameters.to_owned(),
+            ))
             .payload(body.map_or_else(ZBytes::new, ZBytes::from))
             .target(QueryTarget::All)
             .consolidation(ConsolidationMode::None)
@@ -181,8 +228,14 @@ impl Session {
     }
 
     pub(super) fn token(&self, key: &str) -> Result<Declared, BusError> {
-        let declared = self.session.liveliness().declare_token(key.to_owned()).wait();
-        Ok(Declared { _inner: Box::new(used("declare", key, declared)?) })
+        let declared = self
+            .session
+            .liveliness()
+            .declare_token(key.to_owned())
+            .wait();
+        Ok(Declared {
+            _inner: Box::new(used("declare", key, declared)?),
+        })
     }
 
     pub(super) fn watch(
@@ -199,7 +252,9 @@ impl Session {
                 handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put);
             })
             .wait();
-        Ok(Declared { _inner: Box::new(used("watch", keys, declared)?) })
+        Ok(Declared {
+            _inner: Box::new(used("watch", keys, declared)?),
+        })
     }
 
     pub(super) fn close(&self) {
@@ -217,7 +272,11 @@ pub(super) struct Publisher {
 
 impl Publisher {
     pub(super) fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
-        used("put on", self.inner.key_expr().as_str(), self.inner.put(message).wait())
+        used(
+            "put on",
+            self.inner.key_expr().as_str(),
+            self.inner.put(message).wait(),
+        )
     }
 
     pub(super) fn is_watched(&self) -> bool {
@@ -235,7 +294,10 @@ impl AnswerOf {
             }),
             Err(error) => {
                 let text = String::from_utf8_lossy(&error.payload().to_bytes()).into_owned();
-                (text != "Timeout").then_some(Self { key: String::new(), result: Err(text) })
+                (text != "Timeout").then_some(Self {
+                    key: String::new(),
+                    result: Err(text),
+                })
             }
         }
     }
@@ -256,7 +318,10 @@ impl Question {
     }
 
     pub(super) fn body(&self) -> Vec<u8> {
-        self.query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default()
+        self.query
+            .payload()
+            .map(|payload| payload.to_bytes().into_owned())
+            .unwrap_or_default()
     }
 
     pub(super) fn answer(&self, key: &str, message: Vec<u8>) {
@@ -282,7 +347,9 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
         None => Config::default(),
     };
     let mut set = |key: &str, value: &str| {
-        config.insert_json5(key, value).map_err(|error| format!("setting {key} = {value}: {error}"))
+        config
+            .insert_json5(key, value)
+            .map_err(|error| format!("setting {key} = {value}: {error}"))
     };
     let mode = match role {
         Role::Router { listen, .. } => {
@@ -294,9 +361,14 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
             set("connect/timeout_ms", &patience.as_millis().to_string())?;
             CLIENT_MODE
         }
-        Role::Relay { listen, connect, .. } => {
+        Role::Relay {
+            listen, connect, ..
+        } => {
             let listen: Vec<String> = listen.iter().map(|endpoint| listener(endpoint)).collect();
-            for (key, endpoints) in [("listen/endpoints", &listen), ("connect/endpoints", connect)] {
+            for (key, endpoints) in [
+                ("listen/endpoints", &listen),
+                ("connect/endpoints", connect),
+            ] {
                 if !endpoints.is_empty() {
                     set(key, &format!("{endpoints:?}"))?;
                 }
@@ -318,13 +390,21 @@ fn from_file(file: &Path) -> Result<Config, String> {
 /// An endpoint to listen at, with what an encrypted one needs in addition.
 fn listener(endpoint: &str) -> String {
     let separator = if endpoint.contains('#') { ';' } else { '#' };
-    if is_tls(endpoint) { format!("{endpoint}{separator}{HANDSHAKE_TIMEOUT}") } else { endpoint.to_owned() }
+    if is_tls(endpoint) {
+        format!("{endpoint}{separator}{HANDSHAKE_TIMEOUT}")
+    } else {
+        endpoint.to_owned()
+    }
 }
 
 /// Where a relay listens: what the command line says, or else its configuration file.
 fn relay_listens(listen: &[String], overrides: Option<&PathBuf>) -> Result<Vec<String>, String> {
-    let Some(file) = overrides.filter(|_| listen.is_empty()) else { return Ok(listen.to_vec()) };
-    let said = from_file(file)?.get_json("listen/endpoints").map_err(|error| error.to_string())?;
+    let Some(file) = overrides.filter(|_| listen.is_empty()) else {
+        return Ok(listen.to_vec());
+    };
+    let said = from_file(file)?
+        .get_json("listen/endpoints")
+        .map_err(|error| error.to_string())?;
     let said = serde_json::from_str(&said).map_err(|error| error.to_string())?;
     let mut endpoints = Vec::new();
     texts(&said, &mut endpoints);
@@ -395,18 +475,31 @@ mod tests {
     use crate::{RobotName, keys::Keys};
 
     fn credentials() -> Credentials<'static> {
-        Credentials { ca: "a CA", certificate: "a certificate", key: "a key", validity: "some time" }
+        Credentials {
+            ca: "a CA",
+            certificate: "a certificate",
+            key: "a key",
+            validity: "some time",
+        }
     }
 
     fn robots() -> Vec<RobotName> {
-        ["Butler", "r-2_d.2"].map(|name| RobotName::new(name).unwrap()).to_vec()
+        ["Butler", "r-2_d.2"]
+            .map(|name| RobotName::new(name).unwrap())
+            .to_vec()
     }
 
     fn assert_settings(config: &Config, settings: &[Setting]) {
-        for Setting { key, value, .. } in settings.iter().filter(|setting| !setting.key.ends_with("retry")) {
+        for Setting { key, value, .. } in settings
+            .iter()
+            .filter(|setting| !setting.key.ends_with("retry"))
+        {
             assert_eq!(config.get_json(key).unwrap(), *value, "{key}");
         }
-        assert_eq!(config.get_json("transport/link/tls/enable_mtls").unwrap(), "true");
+        assert_eq!(
+            config.get_json("transport/link/tls/enable_mtls").unwrap(),
+            "true"
+        );
     }
 
     #[test]
@@ -415,15 +508,28 @@ mod tests {
         let config = Config::from_json5(&client).unwrap();
         assert_settings(&config, &SETTINGS);
         assert_settings(&config, &[CLIENT_MODE]);
-        assert!(config.get_json("connect/retry").unwrap().contains("\"period_init_ms\":100"));
+        assert!(
+            config
+                .get_json("connect/retry")
+                .unwrap()
+                .contains("\"period_init_ms\":100")
+        );
         let simulator = simulator_config(&Keys::of_any_run(), &robots(), &credentials());
         let config = Config::from_json5(&simulator).unwrap();
         assert_settings(&config, &SETTINGS);
         assert_settings(&config, &[ROUTER_MODE]);
-        assert_eq!(config.get_json("access_control/default_permission").unwrap(), "\"deny\"");
+        assert_eq!(
+            config
+                .get_json("access_control/default_permission")
+                .unwrap(),
+            "\"deny\""
+        );
         let subjects = config.get_json("access_control/subjects").unwrap();
         for name in ["Butler", "r-2_d.2", "operator", "console"] {
-            assert!(subjects.contains(&format!("\"cert_common_names\":[\"{name}\"]")), "{subjects}");
+            assert!(
+                subjects.contains(&format!("\"cert_common_names\":[\"{name}\"]")),
+                "{subjects}"
+            );
         }
     }
 
@@ -436,25 +542,37 @@ mod tests {
             std::fs::write(&file, text).unwrap();
             file
         };
-        let guarded =
-            write("guarded.json5", &simulator_config(&Keys::of_any_run(), &robots(), &credentials()));
-        let encrypted = write("encrypted.json5", "{transport: {link: {tls: {enable_mtls: true}}}}");
-        let refused =
-            |listen: &str, file: Option<&PathBuf>, trusts: bool| match check_exposure(listen, file, trusts) {
-                Ok(()) => "",
-                Err(BusError::Exposed(_)) => "exposed",
-                Err(BusError::Unencrypted(_)) => "unencrypted",
-                Err(error) => panic!("{error}"),
-            };
+        let guarded = write(
+            "guarded.json5",
+            &simulator_config(&Keys::of_any_run(), &robots(), &credentials()),
+        );
+        let encrypted = write(
+            "encrypted.json5",
+            "{transport: {link: {tls: {enable_mtls: true}}}}",
+        );
+        let refused = |listen: &str, file: Option<&PathBuf>, trusts: bool| match check_exposure(
+            listen, file, trusts,
+        ) {
+            Ok(()) => "",
+            Err(BusError::Exposed(_)) => "exposed",
+            Err(BusError::Unencrypted(_)) => "unencrypted",
+            Err(error) => panic!("{error}"),
+        };
         let all = "tcp/0.0.0.0:7447";
         assert_eq!(refused(DEFAULT_ENDPOINT, None, false), "");
         assert_eq!(refused(all, None, false), "exposed");
         assert_eq!(refused(all, None, true), "");
         assert_eq!(refused("tls/0.0.0.0:7447", None, false), "exposed");
-        assert_eq!(refused("tls/0.0.0.0:7447", Some(&encrypted), false), "exposed");
+        assert_eq!(
+            refused("tls/0.0.0.0:7447", Some(&encrypted), false),
+            "exposed"
+        );
         assert_eq!(refused("tls/0.0.0.0:7447", Some(&guarded), false), "");
         assert_eq!(refused(all, Some(&guarded), true), "unencrypted");
-        assert_eq!(refused(DEFAULT_ENDPOINT, Some(&guarded), false), "unencrypted");
+        assert_eq!(
+            refused(DEFAULT_ENDPOINT, Some(&guarded), false),
+            "unencrypted"
+        );
         std::fs::remove_dir_all(&folder).unwrap();
     }
 
@@ -464,9 +582,28 @@ mod tests {
         let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/zenoh"));
         let here = || "tcp/127.0.0.1:7447".to_owned();
         for (file, role) in [
-            ("simulator.json5", Role::Router { listen: here(), trusts_network: false }),
-            ("robot.json5", Role::Client { connect: here(), patience: QUERY_TIMEOUT }),
-            ("router.json5", Role::Relay { listen: Vec::new(), connect: Vec::new(), trusts_network: false }),
+            (
+                "simulator.json5",
+                Role::Router {
+                    listen: here(),
+                    trusts_network: false,
+                },
+            ),
+            (
+                "robot.json5",
+                Role::Client {
+                    connect: here(),
+                    patience: QUERY_TIMEOUT,
+                },
+            ),
+            (
+                "router.json5",
+                Role::Relay {
+                    listen: Vec::new(),
+                    connect: Vec::new(),
+                    trusts_network: false,
+                },
+            ),
         ] {
             let built_in = configuration(&role, None).unwrap();
             let from_file = configuration(&role, Some(&folder.join(file))).unwrap();
@@ -476,7 +613,10 @@ mod tests {
                     built_in.get_json(key).ok(),
                     "{key} in {file} and as it is built in"
                 );
-                assert!(built_in.get_json(key).is_ok_and(|value| value != "null"), "{key} is set");
+                assert!(
+                    built_in.get_json(key).is_ok_and(|value| value != "null"),
+                    "{key} is set"
+                );
             }
         }
     }

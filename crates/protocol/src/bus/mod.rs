@@ -49,7 +49,9 @@ pub enum BusError {
     )]
     NoCertificate(String),
     /// A configuration with access control does not fit a listener without certificates.
-    #[error("{0} is not encrypted, so nobody could show a certificate there: a secured run listens at tls/…")]
+    #[error(
+        "{0} is not encrypted, so nobody could show a certificate there: a secured run listens at tls/…"
+    )]
     Unencrypted(String),
     /// A session that was open cannot do what was asked.
     #[error("bus: cannot {doing} {key}: {reason}")]
@@ -133,7 +135,9 @@ impl Bus {
     /// # Errors
     /// [`BusError::Open`] names the address that was tried and what went wrong.
     pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
-        Ok(Self { session: Session::Middleware(middleware::Session::open(role, overrides)?) })
+        Ok(Self {
+            session: Session::Middleware(middleware::Session::open(role, overrides)?),
+        })
     }
 
     /// An identity that no other session has.
@@ -163,7 +167,9 @@ impl Bus {
     pub fn observer_publisher(&self, key: &str) -> Result<Publisher, BusError> {
         Ok(Publisher {
             inner: match &self.session {
-                Session::Middleware(session) => Putter::Middleware(session.observer_publisher(key)?),
+                Session::Middleware(session) => {
+                    Putter::Middleware(session.observer_publisher(key)?)
+                }
                 Session::Memory(session) => Putter::Memory(session.publisher(key)?),
             },
         })

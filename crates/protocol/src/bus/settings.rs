@@ -16,32 +16,66 @@ const fn setting(key: &'static str, value: &'static str, why: &'static str) -> S
 }
 
 /// How those who connect take part; never a file's affair.
-pub(crate) const CLIENT_MODE: Setting =
-    setting("mode", "\"client\"", "Everything goes by the simulator, which checks it.");
+pub(crate) const CLIENT_MODE: Setting = setting(
+    "mode",
+    "\"client\"",
+    "Everything goes by the simulator, which checks it.",
+);
 
 /// How those to whom others connect take part; never a file's affair.
-pub(crate) const ROUTER_MODE: Setting =
-    setting("mode", "\"router\"", "Everybody connects here, and nobody to anybody else.");
+pub(crate) const ROUTER_MODE: Setting = setting(
+    "mode",
+    "\"router\"",
+    "Everybody connects here, and nobody to anybody else.",
+);
 
 /// What every session is set to, unless a configuration file says otherwise.
 pub(crate) const SETTINGS: [Setting; 12] = [
-    setting("scouting/delay", "0", "A router waits half a second for scouting that is switched off below."),
-    setting("scouting/multicast/enabled", "false", "Nobody is looked for: the endpoint says where to go."),
-    setting("scouting/gossip/enabled", "false", "One path between any two keeps messages in order."),
+    setting(
+        "scouting/delay",
+        "0",
+        "A router waits half a second for scouting that is switched off below.",
+    ),
+    setting(
+        "scouting/multicast/enabled",
+        "false",
+        "Nobody is looked for: the endpoint says where to go.",
+    ),
+    setting(
+        "scouting/gossip/enabled",
+        "false",
+        "One path between any two keeps messages in order.",
+    ),
     setting(
         "transport/link/tx/lease",
         "2000",
         "A process that hangs or a link that is cut is noticed within this time, milliseconds.",
     ),
-    setting("transport/link/tx/keep_alive", "4", "Signs of life within that time."),
+    setting(
+        "transport/link/tx/keep_alive",
+        "4",
+        "Signs of life within that time.",
+    ),
     setting(
         "transport/link/tx/queue/congestion_control/block/wait_before_close",
         "500000",
         "A receiver that does not read holds the sender for at most this long, microseconds.",
     ),
-    setting("transport/link/rx/max_message_size", "4194304", "Bytes; nothing here is nearly as long."),
-    setting("transport/unicast/accept_pending", "1000", "Hundreds of robots may connect at the same moment."),
-    setting("transport/unicast/max_sessions", "2000", "No more sessions than this."),
+    setting(
+        "transport/link/rx/max_message_size",
+        "4194304",
+        "Bytes; nothing here is nearly as long.",
+    ),
+    setting(
+        "transport/unicast/accept_pending",
+        "1000",
+        "Hundreds of robots may connect at the same moment.",
+    ),
+    setting(
+        "transport/unicast/max_sessions",
+        "2000",
+        "No more sessions than this.",
+    ),
     setting(
         "transport/unicast/accept_timeout",
         "2000",

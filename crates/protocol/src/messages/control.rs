@@ -77,10 +77,17 @@ pub enum Control {
 impl Message for Control {
     fn check(&self) -> Result<(), (String, String)> {
         match self {
-            Self::Speed { factor: Some(factor) } => finite(*factor, "factor"),
-            Self::Late { deadline_s: Some(deadline_s), .. } => finite(*deadline_s, "deadline_s"),
+            Self::Speed {
+                factor: Some(factor),
+            } => finite(*factor, "factor"),
+            Self::Late {
+                deadline_s: Some(deadline_s),
+                ..
+            } => finite(*deadline_s, "deadline_s"),
             Self::Command { command, .. } => short(command, "command"),
-            Self::Init { setup: Some(setup), .. } => setup.check(),
+            Self::Init {
+                setup: Some(setup), ..
+            } => setup.check(),
             _ => Ok(()),
         }
     }
@@ -172,16 +179,24 @@ impl Setup {
     /// Numbers that are numbers and lists that are bounded; whether they make sense is the simulator's to say.
     fn check(&self) -> Result<(), (String, String)> {
         finite(self.duration_s, "setup.duration_s")?;
-        self.field_m.iter().try_for_each(|size| finite(*size, "setup.field_m"))?;
+        self.field_m
+            .iter()
+            .try_for_each(|size| finite(*size, "setup.field_m"))?;
         for (range, name) in [
             (self.guest_speed_mps, "setup.guest_speed_mps"),
             (self.guest_duration_s, "setup.guest_duration_s"),
         ] {
-            [range.min, range.mode, range.max].iter().try_for_each(|value| finite(*value, name))?;
+            [range.min, range.mode, range.max]
+                .iter()
+                .try_for_each(|value| finite(*value, name))?;
         }
-        self.obstacles.iter().try_for_each(|at| at.check("setup.obstacles"))?;
+        self.obstacles
+            .iter()
+            .try_for_each(|at| at.check("setup.obstacles"))?;
         short(&self.log_file.name, "setup.log_file.name")?;
-        self.robots.values().try_for_each(|at| at.check("setup.robots"))
+        self.robots
+            .values()
+            .try_for_each(|at| at.check("setup.robots"))
     }
 }
 

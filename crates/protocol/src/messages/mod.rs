@@ -8,17 +8,18 @@ mod step;
 use std::collections::BTreeMap;
 
 pub use control::{
-    Awaited, Control, ControlAnswer, FaultKind, FaultOrder, FieldError, LogFile, OnLate, Phase, ProcessOrder,
-    Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
+    Awaited, Control, ControlAnswer, FaultKind, FaultOrder, FieldError, LogFile, OnLate, Phase,
+    ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
 pub use observe::{
-    Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, Presence, RecordedRobot,
-    RecordedTick, RecordingHeader, RobotFrame, Tone, Widget, WorldFrame,
+    Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, Presence,
+    RecordedRobot, RecordedTick, RecordingHeader, RobotFrame, Tone, Widget, WorldFrame,
 };
 pub use state::{Answer, PublicState, StateVariables, Variable};
 pub use step::{
-    Clock, Command, CommandId, Correction, End, JoinAnswer, JoinRequest, News, Percept, Performative,
-    Refusal, Report, SensedBody, SensedKind, SensedRobot, SentCommand, Waiting, Welcome,
+    Clock, Command, CommandId, Correction, End, JoinAnswer, JoinRequest, News, Percept,
+    Performative, Refusal, Report, SensedBody, SensedKind, SensedRobot, SentCommand, Waiting,
+    Welcome,
 };
 
 use schemars::JsonSchema;
@@ -71,26 +72,43 @@ pub const MAX_TEXT_BYTES: usize = 4096;
 pub const MAX_ENTRIES: usize = 1024;
 
 fn finite(value: f64, field: &str) -> Result<(), (String, String)> {
-    if value.is_finite() { Ok(()) } else { Err((field.to_owned(), "not a finite number".to_owned())) }
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err((field.to_owned(), "not a finite number".to_owned()))
+    }
 }
 
 /// Ticks are integers that every language can hold and that can be counted on from.
 fn counted(tick: Tick, field: &str) -> Result<(), (String, String)> {
-    if tick < 1 << 53 { Ok(()) } else { Err((field.to_owned(), "not below 2^53".to_owned())) }
+    if tick < 1 << 53 {
+        Ok(())
+    } else {
+        Err((field.to_owned(), "not below 2^53".to_owned()))
+    }
 }
 
 fn short(text: &str, field: &str) -> Result<(), (String, String)> {
     if text.len() <= MAX_TEXT_BYTES {
         return Ok(());
     }
-    Err((field.to_owned(), format!("{} bytes of text, more than the {MAX_TEXT_BYTES} allowed", text.len())))
+    Err((
+        field.to_owned(),
+        format!(
+            "{} bytes of text, more than the {MAX_TEXT_BYTES} allowed",
+            text.len()
+        ),
+    ))
 }
 
 fn few(len: usize, field: &str) -> Result<(), (String, String)> {
     if len <= MAX_ENTRIES {
         return Ok(());
     }
-    Err((field.to_owned(), format!("{len} entries, more than the {MAX_ENTRIES} allowed")))
+    Err((
+        field.to_owned(),
+        format!("{len} entries, more than the {MAX_ENTRIES} allowed"),
+    ))
 }
 
 fn is_false(flag: &bool) -> bool {

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Awaited, Epoch, Generation, Phase, Point, Seq, StateVariables, Tick, finite, is_false, short};
+use super::{
+    Awaited, Epoch, Generation, Phase, Point, Seq, StateVariables, Tick, finite, is_false, short,
+};
 use crate::codec::Message;
 use crate::name::{RobotName, RunName};
 
@@ -221,7 +223,9 @@ impl Message for LogRecord {
 }
 
 /// Kinds of log lines, to filter by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum LogKind {
     /// Init, start, pause, stop, end.
@@ -255,10 +259,16 @@ pub const MAX_WIDGETS: usize = 64;
 impl Message for Panel {
     fn check(&self) -> Result<(), (String, String)> {
         if self.widgets.len() > MAX_WIDGETS {
-            let reason = format!("{} widgets, more than the {MAX_WIDGETS} allowed", self.widgets.len());
+            let reason = format!(
+                "{} widgets, more than the {MAX_WIDGETS} allowed",
+                self.widgets.len()
+            );
             return Err(("widgets".to_owned(), reason));
         }
-        self.widgets.iter().enumerate().try_for_each(|(i, widget)| widget.check(&format!("widgets[{i}]")))
+        self.widgets
+            .iter()
+            .enumerate()
+            .try_for_each(|(i, widget)| widget.check(&format!("widgets[{i}]")))
     }
 }
 
@@ -335,7 +345,12 @@ impl Widget {
                 short(label, &format!("{field}.label"))?;
                 short(text, &format!("{field}.text"))
             }
-            Self::Bar { label, value, min, max } => {
+            Self::Bar {
+                label,
+                value,
+                min,
+                max,
+            } => {
                 short(label, &format!("{field}.label"))?;
                 finite(*value, &format!("{field}.value"))?;
                 finite(*min, &format!("{field}.min"))?;
@@ -345,11 +360,15 @@ impl Widget {
             Self::Sparkline { label, values } => {
                 super::few(values.len(), &format!("{field}.values"))?;
                 short(label, &format!("{field}.label"))?;
-                values.iter().try_for_each(|value| finite(*value, &format!("{field}.values")))
+                values
+                    .iter()
+                    .try_for_each(|value| finite(*value, &format!("{field}.values")))
             }
             Self::Table { rows } => {
                 super::few(rows.iter().map(Vec::len).sum(), &format!("{field}.rows"))?;
-                rows.iter().flatten().try_for_each(|cell| short(cell, &format!("{field}.rows")))
+                rows.iter()
+                    .flatten()
+                    .try_for_each(|cell| short(cell, &format!("{field}.rows")))
             }
             // The size of a picture is bounded by that of a message.
             Self::Svg { label, .. } => short(label, &format!("{field}.label")),
@@ -378,7 +397,10 @@ pub enum Tone {
 /// The facial expressions of the seed ("Emotion Components").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[allow(missing_docs, reason = "the words are the seed's and say what they are")]
+#[allow(
+    missing_docs,
+    reason = "the words are the seed's and say what they are"
+)]
 pub enum Face {
     Happy,
     Sad,

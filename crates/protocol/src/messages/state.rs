@@ -169,6 +169,11 @@ impl PublicState {
             "behavior_state" => self.behavior_state.clone().into(),
             _ => return None,
         };
-        Some(Answer { performative: Performative::Tell, epoch: self.epoch, tick: self.tick, value })
+        Some(Answer {
+            performative: Performative::Tell,
+            epoch: self.epoch,
+            tick: self.tick,
+            value,
+        })
     }
 }

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::state::check_variables;
 use super::{
-    Epoch, Generation, Parameters, Point, PublicState, Seq, StateVariables, Tick, counted, few, finite,
-    is_false, short,
+    Epoch, Generation, Parameters, Point, PublicState, Seq, StateVariables, Tick, counted, few,
+    finite, is_false, short,
 };
 use crate::codec::Message;
 use crate::name::{RobotName, RunName};
@@ -264,7 +264,9 @@ impl Message for Report {
         few(self.sent.len(), "sent")?;
         few(self.missing.len(), "missing")?;
         few(self.log.len(), "log")?;
-        self.sent.iter().try_for_each(|sent| short(&sent.command, "sent.command"))?;
+        self.sent
+            .iter()
+            .try_for_each(|sent| short(&sent.command, "sent.command"))?;
         self.log.iter().try_for_each(|line| short(line, "log"))
     }
 }
@@ -379,7 +381,9 @@ pub struct SensedBody {
 }
 
 /// What a robot can tell about a body it senses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum SensedKind {
     /// A fixed obstacle.

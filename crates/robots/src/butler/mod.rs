@@ -8,8 +8,8 @@ mod tables;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::progress::{need_ratio, time_to_arrive_by_depot_s, time_to_arrive_s, time_to_empty_s};
 use affect::{
-    Circumstances, DynamicGenerator, Dynamics, EmotionGenerator, EmotionLabel, EmotionState, Feeling,
-    Intensity, StandardEmotion,
+    Circumstances, DynamicGenerator, Dynamics, EmotionGenerator, EmotionLabel, EmotionState,
+    Feeling, Intensity, StandardEmotion,
 };
 use robot::{BadParameters, Cars, Panel, Point, Robot, RobotName, StateVariables, Widget};
 use serde::{Deserialize, Serialize};
@@ -52,7 +52,9 @@ impl Default for Butler {
     fn default() -> Self {
         match Self::new(Parameters::default()) {
             Ok(butler) => butler,
-            Err(reason) => unreachable!("the default parameters, which a test checks, are refused: {reason}"),
+            Err(reason) => {
+                unreachable!("the default parameters, which a test checks, are refused: {reason}")
+            }
         }
     }
 }
@@ -68,7 +70,12 @@ impl Butler {
         let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution);
         let dynamics = dynamics.map_err(|error| error.to_string())?;
         let esg = DynamicGenerator::new(dynamics, appraise);
-        Ok(Self { parameters, esg, bsg: BehaviorGenerator::new(TABLE, Behavior::Serve), state })
+        Ok(Self {
+            parameters,
+            esg,
+            bsg: BehaviorGenerator::new(TABLE, Behavior::Serve),
+            state,
+        })
     }
 
     /// What he feels; without emotions a steady state without intensity.
@@ -114,7 +121,15 @@ impl Butler {
 
     /// Guests take treats: exponential times from one to the next.
     fn serve(&mut self, tick_s: f64) {
-        let State { treats, served, missed, taps, until_tap_s, rate, .. } = &mut self.state;
+        let State {
+            treats,
+            served,
+            missed,
+            taps,
+            until_tap_s,
+            rate,
+            ..
+        } = &mut self.state;
         if !self.parameters.consume_in.contains(self.bsg.current()) {
             return;
         }
@@ -135,7 +150,13 @@ impl Butler {
 
     /// Asks and looks for the refiller, and learns how fast she comes.
     fn watch_refiller(&mut self, cars: &mut Cars<'_>) {
-        let State { refiller, refiller_left, approach, at, .. } = &mut self.state;
+        let State {
+            refiller,
+            refiller_left,
+            approach,
+            at,
+            ..
+        } = &mut self.state;
         let news = refiller.look(cars, *at);
         let is_called = refiller.behavior(self.parameters.query_stale_s) == Some("REFILL");
         // While she still prepares at the table, her speed says nothing about how fast she will come.
@@ -143,7 +164,9 @@ impl Butler {
         *refiller_left = is_called && (*refiller_left || moves);
         let is_coming = *refiller_left;
         match (news.seen_after_s, refiller.place()) {
-            (Some(after_s), Some(place)) => approach.observe(at.distance_m(place), is_coming, after_s),
+            (Some(after_s), Some(place)) => {
+                approach.observe(at.distance_m(place), is_coming, after_s)
+            }
             _ => approach.observe_silence(cars.tick_s()),
         }
     }
@@ -179,15 +202,24 @@ impl Butler {
             // Nothing was ever known of her: she may be at her table, or else anywhere on the field [I].
             let [width_m, height_m] = cars.welcome().field_m;
             let farthest_m = (width_m * width_m + height_m * height_m).sqrt();
-            let away_m = self.table().map_or(farthest_m, |table| table.distance_m(state.at));
-            time_to_arrive_s(away_m - reach_m, state.approach.speed_mps().max(parameters.approach.floor_mps))
+            let away_m = self
+                .table()
+                .map_or(farthest_m, |table| table.distance_m(state.at));
+            time_to_arrive_s(
+                away_m - reach_m,
+                state
+                    .approach
+                    .speed_mps()
+                    .max(parameters.approach.floor_mps),
+            )
         })
     }
 
     /// Where the refiller's table is: as he was told, or where he first knew her to be.
     fn table(&self) -> Option<Point> {
         let told = self.parameters.table.map(|[x, y]| Point::new(x, y));
-        told.or(self.state.table).or(self.state.refiller.first_place())
+        told.or(self.state.table)
+            .or(self.state.refiller.first_place())
     }
 
     fn context(&self, cars: &Cars<'_>) -> Context {
@@ -196,10 +228,12 @@ impl Butler {
         let stale_s = parameters.query_stale_s;
         let refiller = state.refiller.behavior(stale_s);
         // She may see the two of them meet a tick before he does, and then already exchanges.
-        let is_ready =
-            state.refiller.is_unknown(stale_s) || matches!(refiller, Some("WAIT" | "REFILL" | "EXCHANGE"));
+        let is_ready = state.refiller.is_unknown(stale_s)
+            || matches!(refiller, Some("WAIT" | "REFILL" | "EXCHANGE"));
         let radius_m = parameters.exchange_radius_m;
-        let is_here = state.refiller.is_within(radius_m, state.at, cars.welcome().sensing_range_m);
+        let is_here = state
+            .refiller
+            .is_within(radius_m, state.at, cars.welcome().sensing_range_m);
         let is_due = |since_s: f64| parameters.resend.is_on() && since_s >= parameters.resend_s;
         Context {
             emotion: acts_by_emotion.then(|| self.feeling().emotion),
@@ -222,7 +256,8 @@ impl Butler {
     fn pressure(&self) -> f64 {
         let dynamics = &self.parameters.dynamics;
         let need = self.state.measures.need_ratio;
-        Intensity::saturating(dynamics.gain(self.parameters.caution) * need / dynamics.rho_max).value()
+        Intensity::saturating(dynamics.gain(self.parameters.caution) * need / dynamics.rho_max)
+            .value()
     }
 
     fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {
@@ -233,7 +268,11 @@ impl Butler {
                 self.say_to_refiller(REFILL, cars);
             }
             Act::CallHurry => {
-                (self.state.called, self.state.hurried, self.state.since_call_s) = (true, true, 0.0);
+                (
+                    self.state.called,
+                    self.state.hurried,
+                    self.state.since_call_s,
+                ) = (true, true, 0.0);
                 self.say_to_refiller(HURRY, cars);
             }
             Act::SendHome => {
@@ -251,7 +290,10 @@ impl Butler {
 
     fn say_to_refiller(&mut self, command: &str, cars: &mut Cars<'_>) {
         // A refiller who is not in the roster was already complained about; there is nobody to send to.
-        if cars.set_robot_command(&self.parameters.refiller, command).is_ok() {
+        if cars
+            .set_robot_command(&self.parameters.refiller, command)
+            .is_ok()
+        {
             self.state.messages += 1;
         }
     }
@@ -260,7 +302,11 @@ impl Butler {
     /// if nothing was ever known of her.
     fn quarry(&self) -> Option<Point> {
         let refiller = &self.state.refiller;
-        if refiller.is_missing() { self.table() } else { refiller.place().or(self.table()) }
+        if refiller.is_missing() {
+            self.table()
+        } else {
+            refiller.place().or(self.table())
+        }
     }
 
     /// Whether the refiller is known to have something else to do than to come.
@@ -274,24 +320,43 @@ impl Butler {
         let speed_mps = parameters.v_intercept_mps;
         // Who comes too near to a refiller on her way home stands in her way.
         let is_busy = self.refiller_is_busy();
-        let stop_m = if is_busy { parameters.leave_room_m } else { parameters.stand_off_m };
+        let stop_m = if is_busy {
+            parameters.leave_room_m
+        } else {
+            parameters.stand_off_m
+        };
         let Some(goal) = self.quarry() else {
             let State { legs, turns, .. } = &mut self.state;
             return legs.walk(cars, at, speed_mps, self.parameters.turn_mean_s, turns);
         };
-        let course = Course { goal, stop_m, speed_mps, look_s: parameters.look_s };
+        let course = Course {
+            goal,
+            stop_m,
+            speed_mps,
+            look_s: parameters.look_s,
+        };
         self.state.legs.drive(cars, at, course)
     }
 }
 
 impl Robot for Butler {
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
-        let bad = |reason| BadParameters { robot: cars.name().clone(), reason };
+        let bad = |reason| BadParameters {
+            robot: cars.name().clone(),
+            reason,
+        };
         *self = Self::new(cars.parameters()?).map_err(bad)?;
         self.state.begin(&self.parameters, cars);
         let refiller = &self.parameters.refiller;
-        if !cars.welcome().roster.iter().any(|robot| robot.as_str() == refiller) {
-            cars.log(format!("error: no robot is called {refiller}; nobody will refill the tray"));
+        if !cars
+            .welcome()
+            .roster
+            .iter()
+            .any(|robot| robot.as_str() == refiller)
+        {
+            cars.log(format!(
+                "error: no robot is called {refiller}; nobody will refill the tray"
+            ));
         }
         Ok(())
     }
@@ -314,7 +379,8 @@ impl Robot for Butler {
     }
 
     fn state_variables(&self) -> StateVariables {
-        self.state.published(self.feeling().intensity, self.behavior())
+        self.state
+            .published(self.feeling().intensity, self.behavior())
     }
 
     fn current_location(&self) -> Point {
@@ -323,14 +389,35 @@ impl Robot for Butler {
 
     fn project_location(&mut self, cars: &mut Cars<'_>) -> Point {
         let (behavior, parameters) = (self.behavior(), &self.parameters);
-        let State { legs, turns, at, start, .. } = &mut self.state;
+        let State {
+            legs,
+            turns,
+            at,
+            start,
+            ..
+        } = &mut self.state;
         match behavior {
-            Behavior::Serve => legs.walk(cars, *at, parameters.v_serve_mps, parameters.turn_mean_s, turns),
+            Behavior::Serve => legs.walk(
+                cars,
+                *at,
+                parameters.v_serve_mps,
+                parameters.turn_mean_s,
+                turns,
+            ),
             Behavior::Intercept => self.intercept(cars),
             Behavior::Exchange => legs.stay(*at),
             Behavior::GoBack => {
                 let (speed_mps, look_s) = (parameters.v_goback_mps, parameters.look_s);
-                legs.drive(cars, *at, Course { goal: *start, stop_m: 0.0, speed_mps, look_s })
+                legs.drive(
+                    cars,
+                    *at,
+                    Course {
+                        goal: *start,
+                        stop_m: 0.0,
+                        speed_mps,
+                        look_s,
+                    },
+                )
             }
         }
     }
@@ -340,18 +427,26 @@ impl Robot for Butler {
     }
 
     fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str) {
-        cars.log(format!("takes no commands, not even {:?} from {from}", shortened(command)));
+        cars.log(format!(
+            "takes no commands, not even {:?} from {from}",
+            shortened(command)
+        ));
     }
 
     fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
         if self.parameters.affect.is_on() {
-            self.esg.update(&self.state.measures, self.bsg.current(), cars.tick_s());
+            self.esg
+                .update(&self.state.measures, self.bsg.current(), cars.tick_s());
         }
         self.state.remember(self.esg.feeling());
     }
 
     fn emotion_state(&self) -> &str {
-        if self.parameters.affect.is_on() { self.feeling().emotion.name() } else { NEUTRAL }
+        if self.parameters.affect.is_on() {
+            self.feeling().emotion.name()
+        } else {
+            NEUTRAL
+        }
     }
 
     fn update_behavior_state(&mut self, cars: &mut Cars<'_>) {
@@ -375,21 +470,49 @@ impl Robot for Butler {
             valence: None,
         };
         let feeling = self.parameters.affect.is_on().then(|| self.feeling());
-        let mut widgets = panel::feeling(feeling, &self.parameters.dynamics.label_cuts, &circumstances);
+        let mut widgets = panel::feeling(
+            feeling,
+            &self.parameters.dynamics.label_cuts,
+            &circumstances,
+        );
         widgets.push(panel::behavior(self.behavior().name()));
-        let (value, max) = (f64::from(state.treats), f64::from(self.parameters.treat_capacity));
-        widgets.push(Widget::Bar { label: goods.to_owned(), value, min: 0.0, max });
+        let (value, max) = (
+            f64::from(state.treats),
+            f64::from(self.parameters.treat_capacity),
+        );
+        widgets.push(Widget::Bar {
+            label: goods.to_owned(),
+            value,
+            min: 0.0,
+            max,
+        });
         widgets.push(Widget::Sparkline {
             label: "intensity".to_owned(),
             values: state.intensities.iter().copied().collect(),
         });
         widgets.push(panel::table(&[
-            ("time to empty", panel::seconds(state.measures.time_to_empty_s)),
-            ("time to refill", panel::seconds(state.measures.time_to_refill_s)),
+            (
+                "time to empty",
+                panel::seconds(state.measures.time_to_empty_s),
+            ),
+            (
+                "time to refill",
+                panel::seconds(state.measures.time_to_refill_s),
+            ),
             ("need ratio", format!("{:.2}", state.measures.need_ratio)),
             ("refiller", self.parameters.refiller.clone()),
-            ("called, hurried", format!("{}, {}", panel::yes(state.called), panel::yes(state.hurried))),
-            ("served, missed", format!("{}, {}", state.served, state.missed)),
+            (
+                "called, hurried",
+                format!(
+                    "{}, {}",
+                    panel::yes(state.called),
+                    panel::yes(state.hurried)
+                ),
+            ),
+            (
+                "served, missed",
+                format!("{}, {}", state.served, state.missed),
+            ),
             ("exchanges", state.exchanges.to_string()),
         ]));
         Panel { widgets }
@@ -399,7 +522,11 @@ impl Robot for Butler {
         self.state.take_over(last, self.parameters.treat_capacity);
         // An exchange cannot be resumed in the middle; its need is still there, and she may still be near.
         let was_going_back = last.get("behavior").and_then(|name| name.as_str()) == Some("GO_BACK");
-        let behavior = if was_going_back { Behavior::GoBack } else { Behavior::Serve };
+        let behavior = if was_going_back {
+            Behavior::GoBack
+        } else {
+            Behavior::Serve
+        };
         self.bsg = BehaviorGenerator::new(TABLE, behavior);
         cars.log("is back, and takes over where the last one was lost");
     }

@@ -102,13 +102,19 @@ pub struct Approach {
 
 impl Default for Rate {
     fn default() -> Self {
-        Self { window_s: 15.0, prior_n: 5.0 }
+        Self {
+            window_s: 15.0,
+            prior_n: 5.0,
+        }
     }
 }
 
 impl Default for Approach {
     fn default() -> Self {
-        Self { floor_mps: 0.3 * FT_M, tau_s: 3.0 }
+        Self {
+            floor_mps: 0.3 * FT_M,
+            tau_s: 3.0,
+        }
     }
 }
 
@@ -155,7 +161,10 @@ impl Parameters {
     pub(super) fn check(&self) -> Result<(), String> {
         // Each treat is an event of its own: more than a thousand a second are no guests.
         if !(self.treat_mean_s >= 1e-3 && self.treat_mean_s.is_finite()) {
-            return Err(format!("treat_mean_s must be at least 0.001 s, not {}", self.treat_mean_s));
+            return Err(format!(
+                "treat_mean_s must be at least 0.001 s, not {}",
+                self.treat_mean_s
+            ));
         }
         positive("exchange_radius_m", self.exchange_radius_m)?;
         positive("v_refill_mps", self.v_refill_mps)?;
@@ -185,11 +194,19 @@ impl Parameters {
 
     pub(super) fn rate(&self) -> RateParameters {
         let Rate { window_s, prior_n } = self.rate;
-        RateParameters { window_s, prior_n, prior_interval_s: self.treat_mean_s }
+        RateParameters {
+            window_s,
+            prior_n,
+            prior_interval_s: self.treat_mean_s,
+        }
     }
 
     pub(super) fn approach(&self) -> ApproachParameters {
         let Approach { floor_mps, tau_s } = self.approach;
-        ApproachParameters { expected_mps: self.v_refill_mps, floor_mps, tau_s }
+        ApproachParameters {
+            expected_mps: self.v_refill_mps,
+            floor_mps,
+            tau_s,
+        }
     }
 }

@@ -151,11 +151,17 @@ impl State {
     /// What a lost incarnation knew. Its estimates and feelings come back by themselves within seconds.
     pub(super) fn take_over(&mut self, last: &StateVariables, capacity: u32) {
         let number = |name: &str| last.get(name).and_then(robot::Variable::as_f64);
-        let flag = |name: &str| last.get(name).and_then(robot::Variable::as_bool).unwrap_or(false);
+        let flag = |name: &str| {
+            last.get(name)
+                .and_then(robot::Variable::as_bool)
+                .unwrap_or(false)
+        };
         // Saturates, so that a number from outside cannot be out of range.
         let count = |name: &str| number(name).map_or(0, |value| value as u32);
         let place = |x: &str, y: &str| Some(Point::new(number(x)?, number(y)?));
-        self.treats = number("treats").map_or(capacity, |value| value as u32).min(capacity);
+        self.treats = number("treats")
+            .map_or(capacity, |value| value as u32)
+            .min(capacity);
         (self.need, self.called, self.hurried) = (flag("need"), flag("called"), flag("hurried"));
         (self.served, self.missed) = (count("served"), count("missed"));
         (self.exchanges, self.messages) = (count("exchanges"), count("messages"));

@@ -143,8 +143,14 @@ pub struct Measures {
 /// The emotion state generator's view of the measures: the need presses, unless an exchange is under way; that it is
 /// completed is the most important positive input.
 pub fn appraise(measures: &Measures, behavior: &Behavior) -> Stimulus {
-    let need = if *behavior == Exchange { 0.0 } else { measures.need_ratio };
-    let event = measures.exchange_is_over.then_some(ProgressEvent::GoalAchieved);
+    let need = if *behavior == Exchange {
+        0.0
+    } else {
+        measures.need_ratio
+    };
+    let event = measures
+        .exchange_is_over
+        .then_some(ProgressEvent::GoalAchieved);
     // That the tray runs empty is the refiller's doing, once he feels it at all [D: FRUSTRATED at the assistant].
     Stimulus::need(need).with_event(event).with_blame(true)
 }

@@ -7,7 +7,9 @@ mod tables;
 
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
-use affect::{Circumstances, EmotionGenerator, EmotionLabel, Feeling, RuleGenerator, StandardEmotion};
+use affect::{
+    Circumstances, EmotionGenerator, EmotionLabel, Feeling, RuleGenerator, StandardEmotion,
+};
 use robot::{BadParameters, Cars, Panel, Point, Robot, RobotName, StateVariables, Widget};
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +52,9 @@ impl Default for Leguin {
     fn default() -> Self {
         match Self::new(Parameters::default()) {
             Ok(leguin) => leguin,
-            Err(reason) => unreachable!("the default parameters, which a test checks, are refused: {reason}"),
+            Err(reason) => {
+                unreachable!("the default parameters, which a test checks, are refused: {reason}")
+            }
         }
     }
 }
@@ -73,7 +77,13 @@ impl Leguin {
         };
         let haste = SensoryMotor::new(haste).map_err(|error| error.to_string())?;
         let state = State::new(&parameters);
-        Ok(Self { parameters, esg, bsg: BehaviorGenerator::new(TABLE, Behavior::Wait), haste, state })
+        Ok(Self {
+            parameters,
+            esg,
+            bsg: BehaviorGenerator::new(TABLE, Behavior::Wait),
+            haste,
+            state,
+        })
     }
 
     /// What she feels; without emotions a steady state without intensity.
@@ -91,7 +101,11 @@ impl Leguin {
     /// All that changes in her.
     #[must_use]
     pub fn save(&self) -> Saved {
-        Saved { state: self.state.clone(), feeling: self.feeling(), behavior: self.bsg.state().clone() }
+        Saved {
+            state: self.state.clone(),
+            feeling: self.feeling(),
+            behavior: self.bsg.state().clone(),
+        }
     }
 
     /// Continues from a saved state; the parameters must be those it was saved with.
@@ -112,8 +126,14 @@ impl Leguin {
         let state = &mut self.state;
         if let Some(waiter) = state.waiter.look(cars, state.at).state {
             let said = &waiter.state_variables;
-            state.waiter_needs = said.get("need").and_then(robot::Variable::as_bool).unwrap_or(false);
-            state.waiter_calls = said.get("refiller").and_then(|name| name.as_str()).map(str::to_owned);
+            state.waiter_needs = said
+                .get("need")
+                .and_then(robot::Variable::as_bool)
+                .unwrap_or(false);
+            state.waiter_calls = said
+                .get("refiller")
+                .and_then(|name| name.as_str())
+                .map(str::to_owned);
         }
     }
 
@@ -121,8 +141,12 @@ impl Leguin {
     /// call for somebody else: Vonda does not step in for Leguin.
     fn is_needed(&self, cars: &Cars<'_>) -> bool {
         let state = &self.state;
-        let calls_another = state.waiter_calls.as_deref().is_some_and(|name| name != cars.name().as_str());
-        !calls_another && (state.waiter_needs || state.waiter.is_unknown(self.parameters.query_stale_s))
+        let calls_another = state
+            .waiter_calls
+            .as_deref()
+            .is_some_and(|name| name != cars.name().as_str());
+        !calls_another
+            && (state.waiter_needs || state.waiter.is_unknown(self.parameters.query_stale_s))
     }
 
     /// Whether she is back at the table: at her place, or near it if somebody stands there and does not go.
@@ -139,7 +163,8 @@ impl Leguin {
         Context {
             emotion: parameters.acts_by_emotion().then(|| self.feeling().emotion),
             pending: state.pending,
-            waiter_is_needy_here: self.is_needed(cars) && state.waiter.is_within(radius_m, state.at, range_m),
+            waiter_is_needy_here: self.is_needed(cars)
+                && state.waiter.is_within(radius_m, state.at, range_m),
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
             sent_home: state.sent_home,
             is_home: self.is_home(),
@@ -152,7 +177,9 @@ impl Leguin {
         match act {
             Act::TakeErrand => state.hurried = state.pending.take() == Some(Errand::Hurry),
             Act::Hurry => (state.hurried, state.pending) = (true, None),
-            Act::FinishErrand => (state.hurried, state.pending, state.sent_home) = (false, None, false),
+            Act::FinishErrand => {
+                (state.hurried, state.pending, state.sent_home) = (false, None, false)
+            }
             Act::TurnHome => (state.trips, state.sent_home) = (state.trips + 1, false),
             Act::GiveUp => {
                 (state.given_up, state.hurried) = (state.given_up + 1, false);
@@ -168,7 +195,11 @@ impl Leguin {
     /// Where she is going.
     fn goal(&self) -> Option<Point> {
         match self.behavior() {
-            Behavior::Refill => self.state.waiter.place().filter(|_| !self.state.waiter.is_missing()),
+            Behavior::Refill => self
+                .state
+                .waiter
+                .place()
+                .filter(|_| !self.state.waiter.is_missing()),
             Behavior::GoHome => Some(self.state.home),
             Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => None,
         }
@@ -177,10 +208,19 @@ impl Leguin {
     /// On the way to the waiter; if he is not where he was last known to be, in search of him.
     fn refill(&mut self, cars: &mut Cars<'_>) -> Point {
         let (parameters, goal) = (&self.parameters, self.goal());
-        let haste =
-            if parameters.sensory_motor.is_on() { self.haste.gain(self.feeling().affect()) } else { 1.0 };
+        let haste = if parameters.sensory_motor.is_on() {
+            self.haste.gain(self.feeling().affect())
+        } else {
+            1.0
+        };
         let speed_mps = parameters.v_refill_mps * haste;
-        let State { legs, turns, at, aim, .. } = &mut self.state;
+        let State {
+            legs,
+            turns,
+            at,
+            aim,
+            ..
+        } = &mut self.state;
         if !self.bsg.has_lasted(parameters.prep_s) {
             return legs.stay(*at);
         }
@@ -197,13 +237,25 @@ impl Leguin {
         let State { legs, at, aim, .. } = &mut self.state;
         let step_m = (speed_mps * cars.tick_s()).min(at.distance_m(goal) - stop_m);
         *aim = (step_m > 0.0).then_some((goal, step_m));
-        legs.drive(cars, *at, Course { goal, stop_m, speed_mps, look_s: self.parameters.look_s })
+        legs.drive(
+            cars,
+            *at,
+            Course {
+                goal,
+                stop_m,
+                speed_mps,
+                look_s: self.parameters.look_s,
+            },
+        )
     }
 }
 
 impl Robot for Leguin {
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
-        let bad = |reason| BadParameters { robot: cars.name().clone(), reason };
+        let bad = |reason| BadParameters {
+            robot: cars.name().clone(),
+            reason,
+        };
         *self = Self::new(cars.parameters()?).map_err(bad)?;
         self.state.begin(&self.parameters, cars);
         Ok(())
@@ -220,7 +272,8 @@ impl Robot for Leguin {
     fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
         let (behavior, parameters) = (self.behavior(), &self.parameters);
         self.bsg.advance(cars.tick_s());
-        self.state.pass(behavior, parameters.progress_share, cars.tick_s());
+        self.state
+            .pass(behavior, parameters.progress_share, cars.tick_s());
         let gain = parameters.gain();
         self.state.measures = Measures {
             hurried: self.state.hurried,
@@ -236,7 +289,8 @@ impl Robot for Leguin {
     }
 
     fn state_variables(&self) -> StateVariables {
-        self.state.published(self.feeling().intensity, self.behavior(), self.goal())
+        self.state
+            .published(self.feeling().intensity, self.behavior(), self.goal())
     }
 
     fn current_location(&self) -> Point {
@@ -250,7 +304,9 @@ impl Robot for Leguin {
                 self.state.legs.stay(self.state.at)
             }
             Behavior::Refill => self.refill(cars),
-            Behavior::GoHome => self.approach(cars, self.state.home, 0.0, self.parameters.v_refill_mps),
+            Behavior::GoHome => {
+                self.approach(cars, self.state.home, 0.0, self.parameters.v_refill_mps)
+            }
         }
     }
 
@@ -268,18 +324,26 @@ impl Robot for Leguin {
             // The waiter may be done with the exchange a tick before her.
             (GO_HOME, Behavior::Exchange | Behavior::AwaitGoHome) => state.sent_home = true,
             (GO_HOME, _) => {}
-            _ => cars.log(format!("does not understand {:?} from {from}", shortened(command))),
+            _ => cars.log(format!(
+                "does not understand {:?} from {from}",
+                shortened(command)
+            )),
         }
     }
 
     fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
         if self.parameters.affect.is_on() {
-            self.esg.update(&self.state.measures, self.bsg.current(), cars.tick_s());
+            self.esg
+                .update(&self.state.measures, self.bsg.current(), cars.tick_s());
         }
     }
 
     fn emotion_state(&self) -> &str {
-        if self.parameters.affect.is_on() { self.feeling().emotion.name() } else { NEUTRAL }
+        if self.parameters.affect.is_on() {
+            self.feeling().emotion.name()
+        } else {
+            NEUTRAL
+        }
     }
 
     fn update_behavior_state(&mut self, cars: &mut Cars<'_>) {
@@ -297,34 +361,54 @@ impl Robot for Leguin {
         let (state, behavior) = (&self.state, self.behavior());
         // On the way it is the crowd that blocks her, unless it is the waiter who presses.
         let is_crowd = behavior == Behavior::Refill && !state.hurried;
-        let other = if is_crowd { "the crowd" } else { self.parameters.waiter.as_str() };
-        let goal = format!("to bring {} to {}", self.parameters.goods, self.parameters.waiter);
-        let circumstances =
-            Circumstances { other: Some(other), goal: Some(&goal), ..Circumstances::default() };
+        let other = if is_crowd {
+            "the crowd"
+        } else {
+            self.parameters.waiter.as_str()
+        };
+        let goal = format!(
+            "to bring {} to {}",
+            self.parameters.goods, self.parameters.waiter
+        );
+        let circumstances = Circumstances {
+            other: Some(other),
+            goal: Some(&goal),
+            ..Circumstances::default()
+        };
         let feeling = self.parameters.affect.is_on().then(|| self.feeling());
-        let mut widgets = panel::feeling(feeling, &self.parameters.dynamics.label_cuts, &circumstances);
+        let mut widgets = panel::feeling(
+            feeling,
+            &self.parameters.dynamics.label_cuts,
+            &circumstances,
+        );
         widgets.push(panel::behavior(behavior.name()));
-        let distance =
-            self.goal().map_or("-".to_owned(), |goal| format!("{:.1} m", state.at.distance_m(goal)));
+        let distance = self.goal().map_or("-".to_owned(), |goal| {
+            format!("{:.1} m", state.at.distance_m(goal))
+        });
         widgets.push(panel::table(&[
             ("waiter", self.parameters.waiter.clone()),
             ("way to go", distance),
             ("hurried", panel::yes(state.hurried).to_owned()),
             ("blocked for", panel::seconds(state.blocked_s)),
             ("kept waiting for", panel::seconds(state.waiting_s)),
-            ("trips, given up", format!("{}, {}", state.trips, state.given_up)),
+            (
+                "trips, given up",
+                format!("{}, {}", state.trips, state.given_up),
+            ),
         ]));
-        widgets.extend(
-            [REFILL, HURRY, GO_HOME]
-                .map(|command| Widget::Button { label: command.to_owned(), command: command.to_owned() }),
-        );
+        widgets.extend([REFILL, HURRY, GO_HOME].map(|command| Widget::Button {
+            label: command.to_owned(),
+            command: command.to_owned(),
+        }));
         Panel { widgets }
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
         self.state.take_over(last);
         let name = last.get("behavior").and_then(|name| name.as_str());
-        let behavior = Behavior::ALL.into_iter().find(|behavior| Some(behavior.name()) == name);
+        let behavior = Behavior::ALL
+            .into_iter()
+            .find(|behavior| Some(behavior.name()) == name);
         self.bsg = BehaviorGenerator::new(TABLE, behavior.unwrap_or(Behavior::GoHome));
         cars.log("is back, and takes over where the last one was lost");
     }

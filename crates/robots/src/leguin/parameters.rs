@@ -138,8 +138,14 @@ impl Parameters {
         positive("await_patience_s", self.await_patience_s)?;
         positive("turn_mean_s", self.turn_mean_s)?;
         positive("joke_mean_s", self.joke_mean_s)?;
-        positive("dynamics.caution_gain_base", self.dynamics.caution_gain_base)?;
-        not_negative("dynamics.caution_gain_slope", self.dynamics.caution_gain_slope)?;
+        positive(
+            "dynamics.caution_gain_base",
+            self.dynamics.caution_gain_base,
+        )?;
+        not_negative(
+            "dynamics.caution_gain_slope",
+            self.dynamics.caution_gain_slope,
+        )?;
         not_negative("exchange_s", self.exchange_s)?;
         not_negative("v_refill_mps", self.v_refill_mps)?;
         not_negative("prep_s", self.prep_s)?;

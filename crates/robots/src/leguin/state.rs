@@ -84,7 +84,11 @@ impl State {
     /// A tick went by in this behavior: was there progress, how long has she waited?
     pub(super) fn pass(&mut self, behavior: Behavior, progress_share: f64, tick_s: f64) {
         self.until_joke_s -= tick_s;
-        self.waiting_s = if behavior == Behavior::AwaitGoHome { self.waiting_s + tick_s } else { 0.0 };
+        self.waiting_s = if behavior == Behavior::AwaitGoHome {
+            self.waiting_s + tick_s
+        } else {
+            0.0
+        };
         if !matches!(behavior, Behavior::Refill | Behavior::GoHome) {
             self.begin_way();
         } else if let Some((goal, step_m)) = self.aim {
@@ -92,7 +96,11 @@ impl State {
             self.way_m += self.before.distance_m(goal) - self.at.distance_m(goal);
             let is_progress = self.way_m >= self.best_way_m + progress_share * step_m;
             self.best_way_m = self.best_way_m.max(self.way_m);
-            self.blocked_s = if is_progress { 0.0 } else { self.blocked_s + tick_s };
+            self.blocked_s = if is_progress {
+                0.0
+            } else {
+                self.blocked_s + tick_s
+            };
         }
     }
 
@@ -136,7 +144,10 @@ impl State {
     pub(super) fn take_over(&mut self, last: &StateVariables) {
         let number = |name: &str| last.get(name).and_then(robot::Variable::as_f64);
         let count = |name: &str| number(name).map_or(0, |value| value as u32);
-        self.hurried = last.get("hurried").and_then(robot::Variable::as_bool).unwrap_or(false);
+        self.hurried = last
+            .get("hurried")
+            .and_then(robot::Variable::as_bool)
+            .unwrap_or(false);
         self.pending = match last.get("pending").and_then(|value| value.as_str()) {
             Some(crate::REFILL) => Some(Errand::Refill),
             Some(crate::HURRY) => Some(Errand::Hurry),

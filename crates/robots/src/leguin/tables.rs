@@ -85,7 +85,11 @@ pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
 
 /// How strongly she feels it \[I\].
 pub fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
-    let hurry = if measures.hurried { measures.th_concerned } else { 0.0 };
+    let hurry = if measures.hurried {
+        measures.th_concerned
+    } else {
+        0.0
+    };
     Intensity::saturating(hurry.max(measures.blocked).max(measures.waiting))
 }
 

@@ -15,11 +15,17 @@ struct Asker {
 /// What `of` answers, beside Butler on the usual stage.
 pub(crate) fn answers(seed: u64, of: &str) -> PublicState {
     let heard = Rc::new(RefCell::new(None));
-    let asker = Asker { of: of.to_owned(), heard: heard.clone() };
+    let asker = Asker {
+        of: of.to_owned(),
+        heard: heard.clone(),
+    };
     let mut stage = Stage::new(
         seed,
         vec![
-            Role { robot: Box::new(asker), ..Role::new("Butler", "Butler", feet(25.0, 25.0), "") },
+            Role {
+                robot: Box::new(asker),
+                ..Role::new("Butler", "Butler", feet(25.0, 25.0), "")
+            },
             Role::new("Leguin", "Leguin", feet(4.0, 4.0), ""),
         ],
     );
@@ -39,7 +45,10 @@ impl Robot for Asker {
         0.0
     }
     fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
-        *self.heard.borrow_mut() = cars.get_robot_state(&self.of).ok().map(|state| (*state).clone());
+        *self.heard.borrow_mut() = cars
+            .get_robot_state(&self.of)
+            .ok()
+            .map(|state| (*state).clone());
     }
     fn state_variables(&self) -> StateVariables {
         StateVariables::new()

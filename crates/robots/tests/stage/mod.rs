@@ -2,7 +2,10 @@
 //! the next tick, unless the test drops them; questions are answered, unless the test cuts them.
 
 #![allow(dead_code, reason = "each test file uses its own part of the stage")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the failure")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests, where a panic is the failure"
+)]
 
 pub(crate) mod asker;
 pub(crate) mod reborn;
@@ -10,8 +13,8 @@ pub(crate) mod reborn;
 use std::collections::BTreeMap;
 
 use robot::{
-    Clock, LocalHost, Parameters, Percept, Point, Report, Robot, RobotName, RunName, SensedBody, SensedKind,
-    SensedRobot, Variable, Welcome,
+    Clock, LocalHost, Parameters, Percept, Point, Report, Robot, RobotName, RunName, SensedBody,
+    SensedKind, SensedRobot, Variable, Welcome,
 };
 use serde_json::{Value, json};
 
@@ -33,7 +36,10 @@ pub(crate) fn feet(x: f64, y: f64) -> Point {
 /// Parameters from TOML text, numbers in SI units.
 pub(crate) fn parameters(text: &str) -> Parameters {
     let table: toml::Table = toml::from_str(text).unwrap();
-    table.into_iter().map(|(key, value)| (key, serde_json::to_value(value).unwrap())).collect()
+    table
+        .into_iter()
+        .map(|(key, value)| (key, serde_json::to_value(value).unwrap()))
+        .collect()
 }
 
 /// One robot of the cast.
@@ -49,8 +55,18 @@ impl Role {
         Self::played_by(robots::make(class).unwrap(), name, at, text)
     }
 
-    pub(crate) fn played_by(robot: Box<dyn Robot>, name: &'static str, at: Point, text: &str) -> Self {
-        Self { name, at, robot, parameters: parameters(text) }
+    pub(crate) fn played_by(
+        robot: Box<dyn Robot>,
+        name: &'static str,
+        at: Point,
+        text: &str,
+    ) -> Self {
+        Self {
+            name,
+            at,
+            robot,
+            parameters: parameters(text),
+        }
     }
 }
 
@@ -135,7 +151,11 @@ impl Stage {
     }
 
     /// Steps until `is_over`, and says whether that came within `limit_s`.
-    pub(crate) fn step_until(&mut self, limit_s: f64, mut is_over: impl FnMut(&Self) -> bool) -> bool {
+    pub(crate) fn step_until(
+        &mut self,
+        limit_s: f64,
+        mut is_over: impl FnMut(&Self) -> bool,
+    ) -> bool {
         let last = self.tick + (limit_s / TICK_S) as u64;
         while self.tick < last {
             self.step();
@@ -152,8 +172,12 @@ impl Stage {
         let seq = self.operator_seq;
         let message = json!({ "epoch": 1, "tick": self.tick, "seq": seq, "command": command });
         let from = name("operator");
-        self.host.inject(&name(to), &from, serde_json::from_value(message).unwrap());
-        self.underway.entry(name(to)).or_default().push(json!({ "from": from, "seq": seq }));
+        self.host
+            .inject(&name(to), &from, serde_json::from_value(message).unwrap());
+        self.underway
+            .entry(name(to))
+            .or_default()
+            .push(json!({ "from": from, "seq": seq }));
     }
 
     pub(crate) fn report(&self, robot: &str) -> &Report {
@@ -169,7 +193,9 @@ impl Stage {
     }
 
     pub(crate) fn number(&self, robot: &str, variable: &str) -> f64 {
-        self.report(robot).state_variables[variable].as_f64().unwrap()
+        self.report(robot).state_variables[variable]
+            .as_f64()
+            .unwrap()
     }
 
     pub(crate) fn flag(&self, robot: &str, variable: &str) -> bool {
@@ -186,7 +212,11 @@ impl Stage {
 
     /// What a robot said, in order.
     pub(crate) fn commands_of(&self, robot: &str) -> Vec<&str> {
-        self.sent.iter().filter(|sent| sent.from == robot).map(|sent| sent.command.as_str()).collect()
+        self.sent
+            .iter()
+            .filter(|sent| sent.from == robot)
+            .map(|sent| sent.command.as_str())
+            .collect()
     }
 
     fn advance(&mut self) -> BTreeMap<RobotName, bool> {
@@ -194,7 +224,10 @@ impl Stage {
         for robot in self.places.keys().cloned().collect::<Vec<_>>() {
             let proposal = self.reports[&robot].proposal;
             let is_free = is_on_field(proposal)
-                && self.bodies_but(&robot).iter().all(|(_, body)| !overlap(*body, proposal));
+                && self
+                    .bodies_but(&robot)
+                    .iter()
+                    .all(|(_, body)| !overlap(*body, proposal));
             if is_free {
                 self.places.insert(robot.clone(), proposal);
             }
@@ -207,7 +240,10 @@ impl Stage {
         let others = self.places.iter().filter(|(other, _)| *other != robot);
         let robots = others.map(|(_, at)| (SensedKind::Robot, *at));
         let obstacles = self.obstacles.iter().map(|at| (SensedKind::Obstacle, *at));
-        robots.chain(obstacles).chain(self.guests.iter().map(|at| (SensedKind::Guest, *at))).collect()
+        robots
+            .chain(obstacles)
+            .chain(self.guests.iter().map(|at| (SensedKind::Guest, *at)))
+            .collect()
     }
 
     fn exchange(&mut self, blocked: &BTreeMap<RobotName, bool>) {
@@ -219,9 +255,15 @@ impl Stage {
         }
         let clock = json!({ "epoch": 1, "tick": self.tick, "news": news });
         let clock: Clock = serde_json::from_value(clock).unwrap();
-        let percepts: BTreeMap<RobotName, Percept> =
-            self.places.keys().map(|robot| (robot.clone(), self.percept(robot))).collect();
-        self.reports = self.host.exchange(&clock, &mut |robot| percepts[robot].clone()).unwrap();
+        let percepts: BTreeMap<RobotName, Percept> = self
+            .places
+            .keys()
+            .map(|robot| (robot.clone(), self.percept(robot)))
+            .collect();
+        self.reports = self
+            .host
+            .exchange(&clock, &mut |robot| percepts[robot].clone())
+            .unwrap();
         self.note_commands();
     }
 
@@ -230,7 +272,10 @@ impl Stage {
         let others = || self.places.iter().filter(|(other, _)| *other != robot);
         let sensed: Vec<SensedRobot> = others()
             .filter(|(_, place)| at.distance_m(**place) <= SENSING_M)
-            .map(|(other, place)| SensedRobot { name: other.clone(), location: *place })
+            .map(|(other, place)| SensedRobot {
+                name: other.clone(),
+                location: *place,
+            })
             .collect();
         let unreachable: Vec<&RobotName> = others()
             .map(|(other, _)| other)
@@ -246,16 +291,30 @@ impl Stage {
 
     fn percept(&self, robot: &RobotName) -> Percept {
         let at = self.places[robot];
-        let near = self.bodies_but(robot).into_iter().filter(|(_, place)| at.distance_m(*place) <= SENSING_M);
-        let bodies = near.map(|(kind, location)| SensedBody { kind, location }).collect();
-        Percept { epoch: 1, tick: self.tick, bodies }
+        let near = self
+            .bodies_but(robot)
+            .into_iter()
+            .filter(|(_, place)| at.distance_m(*place) <= SENSING_M);
+        let bodies = near
+            .map(|(kind, location)| SensedBody { kind, location })
+            .collect();
+        Percept {
+            epoch: 1,
+            tick: self.tick,
+            bodies,
+        }
     }
 
     fn note_commands(&mut self) {
         for (from, report) in &self.reports {
             for sent in &report.sent {
                 let (to, command) = (sent.to.to_string(), sent.command.clone());
-                let note = Sent { tick: self.tick, from: from.to_string(), to, command };
+                let note = Sent {
+                    tick: self.tick,
+                    from: from.to_string(),
+                    to,
+                    command,
+                };
                 if !(self.drops)(&note) {
                     let id = json!({ "from": from, "seq": sent.seq });
                     self.underway.entry(sent.to.clone()).or_default().push(id);

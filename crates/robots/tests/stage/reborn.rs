@@ -14,12 +14,19 @@ macro_rules! reborn {
         impl $name {
             /// Saved and restored at this tick.
             pub(crate) fn saved(at_tick: u64) -> Self {
-                Self { inner: robots::$name::default(), at_tick, is_lost: false }
+                Self {
+                    inner: robots::$name::default(),
+                    at_tick,
+                    is_lost: false,
+                }
             }
 
             /// Lost and resumed at this tick.
             pub(crate) fn lost(at_tick: u64) -> Self {
-                Self { is_lost: true, ..Self::saved(at_tick) }
+                Self {
+                    is_lost: true,
+                    ..Self::saved(at_tick)
+                }
             }
 
             fn maybe_reborn(&mut self, cars: &mut Cars<'_>) {

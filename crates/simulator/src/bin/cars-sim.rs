@@ -67,8 +67,8 @@ fn speed(text: &str) -> Result<Speed, String> {
 fn main() -> miette::Result<ExitCode> {
     protocol::runtime::use_one_thread();
     let args = Args::parse();
-    let filter =
-        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn,zenoh=error".into());
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| "warn,zenoh=error".into());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
@@ -76,18 +76,31 @@ fn main() -> miette::Result<ExitCode> {
         .with_target(false)
         .init();
     let summary = run(&args)?;
-    Ok(if summary.end == Some(End::Aborted) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Ok(if summary.end == Some(End::Aborted) {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 fn run(args: &Args) -> miette::Result<Summary> {
     let duration_s = args.duration.map(|duration| duration.0);
-    let scenario =
-        Scenario::load(&args.scenario, &Changes { seed: args.seed, duration_s, set: args.set.clone() })?;
+    let scenario = Scenario::load(
+        &args.scenario,
+        &Changes {
+            seed: args.seed,
+            duration_s,
+            set: args.set.clone(),
+        },
+    )?;
     // Before anything is made: a refusal leaves nothing behind.
     check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
     let folder = RunFolder::new(&args.out, &args.run);
     let _lock = folder.create(&scenario)?;
-    let role = Role::Router { listen: args.listen.clone(), trusts_network: args.insecure };
+    let role = Role::Router {
+        listen: args.listen.clone(),
+        trusts_network: args.insecure,
+    };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
     let options = Options {
         run: args.run.clone(),
@@ -100,11 +113,17 @@ fn run(args: &Args) -> miette::Result<Summary> {
     // The queue is closed only when the run is over, and then there is nothing left to end.
     ctrlc::set_handler(move || drop(queue.send(Event::Terminate))).into_diagnostic()?;
     if let Some(file) = &args.operator_config {
-        write_line(&folder.file(OPERATOR_CONFIG), &std::path::absolute(file).into_diagnostic()?.display())?;
+        write_line(
+            &folder.file(OPERATOR_CONFIG),
+            &std::path::absolute(file).into_diagnostic()?.display(),
+        )?;
     }
     write_line(&folder.file(ENDPOINT), &connectable(&args.listen))?;
     let outcome = server.run(scenario, &folder).into_diagnostic();
-    for name in [ENDPOINT, OPERATOR_CONFIG].map(|name| folder.file(name)).iter().filter(|file| file.exists())
+    for name in [ENDPOINT, OPERATOR_CONFIG]
+        .map(|name| folder.file(name))
+        .iter()
+        .filter(|file| file.exists())
     {
         if let Err(error) = std::fs::remove_file(name) {
             tracing::debug!(%error, "{} is gone already", name.display());
@@ -118,5 +137,7 @@ fn write_line(file: &Path, line: &dyn std::fmt::Display) -> miette::Result<()> {
     let unfinished = file.with_extension("new");
     let written = std::fs::write(&unfinished, format!("{line}\n"));
     let written = written.and_then(|()| std::fs::rename(&unfinished, file));
-    written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", file.display()))
+    written
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot write {}", file.display()))
 }

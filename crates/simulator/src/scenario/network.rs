@@ -75,13 +75,15 @@ impl Network {
     /// What befalls commands from one robot to another.
     #[must_use]
     pub fn commands(&self, from: &RobotName, to: &RobotName) -> Channel {
-        self.last_said(from, to, |link| link.commands).unwrap_or(self.commands)
+        self.last_said(from, to, |link| link.commands)
+            .unwrap_or(self.commands)
     }
 
     /// What befalls queries of one robot to another.
     #[must_use]
     pub fn queries(&self, from: &RobotName, to: &RobotName) -> Channel {
-        self.last_said(from, to, |link| link.queries).unwrap_or(self.queries)
+        self.last_said(from, to, |link| link.queries)
+            .unwrap_or(self.queries)
     }
 
     fn last_said(
@@ -90,7 +92,11 @@ impl Network {
         to: &RobotName,
         what: impl Fn(&Link) -> Option<Channel>,
     ) -> Option<Channel> {
-        let on_link = self.links.iter().rev().filter(|link| link.from == *from && link.to == *to);
+        let on_link = self
+            .links
+            .iter()
+            .rev()
+            .filter(|link| link.from == *from && link.to == *to);
         on_link.filter_map(what).next()
     }
 
@@ -104,15 +110,27 @@ impl Network {
     /// Whether any link has bursts, so that their coming and going is worth its cost.
     #[must_use]
     pub fn has_bursts(&self) -> bool {
-        let on_links = self.links.iter().flat_map(|link| [link.commands, link.queries]).flatten();
-        on_links.chain([self.commands, self.queries]).any(|channel| channel.burst.is_some())
+        let on_links = self
+            .links
+            .iter()
+            .flat_map(|link| [link.commands, link.queries])
+            .flatten();
+        on_links
+            .chain([self.commands, self.queries])
+            .any(|channel| channel.burst.is_some())
     }
 
     /// How long a command may be on its way, ticks.
     #[must_use]
     pub fn longest_delay(&self, tick_s: f64) -> Tick {
-        let channels = self.links.iter().filter_map(|link| link.commands).chain([self.commands]);
-        let longest_s = channels.filter_map(|channel| Some(channel.delay_s?.max())).fold(0.0, f64::max);
+        let channels = self
+            .links
+            .iter()
+            .filter_map(|link| link.commands)
+            .chain([self.commands]);
+        let longest_s = channels
+            .filter_map(|channel| Some(channel.delay_s?.max()))
+            .fold(0.0, f64::max);
         ticks(longest_s, tick_s)
     }
 }

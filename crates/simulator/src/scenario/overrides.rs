@@ -17,15 +17,19 @@ impl std::str::FromStr for Override {
     /// position from 0: `robot.Butler.params.refiller=Vonda`. The value is written as in a scenario file; what is no
     /// TOML value is a text.
     fn from_str(text: &str) -> Result<Self, String> {
-        let (path, value) =
-            text.split_once('=').ok_or_else(|| format!("{text:?} is not of the form path=value"))?;
+        let (path, value) = text
+            .split_once('=')
+            .ok_or_else(|| format!("{text:?} is not of the form path=value"))?;
         let path: Vec<String> = path.trim().split('.').map(str::to_owned).collect();
         if path.iter().any(String::is_empty) {
             return Err(format!("{text:?}: a part of the path is empty"));
         }
         let parsed = toml::from_str::<toml::Table>(&format!("value = {value}"));
         let parsed = parsed.ok().and_then(|mut table| table.remove("value"));
-        Ok(Self { path, value: parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned())) })
+        Ok(Self {
+            path,
+            value: parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned())),
+        })
     }
 }
 
@@ -40,8 +44,9 @@ impl std::fmt::Display for Override {
 pub(super) fn apply(source: &Source, changes: &Changes) -> Result<Source, FileError> {
     let mut root = toml::Value::Table(source.parse()?);
     for change in &changes.set {
-        set(&mut root, &change.path, &change.value)
-            .map_err(|reason| FileError::new(format!("--set {}: {reason}", change.path.join("."))))?;
+        set(&mut root, &change.path, &change.value).map_err(|reason| {
+            FileError::new(format!("--set {}: {reason}", change.path.join(".")))
+        })?;
     }
     if let toml::Value::Table(table) = &mut root {
         if let Some(seed) = changes.seed {
@@ -49,11 +54,17 @@ pub(super) fn apply(source: &Source, changes: &Changes) -> Result<Source, FileEr
             table.insert("seed".to_owned(), toml::Value::Integer(seed));
         }
         if let Some(duration_s) = changes.duration_s {
-            table.insert("duration".to_owned(), toml::Value::String(format!("{duration_s} s")));
+            table.insert(
+                "duration".to_owned(),
+                toml::Value::String(format!("{duration_s} s")),
+            );
         }
     }
     let text = toml::to_string(&root).map_err(|error| FileError::new(error.to_string()))?;
-    Ok(Source { name: format!("{} (with the command line's changes)", source.name), text })
+    Ok(Source {
+        name: format!("{} (with the command line's changes)", source.name),
+        text,
+    })
 }
 
 fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(), String> {
@@ -66,19 +77,26 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
             table.insert(first.clone(), value.clone());
             return Ok(());
         }
-        toml::Value::Table(table) => {
-            table.entry(first.clone()).or_insert_with(|| toml::Value::Table(toml::Table::new()))
-        }
+        toml::Value::Table(table) => table
+            .entry(first.clone())
+            .or_insert_with(|| toml::Value::Table(toml::Table::new())),
         toml::Value::Array(list) => element(list, first)?,
-        _ => return Err(format!("there is nothing below {first:?}: it is a single value")),
+        _ => {
+            return Err(format!(
+                "there is nothing below {first:?}: it is a single value"
+            ));
+        }
     };
     set(next, rest, value)
 }
 
 fn element<'a>(list: &'a mut [toml::Value], which: &str) -> Result<&'a mut toml::Value, String> {
-    let is_named = |value: &toml::Value| value.get("name").and_then(toml::Value::as_str) == Some(which);
-    let index =
-        list.iter().position(is_named).or_else(|| which.parse().ok().filter(|index| *index < list.len()));
+    let is_named =
+        |value: &toml::Value| value.get("name").and_then(toml::Value::as_str) == Some(which);
+    let index = list
+        .iter()
+        .position(is_named)
+        .or_else(|| which.parse().ok().filter(|index| *index < list.len()));
     let len = list.len();
     let found = index.and_then(|index| list.get_mut(index));
     found.ok_or_else(|| format!("none of the {len} elements is called or numbered {which:?}"))

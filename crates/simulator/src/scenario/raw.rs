@@ -108,8 +108,16 @@ struct Robot {
 }
 
 /// Hors d'oeuvres at a reception: guests that stroll. [I] The seed names the distributions and no numbers.
-const GUEST_SPEED: Range<Speed> = Range { min: Speed(0.06096), mode: Speed(0.3048), max: Speed(0.6096) };
-const GUEST_DURATION: Range<Time> = Range { min: Time(2.0), mode: Time(5.0), max: Time(10.0) };
+const GUEST_SPEED: Range<Speed> = Range {
+    min: Speed(0.06096),
+    mode: Speed(0.3048),
+    max: Speed(0.6096),
+};
+const GUEST_DURATION: Range<Time> = Range {
+    min: Time(2.0),
+    mode: Time(5.0),
+    max: Time(10.0),
+};
 /// Everything occupies 2 ft by 2 ft [D: seed, "Obstacles"].
 const BODY: Length = Length(0.6096);
 /// 50 ft by 50 ft [D: seed, "Experimental Results"].
@@ -126,7 +134,11 @@ const SENSING_RANGE: Length = Length(1.8288);
 impl Scenario {
     /// Refuses to name files: what comes from outside must not make this process read them.
     pub(super) fn refuse_files(self, source: &Source) -> Result<Self, FileError> {
-        match self.robots.iter().find(|robot| robot.get_ref().params_from.is_some()) {
+        match self
+            .robots
+            .iter()
+            .find(|robot| robot.get_ref().params_from.is_some())
+        {
             Some(robot) => {
                 let reason = "`params_from` names a file; write its parameters out under `params`";
                 Err(FileError::at(source, Some(robot.span()), reason))
@@ -136,14 +148,24 @@ impl Scenario {
     }
 
     /// From what is written to what it means.
-    pub(super) fn check(self, source: &Source, folder: &Path) -> Result<super::Scenario, FileError> {
+    pub(super) fn check(
+        self,
+        source: &Source,
+        folder: &Path,
+    ) -> Result<super::Scenario, FileError> {
         let seed = match &self.seed {
             Some(seed) => check_seed(*seed.get_ref())
                 .map_err(|reason| FileError::at(source, Some(seed.span()), &reason))?,
             None => DEFAULT_SEED,
         };
         let tick_s = positive(source, self.tick.as_ref(), 0.5, |time| time.0, "a tick")?;
-        let duration_s = positive(source, self.duration.as_ref(), 600.0, |time| time.0, "the duration")?;
+        let duration_s = positive(
+            source,
+            self.duration.as_ref(),
+            600.0,
+            |time| time.0,
+            "the duration",
+        )?;
         let ticks = (duration_s / tick_s).round();
         if ticks > MAX_TICKS {
             let span = self.duration.as_ref().map(Spanned::span);
@@ -161,8 +183,16 @@ impl Scenario {
         let own = self.robots.iter().map(Spanned::get_ref);
         let lateness = Lateness {
             on_late: self.on_late.unwrap_or(OnLate::Wait),
-            own: own.filter_map(|robot| Some((robot.name.clone(), robot.on_late?))).collect(),
-            deadline_s: positive(source, self.deadline.as_ref(), DEADLINE_S, |time| time.0, "the deadline")?,
+            own: own
+                .filter_map(|robot| Some((robot.name.clone(), robot.on_late?)))
+                .collect(),
+            deadline_s: positive(
+                source,
+                self.deadline.as_ref(),
+                DEADLINE_S,
+                |time| time.0,
+                "the deadline",
+            )?,
             lose_after: positive(
                 source,
                 self.lose_after.as_ref(),
@@ -175,16 +205,28 @@ impl Scenario {
             seed,
             tick_s,
             ticks: ticks as u64,
-            field_m: field.map_or(FIELD, |field| field.size).map(|length| length.0),
+            field_m: field
+                .map_or(FIELD, |field| field.size)
+                .map(|length| length.0),
             body_m: field.and_then(|field| field.body).unwrap_or(BODY).0,
-            max_speed_mps: field.and_then(|field| field.max_speed).unwrap_or(MAX_SPEED).0,
+            max_speed_mps: field
+                .and_then(|field| field.max_speed)
+                .unwrap_or(MAX_SPEED)
+                .0,
             sensing_range_m,
             guests: world::Guests {
-                count: self.guests.as_ref().map_or(0, |guests| guests.get_ref().count),
+                count: self
+                    .guests
+                    .as_ref()
+                    .map_or(0, |guests| guests.get_ref().count),
                 speed_mps: speed,
                 duration_s: duration,
             },
-            obstacles: self.obstacles.iter().map(|obstacle| point(obstacle.at)).collect(),
+            obstacles: self
+                .obstacles
+                .iter()
+                .map(|obstacle| point(obstacle.at))
+                .collect(),
             lateness,
             robots: robots(self.robots, source, folder)?,
             network: super::Network::default(),
@@ -192,13 +234,26 @@ impl Scenario {
             record: record(self.record, source)?,
         };
         let network = network::check(self.network, &scenario.robots, tick_s, source)?;
-        let faults = fault::check(self.faults, &scenario.robots, &scenario.lateness, tick_s, source)?;
-        let scenario = super::Scenario { network, faults, ..scenario };
+        let faults = fault::check(
+            self.faults,
+            &scenario.robots,
+            &scenario.lateness,
+            tick_s,
+            source,
+        )?;
+        let scenario = super::Scenario {
+            network,
+            faults,
+            ..scenario
+        };
         scenario.check_hall(source, self.guests.as_ref().map(Spanned::span))?;
         Ok(scenario)
     }
 
-    fn guest_courses(&self, source: &Source) -> Result<(world::Triangular, world::Triangular), FileError> {
+    fn guest_courses(
+        &self,
+        source: &Source,
+    ) -> Result<(world::Triangular, world::Triangular), FileError> {
         let guests = self.guests.as_ref().map(Spanned::get_ref);
         let speed = guests.and_then(|guests| guests.speed.as_ref());
         let duration = guests.and_then(|guests| guests.duration.as_ref());
@@ -206,20 +261,39 @@ impl Scenario {
             super::triangular(&raw).map_err(|reason| FileError::at(source, span, &reason))
         };
         let drawn = speed.map_or(GUEST_SPEED, |speed| *speed.get_ref());
-        let speed = Triangle { min: drawn.min.0, mode: drawn.mode.0, max: drawn.max.0 };
-        let speed = shape(speed, guests.and_then(|guests| guests.speed.as_ref()).map(Spanned::span))?;
+        let speed = Triangle {
+            min: drawn.min.0,
+            mode: drawn.mode.0,
+            max: drawn.max.0,
+        };
+        let speed = shape(
+            speed,
+            guests
+                .and_then(|guests| guests.speed.as_ref())
+                .map(Spanned::span),
+        )?;
         let drawn = duration.map_or(GUEST_DURATION, |duration| *duration.get_ref());
-        let lasting = Triangle { min: drawn.min.0, mode: drawn.mode.0, max: drawn.max.0 };
+        let lasting = Triangle {
+            min: drawn.min.0,
+            mode: drawn.mode.0,
+            max: drawn.max.0,
+        };
         Ok((speed, shape(lasting, duration.map(Spanned::span))?))
     }
 }
 
 impl super::Scenario {
     /// Places everything once, so that a hall that cannot be placed is refused before anything starts.
-    fn check_hall(&self, source: &Source, guests: Option<std::ops::Range<usize>>) -> Result<(), FileError> {
+    fn check_hall(
+        &self,
+        source: &Source,
+        guests: Option<std::ops::Range<usize>>,
+    ) -> Result<(), FileError> {
         let stream = protocol::random::stream(self.seed, "guests");
         let placed = world::World::new(&self.hall(), stream);
-        placed.map(|_| ()).map_err(|error| FileError::at(source, guests, &self.name_robots(&error)))
+        placed
+            .map(|_| ())
+            .map_err(|error| FileError::at(source, guests, &self.name_robots(&error)))
     }
 
     /// The environment counts its robots; people know their names.
@@ -256,7 +330,9 @@ fn robots(
         let (span, robot) = (entry.span(), entry.into_inner());
         let refuse = |reason: &str| FileError::at(source, Some(span.clone()), reason);
         if robot.name.is_operator() {
-            return Err(refuse("the name `operator` is kept for commands from outside the roster"));
+            return Err(refuse(
+                "the name `operator` is kept for commands from outside the roster",
+            ));
         }
         if robots.len() == MAX_ROBOTS {
             return Err(refuse("more than 1024 robots"));
@@ -264,11 +340,19 @@ fn robots(
         let mut parameters = Parameters::new();
         if let Some(file) = &robot.params_from {
             let read = Source::read(&folder.join(file)).and_then(|file| file.parse());
-            parameters.extend(to_parameters(&read.map_err(|error| error.named_by(&source.name))?));
+            parameters.extend(to_parameters(
+                &read.map_err(|error| error.named_by(&source.name))?,
+            ));
         }
         parameters.extend(to_parameters(&robot.params));
-        let class = robot.class.unwrap_or_else(|| robot.name.as_str().to_owned());
-        let spec = RobotSpec { class, at: point(robot.at), parameters };
+        let class = robot
+            .class
+            .unwrap_or_else(|| robot.name.as_str().to_owned());
+        let spec = RobotSpec {
+            class,
+            at: point(robot.at),
+            parameters,
+        };
         if robots.insert(robot.name.clone(), spec).is_some() {
             return Err(refuse(&format!("a second robot called {}", robot.name)));
         }
@@ -288,17 +372,26 @@ fn positive<T>(
     number: impl Fn(&T) -> f64,
     what: &str,
 ) -> Result<f64, FileError> {
-    let Some(spanned) = value else { return Ok(default) };
+    let Some(spanned) = value else {
+        return Ok(default);
+    };
     let value = number(spanned.get_ref());
     if value > 0.0 && value.is_finite() {
         return Ok(value);
     }
-    Err(FileError::at(source, Some(spanned.span()), &format!("{what} must be more than zero")))
+    Err(FileError::at(
+        source,
+        Some(spanned.span()),
+        &format!("{what} must be more than zero"),
+    ))
 }
 
 /// Parameters as they travel: JSON, every text that is a quantity turned into its SI number.
 fn to_parameters(table: &toml::Table) -> Parameters {
-    table.iter().map(|(key, value)| (key.clone(), to_json(value))).collect()
+    table
+        .iter()
+        .map(|(key, value)| (key.clone(), to_json(value)))
+        .collect()
 }
 
 fn to_json(value: &toml::Value) -> serde_json::Value {
@@ -312,7 +405,10 @@ fn to_json(value: &toml::Value) -> serde_json::Value {
         toml::Value::Boolean(flag) => (*flag).into(),
         toml::Value::Datetime(date) => date.to_string().into(),
         toml::Value::Array(values) => values.iter().map(to_json).collect(),
-        toml::Value::Table(table) => table.iter().map(|(key, value)| (key.clone(), to_json(value))).collect(),
+        toml::Value::Table(table) => table
+            .iter()
+            .map(|(key, value)| (key.clone(), to_json(value)))
+            .collect(),
     }
 }
 
@@ -321,9 +417,17 @@ impl From<&super::Scenario> for Scenario {
         let spanned = |value| Some(Spanned::new(0..0, value));
         let range = |shape: &world::Triangular| (shape.min(), shape.mode(), shape.max());
         let (min, mode, max) = range(&scenario.guests.speed_mps);
-        let speed = Range { min: Speed(min), mode: Speed(mode), max: Speed(max) };
+        let speed = Range {
+            min: Speed(min),
+            mode: Speed(mode),
+            max: Speed(max),
+        };
         let (min, mode, max) = range(&scenario.guests.duration_s);
-        let duration = Range { min: Time(min), mode: Time(mode), max: Time(max) };
+        let duration = Range {
+            min: Time(min),
+            mode: Time(mode),
+            max: Time(max),
+        };
         Self {
             seed: Some(Spanned::new(0..0, scenario.seed)),
             tick: spanned(Time(scenario.tick_s)),
@@ -339,7 +443,9 @@ impl From<&super::Scenario> for Scenario {
                     max_speed: Some(Speed(scenario.max_speed_mps)),
                 },
             )),
-            sensing: Some(SensingTable { range: Spanned::new(0..0, Length(scenario.sensing_range_m)) }),
+            sensing: Some(SensingTable {
+                range: Spanned::new(0..0, Length(scenario.sensing_range_m)),
+            }),
             guests: Some(Spanned::new(
                 0..0,
                 GuestsTable {
@@ -362,14 +468,22 @@ impl From<&super::Scenario> for Scenario {
             obstacles: scenario
                 .obstacles
                 .iter()
-                .map(|at| Obstacle { at: [Length(at.x), Length(at.y)] })
+                .map(|at| Obstacle {
+                    at: [Length(at.x), Length(at.y)],
+                })
                 .collect(),
             robots: scenario
                 .robots
                 .iter()
                 .map(|(name, spec)| {
                     let on_late = scenario.lateness.own.get(name).copied();
-                    Spanned::new(0..0, Robot { on_late, ..Robot::from((name, spec)) })
+                    Spanned::new(
+                        0..0,
+                        Robot {
+                            on_late,
+                            ..Robot::from((name, spec))
+                        },
+                    )
                 })
                 .collect(),
         }
@@ -378,7 +492,10 @@ impl From<&super::Scenario> for Scenario {
 
 impl From<(&RobotName, &RobotSpec)> for Robot {
     fn from((name, spec): (&RobotName, &RobotSpec)) -> Self {
-        let params = spec.parameters.iter().filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
+        let params = spec
+            .parameters
+            .iter()
+            .filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
         Self {
             name: name.clone(),
             class: Some(spec.class.clone()),

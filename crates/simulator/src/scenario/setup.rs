@@ -14,7 +14,11 @@ impl Scenario {
     /// What a person can change of it.
     #[must_use]
     pub fn setup(&self) -> Setup {
-        let range = |shape: &Triangular| Range { min: shape.min(), mode: shape.mode(), max: shape.max() };
+        let range = |shape: &Triangular| Range {
+            min: shape.min(),
+            mode: shape.mode(),
+            max: shape.max(),
+        };
         Setup {
             seed: self.seed,
             duration_s: self.duration_s(),
@@ -23,8 +27,15 @@ impl Scenario {
             guest_speed_mps: range(&self.guests.speed_mps),
             guest_duration_s: range(&self.guests.duration_s),
             obstacles: self.obstacles.clone(),
-            robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.at)).collect(),
-            log_file: LogFile { enabled: self.record.log, name: self.record.log_name.clone() },
+            robots: self
+                .robots
+                .iter()
+                .map(|(name, robot)| (name.clone(), robot.at))
+                .collect(),
+            log_file: LogFile {
+                enabled: self.record.log,
+                name: self.record.log_name.clone(),
+            },
         }
     }
 
@@ -36,17 +47,22 @@ impl Scenario {
         let mut errors = Errors::default();
         let mut scenario = self.clone();
         scenario.seed = setup.seed;
-        errors
-            .unless(setup.seed <= MAX_SEED, "seed", || format!("a seed is a whole number up to {MAX_SEED}"));
+        errors.unless(setup.seed <= MAX_SEED, "seed", || {
+            format!("a seed is a whole number up to {MAX_SEED}")
+        });
         let ticks = (setup.duration_s / self.tick_s).round();
         errors.unless((1.0..=MAX_TICKS).contains(&ticks), "duration_s", || {
-            format!("the duration must be at least one tick of {} s and at most a billion", self.tick_s)
+            format!(
+                "the duration must be at least one tick of {} s and at most a billion",
+                self.tick_s
+            )
         });
         scenario.ticks = ticks as u64;
         scenario.field_m = setup.field_m;
         let mut triangular = |range: &Range, field: &str| {
             let made = Triangular::new(range.min, range.mode, range.max);
-            made.map_err(|error| errors.add(field, error.to_string())).ok()
+            made.map_err(|error| errors.add(field, error.to_string()))
+                .ok()
         };
         let speed_mps = triangular(&setup.guest_speed_mps, "guest_speed_mps");
         let duration_s = triangular(&setup.guest_duration_s, "guest_duration_s");
@@ -59,11 +75,21 @@ impl Scenario {
         for (name, robot) in &mut scenario.robots {
             match setup.robots.get(name) {
                 Some(at) => robot.at = *at,
-                None => errors.add(&format!("robots.{name}"), "it must stand somewhere".to_owned()),
+                None => errors.add(
+                    &format!("robots.{name}"),
+                    "it must stand somewhere".to_owned(),
+                ),
             }
         }
-        for name in setup.robots.keys().filter(|name| !self.robots.contains_key(*name)) {
-            errors.add(&format!("robots.{name}"), "no robot of this run has this name".to_owned());
+        for name in setup
+            .robots
+            .keys()
+            .filter(|name| !self.robots.contains_key(*name))
+        {
+            errors.add(
+                &format!("robots.{name}"),
+                "no robot of this run has this name".to_owned(),
+            );
         }
         scenario.record.log = setup.log_file.enabled;
         match recorder::check_log_name(&setup.log_file.name) {
@@ -71,18 +97,27 @@ impl Scenario {
             Err(reason) => errors.add("log_file.name", reason),
         }
         if errors.0.is_empty()
-            && let Err(error) =
-                World::new(&scenario.hall(), protocol::random::stream(scenario.seed, "guests"))
+            && let Err(error) = World::new(
+                &scenario.hall(),
+                protocol::random::stream(scenario.seed, "guests"),
+            )
         {
             errors.add(&scenario.blame(&error), scenario.name_robots(&error));
         }
-        if errors.0.is_empty() { Ok(scenario) } else { Err(errors.0) }
+        if errors.0.is_empty() {
+            Ok(scenario)
+        } else {
+            Err(errors.0)
+        }
     }
 
     /// The field of a set-up that a hall which cannot be placed is the fault of.
     fn blame(&self, error: &HallError) -> String {
         let robot = |index: usize| {
-            self.robots.keys().nth(index).map_or("robots".to_owned(), |name| format!("robots.{name}"))
+            self.robots
+                .keys()
+                .nth(index)
+                .map_or("robots".to_owned(), |name| format!("robots.{name}"))
         };
         match *error {
             HallError::RobotOffField { index, .. }
@@ -90,7 +125,9 @@ impl Scenario {
             | HallError::RobotOnRobot { index, .. } => robot(index),
             HallError::ObstacleOffField { .. } => "obstacles".to_owned(),
             HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => "guests".to_owned(),
-            HallError::OutOfRange { name, .. } if name.contains("guest") => "guest_speed_mps".to_owned(),
+            HallError::OutOfRange { name, .. } if name.contains("guest") => {
+                "guest_speed_mps".to_owned()
+            }
             _ => "field_m".to_owned(),
         }
     }
@@ -101,7 +138,10 @@ impl Scenario {
     /// What differs that a run cannot change: its roster, or a robot's class.
     pub fn with_roster_of(self, running: &Self) -> Result<Self, String> {
         let names = |scenario: &Self| {
-            let robots = scenario.robots.iter().map(|(name, robot)| format!("{name} ({})", robot.class));
+            let robots = scenario
+                .robots
+                .iter()
+                .map(|(name, robot)| format!("{name} ({})", robot.class));
             robots.collect::<Vec<_>>().join(", ")
         };
         let (own, other) = (names(&self), names(running));
@@ -120,7 +160,10 @@ struct Errors(Vec<FieldError>);
 
 impl Errors {
     fn add(&mut self, field: &str, reason: String) {
-        self.0.push(FieldError { field: field.to_owned(), reason });
+        self.0.push(FieldError {
+            field: field.to_owned(),
+            reason,
+        });
     }
 
     fn unless(&mut self, is_right: bool, field: &str, reason: impl Fn() -> String) {

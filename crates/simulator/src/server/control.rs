@@ -4,7 +4,8 @@ use std::time::{Duration, Instant};
 
 use protocol::bus::Question;
 use protocol::messages::{
-    Awaited, Control, ControlAnswer, End, FieldError, Phase, Reason, RobotStatus, Setup, SetupAnswer, Status,
+    Awaited, Control, ControlAnswer, End, FieldError, Phase, Reason, RobotStatus, Setup,
+    SetupAnswer, Status,
 };
 use protocol::random::MAX_SEED;
 use protocol::{RobotName, Tick, decode, encode};
@@ -54,7 +55,11 @@ impl Pace {
 
     /// Tick 0 is complete.
     pub(super) fn ready(&mut self) {
-        self.phase = if self.starts_paused { Phase::Ready } else { Phase::Running };
+        self.phase = if self.starts_paused {
+            Phase::Ready
+        } else {
+            Phase::Running
+        };
         // Whoever presses init later wants to press start, too.
         self.starts_paused = true;
         (self.pending_steps, self.stepping) = (0, None);
@@ -84,15 +89,23 @@ impl Pace {
         if self.phase != Phase::Running {
             return Err(None);
         }
-        let Some(speed) = self.speed else { return Ok(()) };
+        let Some(speed) = self.speed else {
+            return Ok(());
+        };
         let now = Instant::now();
         if self.due > now {
             return Err(Some(self.due - now));
         }
         // A speed is finite and positive, but a very slow one asks for a very long tick.
         let tick = Duration::try_from_secs_f64(tick_s / speed).unwrap_or(Duration::MAX);
-        let from = if now - self.due > MAX_BEHIND { now } else { self.due };
-        self.due = from.checked_add(tick).unwrap_or(now + Duration::from_secs(86_400));
+        let from = if now - self.due > MAX_BEHIND {
+            now
+        } else {
+            self.due
+        };
+        self.due = from
+            .checked_add(tick)
+            .unwrap_or(now + Duration::from_secs(86_400));
         Ok(())
     }
 }
@@ -142,7 +155,11 @@ impl Server {
                 self.on_init(next, &question, simulation)?;
             }
             Control::Load { scenario } => {
-                self.on_init(load(&scenario, simulation.scenario()), &question, simulation)?;
+                self.on_init(
+                    load(&scenario, simulation.scenario()),
+                    &question,
+                    simulation,
+                )?;
             }
             Control::Setup => {
                 answer_setup(&question, simulation.scenario());
@@ -154,7 +171,8 @@ impl Server {
             }
             other => match self.act(&other) {
                 Ok(()) => {
-                    if let (Control::Pause, Some(stepping)) = (&other, self.pace.give_up_stepping()) {
+                    if let (Control::Pause, Some(stepping)) = (&other, self.pace.give_up_stepping())
+                    {
                         self.answer_status(&stepping, simulation);
                     }
                     self.answer_status(&question, simulation);
@@ -198,7 +216,11 @@ impl Server {
                 self.operator.push((to.clone(), command.clone()));
             }
             Control::FaultsDone { epoch, tick } => self.orders.done(*epoch, *tick),
-            Control::Late { robot, on_late, deadline_s } => {
+            Control::Late {
+                robot,
+                on_late,
+                deadline_s,
+            } => {
                 self.change_lateness(robot.as_ref(), *on_late, *deadline_s)?;
             }
             Control::Status => {}
@@ -265,7 +287,10 @@ impl Server {
 
     fn on_step(&mut self, n: u64, question: Question, simulation: &Simulation) {
         if !matches!(self.pace.phase, Phase::Ready | Phase::Paused) {
-            return refuse(&question, &format!("the run is {}; pause it to step", self.pace.phase));
+            return refuse(
+                &question,
+                &format!("the run is {}; pause it to step", self.pace.phase),
+            );
         }
         if n == 0 || n > MAX_STEPS {
             return refuse(&question, &format!("a step is 1 to {MAX_STEPS} ticks"));
@@ -280,8 +305,10 @@ impl Server {
         }
         // Only the last one to step is kept waiting; whoever came before is told how far things are.
         let until = simulation.tick() + self.pace.pending_steps + u64::from(self.open.is_open);
-        if let Some((earlier, _)) =
-            self.pace.stepping.replace((question, until.min(simulation.scenario().ticks)))
+        if let Some((earlier, _)) = self
+            .pace
+            .stepping
+            .replace((question, until.min(simulation.scenario().ticks)))
         {
             self.answer_status(&earlier, simulation);
         }
@@ -328,7 +355,11 @@ impl Server {
         if self.pace.phase == Phase::Gathering && !self.open.is_open {
             let missing = self.members.iter().filter(|(_, member)| !member.is_ready());
             return missing
-                .map(|(name, _)| Awaited { name: name.clone(), since_s, because: Reason::NotJoined })
+                .map(|(name, _)| Awaited {
+                    name: name.clone(),
+                    since_s,
+                    because: Reason::NotJoined,
+                })
                 .collect();
         }
         let because = |name| match self.open.waits.get(name) {
@@ -336,7 +367,13 @@ impl Server {
             Some(other) => Reason::WaitsFor(other.clone()),
             None => Reason::Silent,
         };
-        self.awaited().map(|name| Awaited { name: name.clone(), since_s, because: because(name) }).collect()
+        self.awaited()
+            .map(|name| Awaited {
+                name: name.clone(),
+                since_s,
+                because: because(name),
+            })
+            .collect()
     }
 }
 
@@ -348,18 +385,33 @@ struct Refusal {
 
 impl From<String> for Refusal {
     fn from(explanation: String) -> Self {
-        Self { explanation, fields: Vec::new() }
+        Self {
+            explanation,
+            fields: Vec::new(),
+        }
     }
 }
 
 impl From<Refusal> for ControlAnswer {
-    fn from(Refusal { explanation, fields }: Refusal) -> Self {
-        Self::Refused { explanation, fields }
+    fn from(
+        Refusal {
+            explanation,
+            fields,
+        }: Refusal,
+    ) -> Self {
+        Self::Refused {
+            explanation,
+            fields,
+        }
     }
 }
 
 /// The scenario of the next epoch.
-fn next_scenario(running: &Scenario, seed: Option<u64>, setup: Option<&Setup>) -> Result<Scenario, Refusal> {
+fn next_scenario(
+    running: &Scenario,
+    seed: Option<u64>,
+    setup: Option<&Setup>,
+) -> Result<Scenario, Refusal> {
     if seed.is_some_and(|seed| seed > MAX_SEED) {
         return Err(format!("a seed is at most {MAX_SEED}").into());
     }
@@ -372,12 +424,18 @@ fn next_scenario(running: &Scenario, seed: Option<u64>, setup: Option<&Setup>) -
             .join("\n"),
         fields,
     })?;
-    Ok(Scenario { seed: seed.unwrap_or(next.seed), ..next })
+    Ok(Scenario {
+        seed: seed.unwrap_or(next.seed),
+        ..next
+    })
 }
 
 /// The scenario that a text from outside describes, for the robots that are there.
 fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
-    let source = Source { name: "the scenario".to_owned(), text: text.to_owned() };
+    let source = Source {
+        name: "the scenario".to_owned(),
+        text: text.to_owned(),
+    };
     let loaded = Scenario::parse_alone(&source).map_err(|error| error.in_words())?;
     Ok(loaded.with_roster_of(running)?)
 }
@@ -385,8 +443,14 @@ fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
 fn answer_setup(question: &Question, scenario: &Scenario) {
     match scenario.to_toml() {
         Ok(text) => {
-            let answer = SetupAnswer { setup: scenario.setup(), scenario: text };
-            question.answer(question.key(), encode(&ControlAnswer::Setup(Box::new(answer))));
+            let answer = SetupAnswer {
+                setup: scenario.setup(),
+                scenario: text,
+            };
+            question.answer(
+                question.key(),
+                encode(&ControlAnswer::Setup(Box::new(answer))),
+            );
         }
         Err(error) => refuse(question, &error.to_string()),
     }

@@ -29,7 +29,11 @@ pub(super) struct Orders {
 
 impl Orders {
     pub(super) fn new(publisher: Publisher) -> Self {
-        Self { publisher, done: None, has_complained: false }
+        Self {
+            publisher,
+            done: None,
+            has_complained: false,
+        }
     }
 
     /// The launcher has carried out an order.
@@ -40,7 +44,10 @@ impl Orders {
 
 impl Server {
     /// Has the faults carried out that are due before the next tick.
-    pub(super) fn carry_out_faults(&mut self, simulation: &mut Simulation) -> Result<(), Interrupt> {
+    pub(super) fn carry_out_faults(
+        &mut self,
+        simulation: &mut Simulation,
+    ) -> Result<(), Interrupt> {
         let orders = simulation.faults_due();
         if orders.is_empty() {
             return Ok(());
@@ -49,13 +56,20 @@ impl Server {
         if !self.has_launcher(simulation)? {
             return Ok(());
         }
-        let order = FaultOrder { epoch: simulation.epoch(), tick: simulation.tick() + 1, orders };
+        let order = FaultOrder {
+            epoch: simulation.epoch(),
+            tick: simulation.tick() + 1,
+            orders,
+        };
         let message = encode(&order);
         self.orders.publisher.put(message.clone())?;
         let (begun, mut repeated) = (Instant::now(), Instant::now());
         while !self.is_carried_out(&order) {
             if begun.elapsed() > PATIENCE {
-                tracing::error!("the faults before tick {} were not carried out in time", order.tick);
+                tracing::error!(
+                    "the faults before tick {} were not carried out in time",
+                    order.tick
+                );
                 return Ok(());
             }
             if repeated.elapsed() > REPEAT_AFTER {
@@ -95,7 +109,9 @@ impl Server {
     /// over is back.
     fn is_carried_out(&self, order: &FaultOrder) -> bool {
         let is_so = |order: &ProcessOrder| {
-            let Some(member) = self.members.get(&order.robot) else { return true };
+            let Some(member) = self.members.get(&order.robot) else {
+                return true;
+            };
             match (order.kind, order.begins) {
                 (FaultKind::Crash, true) => !member.is_present,
                 (_, true) => true,

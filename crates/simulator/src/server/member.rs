@@ -69,7 +69,12 @@ impl Member {
         if !((self.is_pending || self.has_returned) && self.is_present) {
             return None;
         }
-        (self.is_pending, self.has_returned, self.is_lost, self.missed) = (false, false, false, 0);
+        (
+            self.is_pending,
+            self.has_returned,
+            self.is_lost,
+            self.missed,
+        ) = (false, false, false, 0);
         Some(self.generation)
     }
 
@@ -105,7 +110,11 @@ impl Member {
     /// Whether another process is this robot, or is about to show its token.
     fn is_taken_from(&self, instance: &str) -> bool {
         let is_other = self.instance.as_deref().is_some_and(|own| own != instance);
-        is_other && (self.is_present || self.joined_at.is_some_and(|at| at.elapsed() < TOKEN_PATIENCE))
+        is_other
+            && (self.is_present
+                || self
+                    .joined_at
+                    .is_some_and(|at| at.elapsed() < TOKEN_PATIENCE))
     }
 
     fn take_place(&mut self, instance: String) {
@@ -124,10 +133,15 @@ impl Member {
 
 impl Server {
     pub(super) fn on_join(&mut self, question: &Question, simulation: &Simulation) {
-        let answer = self.judge_join(question, simulation).unwrap_or_else(|(reason, explanation)| {
-            tracing::info!("refused a robot: {explanation}");
-            JoinAnswer::Refused { reason, explanation }
-        });
+        let answer =
+            self.judge_join(question, simulation)
+                .unwrap_or_else(|(reason, explanation)| {
+                    tracing::info!("refused a robot: {explanation}");
+                    JoinAnswer::Refused {
+                        reason,
+                        explanation,
+                    }
+                });
         question.answer(question.key(), encode(&answer));
     }
 
@@ -140,7 +154,8 @@ impl Server {
             .map_err(|error| (Refusal::Malformed, error.to_string()))?;
         let (name, run) = (&request.name, &self.options.run);
         // Access control looks at keys: whoever is in the key must be who is meant.
-        if let Some(asker) = Keys::joins_as(question.key()).filter(|asker| *asker != name.as_str()) {
+        if let Some(asker) = Keys::joins_as(question.key()).filter(|asker| *asker != name.as_str())
+        {
             return Err((Refusal::Malformed, format!("{asker} cannot join as {name}")));
         }
         if request.protocol != PROTOCOL_VERSION {
@@ -151,29 +166,51 @@ impl Server {
             return Err((Refusal::OtherProtocol, text));
         }
         if request.run != *run {
-            return Err((Refusal::OtherRun, format!("{name} means run {}, this is run {run}", request.run)));
+            return Err((
+                Refusal::OtherRun,
+                format!("{name} means run {}, this is run {run}", request.run),
+            ));
         }
         if self.pace.phase() == Phase::Ended {
             return Err((Refusal::Ended, format!("run {run} is over")));
         }
         let Some(member) = self.members.get_mut(name) else {
-            let roster: Vec<&str> = self.members.keys().map(protocol::RobotName::as_str).collect();
-            let text = format!("no robot of this run is called {name}; its robots are {}", roster.join(", "));
+            let roster: Vec<&str> = self
+                .members
+                .keys()
+                .map(protocol::RobotName::as_str)
+                .collect();
+            let text = format!(
+                "no robot of this run is called {name}; its robots are {}",
+                roster.join(", ")
+            );
             return Err((Refusal::UnknownName, text));
         };
         if member.is_taken_from(&request.instance) {
-            return Err((Refusal::NameTaken, format!("another living process is {name} already")));
+            return Err((
+                Refusal::NameTaken,
+                format!("another living process is {name} already"),
+            ));
         }
         member.take_place(request.instance.clone());
         let generation = member.generation;
         let mut welcome = simulation.welcome(run, name, generation);
         // Its predecessor had done the tick that is under way, in which others may still ask for the one before.
         if let (Some(welcome), Some(report)) = (&mut welcome, self.open.reports.get(name)) {
-            welcome.state_before = welcome.last_state.replace(public_state(report, welcome.location));
+            welcome.state_before = welcome
+                .last_state
+                .replace(public_state(report, welcome.location));
             set_apart(welcome);
         }
-        let unknown = || (Refusal::UnknownName, format!("no robot of this run is called {name}"));
-        welcome.map(|welcome| JoinAnswer::Welcome(Box::new(welcome))).ok_or_else(unknown)
+        let unknown = || {
+            (
+                Refusal::UnknownName,
+                format!("no robot of this run is called {name}"),
+            )
+        };
+        welcome
+            .map(|welcome| JoinAnswer::Welcome(Box::new(welcome)))
+            .ok_or_else(unknown)
     }
 
     pub(super) fn on_token(
@@ -188,7 +225,9 @@ impl Server {
         };
         let name = name.clone();
         let is_open = self.open_tick().is_some() && !self.open.reports.contains_key(&name);
-        let Some(member) = self.members.get_mut(&name) else { return Ok(()) };
+        let Some(member) = self.members.get_mut(&name) else {
+            return Ok(());
+        };
         member.is_present = is_there;
         if is_there {
             // It has been here: when its token goes, its place is free at once.
@@ -197,7 +236,9 @@ impl Server {
         if is_there && is_open {
             // It takes the place of one that was lost in this very tick, or it is back and may have missed the clock.
             if let Some(generation) = member.take_pending() {
-                self.open.membership.push(Membership::Joined(name.clone(), generation));
+                self.open
+                    .membership
+                    .push(Membership::Joined(name.clone(), generation));
                 introduce(&mut self.open.clock, &name, generation, simulation);
             }
             self.repeat_clock()?;

@@ -7,7 +7,8 @@ use protocol::bus::{Bus, BusError, Publisher};
 use protocol::encode;
 use protocol::keys::Keys;
 use protocol::messages::{
-    Awaited, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, Presence, RobotFrame, Status, WorldFrame,
+    Awaited, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, Presence, RobotFrame, Status,
+    WorldFrame,
 };
 use protocol::{Event, RobotName};
 
@@ -45,7 +46,10 @@ impl Observers {
     pub(super) fn frame(&mut self, simulation: &Simulation, status: &Status) {
         self.painted = Instant::now();
         let flights = std::mem::take(&mut self.flights);
-        show(&self.world, encode(&paint(simulation, status, flights.into())));
+        show(
+            &self.world,
+            encode(&paint(simulation, status, flights.into())),
+        );
     }
 
     /// Notes what the next frame tells of a tick.
@@ -53,7 +57,11 @@ impl Observers {
         if !self.world.is_watched() {
             return;
         }
-        for flight in record.events.iter().filter_map(|event| flight(record.tick, event)) {
+        for flight in record
+            .events
+            .iter()
+            .filter_map(|event| flight(record.tick, event))
+        {
             if self.flights.len() == MAX_FLIGHTS {
                 self.flights.pop_front();
             }
@@ -91,8 +99,14 @@ impl Observers {
         tracing::warn!("{text}");
         let (epoch, tick) = (simulation.epoch(), simulation.tick());
         let (source, kind) = ("simulator".to_owned(), LogKind::Late);
-        let line =
-            LogRecord { epoch, tick, time_s: simulation.time_s(tick), source, kind, text: text.to_owned() };
+        let line = LogRecord {
+            epoch,
+            tick,
+            time_s: simulation.time_s(tick),
+            source,
+            kind,
+            text: text.to_owned(),
+        };
         show(&self.log, encode(&line));
     }
 }
@@ -105,21 +119,38 @@ fn show(to: &Publisher, message: Vec<u8>) {
 }
 
 fn name_all(awaiting: &[Awaited]) -> String {
-    let one =
-        |awaited: &Awaited| format!("{} ({}, since {:.1} s)", awaited.name, awaited.because, awaited.since_s);
+    let one = |awaited: &Awaited| {
+        format!(
+            "{} ({}, since {:.1} s)",
+            awaited.name, awaited.because, awaited.since_s
+        )
+    };
     awaiting.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// What an event says of a command; `None` if it is about something else.
 fn flight(tick: protocol::Tick, event: &Event) -> Option<Flight> {
     let (from, to, seq, command, fate) = match event {
-        Event::CommandSent { from, to, seq, command, .. } => (from, to, *seq, command.as_str(), Fate::Sent),
+        Event::CommandSent {
+            from,
+            to,
+            seq,
+            command,
+            ..
+        } => (from, to, *seq, command.as_str(), Fate::Sent),
         Event::CommandDelivered { from, to, seq } => (from, to, *seq, "", Fate::Delivered),
         Event::CommandDropped { from, to, seq, .. } => (from, to, *seq, "", Fate::Dropped),
         Event::CommandMissing { from, to, seq } => (from, to, *seq, "", Fate::Missing),
         _ => return None,
     };
-    Some(Flight { tick, from: from.clone(), to: to.clone(), seq, command: command.to_owned(), fate })
+    Some(Flight {
+        tick,
+        from: from.clone(),
+        to: to.clone(),
+        seq,
+        command: command.to_owned(),
+        fate,
+    })
 }
 
 fn paint(simulation: &Simulation, status: &Status, flights: Vec<Flight>) -> WorldFrame {
@@ -133,9 +164,15 @@ fn paint(simulation: &Simulation, status: &Status, flights: Vec<Flight>) -> Worl
             speed_mps: report.map_or(0.0, |report| report.speed_mps),
             direction_rad: report.map_or(0.0, |report| report.direction_rad),
             blocked: simulation.is_blocked(name),
-            emotion_state: report.map(|report| report.emotion_state.clone()).unwrap_or_default(),
-            behavior_state: report.map(|report| report.behavior_state.clone()).unwrap_or_default(),
-            state_variables: report.map(|report| report.state_variables.clone()).unwrap_or_default(),
+            emotion_state: report
+                .map(|report| report.emotion_state.clone())
+                .unwrap_or_default(),
+            behavior_state: report
+                .map(|report| report.behavior_state.clone())
+                .unwrap_or_default(),
+            state_variables: report
+                .map(|report| report.state_variables.clone())
+                .unwrap_or_default(),
             generation: process.map_or(0, |process| process.generation),
             presence: process.map_or(Presence::Gone, |process| process.presence),
         }
@@ -154,8 +191,16 @@ fn paint(simulation: &Simulation, status: &Status, flights: Vec<Flight>) -> Worl
         field_m: scenario.field_m,
         body_m: scenario.body_m,
         robots: simulation.names().iter().map(robot).collect(),
-        guests: world.guests().iter().map(|guest| [guest.x, guest.y]).collect(),
-        obstacles: world.obstacles().iter().map(|obstacle| [obstacle.x, obstacle.y]).collect(),
+        guests: world
+            .guests()
+            .iter()
+            .map(|guest| [guest.x, guest.y])
+            .collect(),
+        obstacles: world
+            .obstacles()
+            .iter()
+            .map(|obstacle| [obstacle.x, obstacle.y])
+            .collect(),
         flights,
         cuts: simulation.cuts(),
     }

@@ -68,11 +68,15 @@ impl NetworkSummary {
             Event::CommandDelivered { from, to, .. } => {
                 self.link(from, to).delivered += 1;
                 let cut = self.cuts.iter_mut().rev().find(|cut| cut.is_of(from, to));
-                if let Some((cut, until_s)) = cut.and_then(|cut| cut.until_s.map(|until_s| (cut, until_s))) {
+                if let Some((cut, until_s)) =
+                    cut.and_then(|cut| cut.until_s.map(|until_s| (cut, until_s)))
+                {
                     cut.healed_after_s.get_or_insert(now_s - until_s);
                 }
             }
-            Event::CommandDropped { from, to, because, .. } => {
+            Event::CommandDropped {
+                from, to, because, ..
+            } => {
                 *self.link(from, to).dropped.entry(*because).or_default() += 1;
                 if let (Cause::Partition, Some(cut)) = (because, self.open_cut(from, to)) {
                     cut.detected_after_s.get_or_insert(now_s - cut.from_s);
@@ -81,7 +85,9 @@ impl NetworkSummary {
             Event::CommandDelayed { from, to, .. } => self.link(from, to).delayed += 1,
             Event::CommandDuplicated { from, to, .. } => self.link(from, to).duplicated += 1,
             Event::CommandMissing { from, to, .. } => self.link(from, to).missing += 1,
-            Event::LinkCut { from, to, queries, .. } => self.begin_cut(from, to, now_s, *queries),
+            Event::LinkCut {
+                from, to, queries, ..
+            } => self.begin_cut(from, to, now_s, *queries),
             Event::LinkHealed { from, to } => {
                 if let Some(cut) = self.open_cut(from, to) {
                     cut.until_s = Some(now_s);
@@ -98,7 +104,14 @@ impl NetworkSummary {
             None => {
                 let (from, to) = (from.clone(), to.clone());
                 let (until_s, detected_after_s, healed_after_s) = (None, None, None);
-                self.cuts.push(CutSummary { from, to, from_s, until_s, detected_after_s, healed_after_s });
+                self.cuts.push(CutSummary {
+                    from,
+                    to,
+                    from_s,
+                    until_s,
+                    detected_after_s,
+                    healed_after_s,
+                });
                 let last = self.cuts.len() - 1;
                 &mut self.cuts[last]
             }
@@ -121,7 +134,10 @@ impl NetworkSummary {
                 aged.insert(key(asker, target));
             }
         }
-        let fresh = self.links.iter_mut().filter(|(name, _)| !aged.contains(*name));
+        let fresh = self
+            .links
+            .iter_mut()
+            .filter(|(name, _)| !aged.contains(*name));
         fresh.for_each(|(_, link)| link.stale_ticks = 0);
     }
 
@@ -130,7 +146,10 @@ impl NetworkSummary {
     }
 
     fn open_cut(&mut self, from: &RobotName, to: &RobotName) -> Option<&mut CutSummary> {
-        self.cuts.iter_mut().rev().find(|cut| cut.is_of(from, to) && cut.until_s.is_none())
+        self.cuts
+            .iter_mut()
+            .rev()
+            .find(|cut| cut.is_of(from, to) && cut.until_s.is_none())
     }
 }
 

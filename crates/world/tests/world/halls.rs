@@ -20,9 +20,16 @@ pub(crate) fn triangular(min: f64, mode: f64, max: f64) -> Triangular {
 /// The seed's hall: 50 ft by 50 ft, bodies of 2 ft, `count` guests, nothing else.
 pub(crate) fn reception(count: usize) -> Hall {
     Hall {
-        field: Field { size_m: (50.0 * FT, 50.0 * FT), body_m: 2.0 * FT },
+        field: Field {
+            size_m: (50.0 * FT, 50.0 * FT),
+            body_m: 2.0 * FT,
+        },
         obstacles: Vec::new(),
-        guests: Guests { count, speed_mps: triangular(0.2, 0.6, 1.2), duration_s: triangular(1.0, 3.0, 8.0) },
+        guests: Guests {
+            count,
+            speed_mps: triangular(0.2, 0.6, 1.2),
+            duration_s: triangular(1.0, 3.0, 8.0),
+        },
         robots: Vec::new(),
         tick_s: 0.1,
         max_speed_mps: 2.0 * FT,
@@ -31,7 +38,12 @@ pub(crate) fn reception(count: usize) -> Hall {
 
 /// The places of all bodies that must not overlap one another: robots, then guests.
 pub(crate) fn movers(world: &TestWorld) -> Vec<Point> {
-    world.robots().iter().chain(world.guests()).copied().collect()
+    world
+        .robots()
+        .iter()
+        .chain(world.guests())
+        .copied()
+        .collect()
 }
 
 /// Whether squares with these centers overlap, in the tests' own words; a nanometre counts as touching.
@@ -44,7 +56,10 @@ pub(crate) fn is_inside(field: &Field, at: Point) -> bool {
     let (left, right) = (at.x - half_m, at.x + half_m);
     let (bottom, top) = (at.y - half_m, at.y + half_m);
     // Twice the tolerance leaves room for the rounding of this very test.
-    left >= -2e-9 && bottom >= -2e-9 && right <= field.size_m.0 + 2e-9 && top <= field.size_m.1 + 2e-9
+    left >= -2e-9
+        && bottom >= -2e-9
+        && right <= field.size_m.0 + 2e-9
+        && top <= field.size_m.1 + 2e-9
 }
 
 /// The two promises of the crate: no body leaves the field, no two overlap (obstacles may among themselves).
@@ -53,7 +68,9 @@ pub(crate) fn check_promises(world: &TestWorld) {
     for (index, &at) in movers.iter().enumerate() {
         assert!(is_inside(field, at), "body {index} at {at} left the field");
         let others = movers[..index].iter().chain(world.obstacles());
-        let hit = others.copied().find(|&other| overlap(field.body_m, at, other));
+        let hit = others
+            .copied()
+            .find(|&other| overlap(field.body_m, at, other));
         assert_eq!(hit, None, "body {index} at {at} overlaps another");
     }
 }

@@ -16,7 +16,11 @@ struct Plain {
 
 impl Plain {
     fn of(world: &TestWorld) -> Self {
-        Self { obstacles: world.obstacles().to_vec(), robots: world.robots().len(), movers: movers(world) }
+        Self {
+            obstacles: world.obstacles().to_vec(),
+            robots: world.robots().len(),
+            movers: movers(world),
+        }
     }
 
     fn attempt(&mut self, world: &TestWorld, mover: usize, to: Point) -> Option<Blocker> {
@@ -24,14 +28,22 @@ impl Plain {
         if !field.contains(to) {
             return Some(Blocker::Edge);
         }
-        if let Some(index) = self.obstacles.iter().position(|&at| overlap(field.body_m, at, to)) {
+        if let Some(index) = self
+            .obstacles
+            .iter()
+            .position(|&at| overlap(field.body_m, at, to))
+        {
             return Some(Blocker::Body(Body::Obstacle(index)));
         }
         let hit = (0..self.movers.len())
             .find(|&other| other != mover && overlap(field.body_m, self.movers[other], to));
         if let Some(other) = hit {
             let is_robot = other < self.robots;
-            let body = if is_robot { Body::Robot(other) } else { Body::Guest(other - self.robots) };
+            let body = if is_robot {
+                Body::Robot(other)
+            } else {
+                Body::Guest(other - self.robots)
+            };
             return Some(Blocker::Body(body));
         }
         self.movers[mover] = to;
@@ -39,14 +51,17 @@ impl Plain {
     }
 
     fn judge(&mut self, world: &TestWorld, robot: usize, proposal: Option<Point>) -> Verdict {
-        let Some(to) = proposal else { return Verdict::Stayed };
+        let Some(to) = proposal else {
+            return Verdict::Stayed;
+        };
         let way = to - self.movers[robot];
         if !(to.x.is_finite() && to.y.is_finite()) {
             Verdict::NotFinite
         } else if (way.x * way.x + way.y * way.y).sqrt() > world.stride_m() + 1e-9 {
             Verdict::TooFast
         } else {
-            self.attempt(world, robot, to).map_or(Verdict::Advanced, |by| Verdict::Blocked { by })
+            self.attempt(world, robot, to)
+                .map_or(Verdict::Advanced, |by| Verdict::Blocked { by })
         }
     }
 }
@@ -84,12 +99,20 @@ fn check_run(world: &mut TestWorld, ticks: usize, seed: u64) {
         let mut plain = Plain::of(world);
         let verdicts = world.advance(&proposals);
         for (robot, &proposal) in proposals.iter().enumerate() {
-            assert_eq!(verdicts[robot], plain.judge(&before, robot, proposal), "robot {robot} {proposal:?}");
+            assert_eq!(
+                verdicts[robot],
+                plain.judge(&before, robot, proposal),
+                "robot {robot} {proposal:?}"
+            );
         }
         for (guest, course) in world.courses().iter().enumerate() {
             let mover = plain.robots + guest;
             let to = plain.movers[mover] + course.step_m;
-            assert_eq!(world.guest_blockers()[guest], plain.attempt(&before, mover, to), "guest {guest}");
+            assert_eq!(
+                world.guest_blockers()[guest],
+                plain.attempt(&before, mover, to),
+                "guest {guest}"
+            );
         }
         assert_eq!(movers(world), plain.movers);
         assert_eq!(world.obstacles(), plain.obstacles);
@@ -140,8 +163,14 @@ proptest! {
 fn the_reception_follows_the_rules_at_every_density() {
     for count in [0, 1, 25, 100, 200, 300, 350, 400, 500, 600, 620] {
         let mut hall = reception(count);
-        hall.obstacles = vec![Point::new(3.0 * FT, 3.0 * FT), Point::new(5.0 * FT, 3.0 * FT)];
-        hall.robots = vec![Point::new(25.0 * FT, 25.0 * FT), Point::new(3.0 * FT, 5.0 * FT)];
+        hall.obstacles = vec![
+            Point::new(3.0 * FT, 3.0 * FT),
+            Point::new(5.0 * FT, 3.0 * FT),
+        ];
+        hall.robots = vec![
+            Point::new(25.0 * FT, 25.0 * FT),
+            Point::new(3.0 * FT, 5.0 * FT),
+        ];
         check_run(&mut World::new(&hall, rng(count as u64)).unwrap(), 200, 7);
     }
 }
@@ -162,7 +191,10 @@ fn in_a_full_hall_nobody_moves() {
 fn quiet(obstacles: &[(f64, f64)], robots: &[(f64, f64)]) -> TestWorld {
     let points = |places: &[(f64, f64)]| places.iter().map(|&(x, y)| Point::new(x, y)).collect();
     let hall = Hall {
-        field: world::Field { size_m: (10.0, 10.0), body_m: 1.0 },
+        field: world::Field {
+            size_m: (10.0, 10.0),
+            body_m: 1.0,
+        },
         obstacles: points(obstacles),
         robots: points(robots),
         max_speed_mps: 10.0,
@@ -176,14 +208,19 @@ fn go(x: f64, y: f64) -> Option<Point> {
 }
 
 fn blocked(body: Body) -> Verdict {
-    Verdict::Blocked { by: Blocker::Body(body) }
+    Verdict::Blocked {
+        by: Blocker::Body(body),
+    }
 }
 
 #[test]
 fn the_first_in_the_order_goes_first() {
     // The follower takes the leader's place if the leader has gone before, and not if it is to go after.
     let mut world = quiet(&[], &[(5.5, 5.0), (4.5, 5.0)]);
-    assert_eq!(world.advance(&[go(6.5, 5.0), go(5.5, 5.0)]), [Verdict::Advanced, Verdict::Advanced]);
+    assert_eq!(
+        world.advance(&[go(6.5, 5.0), go(5.5, 5.0)]),
+        [Verdict::Advanced, Verdict::Advanced]
+    );
     let mut world = quiet(&[], &[(4.5, 5.0), (5.5, 5.0)]);
     let verdicts = world.advance(&[go(5.5, 5.0), go(6.5, 5.0)]);
     assert_eq!(verdicts, [blocked(Body::Robot(1)), Verdict::Advanced]);
@@ -197,7 +234,10 @@ fn the_first_in_the_order_goes_first() {
 fn robots_go_before_guests() {
     let mut tried = 0;
     for seed in 0..50 {
-        let mut hall = Hall { max_speed_mps: 1000.0, ..reception(1) };
+        let mut hall = Hall {
+            max_speed_mps: 1000.0,
+            ..reception(1)
+        };
         hall.robots = vec![Point::new(1.0, 1.0)];
         let mut world = World::new(&hall, rng(seed)).unwrap();
         // Beside the guest, on the side to which it is about to step.
@@ -206,7 +246,10 @@ fn robots_go_before_guests() {
         if world.field().contains(to) {
             tried += 1;
             assert_eq!(world.advance(&[Some(to)]), [Verdict::Advanced]);
-            assert_eq!(world.guest_blockers(), [Some(Blocker::Body(Body::Robot(0)))]);
+            assert_eq!(
+                world.guest_blockers(),
+                [Some(Blocker::Body(Body::Robot(0)))]
+            );
         }
     }
     assert!(tried > 25, "{tried}");
@@ -215,10 +258,19 @@ fn robots_go_before_guests() {
 #[test]
 fn touching_is_not_colliding() {
     let mut world = quiet(&[(2.5, 5.0)], &[(4.0, 5.0), (4.0, 6.0)]);
-    assert_eq!(world.advance(&[go(3.5, 5.0), go(3.5, 6.0)]), [Verdict::Advanced, Verdict::Advanced]);
-    assert_eq!(world.advance(&[go(3.5 - 5e-10, 5.0), None]), [Verdict::Advanced, Verdict::Stayed]);
+    assert_eq!(
+        world.advance(&[go(3.5, 5.0), go(3.5, 6.0)]),
+        [Verdict::Advanced, Verdict::Advanced]
+    );
+    assert_eq!(
+        world.advance(&[go(3.5 - 5e-10, 5.0), None]),
+        [Verdict::Advanced, Verdict::Stayed]
+    );
     let verdicts = world.advance(&[go(3.5 - 2e-9, 5.0), go(3.5, 6.0 - 2e-9)]);
-    assert_eq!(verdicts, [blocked(Body::Obstacle(0)), blocked(Body::Robot(0))]);
+    assert_eq!(
+        verdicts,
+        [blocked(Body::Obstacle(0)), blocked(Body::Robot(0))]
+    );
     // Tolerance is for each test, not for each tick: it cannot be used to creep in.
     for nanometre in 1..100 {
         world.advance(&[go(3.5 - f64::from(nanometre) * 1e-9, 5.0), None]);
@@ -231,7 +283,10 @@ fn edges_hold() {
     let mut world = quiet(&[], &[(0.5, 0.5), (9.5, 9.5)]);
     let edge = Verdict::Blocked { by: Blocker::Edge };
     for (first, second) in [((0.4, 0.5), (9.6, 9.5)), ((0.5, 0.4), (9.5, 9.6))] {
-        assert_eq!(world.advance(&[go(first.0, first.1), go(second.0, second.1)]), [edge, edge]);
+        assert_eq!(
+            world.advance(&[go(first.0, first.1), go(second.0, second.1)]),
+            [edge, edge]
+        );
     }
     assert!(!is_inside(world.field(), Point::new(0.4, 0.5)));
     check_promises(&world);
@@ -240,8 +295,14 @@ fn edges_hold() {
 #[test]
 fn the_first_of_several_blockers_is_named() {
     let mut world = quiet(&[(1.2, 4.5), (1.2, 5.5)], &[(2.5, 5.0), (1.9, 6.5)]);
-    assert_eq!(world.advance(&[go(1.9, 5.2), None]), [blocked(Body::Obstacle(0)), Verdict::Stayed]);
-    assert_eq!(world.advance(&[go(2.5, 5.8), None]), [blocked(Body::Robot(1)), Verdict::Stayed]);
+    assert_eq!(
+        world.advance(&[go(1.9, 5.2), None]),
+        [blocked(Body::Obstacle(0)), Verdict::Stayed]
+    );
+    assert_eq!(
+        world.advance(&[go(2.5, 5.8), None]),
+        [blocked(Body::Robot(1)), Verdict::Stayed]
+    );
 }
 
 #[test]

@@ -41,19 +41,32 @@ fn the_one_at_the_place_is_near_and_the_range_is_a_circle() {
     hall.robots = vec![Point::new(5.0, 5.0)];
     let world = World::new(&hall, rng(0)).unwrap();
     let found = |range_m| {
-        world.near(Point::new(5.0, 5.0), range_m).into_iter().map(|near| near.body).collect::<Vec<_>>()
+        world
+            .near(Point::new(5.0, 5.0), range_m)
+            .into_iter()
+            .map(|near| near.body)
+            .collect::<Vec<_>>()
     };
     assert_eq!(found(0.0), [Body::Robot(0)]);
     assert_eq!(found(4.0), [Body::Obstacle(1), Body::Robot(0)]);
-    assert_eq!(found(4.3), [Body::Obstacle(0), Body::Obstacle(1), Body::Robot(0)]);
+    assert_eq!(
+        found(4.3),
+        [Body::Obstacle(0), Body::Obstacle(1), Body::Robot(0)]
+    );
 }
 
 #[test]
 fn nonsense_finds_nothing() {
     let world = World::new(&reception(100), rng(0)).unwrap();
     assert_eq!(world.near(Point::new(f64::NAN, 1.0), 100.0), []);
-    assert_eq!(world.near(Point::new(1.0, f64::INFINITY), f64::INFINITY), []);
+    assert_eq!(
+        world.near(Point::new(1.0, f64::INFINITY), f64::INFINITY),
+        []
+    );
     assert_eq!(world.near(Point::new(1.0, 1.0), f64::NAN), []);
     assert_eq!(world.near(Point::new(1.0, 1.0), -100.0), []);
-    assert_eq!(world.near(Point::new(-1e300, 1.0), f64::INFINITY).len(), 100);
+    assert_eq!(
+        world.near(Point::new(-1e300, 1.0), f64::INFINITY).len(),
+        100
+    );
 }

@@ -57,17 +57,33 @@ fn an_obstacle_on_the_lattice_costs_one_place() {
     hall.robots = vec![Point::new(25.0 * FT, 25.0 * FT)];
     check_promises(&World::new(&hall, rng(1)).unwrap());
     hall.guests.count = 624;
-    assert_eq!(World::new(&hall, rng(1)).unwrap_err(), HallError::NoRoom { count: 624, room: 623 });
+    assert_eq!(
+        World::new(&hall, rng(1)).unwrap_err(),
+        HallError::NoRoom {
+            count: 624,
+            room: 623
+        }
+    );
 }
 
 #[test]
 fn rows_close_up_behind_bodies_off_the_lattice() {
     // Robots at 0.9..1.9 and 2.9..3.9 of 5 m: one guest fits between and one beyond; the lattice had one cell.
-    let field = Field { size_m: (5.0, 1.0), body_m: 1.0 };
-    let mut hall = Hall { field, robots: vec![Point::new(1.4, 0.5), Point::new(3.4, 0.5)], ..reception(2) };
+    let field = Field {
+        size_m: (5.0, 1.0),
+        body_m: 1.0,
+    };
+    let mut hall = Hall {
+        field,
+        robots: vec![Point::new(1.4, 0.5), Point::new(3.4, 0.5)],
+        ..reception(2)
+    };
     check_promises(&World::new(&hall, rng(1)).unwrap());
     hall.guests.count = 3;
-    assert_eq!(World::new(&hall, rng(1)).unwrap_err(), HallError::NoRoom { count: 3, room: 2 });
+    assert_eq!(
+        World::new(&hall, rng(1)).unwrap_err(),
+        HallError::NoRoom { count: 3, room: 2 }
+    );
 }
 
 #[test]
@@ -85,12 +101,20 @@ fn a_crowd_below_the_jam_stands_anywhere() {
     }
     assert_eq!(columns.len(), 20_000);
     // Those at the edges have fewer neighbors and get a little more.
-    assert!(sixteenths.iter().all(|share| (0.85..1.2).contains(share)), "{sixteenths:?}");
+    assert!(
+        sixteenths.iter().all(|share| (0.85..1.2).contains(share)),
+        "{sixteenths:?}"
+    );
 }
 
 #[test]
 fn a_jammed_crowd_is_a_random_choice_of_the_lattice() {
-    let place = |seed| World::new(&reception(500), rng(seed)).unwrap().guests().to_vec();
+    let place = |seed| {
+        World::new(&reception(500), rng(seed))
+            .unwrap()
+            .guests()
+            .to_vec()
+    };
     let cell = |at: &Point| ((at.x / (2.0 * FT)) as usize, (at.y / (2.0 * FT)) as usize);
     let mut taken = BTreeSet::new();
     for seed in 0..10 {
@@ -106,8 +130,9 @@ fn a_jammed_crowd_is_a_random_choice_of_the_lattice() {
 #[test]
 fn obstacles_may_touch_and_overlap() {
     let mut hall = reception(100);
-    hall.obstacles =
-        [(3.0, 3.0), (5.0, 3.0), (5.0, 4.0), (3.0, 3.0)].map(|(x, y)| Point::new(x * FT, y * FT)).into();
+    hall.obstacles = [(3.0, 3.0), (5.0, 3.0), (5.0, 4.0), (3.0, 3.0)]
+        .map(|(x, y)| Point::new(x * FT, y * FT))
+        .into();
     hall.robots = vec![Point::new(7.0 * FT, 3.0 * FT)];
     check_promises(&World::new(&hall, rng(1)).unwrap());
 }
@@ -162,12 +187,23 @@ fn numbers_out_of_range_are_named() {
             wrong(|hall| hall.field.size_m.1 = 2e6),
             "field height_m is 2000000.0; it must be a number from 0.001 to 1000000.0",
         ),
-        (wrong(|hall| hall.field.body_m = 0.0), "body_m is 0.0; it must be a number from 0.001 to 1000000.0"),
         (
-            wrong(|hall| hall.field = Field { size_m: (1.0, 3.0), body_m: 2.0 }),
+            wrong(|hall| hall.field.body_m = 0.0),
+            "body_m is 0.0; it must be a number from 0.001 to 1000000.0",
+        ),
+        (
+            wrong(|hall| {
+                hall.field = Field {
+                    size_m: (1.0, 3.0),
+                    body_m: 2.0,
+                }
+            }),
             "a field of 1 m by 3 m has no room for a body of 2 m",
         ),
-        (wrong(|hall| hall.tick_s = -0.1), "tick_s is -0.1; it must be a number from 1e-6 to 1000000.0"),
+        (
+            wrong(|hall| hall.tick_s = -0.1),
+            "tick_s is -0.1; it must be a number from 1e-6 to 1000000.0",
+        ),
         (
             wrong(|hall| hall.max_speed_mps = f64::INFINITY),
             "max_speed_mps is inf; it must be a number from 0.0 to 1000000.0",
@@ -184,9 +220,24 @@ fn numbers_out_of_range_are_named() {
 #[test]
 fn the_limits_themselves_are_answered() {
     // The most guests asked for where one fits, the largest field, the smallest body: an answer, soon.
-    let mut hall = Hall { field: Field { size_m: (1.0, 1.0), body_m: 1.0 }, ..reception(BODIES_MAX) };
-    assert_eq!(World::new(&hall, rng(0)).unwrap_err(), HallError::NoRoom { count: BODIES_MAX, room: 1 });
-    hall.field = Field { size_m: (1e6, 1e6), body_m: 1e-3 };
+    let mut hall = Hall {
+        field: Field {
+            size_m: (1.0, 1.0),
+            body_m: 1.0,
+        },
+        ..reception(BODIES_MAX)
+    };
+    assert_eq!(
+        World::new(&hall, rng(0)).unwrap_err(),
+        HallError::NoRoom {
+            count: BODIES_MAX,
+            room: 1
+        }
+    );
+    hall.field = Field {
+        size_m: (1e6, 1e6),
+        body_m: 1e-3,
+    };
     hall.guests.count = 1000;
     hall.guests.speed_mps = triangular(1e6, 1e6, 1e6);
     let mut world = World::new(&hall, rng(0)).unwrap();

@@ -19,8 +19,11 @@ impl Supervisor {
         }
         for order in orders {
             let runs = |kept: &super::Kept| kept.planned.robots.contains(&order.robot);
-            let Some(index) =
-                self.kept.iter().position(runs).filter(|index| !self.kept[*index].planned.is_extern)
+            let Some(index) = self
+                .kept
+                .iter()
+                .position(runs)
+                .filter(|index| !self.kept[*index].planned.is_extern)
             else {
                 self.tell.notice(format!(
                     "{} is not run by this launcher: its fault is yours to bring about",
@@ -28,7 +31,11 @@ impl Supervisor {
                 ));
                 continue;
             };
-            if order.begins { self.begin_fault(index, order) } else { self.end_fault(index, order.kind) }
+            if order.begins {
+                self.begin_fault(index, order)
+            } else {
+                self.end_fault(index, order.kind)
+            }
         }
         (done.0)();
     }
@@ -48,7 +55,10 @@ impl Supervisor {
                 self.pulse(index, true);
             }
         }
-        if let Some(wall) = order.for_s.and_then(|for_s| Duration::try_from_secs_f64(for_s).ok()) {
+        if let Some(wall) = order
+            .for_s
+            .and_then(|for_s| Duration::try_from_secs_f64(for_s).ok())
+        {
             self.after(wall, Event::FaultOver(index, order.kind));
         }
     }
@@ -81,7 +91,11 @@ impl Supervisor {
         if !self.kept[index].is_slow || self.stage != Stage::Running {
             return;
         }
-        let (signal, wait) = if stops { (Signal::SIGSTOP, SLOW_STOP) } else { (Signal::SIGCONT, SLOW_GO) };
+        let (signal, wait) = if stops {
+            (Signal::SIGSTOP, SLOW_STOP)
+        } else {
+            (Signal::SIGCONT, SLOW_GO)
+        };
         self.signal(index, signal);
         self.after(wait, Event::Pulse(index, !stops));
     }

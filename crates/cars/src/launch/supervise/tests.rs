@@ -29,7 +29,10 @@ impl Hall {
             planned: Vec::new(),
             grace: Duration::from_secs(20),
         };
-        hall.with(Planned { part: Part::Simulator, ..shell("simulator", simulator) })
+        hall.with(Planned {
+            part: Part::Simulator,
+            ..shell("simulator", simulator)
+        })
     }
 
     fn with(mut self, mut planned: Planned) -> Self {
@@ -60,8 +63,12 @@ impl Hall {
     fn run(&self, ready: &[&str], signals: &[Signal]) -> Outcome {
         let screen = Screen::open(quiet());
         let outcome = runtime().block_on(async {
-            let supervisor =
-                Supervisor::new(self.planned.clone(), self.folder.path(), self.grace, screen.tell());
+            let supervisor = Supervisor::new(
+                self.planned.clone(),
+                self.folder.path(),
+                self.grace,
+                screen.tell(),
+            );
             let queue = supervisor.queue();
             let running = tokio::spawn(supervisor.run());
             Self::ready(self.folder.path(), ready).await;
@@ -76,11 +83,20 @@ impl Hall {
 }
 
 fn runtime() -> tokio::runtime::Runtime {
-    tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap()
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap()
 }
 
 fn quiet() -> Look {
-    Look { names: Vec::new(), is_quiet: true, has_colors_out: false, has_colors_err: false, has_bar: false }
+    Look {
+        names: Vec::new(),
+        is_quiet: true,
+        has_colors_out: false,
+        has_colors_err: false,
+        has_bar: false,
+    }
 }
 
 fn shell(name: &str, script: &str) -> Planned {
@@ -118,7 +134,9 @@ fn assert_gone(pid: &str) {
 
 #[test]
 fn a_run_that_ends_well_is_no_failure() {
-    let hall = Hall::new("sleep 0.2").with(shell("Butler", "sleep 0.1")).with(shell("Leguin", "sleep 0.3"));
+    let hall = Hall::new("sleep 0.2")
+        .with(shell("Butler", "sleep 0.1"))
+        .with(shell("Leguin", "sleep 0.3"));
     let outcome = hall.run(&[], &[]);
     assert_eq!((outcome.failure, outcome.asked), (None, None));
 }
@@ -126,9 +144,19 @@ fn a_run_that_ends_well_is_no_failure() {
 #[test]
 fn who_watches_is_told_when_the_run_is_over_and_does_not_end_it() {
     let watching = "trap 'touch $DIR/told; exit 0' TERM; touch $DIR/watching; sleep 600 & wait";
-    let observer = Planned { part: Part::Observer, is_required: false, ..shell("console", watching) };
-    let broken = Planned { part: Part::Observer, is_required: false, ..shell("broken", "exit 1") };
-    let hall = Hall::new("until [ -e $DIR/watching ]; do sleep 0.01; done").with(observer).with(broken);
+    let observer = Planned {
+        part: Part::Observer,
+        is_required: false,
+        ..shell("console", watching)
+    };
+    let broken = Planned {
+        part: Part::Observer,
+        is_required: false,
+        ..shell("broken", "exit 1")
+    };
+    let hall = Hall::new("until [ -e $DIR/watching ]; do sleep 0.01; done")
+        .with(observer)
+        .with(broken);
     let told = hall.path("told");
     let outcome = hall.run(&[], &[]);
     assert_eq!((outcome.failure, outcome.asked), (None, None));
@@ -137,16 +165,27 @@ fn who_watches_is_told_when_the_run_is_over_and_does_not_end_it() {
 
 #[test]
 fn the_first_required_failure_ends_the_run_in_good_order() {
-    let simulator = "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
-    let robot = "until [ -e $DIR/up ]; do sleep 0.01; done; echo one >&2; echo two >&2; echo plain; exit 3";
-    let hall = Hall::new(simulator).with(shell("Butler", robot)).with(shell("Leguin", FOREVER));
-    let hall = Hall { grace: Duration::from_millis(300), ..hall };
+    let simulator =
+        "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
+    let robot =
+        "until [ -e $DIR/up ]; do sleep 0.01; done; echo one >&2; echo two >&2; echo plain; exit 3";
+    let hall = Hall::new(simulator)
+        .with(shell("Butler", robot))
+        .with(shell("Leguin", FOREVER));
+    let hall = Hall {
+        grace: Duration::from_millis(300),
+        ..hall
+    };
     let failure = hall.run(&[], &[]).failure.unwrap();
     assert_eq!(failure.code, 3);
     assert_eq!(failure.text, "Butler ended with exit status 3");
     assert_eq!(failure.tail, ["one", "two"]);
     assert_eq!(failure.log, hall.path("Butler.log"));
-    assert_eq!(hall.read("record"), "stopped\n", "the simulator was to write its record");
+    assert_eq!(
+        hall.read("record"),
+        "stopped\n",
+        "the simulator was to write its record"
+    );
     let mut log: Vec<String> = hall.read("Butler.log").lines().map(str::to_owned).collect();
     log.sort();
     assert_eq!(log, ["one", "plain", "two"]);
@@ -156,13 +195,20 @@ fn the_first_required_failure_ends_the_run_in_good_order() {
 fn a_signal_is_a_failure_with_its_number() {
     let hall = Hall::new(FOREVER).with(shell("Butler", "kill -KILL $$"));
     let failure = hall.run(&[], &[]).failure.unwrap();
-    assert_eq!((failure.code, failure.text.as_str()), (137, "Butler was ended by SIGKILL"));
+    assert_eq!(
+        (failure.code, failure.text.as_str()),
+        (137, "Butler was ended by SIGKILL")
+    );
 }
 
 #[test]
 fn a_simulator_that_fails_takes_the_robots_with_it_at_once() {
     let begun = Instant::now();
-    let failure = Hall::new("exit 4").with(shell("Butler", FOREVER)).run(&[], &[]).failure.unwrap();
+    let failure = Hall::new("exit 4")
+        .with(shell("Butler", FOREVER))
+        .run(&[], &[])
+        .failure
+        .unwrap();
     assert_eq!(failure.text, "simulator ended with exit status 4");
     assert!(begun.elapsed() < Duration::from_secs(10));
 }
@@ -171,32 +217,53 @@ fn a_simulator_that_fails_takes_the_robots_with_it_at_once() {
 fn a_program_that_cannot_be_started_is_a_failure() {
     let mut missing = shell("Butler", "");
     missing.command.program = "/nowhere/cars-butler".into();
-    let failure = Hall::new(FOREVER).with(missing).run(&[], &[]).failure.unwrap();
+    let failure = Hall::new(FOREVER)
+        .with(missing)
+        .run(&[], &[])
+        .failure
+        .unwrap();
     assert_eq!(failure.code, 126);
-    assert!(failure.text.contains("/nowhere/cars-butler cannot be started"), "{}", failure.text);
+    assert!(
+        failure
+            .text
+            .contains("/nowhere/cars-butler cannot be started"),
+        "{}",
+        failure.text
+    );
 }
 
 #[test]
 fn a_robot_that_is_not_required_may_fail() {
-    let robot = Planned { is_required: false, ..shell("Butler", "exit 1") };
+    let robot = Planned {
+        is_required: false,
+        ..shell("Butler", "exit 1")
+    };
     let outcome = Hall::new("sleep 0.3").with(robot).run(&[], &[]);
     assert_eq!(outcome.failure, None);
 }
 
 #[test]
 fn a_failed_robot_is_restarted_and_the_run_goes_on() {
-    let script =
-        "echo up >> $DIR/starts; [ $(wc -l < $DIR/starts) -lt 3 ] && exit 1; touch $DIR/well; sleep 600";
-    let robot = Planned { restart: Restart::OnFailure, ..shell("Butler", script) };
+    let script = "echo up >> $DIR/starts; [ $(wc -l < $DIR/starts) -lt 3 ] && exit 1; touch $DIR/well; sleep 600";
+    let robot = Planned {
+        restart: Restart::OnFailure,
+        ..shell("Butler", script)
+    };
     let hall = Hall::new("until [ -e $DIR/well ]; do sleep 0.01; done").with(robot);
-    let hall = Hall { grace: Duration::from_millis(100), ..hall };
+    let hall = Hall {
+        grace: Duration::from_millis(100),
+        ..hall
+    };
     assert_eq!(hall.run(&[], &[]).failure, None);
     assert_eq!(hall.read("starts"), "up\nup\nup\n");
 }
 
 #[test]
 fn a_robot_that_always_fails_is_given_up() {
-    let robot = Planned { restart: Restart::Always, ..shell("Butler", "echo up >> $DIR/starts; exit 7") };
+    let robot = Planned {
+        restart: Restart::Always,
+        ..shell("Butler", "echo up >> $DIR/starts; exit 7")
+    };
     let hall = Hall::new(FOREVER).with(robot);
     assert_eq!(hall.run(&[], &[]).failure.unwrap().code, 7);
     assert_eq!(hall.read("starts").lines().count(), 1 + BUDGET);
@@ -212,13 +279,15 @@ fn what_a_process_started_ends_with_it() {
 }
 
 /// Hears SIGTERM and does not care; so does what it started.
-const DEAF: &str =
-    "trap '' TERM; (sleep 600; true) & echo $! > $DIR/grandchild; echo $$ > $DIR/own; touch $DIR/deaf; wait";
+const DEAF: &str = "trap '' TERM; (sleep 600; true) & echo $! > $DIR/grandchild; echo $$ > $DIR/own; touch $DIR/deaf; wait";
 
 #[test]
 fn who_does_not_leave_in_time_is_killed_with_all_it_started() {
     let hall = Hall::new("until [ -e $DIR/deaf ]; do sleep 0.01; done").with(shell("Butler", DEAF));
-    let hall = Hall { grace: Duration::from_millis(100), ..hall };
+    let hall = Hall {
+        grace: Duration::from_millis(100),
+        ..hall
+    };
     assert_eq!(hall.run(&[], &[]).failure, None);
     assert_gone(&hall.read("own"));
     assert_gone(&hall.read("grandchild"));
@@ -226,19 +295,32 @@ fn who_does_not_leave_in_time_is_killed_with_all_it_started() {
 
 #[test]
 fn asked_once_all_are_ended_also_one_that_is_stopped() {
-    let simulator = "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
-    let hall = Hall::new(simulator).with(shell("Butler", "touch $DIR/stopped; kill -STOP $$; sleep 600"));
+    let simulator =
+        "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
+    let hall = Hall::new(simulator).with(shell(
+        "Butler",
+        "touch $DIR/stopped; kill -STOP $$; sleep 600",
+    ));
     let begun = Instant::now();
     let outcome = hall.run(&["up", "stopped"], &[Signal::SIGINT]);
-    assert!(begun.elapsed() < Duration::from_secs(10), "nobody had to be killed");
-    assert_eq!((outcome.failure, outcome.asked), (None, Some(Signal::SIGINT)));
+    assert!(
+        begun.elapsed() < Duration::from_secs(10),
+        "nobody had to be killed"
+    );
+    assert_eq!(
+        (outcome.failure, outcome.asked),
+        (None, Some(Signal::SIGINT))
+    );
     assert_eq!(hall.read("record"), "stopped\n");
 }
 
 #[test]
 fn asked_twice_all_are_killed_at_once() {
     let hall = Hall::new(FOREVER).with(shell("Butler", DEAF));
-    let hall = Hall { grace: Duration::from_secs(600), ..hall };
+    let hall = Hall {
+        grace: Duration::from_secs(600),
+        ..hall
+    };
     let outcome = hall.run(&["deaf"], &[Signal::SIGINT, Signal::SIGINT]);
     assert_eq!(outcome.asked, Some(Signal::SIGINT));
     assert_gone(&hall.read("own"));
@@ -252,7 +334,12 @@ fn nobody_is_left_behind_when_the_launcher_gives_up_in_the_middle() {
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         runtime().block_on(async {
             let grace = Duration::from_secs(600);
-            let supervisor = Supervisor::new(hall.planned.clone(), hall.folder.path(), grace, screen.tell());
+            let supervisor = Supervisor::new(
+                hall.planned.clone(),
+                hall.folder.path(),
+                grace,
+                screen.tell(),
+            );
             tokio::spawn(supervisor.run());
             Hall::ready(hall.folder.path(), &["deaf"]).await;
             panic!("as a defect of the launcher would");

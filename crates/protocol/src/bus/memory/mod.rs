@@ -135,7 +135,10 @@ impl MemoryNetwork {
         });
         let own = shared.clone();
         let scheduler = std::thread::spawn(move || deliver_all(&own, faults.pause));
-        Self { shared, scheduler: Some(scheduler) }
+        Self {
+            shared,
+            scheduler: Some(scheduler),
+        }
     }
 
     /// A session whose link never breaks: the simulator's, which is one process with the router.
@@ -152,8 +155,13 @@ impl MemoryNetwork {
 
     fn session(&self, can_break: bool) -> Bus {
         let peer = self.shared.lock().join(can_break);
-        let open = Arc::new(Open { shared: self.shared.clone(), peer });
-        Bus { session: super::Session::Memory(Session { open }) }
+        let open = Arc::new(Open {
+            shared: self.shared.clone(),
+            peer,
+        });
+        Bus {
+            session: super::Session::Memory(Session { open }),
+        }
     }
 
     /// Kills the process behind a session: of what it has sent last, some is lost, and it says no more.
@@ -169,7 +177,11 @@ impl MemoryNetwork {
     /// Everything that came to the router since this was called last; the first call begins to listen in.
     #[must_use]
     pub fn overhear(&self) -> Vec<Overheard> {
-        self.shared.lock().overheard.replace(Vec::new()).unwrap_or_default()
+        self.shared
+            .lock()
+            .overheard
+            .replace(Vec::new())
+            .unwrap_or_default()
     }
 
     /// What it has done so far.
@@ -203,9 +215,16 @@ fn deliver_all(shared: &Shared, pause: Duration) {
             let due = star.next_due();
             star = match due.map(|due| due.saturating_duration_since(Instant::now())) {
                 Some(wait) => {
-                    shared.changed.wait_timeout(star, wait).unwrap_or_else(PoisonError::into_inner).0
+                    shared
+                        .changed
+                        .wait_timeout(star, wait)
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0
                 }
-                None => shared.changed.wait(star).unwrap_or_else(PoisonError::into_inner),
+                None => shared
+                    .changed
+                    .wait(star)
+                    .unwrap_or_else(PoisonError::into_inner),
             };
             continue;
         }
@@ -265,8 +284,13 @@ fn legal(doing: &'static str, key: &str) -> Result<(), BusError> {
     if key.split('/').all(is_legal) {
         return Ok(());
     }
-    let reason = "a key has chunks between slashes; of wildcards it may have `*` for a whole one".to_owned();
-    Err(BusError::Use { doing, key: key.to_owned(), reason })
+    let reason =
+        "a key has chunks between slashes; of wildcards it may have `*` for a whole one".to_owned();
+    Err(BusError::Use {
+        doing,
+        key: key.to_owned(),
+        reason,
+    })
 }
 
 impl Session {
@@ -277,7 +301,11 @@ impl Session {
     fn send(&self, doing: &'static str, key: &str, message: Message) -> Result<(), BusError> {
         legal(doing, key)?;
         let sent = self.open.shared.send(self.open.peer, message);
-        sent.map_err(|reason| BusError::Use { doing, key: key.to_owned(), reason: reason.to_owned() })
+        sent.map_err(|reason| BusError::Use {
+            doing,
+            key: key.to_owned(),
+            reason: reason.to_owned(),
+        })
     }
 
     fn declare(
@@ -290,16 +318,34 @@ impl Session {
         let Open { shared, peer } = &*self.open;
         let declared = shared.lock().declare(*peer, declaration);
         shared.changed.notify_one();
-        let failed = |reason: &str| BusError::Use { doing, key: key.to_owned(), reason: reason.to_owned() };
+        let failed = |reason: &str| BusError::Use {
+            doing,
+            key: key.to_owned(),
+            reason: reason.to_owned(),
+        };
         let id = declared.map_err(failed)?;
-        Ok(Declared { _inner: Box::new(Guard { shared: shared.clone(), peer: *peer, id }) })
+        Ok(Declared {
+            _inner: Box::new(Guard {
+                shared: shared.clone(),
+                peer: *peer,
+                id,
+            }),
+        })
     }
 
     pub(super) fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
         let watched = Arc::new(AtomicBool::new(false));
-        let declared =
-            self.declare("publish on", key, Declaration::Publish(key.to_owned(), watched.clone()))?;
-        Ok(Publisher { session: self.clone(), key: key.to_owned(), watched, _declared: declared })
+        let declared = self.declare(
+            "publish on",
+            key,
+            Declaration::Publish(key.to_owned(), watched.clone()),
+        )?;
+        Ok(Publisher {
+            session: self.clone(),
+            key: key.to_owned(),
+            watched,
+            _declared: declared,
+        })
     }
 
     pub(super) fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
@@ -311,7 +357,11 @@ impl Session {
         keys: &str,
         handle: impl Fn(&str, &[u8]) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        self.declare("subscribe to", keys, Declaration::Subscribe(keys.to_owned(), Arc::new(handle)))
+        self.declare(
+            "subscribe to",
+            keys,
+            Declaration::Subscribe(keys.to_owned(), Arc::new(handle)),
+        )
     }
 
     pub(super) fn serve(
@@ -319,8 +369,16 @@ impl Session {
         keys: &str,
         handle: impl Fn(super::Question) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        let handle = move |inner| handle(super::Question { inner: super::Query::Memory(inner) });
-        self.declare("serve", keys, Declaration::Serve(keys.to_owned(), Arc::new(handle)))
+        let handle = move |inner| {
+            handle(super::Question {
+                inner: super::Query::Memory(inner),
+            })
+        };
+        self.declare(
+            "serve",
+            keys,
+            Declaration::Serve(keys.to_owned(), Arc::new(handle)),
+        )
     }
 
     pub(super) fn ask_within(
@@ -332,7 +390,13 @@ impl Session {
     ) -> Result<Option<AnswerOf>, BusError> {
         let (sender, answers) = channel();
         // Whoever asks waits below, so there is somebody to receive.
-        self.start(key, parameters, body, timeout, Pending::new(move |answer| drop(sender.send(answer))))?;
+        self.start(
+            key,
+            parameters,
+            body,
+            timeout,
+            Pending::new(move |answer| drop(sender.send(answer))),
+        )?;
         Ok(answers.recv().ok().flatten())
     }
 
@@ -355,8 +419,16 @@ impl Session {
     ) -> Result<(), BusError> {
         legal("ask", key)?;
         let (key, parameters) = (key.to_owned(), parameters.to_owned());
-        let asked = Asked { key, parameters, body: body.unwrap_or_default() };
-        let unasked = self.open.shared.lock().ask(self.open.peer, asked, Instant::now() + timeout, then);
+        let asked = Asked {
+            key,
+            parameters,
+            body: body.unwrap_or_default(),
+        };
+        let unasked =
+            self.open
+                .shared
+                .lock()
+                .ask(self.open.peer, asked, Instant::now() + timeout, then);
         self.open.shared.changed.notify_one();
         // Where the link is cut, the question ends here, without the lock.
         drop(unasked);
@@ -372,7 +444,11 @@ impl Session {
         keys: &str,
         handle: impl Fn(&str, bool) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        self.declare("watch", keys, Declaration::Watch(keys.to_owned(), Arc::new(handle)))
+        self.declare(
+            "watch",
+            keys,
+            Declaration::Watch(keys.to_owned(), Arc::new(handle)),
+        )
     }
 
     pub(super) fn close(&self) {
@@ -441,8 +517,15 @@ impl Question {
     }
 
     pub(super) fn parameter(&self, name: &str) -> Option<&str> {
-        let pairs = self.asked.parameters.split(';').filter_map(|pair| pair.split_once('='));
-        pairs.into_iter().find(|(key, _)| *key == name).map(|(_, value)| value)
+        let pairs = self
+            .asked
+            .parameters
+            .split(';')
+            .filter_map(|pair| pair.split_once('='));
+        pairs
+            .into_iter()
+            .find(|(key, _)| *key == name)
+            .map(|(_, value)| value)
     }
 
     pub(super) fn body(&self) -> Vec<u8> {
@@ -450,12 +533,20 @@ impl Question {
     }
 
     pub(super) fn answer(&self, key: &str, message: Vec<u8>) {
-        let answer = AnswerOf { key: key.to_owned(), result: Ok(message) };
-        self.ending.send(Message::Reply(self.ending.question, answer));
+        let answer = AnswerOf {
+            key: key.to_owned(),
+            result: Ok(message),
+        };
+        self.ending
+            .send(Message::Reply(self.ending.question, answer));
     }
 
     pub(super) fn refuse(&self, reason: &str) {
-        let answer = AnswerOf { key: String::new(), result: Err(reason.to_owned()) };
-        self.ending.send(Message::Reply(self.ending.question, answer));
+        let answer = AnswerOf {
+            key: String::new(),
+            result: Err(reason.to_owned()),
+        };
+        self.ending
+            .send(Message::Reply(self.ending.question, answer));
     }
 }

@@ -135,16 +135,21 @@ impl Peer {
     }
 
     fn subscribes_to(&self, key: &str) -> bool {
-        let covers = |d: &Declaration| matches!(d, Declaration::Subscribe(keys, _) if covers(keys, key));
+        let covers =
+            |d: &Declaration| matches!(d, Declaration::Subscribe(keys, _) if covers(keys, key));
         self.known.values().any(covers)
     }
 
     fn serves(&self, key: &str) -> bool {
-        self.known.values().any(|d| matches!(d, Declaration::Serve(keys, _) if covers(keys, key)))
+        self.known
+            .values()
+            .any(|d| matches!(d, Declaration::Serve(keys, _) if covers(keys, key)))
     }
 
     fn has_token(&self, key: &str) -> bool {
-        self.known.values().any(|d| matches!(d, Declaration::Token(own) if own == key))
+        self.known
+            .values()
+            .any(|d| matches!(d, Declaration::Token(own) if own == key))
     }
 }
 
@@ -152,16 +157,20 @@ impl Overheard {
     /// What a message says to whoever listens in; `None` if it is of no interest to anybody else.
     fn of(message: &Message) -> Option<Self> {
         Some(match message {
-            Message::Put(key, bytes) => Self::Put { key: key.to_string(), message: bytes.to_vec() },
+            Message::Put(key, bytes) => Self::Put {
+                key: key.to_string(),
+                message: bytes.to_vec(),
+            },
             Message::Ask(question, asked) => Self::Asked {
                 question: *question,
                 key: asked.key.clone(),
                 parameters: asked.parameters.clone(),
                 body: asked.body.clone(),
             },
-            Message::Reply(question, answer) => {
-                Self::Answered { question: *question, result: answer.result.clone() }
-            }
+            Message::Reply(question, answer) => Self::Answered {
+                question: *question,
+                result: answer.result.clone(),
+            },
             Message::Declare(_, Declaration::Token(key)) => Self::Token { key: key.clone() },
             _ => return None,
         })
@@ -188,7 +197,10 @@ impl Star {
 
     /// The end: all that is left, to be dropped without the lock.
     pub(super) fn clear(&mut self) -> impl Send + use<> {
-        (std::mem::take(&mut self.peers), std::mem::take(&mut self.rubbish))
+        (
+            std::mem::take(&mut self.peers),
+            std::mem::take(&mut self.rubbish),
+        )
     }
 
     fn id(&mut self) -> u64 {
@@ -223,7 +235,11 @@ impl Star {
     }
 
     pub(super) fn send(&mut self, from: PeerId, message: Message) -> Result<(), &'static str> {
-        let peer = self.peers.get_mut(&from).filter(|peer| !peer.is_closed).ok_or("the session is closed")?;
+        let peer = self
+            .peers
+            .get_mut(&from)
+            .filter(|peer| !peer.is_closed)
+            .ok_or("the session is closed")?;
         if peer.cut_until.is_some() {
             self.traffic.lost += 1;
         } else {
@@ -232,7 +248,11 @@ impl Star {
         Ok(())
     }
 
-    pub(super) fn declare(&mut self, from: PeerId, declaration: Declaration) -> Result<u64, &'static str> {
+    pub(super) fn declare(
+        &mut self,
+        from: PeerId,
+        declaration: Declaration,
+    ) -> Result<u64, &'static str> {
         let id = self.id();
         self.send(from, Message::Declare(id, declaration.clone()))?;
         if let Some(peer) = self.peers.get_mut(&from) {
@@ -242,7 +262,9 @@ impl Star {
     }
 
     pub(super) fn undeclare(&mut self, from: PeerId, id: u64) {
-        let Some(peer) = self.peers.get_mut(&from) else { return };
+        let Some(peer) = self.peers.get_mut(&from) else {
+            return;
+        };
         self.rubbish.push(Box::new(peer.declared.remove(&id)));
         peer.seen.retain(|(watcher, _)| *watcher != id);
         // A session that is closed withdraws everything anyway.
@@ -258,7 +280,10 @@ impl Star {
         then: Pending,
     ) -> Option<Pending> {
         let id = self.id();
-        let is_cut = self.peers.get(&from).is_none_or(|peer| peer.cut_until.is_some() || peer.is_closed);
+        let is_cut = self
+            .peers
+            .get(&from)
+            .is_none_or(|peer| peer.cut_until.is_some() || peer.is_closed);
         if is_cut || self.send(from, Message::Ask(id, Arc::new(asked))).is_err() {
             return Some(then);
         }
@@ -271,15 +296,22 @@ impl Star {
     /// The session says no more; what it has said is delivered. Returns whoever waits for an answer.
     pub(super) fn close(&mut self, from: PeerId) -> Vec<Pending> {
         let is_closed = self.send(from, Message::Close).is_err();
-        let Some(peer) = self.peers.get_mut(&from).filter(|_| !is_closed) else { return Vec::new() };
+        let Some(peer) = self.peers.get_mut(&from).filter(|_| !is_closed) else {
+            return Vec::new();
+        };
         peer.is_closed = true;
-        std::mem::take(&mut peer.asks).into_values().map(|(_, then)| then).collect()
+        std::mem::take(&mut peer.asks)
+            .into_values()
+            .map(|(_, then)| then)
+            .collect()
     }
 
     /// The process is killed: some of what it said last never left it. Whatever of it lives on in this process finds its
     /// link broken for good.
     pub(super) fn kill(&mut self, from: PeerId, calls: &mut Calls) {
-        let Some(peer) = self.peers.get_mut(&from).filter(|peer| !peer.is_closed) else { return };
+        let Some(peer) = self.peers.get_mut(&from).filter(|peer| !peer.is_closed) else {
+            return;
+        };
         let draw = unit(&mut peer.up.random);
         let kept = (draw * (peer.up.queue.len() + 1) as f64) as usize;
         self.traffic.lost += (peer.up.queue.len() - kept) as u64;
@@ -294,7 +326,9 @@ impl Star {
     /// When something is due that no message causes.
     pub(super) fn next_due(&self) -> Option<Instant> {
         let of_peer = |peer: &Peer| {
-            let naps = [&peer.up, &peer.down].into_iter().filter(|link| !link.queue.is_empty());
+            let naps = [&peer.up, &peer.down]
+                .into_iter()
+                .filter(|link| !link.queue.is_empty());
             let naps = naps.filter_map(|link| link.naps_until).min();
             let asks = peer.asks.values().map(|(deadline, _)| *deadline).min();
             [naps, asks, peer.cut_until].into_iter().flatten().min()
@@ -335,7 +369,13 @@ impl Star {
     }
 
     /// The next message of a link, unless the link does something else with it.
-    fn take(&mut self, number: PeerId, way: Way, now: Instant, calls: &mut Calls) -> Option<Message> {
+    fn take(
+        &mut self,
+        number: PeerId,
+        way: Way,
+        now: Instant,
+        calls: &mut Calls,
+    ) -> Option<Message> {
         let faults = self.faults;
         let peer = self.peers.get_mut(&number)?;
         let can_break = peer.can_break;
@@ -373,16 +413,25 @@ impl Star {
 
     fn heal_and_expire(&mut self, now: Instant, calls: &mut Calls) {
         for peer in self.peers.values_mut() {
-            let late: Vec<u64> =
-                peer.asks.iter().filter(|(_, (deadline, _))| *deadline <= now).map(|(id, _)| *id).collect();
+            let late: Vec<u64> = peer
+                .asks
+                .iter()
+                .filter(|(_, (deadline, _))| *deadline <= now)
+                .map(|(id, _)| *id)
+                .collect();
             for (_, then) in late.into_iter().filter_map(|id| peer.asks.remove(&id)) {
                 calls.push(Box::new(move || drop(then)));
             }
             if peer.cut_until.is_some_and(|until| until <= now) {
                 peer.cut_until = None;
                 // One that was closed meanwhile comes back only to be forgotten.
-                let anew = peer.declared.iter().map(|(id, d)| Message::Declare(*id, d.clone()));
-                let anew = anew.filter(|_| !peer.is_closed).chain(peer.is_closed.then_some(Message::Close));
+                let anew = peer
+                    .declared
+                    .iter()
+                    .map(|(id, d)| Message::Declare(*id, d.clone()));
+                let anew = anew
+                    .filter(|_| !peer.is_closed)
+                    .chain(peer.is_closed.then_some(Message::Close));
                 peer.up.queue.extend(anew);
             }
         }
@@ -390,11 +439,15 @@ impl Star {
 
     /// A link breaks: both ends notice, and everything on it is lost.
     fn cut(&mut self, number: PeerId, until: Instant, calls: &mut Calls) {
-        let Some(peer) = self.peers.get_mut(&number) else { return };
+        let Some(peer) = self.peers.get_mut(&number) else {
+            return;
+        };
         self.traffic.cuts += 1;
         self.traffic.lost += (peer.up.queue.len() + peer.down.queue.len()) as u64;
-        self.rubbish
-            .push(Box::new((std::mem::take(&mut peer.up.queue), std::mem::take(&mut peer.down.queue))));
+        self.rubbish.push(Box::new((
+            std::mem::take(&mut peer.up.queue),
+            std::mem::take(&mut peer.down.queue),
+        )));
         peer.cut_until = Some(until);
         for (_, then) in std::mem::take(&mut peer.asks).into_values() {
             calls.push(Box::new(move || drop(then)));
@@ -414,17 +467,25 @@ impl Star {
 
     /// The router gives up what it knows of a session.
     fn forget(&mut self, number: PeerId) {
-        let Some(peer) = self.peers.get_mut(&number) else { return };
+        let Some(peer) = self.peers.get_mut(&number) else {
+            return;
+        };
         let known: Vec<u64> = peer.known.keys().copied().collect();
         known.into_iter().for_each(|id| self.withdraw(number, id));
         self.questions.retain(|_, routed| routed.asker != number);
         let waiting: Vec<u64> = self.questions.keys().copied().collect();
-        waiting.into_iter().for_each(|question| self.end_at(question, number));
+        waiting
+            .into_iter()
+            .for_each(|question| self.end_at(question, number));
     }
 
     /// To a session, if its link is there.
     fn tell(&mut self, number: PeerId, message: Message) {
-        if let Some(peer) = self.peers.get_mut(&number).filter(|peer| peer.cut_until.is_none()) {
+        if let Some(peer) = self
+            .peers
+            .get_mut(&number)
+            .filter(|peer| peer.cut_until.is_none())
+        {
             peer.down.queue.push_back(message);
         }
     }
@@ -436,18 +497,35 @@ impl Star {
         }
         match message {
             Message::Put(key, bytes) => {
-                for peer in self.peers.values_mut().filter(|peer| peer.subscribes_to(&key)) {
-                    peer.down.queue.push_back(Message::Put(key.clone(), bytes.clone()));
+                for peer in self
+                    .peers
+                    .values_mut()
+                    .filter(|peer| peer.subscribes_to(&key))
+                {
+                    peer.down
+                        .queue
+                        .push_back(Message::Put(key.clone(), bytes.clone()));
                 }
             }
             Message::Ask(id, asked) => {
-                let serving = self.peers.iter().filter(|(_, peer)| peer.serves(&asked.key));
+                let serving = self
+                    .peers
+                    .iter()
+                    .filter(|(_, peer)| peer.serves(&asked.key));
                 let waits_for: BTreeSet<PeerId> = serving.map(|(number, _)| *number).collect();
                 if waits_for.is_empty() {
                     return self.tell(from, Message::Done(id));
                 }
-                waits_for.iter().for_each(|to| self.tell(*to, Message::Ask(id, asked.clone())));
-                self.questions.insert(id, Routed { asker: from, waits_for });
+                waits_for
+                    .iter()
+                    .for_each(|to| self.tell(*to, Message::Ask(id, asked.clone())));
+                self.questions.insert(
+                    id,
+                    Routed {
+                        asker: from,
+                        waits_for,
+                    },
+                );
             }
             Message::Reply(id, answer) => {
                 if let Some(asker) = self.questions.get(&id).map(|routed| routed.asker) {
@@ -461,13 +539,17 @@ impl Star {
                 self.forget(from);
                 self.rubbish.push(Box::new(self.peers.remove(&from)));
             }
-            Message::Token(..) | Message::Matching(..) => unreachable!("only the router says these"),
+            Message::Token(..) | Message::Matching(..) => {
+                unreachable!("only the router says these")
+            }
         }
     }
 
     /// A session has nothing more to say to a question.
     fn end_at(&mut self, question: u64, number: PeerId) {
-        let Some(routed) = self.questions.get_mut(&question) else { return };
+        let Some(routed) = self.questions.get_mut(&question) else {
+            return;
+        };
         if routed.waits_for.remove(&number) && routed.waits_for.is_empty() {
             let asker = routed.asker;
             self.questions.remove(&question);
@@ -486,7 +568,9 @@ impl Star {
                         _ => None,
                     })
                     .collect();
-                tokens.into_iter().for_each(|key| self.tell(from, Message::Token(id, key, true)));
+                tokens
+                    .into_iter()
+                    .for_each(|key| self.tell(from, Message::Token(id, key, true)));
             }
             Declaration::Publish(key, _) => {
                 let is_watched = self.peers.values().any(|peer| peer.subscribes_to(key));
@@ -494,7 +578,8 @@ impl Star {
             }
             _ => {}
         }
-        let subscribes = matches!(declaration, Declaration::Subscribe(..)).then(|| declaration.clone());
+        let subscribes =
+            matches!(declaration, Declaration::Subscribe(..)).then(|| declaration.clone());
         if let Some(peer) = self.peers.get_mut(&from) {
             peer.known.insert(id, declaration);
         }
@@ -504,9 +589,14 @@ impl Star {
     }
 
     fn withdraw(&mut self, from: PeerId, id: u64) {
-        let declaration = self.peers.get_mut(&from).and_then(|peer| peer.known.remove(&id));
+        let declaration = self
+            .peers
+            .get_mut(&from)
+            .and_then(|peer| peer.known.remove(&id));
         match declaration {
-            Some(Declaration::Token(key)) if !self.is_there(&key) => self.tell_watchers(&key, false),
+            Some(Declaration::Token(key)) if !self.is_there(&key) => {
+                self.tell_watchers(&key, false)
+            }
             Some(Declaration::Subscribe(keys, handle)) => {
                 self.rubbish.push(Box::new(handle));
                 self.tell_publishers(&keys);
@@ -523,7 +613,9 @@ impl Star {
         for peer in self.peers.values_mut() {
             for (id, declaration) in &peer.known {
                 if matches!(declaration, Declaration::Watch(keys, _) if covers(keys, token)) {
-                    peer.down.queue.push_back(Message::Token(*id, token.to_owned(), is_there));
+                    peer.down
+                        .queue
+                        .push_back(Message::Token(*id, token.to_owned(), is_there));
                 }
             }
         }
@@ -542,12 +634,15 @@ impl Star {
                 }
             }
         }
-        told.into_iter().for_each(|(number, message)| self.tell(number, message));
+        told.into_iter()
+            .for_each(|(number, message)| self.tell(number, message));
     }
 
     /// A message has come down to a session.
     fn receive(&mut self, number: PeerId, message: Message, calls: &mut Calls) {
-        let Some(peer) = self.peers.get_mut(&number) else { return };
+        let Some(peer) = self.peers.get_mut(&number) else {
+            return;
+        };
         match message {
             Message::Put(key, bytes) => {
                 for declaration in peer.declared.values() {
@@ -560,13 +655,22 @@ impl Star {
                 }
             }
             Message::Ask(question, asked) => {
-                let Some(shared) = self.shared.upgrade() else { return };
-                let ending = Arc::new(Ending { shared, peer: number, question });
+                let Some(shared) = self.shared.upgrade() else {
+                    return;
+                };
+                let ending = Arc::new(Ending {
+                    shared,
+                    peer: number,
+                    question,
+                });
                 for declaration in peer.declared.values() {
                     if let Declaration::Serve(keys, handle) = declaration
                         && covers(keys, &asked.key)
                     {
-                        let question = Question { asked: asked.clone(), ending: ending.clone() };
+                        let question = Question {
+                            asked: asked.clone(),
+                            ending: ending.clone(),
+                        };
                         let handle = handle.clone();
                         calls.push(Box::new(move || handle(question)));
                     }
@@ -585,9 +689,15 @@ impl Star {
                 }
             }
             Message::Token(watcher, key, is_there) => {
-                let Some(Declaration::Watch(_, handle)) = peer.declared.get(&watcher) else { return };
+                let Some(Declaration::Watch(_, handle)) = peer.declared.get(&watcher) else {
+                    return;
+                };
                 let seen = (watcher, key.clone());
-                let is_news = if is_there { peer.seen.insert(seen) } else { peer.seen.remove(&seen) };
+                let is_news = if is_there {
+                    peer.seen.insert(seen)
+                } else {
+                    peer.seen.remove(&seen)
+                };
                 if is_news {
                     let handle = handle.clone();
                     calls.push(Box::new(move || handle(&key, is_there)));

@@ -39,7 +39,11 @@ pub(super) fn check(
     source: &Source,
 ) -> Result<Vec<Fault>, FileError> {
     if let Some(extra) = raw.get(MAX_FAULTS) {
-        return Err(FileError::at(source, Some(extra.span()), "more than 10000 faults"));
+        return Err(FileError::at(
+            source,
+            Some(extra.span()),
+            "more than 10000 faults",
+        ));
     }
     let mut faults = Vec::new();
     for entry in raw {
@@ -72,7 +76,9 @@ fn one(
             return Err("`until` is simulated time, `for` is wall clock: say one".to_owned());
         }
         (Some(until), None) => FaultEnd::At(ticks(until.0, tick_s)),
-        (None, Some(lasting)) if lasting.0 > 0.0 && lasting.0 <= MAX_WALL_S => FaultEnd::After(lasting.0),
+        (None, Some(lasting)) if lasting.0 > 0.0 && lasting.0 <= MAX_WALL_S => {
+            FaultEnd::After(lasting.0)
+        }
         (None, Some(_)) => return Err("`for` is more than zero and at most an hour".to_owned()),
         (None, None) => FaultEnd::Never,
     };
@@ -88,7 +94,12 @@ fn one(
             "the clock waits for {robot} for ever: say `for` (wall clock), or on_late = \"continue\""
         ));
     }
-    Ok(Fault { robot, kind: raw.kind, at, end })
+    Ok(Fault {
+        robot,
+        kind: raw.kind,
+        at,
+        end,
+    })
 }
 
 impl FaultTable {
@@ -100,6 +111,12 @@ impl FaultTable {
             FaultEnd::Never => (None, None),
         };
         let robot = Spanned::new(0..0, fault.robot.clone());
-        Self { robot, kind: fault.kind, at: time(fault.at), until, lasting }
+        Self {
+            robot,
+            kind: fault.kind,
+            at: time(fault.at),
+            until,
+            lasting,
+        }
     }
 }

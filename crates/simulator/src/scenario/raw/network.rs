@@ -93,18 +93,39 @@ pub(super) fn check(
     tick_s: f64,
     source: &Source,
 ) -> Result<Network, FileError> {
-    let Some(raw) = raw else { return Ok(Network::default()) };
+    let Some(raw) = raw else {
+        return Ok(Network::default());
+    };
     let (span, raw) = (raw.span(), raw.into_inner());
     if raw.links.len().max(raw.partitions.len()) > MAX_ENTRIES {
-        return Err(FileError::at(source, Some(span), "more than 10000 links or partitions"));
+        return Err(FileError::at(
+            source,
+            Some(span),
+            "more than 10000 links or partitions",
+        ));
     }
-    let checker = Checker { source, robots, tick_s };
+    let checker = Checker {
+        source,
+        robots,
+        tick_s,
+    };
     let commands = checker.commands(raw.commands)?.unwrap_or_default();
     let queries = checker.queries(raw.queries)?.unwrap_or_default();
-    let links = raw.links.into_iter().map(|link| checker.link(link.into_inner()));
+    let links = raw
+        .links
+        .into_iter()
+        .map(|link| checker.link(link.into_inner()));
     let links = links.collect::<Result<_, _>>()?;
-    let partitions = raw.partitions.into_iter().map(|partition| checker.partition(partition));
-    Ok(Network { commands, queries, links, partitions: partitions.collect::<Result<_, _>>()? })
+    let partitions = raw
+        .partitions
+        .into_iter()
+        .map(|partition| checker.partition(partition));
+    Ok(Network {
+        commands,
+        queries,
+        links,
+        partitions: partitions.collect::<Result<_, _>>()?,
+    })
 }
 
 impl Checker<'_> {
@@ -123,29 +144,39 @@ impl Checker<'_> {
 
     fn link(&self, raw: LinkTable) -> Result<Link, FileError> {
         let (commands, queries) = (self.commands(raw.commands)?, self.queries(raw.queries)?);
-        Ok(Link { from: self.known(raw.from)?, to: self.known(raw.to)?, commands, queries })
+        Ok(Link {
+            from: self.known(raw.from)?,
+            to: self.known(raw.to)?,
+            commands,
+            queries,
+        })
     }
 
     fn commands(&self, raw: Option<Spanned<ChannelTable>>) -> Result<Option<Channel>, FileError> {
-        raw.map(|raw| self.channel(raw.span(), raw.get_ref())).transpose()
+        raw.map(|raw| self.channel(raw.span(), raw.get_ref()))
+            .transpose()
     }
 
     fn queries(&self, raw: Option<Spanned<ChannelTable>>) -> Result<Option<Channel>, FileError> {
         let Some(raw) = raw else { return Ok(None) };
         if raw.get_ref().delay.is_some() || raw.get_ref().duplication.is_some() {
-            let reason =
-                "queries are answered within their tick or not at all: only loss and bursts befall them";
+            let reason = "queries are answered within their tick or not at all: only loss and bursts befall them";
             return Err(self.refuse(raw.span(), reason));
         }
         self.channel(raw.span(), raw.get_ref()).map(Some)
     }
 
-    fn channel(&self, span: std::ops::Range<usize>, raw: &ChannelTable) -> Result<Channel, FileError> {
+    fn channel(
+        &self,
+        span: std::ops::Range<usize>,
+        raw: &ChannelTable,
+    ) -> Result<Channel, FileError> {
         let refuse = |reason: &str| self.refuse(span.clone(), reason);
-        let probability = |what: &str, value: Option<f64>, default: f64| match value.unwrap_or(default) {
-            value if (0.0..=1.0).contains(&value) => Ok(value),
-            _ => Err(refuse(&format!("{what} is a probability, from 0 to 1"))),
-        };
+        let probability =
+            |what: &str, value: Option<f64>, default: f64| match value.unwrap_or(default) {
+                value if (0.0..=1.0).contains(&value) => Ok(value),
+                _ => Err(refuse(&format!("{what} is a probability, from 0 to 1"))),
+            };
         let burst = |burst: &BurstTable| {
             Ok(Burst {
                 enter: probability("burst.enter", Some(burst.enter), 0.0)?,
@@ -155,13 +186,18 @@ impl Checker<'_> {
         };
         let delay = |delay: &Delay| {
             let Range { min, mode, max } = match delay {
-                Delay::Constant(time) => Range { min: *time, mode: *time, max: *time },
+                Delay::Constant(time) => Range {
+                    min: *time,
+                    mode: *time,
+                    max: *time,
+                },
                 Delay::Triangular(range) => *range,
             };
             if ticks(max.0, self.tick_s) > MAX_DELAY_TICKS {
                 return Err(refuse("a delay is at most 1000 ticks"));
             }
-            Triangular::new(min.0, mode.0, max.0).map_err(|error| refuse(&format!("delay: {error}")))
+            Triangular::new(min.0, mode.0, max.0)
+                .map_err(|error| refuse(&format!("delay: {error}")))
         };
         Ok(Channel {
             loss: probability("loss", raw.loss, 0.0)?,
@@ -185,22 +221,38 @@ impl Checker<'_> {
             return Err(self.refuse(span, &format!("{} is in two groups", twice[0])));
         }
         if groups.iter().filter(|group| !group.is_empty()).count() < 2 {
-            return Err(
-                self.refuse(span, "a partition needs two groups, for example [[\"Butler\"], [\"Leguin\"]]")
-            );
+            return Err(self.refuse(
+                span,
+                "a partition needs two groups, for example [[\"Butler\"], [\"Leguin\"]]",
+            ));
         }
-        let (from, until) = (self.tick(&span, raw.from)?, raw.until.map(|time| self.tick(&span, time)));
+        let (from, until) = (
+            self.tick(&span, raw.from)?,
+            raw.until.map(|time| self.tick(&span, time)),
+        );
         let until = until.transpose()?;
         if until.is_some_and(|until| until <= from) {
             return Err(self.refuse(span, "it ends before it begins: `until` comes after `from`"));
         }
-        let cuts = raw.cuts.unwrap_or_else(|| vec![Cuts::Commands, Cuts::Queries]);
+        let cuts = raw
+            .cuts
+            .unwrap_or_else(|| vec![Cuts::Commands, Cuts::Queries]);
         if cuts.is_empty() {
-            return Err(self.refuse(span, "it cuts nothing: name \"commands\", \"queries\" or both"));
+            return Err(self.refuse(
+                span,
+                "it cuts nothing: name \"commands\", \"queries\" or both",
+            ));
         }
         let is_cut = |what| cuts.contains(&what);
         let (commands, queries) = (is_cut(Cuts::Commands), is_cut(Cuts::Queries));
-        Ok(Partition { groups, from, until, one_way: raw.one_way.unwrap_or(false), commands, queries })
+        Ok(Partition {
+            groups,
+            from,
+            until,
+            one_way: raw.one_way.unwrap_or(false),
+            commands,
+            queries,
+        })
     }
 
     fn tick(&self, span: &std::ops::Range<usize>, time: Time) -> Result<u64, FileError> {
@@ -229,23 +281,39 @@ impl NetworkTable {
             groups: partition
                 .groups
                 .iter()
-                .map(|group| group.iter().map(|name| Spanned::new(0..0, name.clone())).collect())
+                .map(|group| {
+                    group
+                        .iter()
+                        .map(|name| Spanned::new(0..0, name.clone()))
+                        .collect()
+                })
                 .collect(),
             from: time(partition.from),
             until: partition.until.map(time),
             one_way: Some(partition.one_way),
             cuts: Some(
-                [(partition.commands, Cuts::Commands), (partition.queries, Cuts::Queries)]
-                    .into_iter()
-                    .filter_map(|(is_cut, what)| is_cut.then_some(what))
-                    .collect(),
+                [
+                    (partition.commands, Cuts::Commands),
+                    (partition.queries, Cuts::Queries),
+                ]
+                .into_iter()
+                .filter_map(|(is_cut, what)| is_cut.then_some(what))
+                .collect(),
             ),
         };
         let table = Self {
             commands: Some(spanned(network.commands)),
             queries: Some(spanned(network.queries)),
-            links: network.links.iter().map(|entry| Spanned::new(0..0, link(entry))).collect(),
-            partitions: network.partitions.iter().map(|entry| Spanned::new(0..0, partition(entry))).collect(),
+            links: network
+                .links
+                .iter()
+                .map(|entry| Spanned::new(0..0, link(entry)))
+                .collect(),
+            partitions: network
+                .partitions
+                .iter()
+                .map(|entry| Spanned::new(0..0, partition(entry)))
+                .collect(),
         };
         Some(Spanned::new(0..0, table))
     }
