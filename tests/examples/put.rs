@@ -6,7 +6,7 @@ use std::error::Error;
 use std::io::Read;
 use std::time::Duration;
 
-use protocol::bus::{Bus, Role};
+use bus::{Bus, Role};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -1,4 +1,4 @@
-//! Hosts that are network namespaces, and the question whether there can be any here.
+//! Hosts that are network namespaces, and the query whether there can be any here.
 
 use std::io::Write;
 use std::path::Path;

@@ -9,9 +9,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use bus::{Bus, Role};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use protocol::bus::{Bus, Role};
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer, Phase, Status};
 use protocol::{RunName, decode, encode};
@@ -72,7 +72,7 @@ impl Run {
     fn ask(&self, control: &Control) -> Option<Status> {
         let answer = self
             .bus
-            .ask(&self.keys.control(), "", Some(encode(control)))
+            .get(&self.keys.control(), "", Some(encode(control)))
             .unwrap()?;
         match decode("control", "simulator", &answer.result.unwrap()).unwrap() {
             ControlAnswer::Done(status) => Some(*status),

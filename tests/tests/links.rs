@@ -17,7 +17,7 @@ use system_tests::processes::{Running, find};
 use system_tests::{Lab, assert_same, eventually, programs, root};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
-/// A link that is silent for so long is given up (`protocol::bus`).
+/// A link that is silent for so long is given up (`bus`).
 const LEASE: Duration = Duration::from_secs(2);
 /// What a loaded machine may take on top of what is promised.
 const ROOM: Duration = Duration::from_secs(2);

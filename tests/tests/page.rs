@@ -273,12 +273,12 @@ fn limits_times_and_version_are_those_of_the_code() {
             "1,000,000,001 for generation 2",
         ),
         (
-            "protocol/src/bus/mod.rs",
+            "bus/src/lib.rs",
             "QUERY_TIMEOUT: Duration = Duration::from_secs(2)",
             "timeout 2 s",
         ),
         (
-            "protocol/src/bus/settings.rs",
+            "bus/src/settings.rs",
             "\"transport/link/tx/lease\",\n        \"2000\"",
             "lease: 2000",
         ),

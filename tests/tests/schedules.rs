@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use protocol::bus::{Bus, Faults, MemoryNetwork, Traffic};
+use bus::{Bus, Faults, MemoryNetwork, Traffic};
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer, End, Point, StateVariables};
 use protocol::random::{Stream, stream, unit};
@@ -248,7 +248,7 @@ impl Schedule {
     /// For whom the clock waits, in the simulator's words.
     fn awaited(&self, run: &RunName) -> String {
         let bus = self.network.router();
-        let answer = bus.ask(
+        let answer = bus.get(
             &Keys::new(run).control(),
             "",
             Some(encode(&Control::Status)),

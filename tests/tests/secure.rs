@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use protocol::bus::{Bus, Declared, Role};
+use bus::{Bus, Declared, Role};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{Clock, Control, ControlAnswer, Status};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
@@ -120,7 +120,7 @@ impl Castle {
     fn control(&self, control: &Control) -> Status {
         let answer = self
             .operator
-            .ask_within(&self.keys.control(), "", Some(encode(control)), PATIENCE)
+            .get_within(&self.keys.control(), "", Some(encode(control)), PATIENCE)
             .unwrap();
         let bytes = answer.expect("an operator is answered").result.unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
@@ -304,7 +304,7 @@ fn a_participant_says_nothing_in_anothers_name() {
     // An answer on the same link comes after what was declared there: from here on they hear.
     assert!(
         witness
-            .ask(&keys.percept(&butler), "", None)
+            .get(&keys.percept(&butler), "", None)
             .unwrap()
             .is_some()
     );
@@ -387,13 +387,13 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
         (keys.all(), Vec::new()),
     ] {
         let answer = thief
-            .ask_within(&key, "", Some(body), Duration::from_millis(300))
+            .get_within(&key, "", Some(body), Duration::from_millis(300))
             .unwrap();
         assert!(answer.is_none(), "{key}: {answer:?}");
     }
     // In its own name for another one: it is let through, and seen through.
     let answer = thief
-        .ask(&keys.join_as(&leguin), "", Some(join("Butler")))
+        .get(&keys.join_as(&leguin), "", Some(join("Butler")))
         .unwrap()
         .unwrap()
         .result
@@ -404,13 +404,13 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     );
     assert!(
         thief
-            .ask(&keys.percept(&leguin), "", None)
+            .get(&keys.percept(&leguin), "", None)
             .unwrap()
             .is_some()
     );
     assert!(
         thief
-            .ask(&keys.query(&butler, STATE), "", None)
+            .get(&keys.query(&butler, STATE), "", None)
             .unwrap()
             .is_some()
     );
@@ -433,7 +433,7 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     let listener = castle.enter("Leguin");
     let _clock = clocks.on(&listener, &keys.clock());
     // It answers for others.
-    let questions = Arc::new(AtomicUsize::new(0));
+    let queries = Arc::new(AtomicUsize::new(0));
     let answering = [
         keys.query(&butler, STATE),
         keys.control(),
@@ -441,16 +441,16 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
         keys.percepts(),
     ]
     .map(|key| {
-        let questions = questions.clone();
+        let queries = queries.clone();
         thief
-            .serve(&key, move |_| {
-                questions.fetch_add(1, Ordering::Relaxed);
+            .queryable(&key, move |_| {
+                queries.fetch_add(1, Ordering::Relaxed);
             })
             .unwrap()
     });
     assert!(
         listener
-            .ask(&keys.percept(&leguin), "", None)
+            .get(&keys.percept(&leguin), "", None)
             .unwrap()
             .is_some()
     );
@@ -458,14 +458,14 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     eventually("clocks", || (clocks.keys().len() >= 80).then_some(()));
     let state = castle
         .operator
-        .ask(&keys.query(&butler, STATE), "", None)
+        .get(&keys.query(&butler, STATE), "", None)
         .unwrap()
         .unwrap()
         .result
         .unwrap();
     assert!(String::from_utf8_lossy(&state).contains("\"tick\":80"));
     assert_eq!(
-        (secrets.keys(), questions.load(Ordering::Relaxed)),
+        (secrets.keys(), queries.load(Ordering::Relaxed)),
         (Vec::<String>::new(), 0)
     );
     drop((listening, answering));

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::Instant;
 
+use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use clap::Args;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
-use protocol::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use robot::{BadParameters, Cars, Point, Robot, RobotArgs, RobotName, StateVariables};
 use simulator::recorder::SUMMARY;
 use simulator::scenario::{Changes, Scenario};

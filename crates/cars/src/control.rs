@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use bus::{Bus, Reply, Role};
 use clap::{Args, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, miette};
-use protocol::bus::{AnswerOf, Bus, Role};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
@@ -243,7 +243,7 @@ fn ask(run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
         PATIENCE
     };
     let answer = bus
-        .ask_within(&keys.control(), "", Some(encode(control)), patience)
+        .get_within(&keys.control(), "", Some(encode(control)), patience)
         .into_diagnostic()?;
     bus.close();
     let bytes = bytes_of(
@@ -253,7 +253,7 @@ fn ask(run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
     decode(&keys.control(), "simulator", &bytes).into_diagnostic()
 }
 
-fn bytes_of(answer: Option<AnswerOf>, nobody: &str) -> miette::Result<Vec<u8>> {
+fn bytes_of(answer: Option<Reply>, nobody: &str) -> miette::Result<Vec<u8>> {
     let answer = answer.ok_or_else(|| miette!("{nobody}"))?;
     answer.result.map_err(|reason| miette!("refused: {reason}"))
 }
@@ -315,7 +315,7 @@ pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     let (bus, keys) = args.run.open()?;
     let what = args.what.as_deref().unwrap_or(STATE);
     let answer = bus
-        .ask(&keys.query(&args.robot, what), "", None)
+        .get(&keys.query(&args.robot, what), "", None)
         .into_diagnostic()?;
     bus.close();
     let bytes = bytes_of(
@@ -393,7 +393,7 @@ pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
             let _ = lines.try_send(Some(line));
         }
     });
-    let watched = bus.watch(&keys.alive_sim(), move |_, is_there| {
+    let watched = bus.liveliness(&keys.alive_sim(), move |_, is_there| {
         if !is_there {
             let _ = gone.send(None);
         }

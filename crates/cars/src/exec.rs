@@ -40,7 +40,7 @@ pub(crate) struct ExecArgs {
 
 /// Runs a program as a robot until the run, or the program, ends.
 pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
-    protocol::runtime::use_one_thread();
+    bus::runtime::use_one_thread();
     let [name] = args.robot.names.as_slice() else {
         let help = "for example: cars exec --name Leguin -- ./leguin.sh";
         return Err(miette!(

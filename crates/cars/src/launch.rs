@@ -20,10 +20,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use bus::check_exposure;
+use bus::endpoint::connectable;
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr, miette};
-use protocol::bus::check_exposure;
-use protocol::endpoint::connectable;
 use protocol::{RobotName, RunName};
 use simulator::diagnostic::{FileError, Source};
 use simulator::recorder::{LOGS, SUMMARY};
@@ -106,7 +106,7 @@ enum Format {
 /// Launches a launch file or a roster.
 pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
     // The observer is on the bus, too; and what is chosen here goes for all processes.
-    protocol::runtime::use_one_thread();
+    bus::runtime::use_one_thread();
     let launch = Launch::load(args)?;
     match (launch.args.export, launch.args.dry_run) {
         (Some(Format::Compose), _) => launch.export(),

@@ -72,7 +72,7 @@ const LAUNCH: &str = include_str!("new/launch.toml");
 const SCENARIO: &str = include_str!("new/scenario.toml");
 const README: &str = include_str!("new/README.md");
 const OVER_PIPES: &str = "\
-What can be said in a tick besides the line `done` (questions to other robots, commands to them, what is near, chance) is in
+What can be said in a tick besides the line `done` (queries to other robots, commands to them, what is near, chance) is in
 `docs/protocol.md` of the CARS project, \"Robots over stdin and stdout\".";
 
 impl Language {

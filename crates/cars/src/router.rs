@@ -4,9 +4,9 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use bus::{Bus, Role};
 use clap::Args;
 use miette::IntoDiagnostic;
-use protocol::bus::{Bus, Role};
 
 /// `cars router`.
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ pub(crate) struct RouterArgs {
 
 /// Forwards until it is told to end.
 pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
-    protocol::runtime::use_one_thread();
+    bus::runtime::use_one_thread();
     let (end, ended) = std::sync::mpsc::sync_channel(1);
     // A second signal finds the queue full and changes nothing.
     ctrlc::set_handler(move || {

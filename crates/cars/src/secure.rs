@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, SystemTime};
 
+use bus::secure::{Credentials, client_config, simulator_config};
 use clap::{Args, Subcommand};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::access::{CONSOLE, RESERVED, SIMULATOR};
 use protocol::keys::Keys;
 use protocol::name::OPERATOR;
-use protocol::secure::{Credentials, client_config, simulator_config};
 use protocol::{RobotName, RunName};
 use rcgen::{
     BasicConstraints, CertificateParams, CertifiedIssuer, DnType, ExtendedKeyUsagePurpose, IsCa,

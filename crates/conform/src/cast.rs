@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use protocol::bus::{Bus, BusError, Declared, Question};
+use bus::{Bus, BusError, Declared, Query};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Percept, PublicState, SensedBody, SensedKind, SensedRobot};
 use protocol::{Epoch, Message, RobotName, Tick, encode};
@@ -118,11 +118,11 @@ impl Cast {
             .flat_map(|name| QUERIES.iter().chain([&STATE]).map(move |what| (name, what)))
         {
             let (cast, name, key) = (self.clone(), name.clone(), keys.query(name, what));
-            declared.push(bus.serve(&key, move |question| cast.answer(&name, what, &question))?);
+            declared.push(bus.queryable(&key, move |query| cast.answer(&name, what, &query))?);
         }
         let cast = self.clone();
-        declared.push(bus.serve(&keys.percept(subject), move |question| {
-            question.answer(question.key(), cast.dress(&cast.percept()));
+        declared.push(bus.queryable(&keys.percept(subject), move |query| {
+            query.reply(query.key(), cast.dress(&cast.percept()));
         })?);
         for name in self.names() {
             declared.push(bus.token(&keys.alive_robot(name))?);
@@ -131,19 +131,19 @@ impl Cast {
     }
 
     /// Asked during a tick, everybody answers with the state reported for the tick before.
-    fn answer(&self, name: &RobotName, what: &str, question: &Question) {
-        let number = |parameter: &str| question.parameter(parameter)?.parse::<Tick>().ok();
+    fn answer(&self, name: &RobotName, what: &str, query: &Query) {
+        let number = |parameter: &str| query.parameter(parameter)?.parse::<Tick>().ok();
         let (epoch, now) = self.now();
         let tick = number("tick").unwrap_or(now);
         let Some(state) = tick
             .checked_sub(1)
             .and_then(|tick| self.state(name, epoch, tick))
         else {
-            return question.refuse("nothing is known before tick 1");
+            return query.reply_err("nothing is known before tick 1");
         };
         match state.answer(what) {
-            Some(answer) => question.answer(question.key(), self.dress(&answer)),
-            None => question.answer(question.key(), self.dress(&state)),
+            Some(answer) => query.reply(query.key(), self.dress(&answer)),
+            None => query.reply(query.key(), self.dress(&state)),
         }
     }
 

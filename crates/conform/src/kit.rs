@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use protocol::bus::{Bus, BusError, Role as BusRole};
+use bus::{Bus, BusError, Role as BusRole};
 use protocol::messages::{JoinRequest, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
 

@@ -5,7 +5,7 @@ use std::process::ExitStatus;
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
-use protocol::bus::{AnswerOf, Bus, BusError, Declared, Publisher, Question};
+use bus::{Bus, BusError, Declared, Publisher, Query, Reply};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
     Clock, Command, JoinAnswer, JoinRequest, Performative, PublicState, Refusal, Welcome,
@@ -33,7 +33,7 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 
 /// All that a robot can say.
 enum Event {
-    Join(Question),
+    Join(Query),
     Report {
         key: String,
         bytes: Vec<u8>,
@@ -49,7 +49,7 @@ enum Event {
 
 /// A robot asks to take part.
 pub(crate) struct Joining {
-    question: Question,
+    query: Query,
     pub(crate) key: String,
     pub(crate) request: Result<JoinRequest, String>,
 }
@@ -149,11 +149,11 @@ impl<'k> Stage<'k> {
             });
         })?);
         let sender = events_of();
-        declared.push(bus.serve(&keys.joins(), move |question| {
-            let _ = sender.send(Event::Join(question));
+        declared.push(bus.queryable(&keys.joins(), move |query| {
+            let _ = sender.send(Event::Join(query));
         })?);
         let sender = events_of();
-        declared.push(bus.watch(&keys.alive_robots(), move |key, is_there| {
+        declared.push(bus.liveliness(&keys.alive_robots(), move |key, is_there| {
             let _ = sender.send(Event::Token(Keys::last_chunk(key).to_owned(), is_there));
         })?);
         let clock = bus.publisher(&keys.clock())?;
@@ -195,8 +195,8 @@ impl<'k> Stage<'k> {
         let order = self.seen.count;
         self.seen.count += 1;
         match event {
-            Event::Join(question) => {
-                let joining = Joining::new(question);
+            Event::Join(query) => {
+                let joining = Joining::new(query);
                 if let Some(welcome) = &self.rejoin {
                     self.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
                     self.seen.requests.push(joining.request);
@@ -337,9 +337,7 @@ impl<'k> Stage<'k> {
 
     /// Answers a request to join.
     pub(crate) fn answer_join(&self, joining: &Joining, answer: &JoinAnswer) {
-        joining
-            .question
-            .answer(&joining.key, self.cast.dress(answer));
+        joining.query.reply(&joining.key, self.cast.dress(answer));
     }
 
     /// Refuses a request to join.
@@ -450,8 +448,8 @@ impl<'k> Stage<'k> {
     }
 
     /// Asks the robot something; `None` if nobody answers.
-    pub(crate) fn ask(&self, what: &str, parameters: &str) -> Result<Option<AnswerOf>, Failure> {
-        Ok(self.kit.bus.ask(
+    pub(crate) fn ask(&self, what: &str, parameters: &str) -> Result<Option<Reply>, Failure> {
+        Ok(self.kit.bus.get(
             &self.keys.query(&self.kit.subject(), what),
             parameters,
             None,
@@ -459,7 +457,7 @@ impl<'k> Stage<'k> {
     }
 
     /// The state that the robot shows in a tick: the one of the tick before.
-    pub(crate) fn state_in(&self, epoch: Epoch, tick: Tick) -> Result<Option<AnswerOf>, Failure> {
+    pub(crate) fn state_in(&self, epoch: Epoch, tick: Tick) -> Result<Option<Reply>, Failure> {
         self.ask(STATE, &format!("tick={tick};epoch={epoch}"))
     }
 
@@ -498,16 +496,16 @@ impl<'k> Stage<'k> {
 
     /// Whether somebody subscribes to what is put on a key.
     pub(crate) fn is_heard(&self, bus: &Bus, key: &str) -> Result<bool, Failure> {
-        Ok(bus.publisher(key)?.is_watched())
+        Ok(bus.publisher(key)?.has_subscribers())
     }
 }
 
 impl Joining {
-    fn new(question: Question) -> Self {
-        let (key, body) = (question.key().to_owned(), question.body());
+    fn new(query: Query) -> Self {
+        let (key, body) = (query.key().to_owned(), query.body());
         let request = decode(&key, "a robot", &body).map_err(|error| error.to_string());
         Self {
-            question,
+            query,
             key,
             request,
         }

@@ -10,7 +10,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use protocol::bus::{Bus, BusError, Declared, Role};
+use bus::{Bus, BusError, Declared, Role};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer};
@@ -179,7 +179,7 @@ impl Live {
         };
         let bus = self.bus.get().ok_or_else(nobody)?;
         let (key, asked) = (self.keys.control(), Instant::now());
-        let answer = bus.ask_within(&key, "", Some(encode(control)), patience);
+        let answer = bus.get_within(&key, "", Some(encode(control)), patience);
         let answer =
             answer
                 .map_err(|error| error.to_string())?
@@ -306,7 +306,7 @@ impl Live {
     fn listen(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
         let (alive, log) = (self.clone(), self.clone());
         Ok([
-            bus.watch(&self.keys.alive_sim(), move |_, is_there| {
+            bus.liveliness(&self.keys.alive_sim(), move |_, is_there| {
                 alive.board.set_present(is_there);
                 alive.nudge();
             })?,

@@ -17,9 +17,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
+use bus::DEFAULT_ENDPOINT;
 use clap::Parser;
 use protocol::RunName;
-use protocol::bus::DEFAULT_ENDPOINT;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -59,7 +59,7 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    protocol::runtime::use_one_thread();
+    bus::runtime::use_one_thread();
     let args = Args::parse();
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| "warn,zenoh=error".into());

@@ -313,7 +313,7 @@ pub fn document() -> Value {
         "defaultContentType": "application/json",
         "servers": {
             "simulator": {
-                "host": crate::bus::DEFAULT_ENDPOINT.rsplit('/').next(),
+                "host": crate::DEFAULT_ENDPOINT.rsplit('/').next(),
                 "protocol": "zenoh",
                 "description": "The simulator is a router of its own; robots are clients of it.",
             },

@@ -1,24 +1,19 @@
 //! The contract between the simulator, the robots and the observers of a run.
 //!
 //! Three things live here and nowhere else: what is said ([`messages`]), where it is said ([`keys`]) and how it
-//! is written ([`codec`]). The [`bus`] carries it; one file of it, and no other of the whole project, names the
-//! middleware, so that everything above it can be tested without a network.
+//! is written ([`codec`]). It knows no sockets: the `bus` crate carries it.
 //!
 //! SI units and REP 103 throughout: meters, seconds, radians counter-clockwise from +x.
 
 pub mod access;
 pub mod asyncapi;
-pub mod bus;
 pub mod codec;
-pub mod endpoint;
 pub mod event;
 pub mod keys;
 pub mod messages;
 pub mod name;
 pub mod random;
-pub mod runtime;
 pub mod schema;
-pub mod secure;
 
 pub use codec::{Malformed, Message, decode, encode};
 pub use event::{Event, Line};
@@ -28,3 +23,6 @@ pub use name::{BadName, RobotName, RunName};
 /// Version of the contract. It is named where two sides first meet (join) and only a change that an old robot
 /// could not survive raises it: unknown fields are ignored, so a new optional field does not.
 pub const PROTOCOL_VERSION: u32 = 1;
+
+/// Endpoint where a simulator listens and others connect unless told otherwise.
+pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";

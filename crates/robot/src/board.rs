@@ -1,9 +1,9 @@
-//! What the robots of a process show to askers: their last two reported states, and questions that came early.
+//! What the robots of a process show to askers: their last two reported states, and queries that came early.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use protocol::bus::Question;
+use bus::Query;
 use protocol::keys::{Keys, STATE};
 use protocol::messages::PublicState;
 use protocol::{Epoch, RobotName, Tick, encode};
@@ -22,10 +22,10 @@ struct Inner {
     /// The last two states of each robot, newest last. During a tick the others must see the state before it,
     /// however far the robot already is.
     states: BTreeMap<RobotName, VecDeque<Arc<PublicState>>>,
-    early: Vec<Question>,
+    early: Vec<Query>,
 }
 
-/// What a board says to a question.
+/// What a board says to a query.
 enum Verdict {
     Answer(Arc<PublicState>),
     Early,
@@ -53,8 +53,8 @@ impl Board {
             states.pop_front();
         }
         let early = std::mem::take(&mut inner.early);
-        for question in early {
-            inner.respond(question);
+        for query in early {
+            inner.respond(query);
         }
     }
 
@@ -74,38 +74,38 @@ impl Board {
             .cloned()
     }
 
-    /// Answers a question now, or when there is something to answer.
-    pub(crate) fn ask(&self, question: Question) {
-        self.lock().respond(question);
+    /// Answers a query now, or when there is something to answer.
+    pub(crate) fn ask(&self, query: Query) {
+        self.lock().respond(query);
     }
 }
 
 impl Inner {
-    fn respond(&mut self, question: Question) {
-        match self.judge(&question) {
-            Verdict::Answer(state) => reply(&question, &state),
-            Verdict::Early if self.early.len() < MAX_EARLY => self.early.push(question),
-            Verdict::Early => question.refuse("too many questions are waiting already"),
-            Verdict::Never(reason) => question.refuse(&reason),
+    fn respond(&mut self, query: Query) {
+        match self.judge(&query) {
+            Verdict::Answer(state) => reply(&query, &state),
+            Verdict::Early if self.early.len() < MAX_EARLY => self.early.push(query),
+            Verdict::Early => query.reply_err("too many queries are waiting already"),
+            Verdict::Never(reason) => query.reply_err(&reason),
         }
     }
 
-    fn judge(&self, question: &Question) -> Verdict {
+    fn judge(&self, query: &Query) -> Verdict {
         let never = |reason: &str| Verdict::Never(reason.to_owned());
-        let Some(states) = Keys::robot_of(question.key()).and_then(|name| self.states.get(name))
+        let Some(states) = Keys::robot_of(query.key()).and_then(|name| self.states.get(name))
         else {
             return never("ask one robot by its name");
         };
         let Some(newest) = states.back() else {
             return Verdict::Early;
         };
-        let Some(tick) = question.parameter("tick") else {
+        let Some(tick) = query.parameter("tick") else {
             return Verdict::Answer(newest.clone());
         };
         let Ok(tick) = tick.parse::<Tick>() else {
             return never("parameter tick: not a whole number");
         };
-        if let Some(epoch) = question.parameter("epoch") {
+        if let Some(epoch) = query.parameter("epoch") {
             match epoch.parse::<Epoch>() {
                 Ok(epoch) if epoch == newest.epoch => {}
                 Ok(epoch) if epoch > newest.epoch => return Verdict::Early,
@@ -126,11 +126,11 @@ impl Inner {
     }
 }
 
-fn reply(question: &Question, state: &PublicState) {
-    let what = Keys::last_chunk(question.key());
+fn reply(query: &Query, state: &PublicState) {
+    let what = Keys::last_chunk(query.key());
     match state.answer(what) {
-        _ if what == STATE => question.answer(question.key(), encode(state)),
-        Some(answer) => question.answer(question.key(), encode(&answer)),
-        None => question.refuse(&format!("there is no query called {what}")),
+        _ if what == STATE => query.reply(query.key(), encode(state)),
+        Some(answer) => query.reply(query.key(), encode(&answer)),
+        None => query.reply_err(&format!("there is no query called {what}")),
     }
 }

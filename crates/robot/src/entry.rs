@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use bus::DEFAULT_ENDPOINT;
 use clap::Parser;
-use protocol::bus::DEFAULT_ENDPOINT;
 use protocol::{RobotName, RunName};
 
 use crate::cri::Robot;
@@ -70,7 +70,7 @@ impl RobotArgs {
 /// Runs a robot's program: `make` builds the robot for a name, `default_name` is used where the command line gives
 /// none. Returns when the run ends; the exit status is 0 if it ended as it should.
 pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> ExitCode {
-    protocol::runtime::use_one_thread();
+    bus::runtime::use_one_thread();
     let mut args = RobotArgs::parse();
     let filter =
         tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
-use protocol::bus::{Bus, BusError, Declared, Publisher, Role};
+use bus::{Bus, BusError, Declared, Publisher, Role};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
@@ -194,10 +194,12 @@ impl Host {
                 let _ = queue.send(Event::Clock(decode(key, "simulator", bytes)));
             })?);
         let queue = self.link.queue();
-        self.declared
-            .push(self.bus.watch(&self.keys.alive_sim(), move |_, there| {
-                let _ = queue.send(Event::Simulator(there));
-            })?);
+        self.declared.push(
+            self.bus
+                .liveliness(&self.keys.alive_sim(), move |_, there| {
+                    let _ = queue.send(Event::Simulator(there));
+                })?,
+        );
         for name in names {
             self.link.host(name);
             self.link.board.host(name);
@@ -220,9 +222,7 @@ impl Host {
                 let board = self.link.board.clone();
                 self.declared.push(
                     self.bus
-                        .serve(&self.keys.query(name, what), move |question| {
-                            board.ask(question)
-                        })?,
+                        .queryable(&self.keys.query(name, what), move |query| board.ask(query))?,
                 );
             }
         }
@@ -240,7 +240,7 @@ impl Host {
         let (key, begun) = (self.keys.join_as(name), Instant::now());
         loop {
             let is_last_try = begun.elapsed() > self.options.patience;
-            match self.bus.ask(&key, "", Some(encode(&request)))? {
+            match self.bus.get(&key, "", Some(encode(&request)))? {
                 Some(answer) => {
                     let bytes = answer.result.unwrap_or_else(String::into_bytes);
                     match decode(&key, "simulator", &bytes)? {
@@ -393,7 +393,7 @@ impl Member {
         }
         // First what others may ask for, then the report: after it the clock may go on and they will ask.
         // Who follows has the state before the next clock, because both come the same way.
-        if self.state.is_watched() {
+        if self.state.has_subscribers() {
             self.state.put(encode(&state))?;
         }
         link.board.show(name, Arc::new(state));
@@ -431,7 +431,7 @@ impl Member {
 
     fn paint(&mut self) -> Result<(), HostError> {
         let is_due = self.painted.is_none_or(|at| at.elapsed() >= PANEL_INTERVAL);
-        if self.panel.is_watched() && is_due {
+        if self.panel.has_subscribers() && is_due {
             self.painted = Some(Instant::now());
             self.panel.put(encode(&self.seat.panel()))?;
         }

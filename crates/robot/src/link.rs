@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
-use protocol::bus::{AnswerOf, Bus, Declared};
+use bus::{Bus, Declared, Reply};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{Clock, Command, CommandId, Percept, PublicState, Waiting};
 use protocol::{Epoch, Malformed, Message, RobotName, Tick, decode, encode};
@@ -271,7 +271,7 @@ impl Link {
     }
 
     /// Asks for a message once, and follows its key from then on: whoever serves it sends it without being asked, before
-    /// what must come after it, so that the next question finds its answer here already.
+    /// what must come after it, so that the next query finds its answer here already.
     fn ask<M: Message + 'static>(
         &mut self,
         key: &str,
@@ -280,7 +280,7 @@ impl Link {
         event: fn(RobotName, M) -> Event,
     ) {
         let (queue, sender) = (self.queue(), of.clone());
-        let file = move |answer: Option<AnswerOf>| {
+        let file = move |answer: Option<Reply>| {
             if let Some(message) = read(answer, &sender) {
                 // The queue is closed only when the process ends; a full one drops the answer, and it is asked again.
                 let _ = queue.try_send(event(sender, message));
@@ -288,7 +288,7 @@ impl Link {
         };
         if let Err(error) =
             self.bus
-                .ask_then(key, &format!("tick={tick};epoch={}", self.current.0), file)
+                .get_then(key, &format!("tick={tick};epoch={}", self.current.0), file)
         {
             tracing::warn!("{error}");
         }
@@ -337,7 +337,7 @@ impl Link {
         let mut asked_at: Option<Instant> = None;
         self.wait(of, None, |link| {
             let found = here(link);
-            // A question that finds nobody ends at once and without an error: it is asked again.
+            // A query that finds nobody ends at once and without an error: it is asked again.
             if found.is_none() && asked_at.is_none_or(|at| at.elapsed() >= ASK_AGAIN) {
                 asked_at = Some(Instant::now());
                 link.ask(key, tick, of, event);
@@ -408,7 +408,7 @@ impl Link {
     }
 }
 
-fn read<M: Message>(answer: Option<AnswerOf>, sender: &RobotName) -> Option<M> {
+fn read<M: Message>(answer: Option<Reply>, sender: &RobotName) -> Option<M> {
     let answer = answer?;
     let bytes = answer
         .result

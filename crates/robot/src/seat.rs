@@ -43,7 +43,7 @@ pub trait Network {
     fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command>;
 }
 
-/// Why a question has no answer.
+/// Why a query has no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Undelivered {
     /// The other side is gone.

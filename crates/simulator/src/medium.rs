@@ -279,7 +279,7 @@ impl Medium {
         decision.delivered.values_mut().for_each(|ids| ids.sort());
     }
 
-    /// One verdict for each asker, target and tick. A question and its answer need both directions.
+    /// One verdict for each asker, target and tick. A query and its answer need both directions.
     fn judge_queries(&self, tick: Tick, decision: &mut Decision) {
         let is_perfect = self.cut.is_empty() && !self.network.touches_queries();
         if is_perfect {

@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
-use protocol::bus::{Bus, BusError, Declared, Publisher, Question};
+use bus::{Bus, BusError, Declared, Publisher, Query};
 use protocol::keys::Keys;
 use protocol::messages::{Clock, Command, Correction, End, Performative, Report, Waiting};
 use protocol::{Epoch, Malformed, RobotName, RunName, Tick, decode, encode};
@@ -69,11 +69,11 @@ pub enum Event {
     /// A robot waits for another one's answer.
     Waiting(Result<Waiting, Malformed>, String),
     /// A robot asks to take part.
-    Join(Question),
+    Join(Query),
     /// A robot asks what it senses.
-    Percept(Question),
+    Percept(Query),
     /// Somebody asks for something.
-    Control(Question),
+    Control(Query),
     /// A robot's token came or went.
     Token(String, bool),
     /// The process is told to end.
@@ -220,24 +220,24 @@ impl Server {
                 })?,
         );
         for (key, event) in [
-            (self.keys.join(), Event::Join as fn(Question) -> Event),
+            (self.keys.join(), Event::Join as fn(Query) -> Event),
             (self.keys.joins(), Event::Join),
             (self.keys.percepts(), Event::Percept),
             (self.keys.control(), Event::Control),
         ] {
             let queue = self.queue();
-            self.declared.push(self.bus.serve(&key, move |question| {
-                let _ = queue.send(event(question));
+            self.declared.push(self.bus.queryable(&key, move |query| {
+                let _ = queue.send(event(query));
             })?);
         }
         let queue = self.queue();
-        self.declared.push(
-            self.bus
-                .watch(&self.keys.alive_robots(), move |key, is_there| {
-                    let robot = Keys::robot_of(key).unwrap_or_default();
-                    let _ = queue.send(Event::Token(robot.to_owned(), is_there));
-                })?,
-        );
+        self.declared.push(self.bus.liveliness(
+            &self.keys.alive_robots(),
+            move |key, is_there| {
+                let robot = Keys::robot_of(key).unwrap_or_default();
+                let _ = queue.send(Event::Token(robot.to_owned(), is_there));
+            },
+        )?);
         self.declared.push(self.bus.token(&self.keys.alive_sim())?);
         Ok(())
     }
@@ -354,8 +354,8 @@ impl Server {
     }
 
     fn after_tick(&mut self, simulation: &Simulation) {
-        if let Some((question, _)) = self.pace.reached(simulation.tick()) {
-            self.answer_status(&question, simulation);
+        if let Some((query, _)) = self.pace.reached(simulation.tick()) {
+            self.answer_status(&query, simulation);
         }
         if self.observers.is_frame_due() {
             self.observers.frame(simulation, &self.status(simulation));
@@ -370,8 +370,8 @@ impl Server {
         mut recorder: Recorder,
     ) -> Result<Summary, ServerError> {
         self.pace.end();
-        if let Some(question) = self.pace.give_up_stepping() {
-            self.answer_status(&question, simulation);
+        if let Some(query) = self.pace.give_up_stepping() {
+            self.answer_status(&query, simulation);
         }
         let lines = recorder.write(simulation, &simulation.end(end))?;
         self.observers.log(&lines);
@@ -436,10 +436,10 @@ impl Server {
             Event::Report(Err(error), _) | Event::Waiting(Err(error), _) => {
                 self.ignore("malformed", &error.to_string());
             }
-            Event::Join(question) => self.on_join(&question, simulation),
-            Event::Percept(question) => self.on_percept(&question, simulation),
+            Event::Join(query) => self.on_join(&query, simulation),
+            Event::Percept(query) => self.on_percept(&query, simulation),
             Event::Token(robot, is_there) => self.on_token(&robot, is_there, simulation)?,
-            Event::Control(question) => self.on_control(question, simulation)?,
+            Event::Control(query) => self.on_control(query, simulation)?,
             Event::Terminate => return Err(Interrupt::End(End::Stopped)),
         }
         Ok(())
@@ -495,10 +495,10 @@ impl Server {
         }
     }
 
-    fn on_percept(&mut self, question: &Question, simulation: &Simulation) {
-        match Keys::robot_of(question.key()).and_then(|name| self.members.get_key_value(name)) {
-            Some((name, _)) => question.answer(question.key(), encode(&simulation.percept(name))),
-            None => question.refuse("no robot of the roster has this name"),
+    fn on_percept(&mut self, query: &Query, simulation: &Simulation) {
+        match Keys::robot_of(query.key()).and_then(|name| self.members.get_key_value(name)) {
+            Some((name, _)) => query.reply(query.key(), encode(&simulation.percept(name))),
+            None => query.reply_err("no robot of the roster has this name"),
         }
     }
 
@@ -561,7 +561,7 @@ impl Server {
         for (name, publisher) in self
             .percepts
             .iter()
-            .filter(|(_, publisher)| publisher.is_watched())
+            .filter(|(_, publisher)| publisher.has_subscribers())
         {
             publisher.put(encode(&simulation.percept(name)))?;
         }
@@ -621,8 +621,8 @@ impl Server {
             self.open.culprits = self.awaited().filter(is_culprit).cloned().collect();
             self.observers.held(simulation, &self.status(simulation));
             // Who steps by hand wants to know that the step hangs, now.
-            if let Some(question) = self.pace.give_up_stepping() {
-                self.answer_status(&question, simulation);
+            if let Some(query) = self.pace.give_up_stepping() {
+                self.answer_status(&query, simulation);
             }
         }
         if self.open.repeated.elapsed() >= self.options.repeat_after {

@@ -283,7 +283,7 @@ fn a_partition_can_be_one_way_or_of_one_kind_only() {
             .values()
             .all(|decision| decision.delivered.contains_key(&name("A")))
     );
-    // A question needs an answer: neither can ask the other.
+    // A query needs an answer: neither can ask the other.
     assert!(
         decisions
             .values()

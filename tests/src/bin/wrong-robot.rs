@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use protocol::bus::{Bus, Declared, Question, Role};
+use bus::{Bus, Declared, Query, Role};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Clock, Command, CommandId, JoinAnswer, JoinRequest, News, Performative, Point, PublicState,
@@ -66,7 +66,7 @@ struct Shown {
 struct Board {
     states: Vec<PublicState>,
     /// Questions for what comes next.
-    early: Vec<Question>,
+    early: Vec<Query>,
 }
 
 impl Shown {
@@ -80,26 +80,26 @@ impl Shown {
         while board.states.len() > kept {
             board.states.remove(0);
         }
-        for question in std::mem::take(&mut board.early) {
-            self.judge(&mut board, question);
+        for query in std::mem::take(&mut board.early) {
+            self.judge(&mut board, query);
         }
     }
 
-    fn answer(&self, question: Question) {
+    fn answer(&self, query: Query) {
         self.judge(
             &mut self.board.lock().unwrap_or_else(PoisonError::into_inner),
-            question,
+            query,
         );
     }
 
-    fn judge(&self, board: &mut Board, question: Question) {
-        let number = |name: &str| question.parameter(name).map(str::parse::<u64>);
+    fn judge(&self, board: &mut Board, query: Query) {
+        let number = |name: &str| query.parameter(name).map(str::parse::<u64>);
         if matches!(number("epoch"), Some(Err(_))) && self.wrong.is("query.unknown") {
             std::process::exit(1);
         }
         let (Ok(tick), Ok(epoch)) = (number("tick").transpose(), number("epoch").transpose())
         else {
-            return question.refuse("not a whole number");
+            return query.reply_err("not a whole number");
         };
         let newest = board.states.last().cloned();
         let is_early = match &newest {
@@ -123,14 +123,12 @@ impl Shown {
         let found = found.or(newest.filter(|_| self.wrong.is("query.early")));
         match found {
             Some(state) => {
-                let answer = state.answer(Keys::last_chunk(question.key()));
+                let answer = state.answer(Keys::last_chunk(query.key()));
                 let bytes = answer.map_or_else(|| encode(&state), |answer| encode(&answer));
-                question.answer(question.key(), bytes);
+                query.reply(query.key(), bytes);
             }
-            None if is_early && !self.wrong.is("query.early:impatient") => {
-                board.early.push(question)
-            }
-            None => question.refuse("not now"),
+            None if is_early && !self.wrong.is("query.early:impatient") => board.early.push(query),
+            None => query.reply_err("not now"),
         }
     }
 }
@@ -221,7 +219,7 @@ fn join(
     let (key, begun) = (Keys::new(run).join_as(name), Instant::now());
     loop {
         let answer = bus
-            .ask(&key, "", Some(encode(&request)))?
+            .get(&key, "", Some(encode(&request)))?
             .and_then(|answer| answer.result.ok());
         match answer
             .map(|bytes| wrong.read(&key, &bytes).ok_or("an answer that is none"))
@@ -270,7 +268,7 @@ impl Robot {
             RunName::new(&variable("CARS_RUN", "default"))?,
         );
         let patience = Duration::from_secs_f64(variable("CARS_PATIENCE_S", "20").parse()?);
-        let connect = variable("CARS_CONNECT", protocol::bus::DEFAULT_ENDPOINT);
+        let connect = variable("CARS_CONNECT", bus::DEFAULT_ENDPOINT);
         let bus = Bus::open(&Role::Client { connect, patience }, None)?;
         let keys = Keys::new(&run);
         let (queue, events) = sync_channel(4096);
@@ -281,9 +279,8 @@ impl Robot {
         let mut declared = Vec::new();
         for what in QUERIES.iter().chain([&STATE]) {
             let shown = shown.clone();
-            declared.push(bus.serve(&keys.query(&name, what), move |question| {
-                shown.answer(question)
-            })?);
+            declared
+                .push(bus.queryable(&keys.query(&name, what), move |query| shown.answer(query))?);
         }
         let is_late = wrong.is("join.ready-last");
         if !is_late {

@@ -65,15 +65,15 @@ fn questions_that_have_no_answer_say_why() {
     let stage = Stage::each_tick(
         r#"
         case $json in *'"tick":0,'*|*'"tick":3,'*)
-            for question in '"of":"Butler","what":"speed"' '"of":"Nobody","what":"speed"' '"of":"Butler","what":"mood"' \
+            for query in '"of":"Butler","what":"speed"' '"of":"Nobody","what":"speed"' '"of":"Butler","what":"mood"' \
                 '"of":"Butler","what":"state"'; do
-                ask '{"type":"query",'"$question"'}'; echo "answer $question: $json" >&2
+                ask '{"type":"query",'"$query"'}'; echo "answer $query: $json" >&2
             done ;;
         esac"#,
         "",
     );
-    stage.start("exec-questions", &[]).finish();
-    let log = stage.log("exec-questions");
+    stage.start("exec-queries", &[]).finish();
+    let log = stage.log("exec-queries");
     let answers: Vec<&str> = log
         .lines()
         .filter_map(|line| line.split_once("answer "))

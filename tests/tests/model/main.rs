@@ -5,7 +5,7 @@
 //!
 //! | Action | Code |
 //! | --- | --- |
-//! | `Start` | `robot::Host::join_over`, `Server::on_join`: a question that is repeated until it is answered is one step |
+//! | `Start` | `robot::Host::join_over`, `Server::on_join`: a query that is repeated until it is answered is one step |
 //! | `Deliver(_, Up)` | `Server::on_report`, `Server::on_token`, then the loop of `Server::exchange` |
 //! | `Deliver(_, Down)` | `Link::file_clock`, `Host::on_clock`, `Seat::tick`; a tick whose command is not here yet waits |
 //! | `Deliver(_, Out)` | `Link::file_command` |

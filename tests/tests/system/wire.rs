@@ -4,7 +4,7 @@ use std::process::Command;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use protocol::bus::{Bus, Declared, Role};
+use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{
     Clock, Control, ControlAnswer, JoinAnswer, Point, PublicState, Refusal, Report, Status, Welcome,
@@ -66,7 +66,7 @@ impl Wire {
 
     fn ask(&self, key: &str, parameters: &str, body: &[u8]) -> Result<Vec<u8>, String> {
         let answer = eventually("an answer", || {
-            self.bus.ask(key, parameters, Some(body.to_vec())).unwrap()
+            self.bus.get(key, parameters, Some(body.to_vec())).unwrap()
         });
         answer.result
     }
@@ -406,7 +406,7 @@ fn queries_answer_with_the_tick_before() {
     });
     let ask = |what: &str, parameters: &str| {
         let answer = bus
-            .ask(&keys.query(&name("Leguin"), what), parameters, None)
+            .get(&keys.query(&name("Leguin"), what), parameters, None)
             .unwrap();
         answer.expect("Leguin answers").result
     };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 
-use protocol::bus::{Bus, Declared};
+use bus::{Bus, Declared};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
     Clock, Command, JoinAnswer, JoinRequest, Performative, Point, PublicState, Report, SentCommand,
@@ -62,16 +62,16 @@ impl Caller {
             let _ = sender.send(decode(key, "simulator", bytes).unwrap());
         });
         let shown = states.clone();
-        let served = bus.serve(&keys.query(name, STATE), move |question| {
+        let served = bus.queryable(&keys.query(name, STATE), move |query| {
             let number = |name: &str| {
-                question
+                query
                     .parameter(name)
                     .and_then(|text| text.parse::<u64>().ok())
             };
             let (epoch, tick) = (number("epoch").unwrap() as Epoch, number("tick").unwrap());
             match shown.lock().unwrap().get(&(epoch, tick - 1)) {
-                Some(state) => question.answer(question.key(), encode(state)),
-                None => question.refuse("that tick is over, or far away"),
+                Some(state) => query.reply(query.key(), encode(state)),
+                None => query.reply_err("that tick is over, or far away"),
             }
         });
         let declared = vec![heard.unwrap(), served.unwrap()];
@@ -99,7 +99,7 @@ impl Caller {
         };
         let answer = self
             .bus
-            .ask(&self.keys.join_as(&self.name), "", Some(encode(&request)))
+            .get(&self.keys.join_as(&self.name), "", Some(encode(&request)))
             .unwrap()
             .expect("an answer");
         match decode("join", "simulator", &answer.result.unwrap()).unwrap() {

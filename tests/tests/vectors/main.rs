@@ -14,7 +14,7 @@ mod echo;
 mod stage;
 mod transcript;
 
-use protocol::bus::{Bus, Role};
+use bus::{Bus, Role};
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer};
 use protocol::random::{MAX_SEED, stream, unit};
@@ -193,11 +193,11 @@ fn leguin_in_the_hall_as_processes() {
         listen(&keys.commands_to(&leguin)),
         listen(&keys.command(&name("Butler"), &leguin)),
     ];
-    // An answer shows that what was declared before the question is in effect.
+    // An answer shows that what was declared before the query is in effect.
     let step = encode(&Control::Step { n: LEGUIN_TICKS });
     eventually("tick 0", || {
         let answer = bus
-            .ask_within(&keys.control(), "", Some(step.clone()), PATIENCE)
+            .get_within(&keys.control(), "", Some(step.clone()), PATIENCE)
             .unwrap()?
             .result
             .unwrap();

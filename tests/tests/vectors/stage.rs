@@ -5,7 +5,7 @@ use std::path::Path;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use protocol::bus::{AnswerOf, Bus, Declared, Faults, MemoryNetwork, Overheard};
+use bus::{Bus, Declared, Faults, MemoryNetwork, Overheard, Reply};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{Control, ControlAnswer, Phase, Presence, Status};
 use protocol::{RobotName, RunName, Tick, decode, encode};
@@ -81,7 +81,7 @@ impl Stage {
         let status = encode(&Control::Status);
         eventually("the simulator", || {
             observer
-                .ask(&keys.control(), "", Some(status.clone()))
+                .get(&keys.control(), "", Some(status.clone()))
                 .unwrap()
         });
         let _ = network.overhear(); // The story begins here.
@@ -166,7 +166,7 @@ impl Stage {
     fn control(&self, control: &Control) -> Status {
         let answer = self
             .observer
-            .ask(&self.keys.control(), "", Some(encode(control)))
+            .get(&self.keys.control(), "", Some(encode(control)))
             .unwrap();
         let bytes = answer.expect("the simulator answers").result.unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
@@ -233,7 +233,7 @@ impl Stage {
     /// Asks the robot, and files what it says.
     pub(super) fn ask(&mut self, what: &str, parameters: &str) {
         let key = self.keys.query(&self.robot, what);
-        if let Some(AnswerOf { result, .. }) = self.observer.ask(&key, parameters, None).unwrap() {
+        if let Some(Reply { result, .. }) = self.observer.get(&key, parameters, None).unwrap() {
             self.transcript.asked(&key, parameters, &result);
         }
     }

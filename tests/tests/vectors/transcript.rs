@@ -1,7 +1,7 @@
 //! What was heard at the router, as one robot's own story: lines in an order that no schedule changes.
 
+use bus::Overheard;
 use protocol::RobotName;
-use protocol::bus::Overheard;
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{Clock, Percept, PublicState};
 
@@ -47,8 +47,8 @@ fn put(way: &str, key: &str, message: &[u8]) -> Line {
     ))
 }
 
-/// A question and what came back. `way` is `ask` where the robot asks and `asked` where it is asked.
-fn question(
+/// A query and what came back. `way` is `ask` where the robot asks and `asked` where it is asked.
+fn query(
     way: &str,
     key: &str,
     parameters: &str,
@@ -100,16 +100,16 @@ impl Transcript {
                     }
                 }
                 Overheard::Asked {
-                    question: number,
+                    query: number,
                     key,
                     body,
                     ..
                 } if self.is_own_join(key, body) => {
-                    let is_answer = |later: &&Overheard| matches!(later, Overheard::Answered { question, .. } if question == number);
+                    let is_answer = |later: &&Overheard| matches!(later, Overheard::Answered { query, .. } if query == number);
                     if let Some(Overheard::Answered { result, .. }) =
                         heard[at..].iter().find(is_answer)
                     {
-                        placed.push((Place::Join, question("ask", key, "", Some(body), result)));
+                        placed.push((Place::Join, query("ask", key, "", Some(body), result)));
                     }
                 }
                 Overheard::Token { key } if *key == self.keys.alive_robot(&self.robot) => {
@@ -135,10 +135,10 @@ impl Transcript {
         }
     }
 
-    /// A question to the robot, and what it answered.
+    /// A query to the robot, and what it answered.
     pub(super) fn asked(&mut self, key: &str, parameters: &str, result: &Result<Vec<u8>, String>) {
         self.lines
-            .push(question("asked", key, parameters, None, result));
+            .push(query("asked", key, parameters, None, result));
     }
 
     pub(super) fn text(&self) -> String {
@@ -188,7 +188,7 @@ impl Transcript {
             let parameters = format!("tick={tick};epoch={epoch}");
             return Some((
                 Place::Ask,
-                question("ask", key, &parameters, None, &Ok(message.to_vec())),
+                query("ask", key, &parameters, None, &Ok(message.to_vec())),
             ));
         }
         let (before, sender) = key.rsplit_once('/')?;
@@ -232,7 +232,7 @@ impl Transcript {
             if is_last && unreachable.iter().all(|name| name.as_str() != of) {
                 asks.push((
                     Place::Ask,
-                    question("ask", key, &parameters, None, &Ok(state.clone())),
+                    query("ask", key, &parameters, None, &Ok(state.clone())),
                 ));
             }
         }

@@ -57,7 +57,7 @@ pub(super) enum Told<'a> {
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         sensed: &'a [SensedRobot],
     },
-    /// What became of a question.
+    /// What became of a query.
     Answer {
         #[serde(flatten)]
         result: Answered,
@@ -157,7 +157,7 @@ pub(super) enum Said {
     Done(Done),
 }
 
-/// A question to another robot.
+/// A query to another robot.
 #[derive(Debug, Deserialize)]
 pub(super) struct Query {
     pub(super) of: String,

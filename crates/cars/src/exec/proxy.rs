@@ -144,7 +144,7 @@ impl Proxy {
     }
 }
 
-/// The answer to a question of the program.
+/// The answer to a query of the program.
 fn ask(cars: &mut Cars<'_>, query: &Query) -> Result<Value, &'static str> {
     let state = cars
         .get_robot_state(&query.of)

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
+use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use protocol::RunName;
-use protocol::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use simulator::diagnostic::FileError;
 
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};

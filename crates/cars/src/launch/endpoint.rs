@@ -2,7 +2,7 @@
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 
-use protocol::endpoint::TLS;
+use bus::endpoint::TLS;
 
 /// A loopback port that is free at this moment.
 pub(crate) fn free_port() -> std::io::Result<u16> {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::Duration;
 
-use protocol::bus::{Bus, BusError, Declared, Role};
+use bus::{Bus, BusError, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer, FaultOrder, LogRecord, Phase, WorldFrame};
 use protocol::{RunName, decode, encode};
@@ -92,7 +92,7 @@ impl Watch {
         );
         // Dropping the sender is the message.
         let end = std::sync::Mutex::new(Some(end));
-        declared.push(bus.watch(&keys.alive_sim(), move |_, is_there| {
+        declared.push(bus.liveliness(&keys.alive_sim(), move |_, is_there| {
             if !is_there && let Ok(mut end) = end.lock() {
                 end.take();
             }
@@ -113,7 +113,7 @@ impl Watch {
     }
 
     fn ask(&self, bus: &Bus, keys: &Keys) -> Result<Option<Phase>, BusError> {
-        let Some(answer) = bus.ask(&keys.control(), "", Some(encode(&Control::Status)))? else {
+        let Some(answer) = bus.get(&keys.control(), "", Some(encode(&Control::Status)))? else {
             return Ok(None);
         };
         let Ok(body) = answer.result else {
@@ -148,7 +148,7 @@ fn hear_faults(
             };
             // On a thread of its own: the answer takes as long as the simulator takes.
             std::thread::spawn(move || {
-                if let Err(error) = asking.ask(&control, "", Some(encode(&done))) {
+                if let Err(error) = asking.get(&control, "", Some(encode(&done))) {
                     tracing::warn!("{error}");
                 }
             });

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use protocol::endpoint::connectable;
+use bus::endpoint::connectable;
 use protocol::{RobotName, RunName};
 use simulator::RunFolder;
 use simulator::diagnostic::FileError;
@@ -213,9 +213,8 @@ fn simulator(
 }
 
 fn prepare(process: &Process, mut command: CommandLine) -> Planned {
-    let runtime = protocol::runtime::RUNTIME_VARIABLE;
-    let chosen =
-        std::env::var(runtime).unwrap_or_else(|_| protocol::runtime::ONE_THREAD.to_owned());
+    let runtime = bus::runtime::RUNTIME_VARIABLE;
+    let chosen = std::env::var(runtime).unwrap_or_else(|_| bus::runtime::ONE_THREAD.to_owned());
     command.env.entry(runtime.to_owned()).or_insert(chosen);
     if !process.is_extern {
         // Its output goes into a file, too, and files have no colors.

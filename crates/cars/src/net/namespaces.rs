@@ -25,7 +25,7 @@ const NETWORK: &str = "10.77.0";
 const PORT: u16 = 7447;
 /// Most processes that find an address.
 const MAX_PROCESSES: usize = 250;
-/// Milliseconds between two questions of a host for another one's hardware address. The kernel's second would be most of
+/// Milliseconds between two queries of a host for another one's hardware address. The kernel's second would be most of
 /// the time that a healed link takes to be used again.
 const ASK_FOR_ADDRESS_AGAIN_MS: &str = "100";
 

@@ -10,11 +10,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::{Duration, SystemTime};
 
+use bus::endpoint::is_tls;
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use protocol::endpoint::is_tls;
 use protocol::{RobotName, RunName};
 use serde::Serialize;
 use simulator::RunFolder;

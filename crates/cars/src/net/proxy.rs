@@ -10,10 +10,10 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use bus::endpoint::TLS;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::RobotName;
-use protocol::endpoint::TLS;
 use protocol::random::{stream, unit};
 
 use super::gate::{Gate, Pace};

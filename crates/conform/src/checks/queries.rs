@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use protocol::bus::AnswerOf;
+use bus::Reply;
 use protocol::keys::{QUERIES, STATE};
 use protocol::messages::{Answer, Clock, Point, PublicState};
 use protocol::{Epoch, Tick, decode};
@@ -15,9 +15,9 @@ use crate::report::Failure;
 use crate::script::{Entry, Script, Straight, Twist, play};
 use crate::stage::{Options, Stage};
 
-/// A question has its answer within this time, or has none.
+/// A query has its answer within this time, or has none.
 const QUESTION_PATIENCE: Duration = Duration::from_secs(3);
-/// The last tick before the odd questions.
+/// The last tick before the odd queries.
 const LAST: Tick = 8;
 /// One tick in so many is asked about at length: that costs time.
 const ROUND: Tick = 10;
@@ -99,14 +99,14 @@ fn late_state_of(
 }
 
 /// What came as an answer, read as a state.
-pub(super) fn state(answer: Option<AnswerOf>, expected: &str) -> Result<PublicState, Failure> {
+pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState, Failure> {
     match answer {
         None => Err(Failure::new(expected, "no answer")),
-        Some(AnswerOf {
+        Some(Reply {
             result: Err(reason),
             ..
         }) => Err(Failure::new(expected, format!("refused: {reason}"))),
-        Some(AnswerOf {
+        Some(Reply {
             result: Ok(bytes), ..
         }) => decode(STATE, "the robot", &bytes)
             .map_err(|error| Failure::new(expected, error.to_string())),
@@ -274,11 +274,11 @@ fn check_six(
             now.answer(what)
         );
         let came = match stage.ask(what, &format!("tick={};epoch={epoch}", tick + 1))? {
-            Some(AnswerOf {
+            Some(Reply {
                 result: Ok(bytes), ..
             }) => decode::<Answer>(what, "the robot", &bytes)
                 .map_err(|error| Failure::new(expected.clone(), error.to_string()))?,
-            Some(AnswerOf {
+            Some(Reply {
                 result: Err(reason),
                 ..
             }) => return Err(Failure::new(expected, reason)),
@@ -310,8 +310,8 @@ fn same_value(one: &serde_json::Value, two: &serde_json::Value) -> bool {
     }
 }
 
-/// A question that has been asked: where its answer comes.
-type Pending = Receiver<Option<AnswerOf>>;
+/// A query that has been asked: where its answer comes.
+type Pending = Receiver<Option<Reply>>;
 
 /// Asks for the state of the tick before `tick`, and goes on.
 fn ask_early(stage: &Stage<'_>, epoch: Epoch, tick: &str) -> Result<Pending, Failure> {
@@ -320,7 +320,7 @@ fn ask_early(stage: &Stage<'_>, epoch: Epoch, tick: &str) -> Result<Pending, Fai
     stage
         .kit
         .bus
-        .ask_then(&key, &format!("tick={tick};epoch={epoch}"), move |came| {
+        .get_then(&key, &format!("tick={tick};epoch={epoch}"), move |came| {
             // Nobody waits for it any more where this check is over.
             let _ = sender.send(came);
         })?;
@@ -328,7 +328,7 @@ fn ask_early(stage: &Stage<'_>, epoch: Epoch, tick: &str) -> Result<Pending, Fai
 }
 
 /// The answer to it; `None` if there is none.
-fn answer_to(pending: &Pending) -> Option<AnswerOf> {
+fn answer_to(pending: &Pending) -> Option<Reply> {
     pending.recv_timeout(QUESTION_PATIENCE).ok().flatten()
 }
 
@@ -368,13 +368,13 @@ pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         let expected =
             format!("after tick {now}, an error reply in words to tick={tick};epoch={epoch}");
         match answer_to(&ask_early(&stage, epoch, &tick)?) {
-            Some(AnswerOf {
+            Some(Reply {
                 result: Err(words), ..
             }) if !words.trim().is_empty() => {}
-            Some(AnswerOf { result: Err(_), .. }) => {
+            Some(Reply { result: Err(_), .. }) => {
                 return Err(Failure::new(expected, "one without words"));
             }
-            Some(AnswerOf {
+            Some(Reply {
                 result: Ok(bytes), ..
             }) => {
                 return Err(Failure::new(expected, String::from_utf8_lossy(&bytes)));
@@ -391,7 +391,7 @@ pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         .map(drop)
 }
 
-/// A question that came early has its answer as soon as there is one.
+/// A query that came early has its answer as soon as there is one.
 fn demand_state(
     stage: &Stage<'_>,
     pending: &Pending,
@@ -431,7 +431,7 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                 (STATE, "tick=-1;epoch=1"),
                 ("location", "tick=1;epoch=x"),
             ] {
-                if let Some(AnswerOf {
+                if let Some(Reply {
                     result: Ok(bytes), ..
                 }) = stage.ask(what, parameters)?
                 {
@@ -445,10 +445,5 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
     let welcome = stage.welcome();
     let asked = play(&mut stage, &welcome, &Script::usual(kit), &mut Odd)?;
-    demand_same(
-        kit,
-        "a question that nobody can answer",
-        usual(kit)?,
-        &asked,
-    )
+    demand_same(kit, "a query that nobody can answer", usual(kit)?, &asked)
 }

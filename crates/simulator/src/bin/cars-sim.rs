@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use bus::endpoint::connectable;
+use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
 use clap::Parser;
 use miette::{IntoDiagnostic, WrapErr};
 use protocol::RunName;
-use protocol::bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
-use protocol::endpoint::connectable;
 use protocol::messages::End;
 use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG};
 use simulator::scenario::{Changes, Override, Scenario};
@@ -65,7 +65,7 @@ fn speed(text: &str) -> Result<Speed, String> {
 }
 
 fn main() -> miette::Result<ExitCode> {
-    protocol::runtime::use_one_thread();
+    bus::runtime::use_one_thread();
     let args = Args::parse();
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| "warn,zenoh=error".into());

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use protocol::bus::Question;
+use bus::Query;
 use protocol::messages::{
     Awaited, Control, ControlAnswer, End, FieldError, Phase, Reason, RobotStatus, Setup,
     SetupAnswer, Status,
@@ -29,7 +29,7 @@ pub(super) struct Pace {
     due: Instant,
     pending_steps: u64,
     /// Who asked to step, and the tick at which the answer is due.
-    stepping: Option<(Question, Tick)>,
+    stepping: Option<(Query, Tick)>,
 }
 
 impl Pace {
@@ -71,13 +71,13 @@ impl Pace {
     }
 
     /// Who is to be told that a tick is reached.
-    pub(super) fn reached(&mut self, tick: Tick) -> Option<(Question, Tick)> {
+    pub(super) fn reached(&mut self, tick: Tick) -> Option<(Query, Tick)> {
         self.stepping.take_if(|(_, until)| tick >= *until)
     }
 
     /// Who is to be told that stepping hangs.
-    pub(super) fn give_up_stepping(&mut self) -> Option<Question> {
-        self.stepping.take().map(|(question, _)| question)
+    pub(super) fn give_up_stepping(&mut self) -> Option<Query> {
+        self.stepping.take().map(|(query, _)| query)
     }
 
     /// Takes one tick of what was granted. `Err` says how long to wait at most before looking again.
@@ -135,38 +135,34 @@ impl Server {
     /// People ask for something; they are answered at once.
     pub(super) fn on_control(
         &mut self,
-        question: Question,
+        query: Query,
         simulation: &Simulation,
     ) -> Result<(), Interrupt> {
-        let control = match decode::<Control>(question.key(), "an operator", &question.body()) {
+        let control = match decode::<Control>(query.key(), "an operator", &query.body()) {
             Ok(control) => control,
             Err(error) => {
-                refuse(&question, &error.to_string());
+                refuse(&query, &error.to_string());
                 return Ok(());
             }
         };
         match control {
             Control::Step { n } => {
-                self.on_step(n, question, simulation);
+                self.on_step(n, query, simulation);
                 return Ok(());
             }
             Control::Init { seed, setup } => {
                 let next = next_scenario(simulation.scenario(), seed, setup.as_deref());
-                self.on_init(next, &question, simulation)?;
+                self.on_init(next, &query, simulation)?;
             }
             Control::Load { scenario } => {
-                self.on_init(
-                    load(&scenario, simulation.scenario()),
-                    &question,
-                    simulation,
-                )?;
+                self.on_init(load(&scenario, simulation.scenario()), &query, simulation)?;
             }
             Control::Setup => {
-                answer_setup(&question, simulation.scenario());
+                answer_setup(&query, simulation.scenario());
                 return Ok(());
             }
             Control::Stop => {
-                self.answer_status(&question, simulation);
+                self.answer_status(&query, simulation);
                 return Err(Interrupt::End(End::Stopped));
             }
             other => match self.act(&other) {
@@ -175,12 +171,12 @@ impl Server {
                     {
                         self.answer_status(&stepping, simulation);
                     }
-                    self.answer_status(&question, simulation);
+                    self.answer_status(&query, simulation);
                 }
-                Err(explanation) => refuse(&question, &explanation),
+                Err(explanation) => refuse(&query, &explanation),
             },
         }
-        if self.observers.is_watched() {
+        if self.observers.has_subscribers() {
             self.observers.frame(simulation, &self.status(simulation));
         }
         Ok(())
@@ -260,63 +256,63 @@ impl Server {
     fn on_init(
         &mut self,
         next: Result<Scenario, Refusal>,
-        question: &Question,
+        query: &Query,
         simulation: &Simulation,
     ) -> Result<(), Interrupt> {
         let next = match next {
             Ok(next) => next,
             Err(refusal) => {
-                question.answer(question.key(), encode(&ControlAnswer::from(refusal)));
+                query.reply(query.key(), encode(&ControlAnswer::from(refusal)));
                 return Ok(());
             }
         };
         match self.pace.phase {
             Phase::Gathering | Phase::Ended => {
-                refuse(question, &format!("the run is {}", self.pace.phase));
+                refuse(query, &format!("the run is {}", self.pace.phase));
                 Ok(())
             }
             _ => {
                 if let Some(stepping) = self.pace.give_up_stepping() {
                     self.answer_status(&stepping, simulation);
                 }
-                self.answer_status(question, simulation);
+                self.answer_status(query, simulation);
                 Err(Interrupt::Init(Box::new(next)))
             }
         }
     }
 
-    fn on_step(&mut self, n: u64, question: Question, simulation: &Simulation) {
+    fn on_step(&mut self, n: u64, query: Query, simulation: &Simulation) {
         if !matches!(self.pace.phase, Phase::Ready | Phase::Paused) {
             return refuse(
-                &question,
+                &query,
                 &format!("the run is {}; pause it to step", self.pace.phase),
             );
         }
         if n == 0 || n > MAX_STEPS {
-            return refuse(&question, &format!("a step is 1 to {MAX_STEPS} ticks"));
+            return refuse(&query, &format!("a step is 1 to {MAX_STEPS} ticks"));
         }
         if self.pace.pending_steps + n > MAX_STEPS {
-            return refuse(&question, "too many steps are pending already");
+            return refuse(&query, "too many steps are pending already");
         }
         self.pace.phase = Phase::Paused;
         self.pace.pending_steps += n;
         if self.open.is_announced {
-            return self.answer_status(&question, simulation);
+            return self.answer_status(&query, simulation);
         }
         // Only the last one to step is kept waiting; whoever came before is told how far things are.
         let until = simulation.tick() + self.pace.pending_steps + u64::from(self.open.is_open);
         if let Some((earlier, _)) = self
             .pace
             .stepping
-            .replace((question, until.min(simulation.scenario().ticks)))
+            .replace((query, until.min(simulation.scenario().ticks)))
         {
             self.answer_status(&earlier, simulation);
         }
     }
 
-    pub(super) fn answer_status(&self, question: &Question, simulation: &Simulation) {
+    pub(super) fn answer_status(&self, query: &Query, simulation: &Simulation) {
         let answer = ControlAnswer::Done(Box::new(self.status(simulation)));
-        question.answer(question.key(), encode(&answer));
+        query.reply(query.key(), encode(&answer));
     }
 
     /// How things stand.
@@ -440,23 +436,20 @@ fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
     Ok(loaded.with_roster_of(running)?)
 }
 
-fn answer_setup(question: &Question, scenario: &Scenario) {
+fn answer_setup(query: &Query, scenario: &Scenario) {
     match scenario.to_toml() {
         Ok(text) => {
             let answer = SetupAnswer {
                 setup: scenario.setup(),
                 scenario: text,
             };
-            question.answer(
-                question.key(),
-                encode(&ControlAnswer::Setup(Box::new(answer))),
-            );
+            query.reply(query.key(), encode(&ControlAnswer::Setup(Box::new(answer))));
         }
-        Err(error) => refuse(question, &error.to_string()),
+        Err(error) => refuse(query, &error.to_string()),
     }
 }
 
-fn refuse(question: &Question, explanation: &str) {
+fn refuse(query: &Query, explanation: &str) {
     let answer = ControlAnswer::from(Refusal::from(explanation.to_owned()));
-    question.answer(question.key(), encode(&answer));
+    query.reply(query.key(), encode(&answer));
 }

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use protocol::bus::Publisher;
+use bus::Publisher;
 use protocol::encode;
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
 use protocol::{Epoch, Tick};
@@ -88,7 +88,7 @@ impl Server {
     /// Whether somebody hears the orders. It is waited for once; if nobody comes, the run goes on and has said so.
     fn has_launcher(&mut self, simulation: &mut Simulation) -> Result<bool, Interrupt> {
         let begun = Instant::now();
-        while !self.orders.publisher.is_watched() {
+        while !self.orders.publisher.has_subscribers() {
             if self.orders.has_complained {
                 return Ok(false);
             }

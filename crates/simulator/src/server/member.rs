@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use protocol::bus::Question;
+use bus::Query;
 use protocol::keys::Keys;
 use protocol::messages::{JoinAnswer, JoinRequest, Phase, Presence, Refusal};
 use protocol::{Generation, PROTOCOL_VERSION, decode, encode};
@@ -132,30 +132,29 @@ impl Member {
 }
 
 impl Server {
-    pub(super) fn on_join(&mut self, question: &Question, simulation: &Simulation) {
-        let answer =
-            self.judge_join(question, simulation)
-                .unwrap_or_else(|(reason, explanation)| {
-                    tracing::info!("refused a robot: {explanation}");
-                    JoinAnswer::Refused {
-                        reason,
-                        explanation,
-                    }
-                });
-        question.answer(question.key(), encode(&answer));
+    pub(super) fn on_join(&mut self, query: &Query, simulation: &Simulation) {
+        let answer = self
+            .judge_join(query, simulation)
+            .unwrap_or_else(|(reason, explanation)| {
+                tracing::info!("refused a robot: {explanation}");
+                JoinAnswer::Refused {
+                    reason,
+                    explanation,
+                }
+            });
+        query.reply(query.key(), encode(&answer));
     }
 
     fn judge_join(
         &mut self,
-        question: &Question,
+        query: &Query,
         simulation: &Simulation,
     ) -> Result<JoinAnswer, (Refusal, String)> {
-        let request: JoinRequest = decode(question.key(), "a robot", &question.body())
+        let request: JoinRequest = decode(query.key(), "a robot", &query.body())
             .map_err(|error| (Refusal::Malformed, error.to_string()))?;
         let (name, run) = (&request.name, &self.options.run);
         // Access control looks at keys: whoever is in the key must be who is meant.
-        if let Some(asker) = Keys::joins_as(question.key()).filter(|asker| *asker != name.as_str())
-        {
+        if let Some(asker) = Keys::joins_as(query.key()).filter(|asker| *asker != name.as_str()) {
             return Err((Refusal::Malformed, format!("{asker} cannot join as {name}")));
         }
         if request.protocol != PROTOCOL_VERSION {

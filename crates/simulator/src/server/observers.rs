@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use protocol::bus::{Bus, BusError, Publisher};
+use bus::{Bus, BusError, Publisher};
 use protocol::encode;
 use protocol::keys::Keys;
 use protocol::messages::{
@@ -35,12 +35,12 @@ impl Observers {
         })
     }
 
-    pub(super) fn is_watched(&self) -> bool {
-        self.world.is_watched()
+    pub(super) fn has_subscribers(&self) -> bool {
+        self.world.has_subscribers()
     }
 
     pub(super) fn is_frame_due(&self) -> bool {
-        self.world.is_watched() && self.painted.elapsed() >= FRAME_INTERVAL
+        self.world.has_subscribers() && self.painted.elapsed() >= FRAME_INTERVAL
     }
 
     pub(super) fn frame(&mut self, simulation: &Simulation, status: &Status) {
@@ -54,7 +54,7 @@ impl Observers {
 
     /// Notes what the next frame tells of a tick.
     pub(super) fn note(&mut self, record: &TickRecord) {
-        if !self.world.is_watched() {
+        if !self.world.has_subscribers() {
             return;
         }
         for flight in record
@@ -70,7 +70,7 @@ impl Observers {
     }
 
     pub(super) fn log(&self, lines: &[LogRecord]) {
-        if self.log.is_watched() {
+        if self.log.has_subscribers() {
             lines.iter().for_each(|line| show(&self.log, encode(line)));
         }
     }

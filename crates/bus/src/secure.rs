@@ -7,12 +7,12 @@ use std::fmt::Write;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::access::{CONSOLE, Grant, of_operator, of_robot};
-use crate::bus::DEFAULT_ENDPOINT;
-use crate::bus::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
+use crate::DEFAULT_ENDPOINT;
 use crate::endpoint::TLS;
-use crate::keys::Keys;
-use crate::name::{OPERATOR, RobotName};
+use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
+use protocol::access::{CONSOLE, Grant, of_operator, of_robot};
+use protocol::keys::Keys;
+use protocol::name::{OPERATOR, RobotName};
 
 /// How a participant shows who it is, as PEM texts.
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,7 @@
 //!
 //! - a link keeps its order, and so declarations are in effect before the token that follows them is seen;
 //! - between links there is no order: the next delivery is chosen by the seed among all links that have something;
-//! - nothing is lost unless a link breaks. Then everything on it is lost, what is said meanwhile is lost, questions end
+//! - nothing is lost unless a link breaks. Then everything on it is lost, what is said meanwhile is lost, queries end
 //!   without an answer, tokens go; and when it heals, the session declares everything anew, in its old order.
 //!
 //! Beyond what the middleware does, a message may come a second time, late, and a few may be lost without anybody
@@ -23,7 +23,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::{AnswerOf, Bus, BusError, Declared, Pending, QUERY_TIMEOUT};
+use super::{Bus, BusError, Declared, Pending, QUERY_TIMEOUT, Reply};
 use star::{Calls, Declaration, Message, PeerId, Star};
 
 /// How bad the network is. The default delivers everything, in an order that the seed chooses.
@@ -68,10 +68,10 @@ pub enum Overheard {
         /// The message.
         message: Vec<u8>,
     },
-    /// A question was asked.
+    /// A query was asked.
     Asked {
         /// Its number.
-        question: u64,
+        query: u64,
         /// The key that was asked.
         key: String,
         /// As in `tick=12;epoch=1`.
@@ -82,7 +82,7 @@ pub enum Overheard {
     /// It was answered.
     Answered {
         /// Its number.
-        question: u64,
+        query: u64,
         /// The message, or the refusal in words.
         result: Result<Vec<u8>, String>,
     },
@@ -199,7 +199,7 @@ impl Drop for MemoryNetwork {
             // It panics only where a callback does, and then the test has failed in its own thread.
             let _ = scheduler.join();
         }
-        // Callbacks may own questions, and those the network: nothing would ever be freed. Not under the lock.
+        // Callbacks may own queries, and those the network: nothing would ever be freed. Not under the lock.
         let rest = self.shared.lock().clear();
         drop(rest);
     }
@@ -364,14 +364,14 @@ impl Session {
         )
     }
 
-    pub(super) fn serve(
+    pub(super) fn queryable(
         &self,
         keys: &str,
-        handle: impl Fn(super::Question) + Send + Sync + 'static,
+        handle: impl Fn(super::Query) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
         let handle = move |inner| {
-            handle(super::Question {
-                inner: super::Query::Memory(inner),
+            handle(super::Query {
+                inner: super::AnyQuery::Memory(inner),
             })
         };
         self.declare(
@@ -381,13 +381,13 @@ impl Session {
         )
     }
 
-    pub(super) fn ask_within(
+    pub(super) fn get_within(
         &self,
         key: &str,
         parameters: &str,
         body: Option<Vec<u8>>,
         timeout: Duration,
-    ) -> Result<Option<AnswerOf>, BusError> {
+    ) -> Result<Option<Reply>, BusError> {
         let (sender, answers) = channel();
         // Whoever asks waits below, so there is somebody to receive.
         self.start(
@@ -400,11 +400,11 @@ impl Session {
         Ok(answers.recv().ok().flatten())
     }
 
-    pub(super) fn ask_then(
+    pub(super) fn get_then(
         &self,
         key: &str,
         parameters: &str,
-        then: impl FnOnce(Option<AnswerOf>) + Send + 'static,
+        then: impl FnOnce(Option<Reply>) + Send + 'static,
     ) -> Result<(), BusError> {
         self.start(key, parameters, None, QUERY_TIMEOUT, Pending::new(then))
     }
@@ -428,9 +428,9 @@ impl Session {
             self.open
                 .shared
                 .lock()
-                .ask(self.open.peer, asked, Instant::now() + timeout, then);
+                .get(self.open.peer, asked, Instant::now() + timeout, then);
         self.open.shared.changed.notify_one();
-        // Where the link is cut, the question ends here, without the lock.
+        // Where the link is cut, the query ends here, without the lock.
         drop(unasked);
         Ok(())
     }
@@ -439,7 +439,7 @@ impl Session {
         self.declare("declare", key, Declaration::Token(key.to_owned()))
     }
 
-    pub(super) fn watch(
+    pub(super) fn liveliness(
         &self,
         keys: &str,
         handle: impl Fn(&str, bool) + Send + Sync + 'static,
@@ -469,12 +469,12 @@ impl Publisher {
         self.session.put(&self.key, message)
     }
 
-    pub(super) fn is_watched(&self) -> bool {
+    pub(super) fn has_subscribers(&self) -> bool {
         self.watched.load(Ordering::Relaxed)
     }
 }
 
-/// What a question says.
+/// What a query says.
 #[derive(Debug)]
 struct Asked {
     key: String,
@@ -482,19 +482,19 @@ struct Asked {
     body: Vec<u8>,
 }
 
-/// A question at one who may answer it.
+/// A query at one who may answer it.
 #[derive(Debug)]
-pub(super) struct Question {
+pub(super) struct Query {
     asked: Arc<Asked>,
     ending: Arc<Ending>,
 }
 
-/// Tells the router that a session has nothing more to say to a question, when the last handler drops it.
+/// Tells the router that a session has nothing more to say to a query, when the last handler drops it.
 #[derive(Debug)]
 struct Ending {
     shared: Arc<Shared>,
     peer: PeerId,
-    question: u64,
+    query: u64,
 }
 
 impl Ending {
@@ -507,11 +507,11 @@ impl Ending {
 
 impl Drop for Ending {
     fn drop(&mut self) {
-        self.send(Message::Done(self.question));
+        self.send(Message::Done(self.query));
     }
 }
 
-impl Question {
+impl Query {
     pub(super) fn key(&self) -> &str {
         &self.asked.key
     }
@@ -532,21 +532,19 @@ impl Question {
         self.asked.body.clone()
     }
 
-    pub(super) fn answer(&self, key: &str, message: Vec<u8>) {
-        let answer = AnswerOf {
+    pub(super) fn reply(&self, key: &str, message: Vec<u8>) {
+        let answer = Reply {
             key: key.to_owned(),
             result: Ok(message),
         };
-        self.ending
-            .send(Message::Reply(self.ending.question, answer));
+        self.ending.send(Message::Reply(self.ending.query, answer));
     }
 
-    pub(super) fn refuse(&self, reason: &str) {
-        let answer = AnswerOf {
+    pub(super) fn reply_err(&self, reason: &str) {
+        let answer = Reply {
             key: String::new(),
             result: Err(reason.to_owned()),
         };
-        self.ending
-            .send(Message::Reply(self.ending.question, answer));
+        self.ending.send(Message::Reply(self.ending.query, answer));
     }
 }

@@ -29,7 +29,7 @@ pub fn is_tls(endpoint: &str) -> bool {
 /// Whether nobody but this machine reaches a listener there. What cannot be read counts as reachable.
 ///
 /// ```
-/// use protocol::endpoint::is_local;
+/// use bus::endpoint::is_local;
 /// assert!(is_local("tcp/127.0.0.1:7447") && is_local("tls/localhost:7447") && is_local("unixsock-stream/x.sock"));
 /// assert!(!is_local("tcp/0.0.0.0:7447") && !is_local("tcp/[::]:7447") && !is_local("tcp/localhost.example:7447"));
 /// ```

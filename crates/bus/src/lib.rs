@@ -6,18 +6,20 @@
 //! There are two of them. `middleware.rs` is the real one and the only file that names it. [`MemoryNetwork`] is a star
 //! of the same shape inside one process whose deliveries are chosen by a seed, for tests of everything above it.
 
+pub mod endpoint;
 mod memory;
 mod middleware;
-pub(crate) mod settings;
+pub mod runtime;
+pub mod secure;
+mod settings;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
+pub use protocol::DEFAULT_ENDPOINT;
+
 pub use memory::{Faults, MemoryNetwork, Overheard, Traffic};
 pub use middleware::check_exposure;
-
-/// Where a simulator listens and others connect unless told otherwise.
-pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
 
 /// Longest wait for an answer before the asker looks again whether the other side is still there.
 pub const QUERY_TIMEOUT: Duration = Duration::from_secs(2);
@@ -196,43 +198,43 @@ impl Bus {
         on!(Session, &self.session, session => session.subscribe(keys, handle))
     }
 
-    /// Calls `handle` for each question asked on `keys`. It must hand over and return.
+    /// Calls `handle` for each query asked on `keys`. It must hand over and return.
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key expression is not legal.
-    pub fn serve(
+    pub fn queryable(
         &self,
         keys: &str,
-        handle: impl Fn(Question) + Send + Sync + 'static,
+        handle: impl Fn(Query) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        on!(Session, &self.session, session => session.serve(keys, handle))
+        on!(Session, &self.session, session => session.queryable(keys, handle))
     }
 
     /// Asks, and waits for the one answer: `None` if nobody answers within [`QUERY_TIMEOUT`].
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn ask(
+    pub fn get(
         &self,
         key: &str,
         parameters: &str,
         body: Option<Vec<u8>>,
-    ) -> Result<Option<AnswerOf>, BusError> {
-        self.ask_within(key, parameters, body, QUERY_TIMEOUT)
+    ) -> Result<Option<Reply>, BusError> {
+        self.get_within(key, parameters, body, QUERY_TIMEOUT)
     }
 
     /// The same with another limit, for answers that take their time.
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn ask_within(
+    pub fn get_within(
         &self,
         key: &str,
         parameters: &str,
         body: Option<Vec<u8>>,
         timeout: Duration,
-    ) -> Result<Option<AnswerOf>, BusError> {
-        on!(Session, &self.session, session => session.ask_within(key, parameters, body, timeout))
+    ) -> Result<Option<Reply>, BusError> {
+        on!(Session, &self.session, session => session.get_within(key, parameters, body, timeout))
     }
 
     /// Asks, and hands the one answer to `then`, or `None` if nobody answers within [`QUERY_TIMEOUT`]. `then` runs on
@@ -240,13 +242,13 @@ impl Bus {
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn ask_then(
+    pub fn get_then(
         &self,
         key: &str,
         parameters: &str,
-        then: impl FnOnce(Option<AnswerOf>) + Send + 'static,
+        then: impl FnOnce(Option<Reply>) + Send + 'static,
     ) -> Result<(), BusError> {
-        on!(Session, &self.session, session => session.ask_then(key, parameters, then))
+        on!(Session, &self.session, session => session.get_then(key, parameters, then))
     }
 
     /// Shows that something is there, until dropped or until this process or its link is gone. To be declared last:
@@ -262,12 +264,12 @@ impl Bus {
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key expression is not legal.
-    pub fn watch(
+    pub fn liveliness(
         &self,
         keys: &str,
         handle: impl Fn(&str, bool) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        on!(Session, &self.session, session => session.watch(keys, handle))
+        on!(Session, &self.session, session => session.liveliness(keys, handle))
     }
 
     /// Closes the session after everything that was put has left. A process that exits without it loses messages.
@@ -276,17 +278,17 @@ impl Bus {
     }
 }
 
-type Then = Box<dyn FnOnce(Option<AnswerOf>) + Send>;
+type Then = Box<dyn FnOnce(Option<Reply>) + Send>;
 
 /// A continuation that is called exactly once: with the answer, or with `None` when the query ends without one.
 struct Pending(Option<Then>);
 
 impl Pending {
-    fn new(then: impl FnOnce(Option<AnswerOf>) + Send + 'static) -> Self {
+    fn new(then: impl FnOnce(Option<Reply>) + Send + 'static) -> Self {
         Self(Some(Box::new(then)))
     }
 
-    fn settle(&mut self, answer: Option<AnswerOf>) {
+    fn settle(&mut self, answer: Option<Reply>) {
         if let Some(then) = self.0.take() {
             then(answer);
         }
@@ -322,58 +324,58 @@ impl Publisher {
 
     /// Whether anybody subscribes: pictures that nobody looks at need not be painted.
     #[must_use]
-    pub fn is_watched(&self) -> bool {
-        on!(Putter, &self.inner, publisher => publisher.is_watched())
+    pub fn has_subscribers(&self) -> bool {
+        on!(Putter, &self.inner, publisher => publisher.has_subscribers())
     }
 }
 
 /// An answer: bytes, or the reason why there are none.
 #[derive(Debug, Clone)]
-pub struct AnswerOf {
+pub struct Reply {
     /// Key on which it came.
     pub key: String,
     /// The message, or the responder's refusal in words.
     pub result: Result<Vec<u8>, String>,
 }
 
-/// A question that waits for an answer. One that is dropped unanswered ends at once at the asker.
+/// A query that waits for an answer. One that is dropped unanswered ends at once at the asker.
 #[derive(Debug)]
-pub struct Question {
-    inner: Query,
+pub struct Query {
+    inner: AnyQuery,
 }
 
 #[derive(Debug)]
-enum Query {
-    Middleware(middleware::Question),
-    Memory(memory::Question),
+enum AnyQuery {
+    Middleware(middleware::Query),
+    Memory(memory::Query),
 }
 
-impl Question {
+impl Query {
     /// Key that was asked.
     #[must_use]
     pub fn key(&self) -> &str {
-        on!(Query, &self.inner, question => question.key())
+        on!(AnyQuery, &self.inner, query => query.key())
     }
 
     /// The parameter called `name`, as in `?tick=12;epoch=1`.
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&str> {
-        on!(Query, &self.inner, question => question.parameter(name))
+        on!(AnyQuery, &self.inner, query => query.parameter(name))
     }
 
     /// What came with it.
     #[must_use]
     pub fn body(&self) -> Vec<u8> {
-        on!(Query, &self.inner, question => question.body())
+        on!(AnyQuery, &self.inner, query => query.body())
     }
 
     /// Answers on `key`.
-    pub fn answer(&self, key: &str, message: Vec<u8>) {
-        on!(Query, &self.inner, question => question.answer(key, message));
+    pub fn reply(&self, key: &str, message: Vec<u8>) {
+        on!(AnyQuery, &self.inner, query => query.reply(key, message));
     }
 
     /// Refuses, in words.
-    pub fn refuse(&self, reason: &str) {
-        on!(Query, &self.inner, question => question.refuse(reason));
+    pub fn reply_err(&self, reason: &str) {
+        on!(AnyQuery, &self.inner, query => query.reply_err(reason));
     }
 }

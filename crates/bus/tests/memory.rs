@@ -5,7 +5,7 @@
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use protocol::bus::{Bus, Declared, Faults, MemoryNetwork};
+use bus::{Bus, Declared, Faults, MemoryNetwork};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -31,7 +31,7 @@ fn listen(bus: &Bus, keys: &str) -> (Receiver<String>, Declared) {
 
 fn tokens(bus: &Bus, keys: &str) -> (Receiver<(String, bool)>, Declared) {
     let (sender, seen) = channel();
-    let declared = bus.watch(keys, move |key, is_there| {
+    let declared = bus.liveliness(keys, move |key, is_there| {
         drop(sender.send((key.to_owned(), is_there)))
     });
     (seen, declared.unwrap())
@@ -91,29 +91,29 @@ fn a_question_has_one_answer_or_ends() {
     let network = slow(1);
     let (a, b) = (network.client(), network.client());
     assert!(
-        a.ask("where/b", "", None).unwrap().is_none(),
+        a.get("where/b", "", None).unwrap().is_none(),
         "nobody serves it"
     );
-    let served = b.serve("where/*", |question| match question.parameter("tick") {
-        Some("1") => question.answer(question.key(), question.body()),
-        Some(_) => question.refuse("another tick"),
-        None => drop(question),
+    let served = b.queryable("where/*", |query| match query.parameter("tick") {
+        Some("1") => query.reply(query.key(), query.body()),
+        Some(_) => query.reply_err("another tick"),
+        None => drop(query),
     });
     let (seen, _watch) = tokens(&a, "alive/b");
     let token = b.token("alive/b").unwrap();
     seen.recv_timeout(PATIENCE).unwrap();
     let answer = a
-        .ask("where/b", "tick=1;epoch=2", Some(b"here".to_vec()))
+        .get("where/b", "tick=1;epoch=2", Some(b"here".to_vec()))
         .unwrap()
         .unwrap();
     assert_eq!(
         (answer.key.as_str(), answer.result),
         ("where/b", Ok(b"here".to_vec()))
     );
-    let answer = a.ask("where/b", "epoch=2;tick=2", None).unwrap().unwrap();
+    let answer = a.get("where/b", "epoch=2;tick=2", None).unwrap().unwrap();
     assert_eq!(answer.result, Err("another tick".to_owned()));
     assert!(
-        a.ask("where/b", "", None).unwrap().is_none(),
+        a.get("where/b", "", None).unwrap().is_none(),
         "dropped unanswered"
     );
     drop((served, token));
@@ -122,7 +122,7 @@ fn a_question_has_one_answer_or_ends() {
         Ok(("alive/b".to_owned(), false))
     );
     assert!(
-        a.ask("where/b", "tick=1", None).unwrap().is_none(),
+        a.get("where/b", "tick=1", None).unwrap().is_none(),
         "nobody serves it any more"
     );
 }
@@ -136,10 +136,10 @@ fn a_publisher_knows_whether_it_is_watched() {
     let (_messages, subscription) = listen(&b, "state");
     let token = b.token("alive/b").unwrap();
     seen.recv_timeout(PATIENCE).unwrap();
-    assert!(publisher.is_watched());
+    assert!(publisher.has_subscribers());
     drop((subscription, token));
     seen.recv_timeout(PATIENCE).unwrap();
-    assert!(!publisher.is_watched());
+    assert!(!publisher.has_subscribers());
 }
 
 #[test]

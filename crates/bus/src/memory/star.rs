@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 
-use super::super::{AnswerOf, Pending};
-use super::{Asked, Ending, Faults, Overheard, Question, Shared, Traffic};
-use crate::random::{Stream, stream, unit};
+use super::super::{Pending, Reply};
+use super::{Asked, Ending, Faults, Overheard, Query, Shared, Traffic};
+use protocol::random::{Stream, stream, unit};
 
 /// Number of a session.
 pub(super) type PeerId = u64;
@@ -17,7 +17,7 @@ pub(super) type PeerId = u64;
 pub(super) type Calls = Vec<Box<dyn FnOnce() + Send>>;
 
 type OnMessage = Arc<dyn Fn(&str, &[u8]) + Send + Sync>;
-type OnQuestion = Arc<dyn Fn(Question) + Send + Sync>;
+type OnQuestion = Arc<dyn Fn(Query) + Send + Sync>;
 type OnToken = Arc<dyn Fn(&str, bool) + Send + Sync>;
 
 /// What a session has declared.
@@ -37,7 +37,7 @@ pub(super) enum Message {
     Undeclare(u64),
     Put(Arc<str>, Arc<[u8]>),
     Ask(u64, Arc<Asked>),
-    Reply(u64, AnswerOf),
+    Reply(u64, Reply),
     /// No more answers.
     Done(u64),
     /// To the watcher of this number: a token came or went.
@@ -67,13 +67,13 @@ struct Peer {
     declared: BTreeMap<u64, Declaration>,
     /// At the router: what has arrived of it.
     known: BTreeMap<u64, Declaration>,
-    /// At the session: questions without an answer.
+    /// At the session: queries without an answer.
     asks: BTreeMap<u64, (Instant, Pending)>,
     /// At the session: tokens that each of its watchers sees.
     seen: BTreeSet<(u64, String)>,
 }
 
-/// A question at the router.
+/// A query at the router.
 struct Routed {
     asker: PeerId,
     waits_for: BTreeSet<PeerId>,
@@ -90,13 +90,13 @@ pub(super) struct Star {
     faults: Faults,
     choice: Stream,
     peers: BTreeMap<PeerId, Peer>,
-    questions: BTreeMap<u64, Routed>,
+    queries: BTreeMap<u64, Routed>,
     next_id: u64,
     /// Sessions so far: a number is never given twice.
     joined: PeerId,
     /// Questions answer through what the sessions share.
     shared: Weak<Shared>,
-    /// What is to be dropped without the lock: a callback may own questions, and a question that is dropped sends.
+    /// What is to be dropped without the lock: a callback may own queries, and a query that is dropped sends.
     rubbish: Vec<Box<dyn Any + Send>>,
     pub(super) traffic: Traffic,
     /// What the router has heard, while somebody listens in.
@@ -161,14 +161,14 @@ impl Overheard {
                 key: key.to_string(),
                 message: bytes.to_vec(),
             },
-            Message::Ask(question, asked) => Self::Asked {
-                question: *question,
+            Message::Ask(query, asked) => Self::Asked {
+                query: *query,
                 key: asked.key.clone(),
                 parameters: asked.parameters.clone(),
                 body: asked.body.clone(),
             },
-            Message::Reply(question, answer) => Self::Answered {
-                question: *question,
+            Message::Reply(query, answer) => Self::Answered {
+                query: *query,
                 result: answer.result.clone(),
             },
             Message::Declare(_, Declaration::Token(key)) => Self::Token { key: key.clone() },
@@ -184,7 +184,7 @@ impl Star {
             faults,
             choice: stream(seed, "choice"),
             peers: BTreeMap::new(),
-            questions: BTreeMap::new(),
+            queries: BTreeMap::new(),
             next_id: 0,
             joined: 0,
             shared,
@@ -271,8 +271,8 @@ impl Star {
         let _ = self.send(from, Message::Undeclare(id));
     }
 
-    /// Returns the continuation where the question cannot be asked.
-    pub(super) fn ask(
+    /// Returns the continuation where the query cannot be asked.
+    pub(super) fn get(
         &mut self,
         from: PeerId,
         asked: Asked,
@@ -472,11 +472,11 @@ impl Star {
         };
         let known: Vec<u64> = peer.known.keys().copied().collect();
         known.into_iter().for_each(|id| self.withdraw(number, id));
-        self.questions.retain(|_, routed| routed.asker != number);
-        let waiting: Vec<u64> = self.questions.keys().copied().collect();
+        self.queries.retain(|_, routed| routed.asker != number);
+        let waiting: Vec<u64> = self.queries.keys().copied().collect();
         waiting
             .into_iter()
-            .for_each(|question| self.end_at(question, number));
+            .for_each(|query| self.end_at(query, number));
     }
 
     /// To a session, if its link is there.
@@ -519,7 +519,7 @@ impl Star {
                 waits_for
                     .iter()
                     .for_each(|to| self.tell(*to, Message::Ask(id, asked.clone())));
-                self.questions.insert(
+                self.queries.insert(
                     id,
                     Routed {
                         asker: from,
@@ -528,7 +528,7 @@ impl Star {
                 );
             }
             Message::Reply(id, answer) => {
-                if let Some(asker) = self.questions.get(&id).map(|routed| routed.asker) {
+                if let Some(asker) = self.queries.get(&id).map(|routed| routed.asker) {
                     self.tell(asker, Message::Reply(id, answer));
                 }
             }
@@ -545,15 +545,15 @@ impl Star {
         }
     }
 
-    /// A session has nothing more to say to a question.
-    fn end_at(&mut self, question: u64, number: PeerId) {
-        let Some(routed) = self.questions.get_mut(&question) else {
+    /// A session has nothing more to say to a query.
+    fn end_at(&mut self, query: u64, number: PeerId) {
+        let Some(routed) = self.queries.get_mut(&query) else {
             return;
         };
         if routed.waits_for.remove(&number) && routed.waits_for.is_empty() {
             let asker = routed.asker;
-            self.questions.remove(&question);
-            self.tell(asker, Message::Done(question));
+            self.queries.remove(&query);
+            self.tell(asker, Message::Done(query));
         }
     }
 
@@ -654,25 +654,25 @@ impl Star {
                     }
                 }
             }
-            Message::Ask(question, asked) => {
+            Message::Ask(query, asked) => {
                 let Some(shared) = self.shared.upgrade() else {
                     return;
                 };
                 let ending = Arc::new(Ending {
                     shared,
                     peer: number,
-                    question,
+                    query,
                 });
                 for declaration in peer.declared.values() {
                     if let Declaration::Serve(keys, handle) = declaration
                         && covers(keys, &asked.key)
                     {
-                        let question = Question {
+                        let query = Query {
                             asked: asked.clone(),
                             ending: ending.clone(),
                         };
                         let handle = handle.clone();
-                        calls.push(Box::new(move || handle(question)));
+                        calls.push(Box::new(move || handle(query)));
                     }
                 }
                 // Where nobody serves it any more, it ends with this.

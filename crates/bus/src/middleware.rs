@@ -9,12 +9,12 @@ use zenoh::bytes::ZBytes;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::key_expr::KeyExpr;
 use zenoh::qos::CongestionControl;
-use zenoh::query::{ConsolidationMode, Query, QueryTarget, Reply};
+use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
 
 use super::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
-use super::{AnswerOf, BusError, Declared, Pending, QUERY_TIMEOUT, Role};
+use super::{BusError, Declared, Pending, QUERY_TIMEOUT, Reply, Role};
 use crate::endpoint::{is_local, is_tls};
 
 /// What else may be the matter with an encrypted endpoint.
@@ -144,17 +144,17 @@ impl Session {
         })
     }
 
-    pub(super) fn serve(
+    pub(super) fn queryable(
         &self,
         keys: &str,
-        handle: impl Fn(super::Question) + Send + Sync + 'static,
+        handle: impl Fn(super::Query) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
         let declared = self
             .session
             .declare_queryable(keys)
-            .callback(move |query: Query| {
-                handle(super::Question {
-                    inner: super::Query::Middleware(Question { query }),
+            .callback(move |query: zenoh::query::Query| {
+                handle(super::Query {
+                    inner: super::AnyQuery::Middleware(Query { query }),
                 });
             })
             .wait();
@@ -163,14 +163,14 @@ impl Session {
         })
     }
 
-    pub(super) fn ask_within(
+    pub(super) fn get_within(
         &self,
         key: &str,
         parameters: &str,
         body: Option<Vec<u8>>,
         timeout: Duration,
-    ) -> Result<Option<AnswerOf>, BusError> {
-        let replies: FifoChannelHandler<Reply> = used(
+    ) -> Result<Option<Reply>, BusError> {
+        let replies: FifoChannelHandler<zenoh::query::Reply> = used(
             "ask",
             key,
             self.get(key, parameters, body, timeout)?
@@ -178,24 +178,24 @@ impl Session {
                 .wait(),
         )?;
         while let Ok(reply) = replies.recv() {
-            if let Some(answer) = AnswerOf::read(reply) {
+            if let Some(answer) = Reply::read(reply) {
                 return Ok(Some(answer));
             }
         }
         Ok(None)
     }
 
-    pub(super) fn ask_then(
+    pub(super) fn get_then(
         &self,
         key: &str,
         parameters: &str,
-        then: impl FnOnce(Option<AnswerOf>) + Send + 'static,
+        then: impl FnOnce(Option<Reply>) + Send + 'static,
     ) -> Result<(), BusError> {
         let pending = std::sync::Mutex::new(Pending::new(then));
         let asked = self
             .get(key, parameters, None, QUERY_TIMEOUT)?
-            .callback(move |reply: Reply| {
-                if let (Some(answer), Ok(mut pending)) = (AnswerOf::read(reply), pending.lock()) {
+            .callback(move |reply: zenoh::query::Reply| {
+                if let (Some(answer), Ok(mut pending)) = (Reply::read(reply), pending.lock()) {
                     pending.settle(Some(answer));
                 }
             })
@@ -238,7 +238,7 @@ impl Session {
         })
     }
 
-    pub(super) fn watch(
+    pub(super) fn liveliness(
         &self,
         keys: &str,
         handle: impl Fn(&str, bool) + Send + Sync + 'static,
@@ -279,14 +279,14 @@ impl Publisher {
         )
     }
 
-    pub(super) fn is_watched(&self) -> bool {
+    pub(super) fn has_subscribers(&self) -> bool {
         self.watched.load(Ordering::Relaxed)
     }
 }
 
-impl AnswerOf {
+impl Reply {
     /// `None` for the middleware's own notice that time is up.
-    fn read(reply: Reply) -> Option<Self> {
+    fn read(reply: zenoh::query::Reply) -> Option<Self> {
         match reply.into_result() {
             Ok(sample) => Some(Self {
                 key: sample.key_expr().to_string(),
@@ -304,11 +304,11 @@ impl AnswerOf {
 }
 
 #[derive(Debug)]
-pub(super) struct Question {
-    query: Query,
+pub(super) struct Query {
+    query: zenoh::query::Query,
 }
 
-impl Question {
+impl Query {
     pub(super) fn key(&self) -> &str {
         self.query.key_expr().as_str()
     }
@@ -324,13 +324,13 @@ impl Question {
             .unwrap_or_default()
     }
 
-    pub(super) fn answer(&self, key: &str, message: Vec<u8>) {
+    pub(super) fn reply(&self, key: &str, message: Vec<u8>) {
         if let Err(error) = self.query.reply(key.to_owned(), message).wait() {
             tracing::debug!(%error, key, "an answer could not be sent");
         }
     }
 
-    pub(super) fn refuse(&self, reason: &str) {
+    pub(super) fn reply_err(&self, reason: &str) {
         if let Err(error) = self.query.reply_err(reason.to_owned()).wait() {
             tracing::debug!(%error, "a refusal could not be sent");
         }
@@ -470,9 +470,9 @@ fn guards(file: &Path) -> Result<Guards, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::DEFAULT_ENDPOINT;
+    use crate::DEFAULT_ENDPOINT;
     use crate::secure::{Credentials, client_config, simulator_config};
-    use crate::{RobotName, keys::Keys};
+    use protocol::{RobotName, keys::Keys};
 
     fn credentials() -> Credentials<'static> {
         Credentials {
