@@ -49,9 +49,8 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
     let name = robot.as_str();
     let says = ["report", "waiting", "panel", STATE].map(|what| keys.robot(name, what));
     let commands = keys.robot("*", &format!("command/{name}"));
-    let (own_percept, own_commands) = (keys.percept(robot), keys.commands_to(robot));
     let mut asks = state_keys(keys, "*");
-    asks.extend([keys.join_as(robot), own_percept.clone()]);
+    asks.push(keys.join_as(robot));
     vec![
         grant(
             "says",
@@ -67,12 +66,7 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
         grant(
             "hears",
             &["declare_subscriber"],
-            vec![
-                keys.clock(),
-                own_commands,
-                keys.robot("*", STATE),
-                own_percept,
-            ],
+            vec![keys.clock(), keys.news(robot), keys.robot("*", STATE)],
         ),
         grant(
             "is there",
@@ -83,13 +77,15 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
     ]
 }
 
-/// What an operator may do: control the run and watch it; speak as nobody.
+/// What an operator may do: control the run, watch it, and command robots.
 #[must_use]
 pub fn of_operator(keys: &Keys) -> Vec<Grant> {
     let mut asks = state_keys(keys, "*");
     asks.push(keys.control());
     let panels = keys.robot("*", "panel");
+    let commands = keys.robot("*", &format!("command/{OPERATOR}"));
     vec![
+        grant("commands", &["put"], vec![commands]),
         grant("asks", &["query"], asks),
         grant(
             "hears",
@@ -153,28 +149,22 @@ mod tests {
         );
         let heard = keys_of(&grants, "declare_subscriber");
         assert!(
-            heard.contains(&"cars/*/robot/Butler/command/*")
-                && heard.contains(&"cars/*/robot/*/state")
+            heard.contains(&"cars/*/robot/Butler/news") && heard.contains(&"cars/*/robot/*/state")
         );
         assert!(
             heard
                 .iter()
-                .all(|key| !key.contains("report") && !key.contains("*/command"))
+                .all(|key| !key.contains("report") && !key.contains("command"))
         );
     }
 
     #[test]
-    fn an_operator_controls_and_watches_and_puts_nothing() {
+    fn an_operator_controls_watches_and_commands() {
         let grants = of_operator(&Keys::of_any_run());
         assert!(keys_of(&grants, "query").contains(&"cars/*/control"));
         assert!(keys_of(&grants, "declare_subscriber").contains(&"cars/*/robot/*/panel"));
-        for message in [
-            "put",
-            "delete",
-            "reply",
-            "declare_queryable",
-            "liveliness_token",
-        ] {
+        assert_eq!(keys_of(&grants, "put"), ["cars/*/robot/*/command/operator"]);
+        for message in ["delete", "reply", "declare_queryable", "liveliness_token"] {
             assert!(keys_of(&grants, message).is_empty(), "{message}");
         }
     }

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use crate::keys::{Keys, QUERIES, STATE};
 use crate::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    Panel, Percept, PublicState, Report, Waiting, WorldFrame,
+    News, Panel, PublicState, Report, Waiting, WorldFrame,
 };
 use crate::name::{RobotName, RunName};
 
@@ -93,9 +93,9 @@ fn channels() -> Vec<Channel> {
         channel(
             "command",
             keys.command(&robot, &from),
-            "A command from one robot to another; the target keeps it until a clock names it.",
+            "A command from one robot to another, for the medium; the news of its target deliver it.",
             &["command"],
-            &[Send("command"), Receive("command")],
+            &[Send("command")],
         ),
         channel(
             "state",
@@ -113,17 +113,11 @@ fn channels() -> Vec<Channel> {
             ],
         ),
         channel(
-            "percept",
-            keys.percept(&robot),
-            "What a robot senses around itself, served by the simulator. Parameters tick and epoch.",
-            &["query", "percept"],
-            &[
-                Ask {
-                    with: "query",
-                    answer: "percept",
-                },
-                Receive("percept"),
-            ],
+            "news",
+            keys.news(&robot),
+            "What is new for one robot in a tick, before the clock of the tick.",
+            &["news"],
+            &[Receive("news")],
         ),
         channel(
             "panel",
@@ -272,7 +266,7 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
         ("join_request", one::<JoinRequest>),
         ("log_record", one::<LogRecord>),
         ("panel", one::<Panel>),
-        ("percept", one::<Percept>),
+        ("news", one::<News>),
         ("public_state", one::<PublicState>),
         ("report", one::<Report>),
         ("waiting", one::<Waiting>),

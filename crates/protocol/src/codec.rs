@@ -1,6 +1,8 @@
 //! One encode, one decode. JSON, because any language can speak it and people can read it.
 
-use serde::{Serialize, de::DeserializeOwned};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 /// Largest message that is accepted, in bytes.
 pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
@@ -19,13 +21,33 @@ pub struct Malformed {
     pub reason: String,
 }
 
+/// A field that is wrong, and why.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct FieldError {
+    /// Path of the field: `sent.command`, `robots.Butler`, `setup.obstacles`.
+    pub field: String,
+    /// What is wrong with it, and what would be right.
+    pub reason: String,
+}
+
+impl FieldError {
+    /// The error `reason` about the field at path `field`.
+    #[must_use]
+    pub fn new(field: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self {
+            field: field.into(),
+            reason: reason.into(),
+        }
+    }
+}
+
 /// A message of the contract: typed JSON plus the limits that JSON cannot say.
 pub trait Message: Serialize + DeserializeOwned {
     /// Checks what the type cannot: finite numbers, bounded sizes.
     ///
     /// # Errors
     /// The path of the offending field and what is wrong with it.
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         Ok(())
     }
 }
@@ -72,13 +94,26 @@ pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Ma
         );
         return Err(malformed(".".to_owned(), reason));
     }
-    let mut json = serde_json::Deserializer::from_slice(bytes);
-    let message: M = serde_path_to_error::deserialize(&mut json)
-        .map_err(|error| malformed(error.path().to_string(), error.inner().to_string()))?;
-    json.end()
-        .map_err(|error| malformed(".".to_owned(), error.to_string()))?;
+
+    let message: M = match serde_json::from_slice(bytes) {
+        Ok(message) => message,
+        Err(_) => return Err(explain::<M>(bytes, malformed)),
+    };
     message
         .check()
-        .map_err(|(field, reason)| malformed(field, reason))?;
+        .map_err(|FieldError { field, reason }| malformed(field, reason))?;
     Ok(message)
+}
+
+/// Reads a message that is known to be malformed once more, to find the path of the field that is wrong.
+fn explain<M: Message>(bytes: &[u8], malformed: impl Fn(String, String) -> Malformed) -> Malformed {
+    let mut json = serde_json::Deserializer::from_slice(bytes);
+    let read: Result<M, _> = serde_path_to_error::deserialize(&mut json);
+    let after = read.map(|_| json.end());
+
+    match after {
+        Err(error) => malformed(error.path().to_string(), error.inner().to_string()),
+        Ok(Err(error)) => malformed(".".to_owned(), error.to_string()),
+        Ok(Ok(())) => malformed(".".to_owned(), "not valid JSON".to_owned()),
+    }
 }

@@ -57,8 +57,8 @@ pub enum Event {
     Blocked {
         /// Who.
         robot: RobotName,
-        /// By what: `edge`, `obstacle`, `guest`, `too_fast` or a robot's name.
-        by: String,
+        /// By what.
+        by: Blocker,
         /// Where it stays.
         at: Point,
     },
@@ -160,15 +160,6 @@ pub enum Event {
         /// The other.
         to: RobotName,
     },
-    /// A command should have arrived and was really lost on the wire.
-    CommandMissing {
-        /// By whom.
-        from: RobotName,
-        /// To whom.
-        to: RobotName,
-        /// Its number among the sender's.
-        seq: Seq,
-    },
     /// What the scenario has the launcher do to a robot's process begins, or is over.
     Fault {
         /// Whose process.
@@ -199,6 +190,34 @@ pub enum Event {
     },
 }
 
+/// What refused a move.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Blocker {
+    /// The edge of the field.
+    Edge,
+    /// A fixed obstacle.
+    Obstacle,
+    /// A guest.
+    Guest,
+    /// The move was faster than the scenario allows.
+    TooFast,
+    /// Another robot.
+    Robot(RobotName),
+}
+
+impl std::fmt::Display for Blocker {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Edge => f.write_str("the edge"),
+            Self::Obstacle => f.write_str("an obstacle"),
+            Self::Guest => f.write_str("a guest"),
+            Self::TooFast => f.write_str("too_fast"),
+            Self::Robot(name) => write!(f, "{name}"),
+        }
+    }
+}
+
 /// Why the medium lost a message.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
@@ -211,6 +230,10 @@ pub enum Cause {
     Burst,
     /// The two are cut off from each other.
     Partition,
+    /// More arrives at the target in this tick than its news hold.
+    Overflow,
+    /// No robot of the roster has the name of the target.
+    Unknown,
 }
 
 impl std::fmt::Display for Cause {
@@ -219,6 +242,8 @@ impl std::fmt::Display for Cause {
             Self::Loss => "by chance",
             Self::Burst => "in a burst",
             Self::Partition => "in a partition",
+            Self::Overflow => "because too much arrives at once",
+            Self::Unknown => "because there is no such robot",
         })
     }
 }
@@ -349,11 +374,6 @@ impl Event {
             Self::LinkHealed { from, to } => simulator(
                 LogKind::Network,
                 format!("messages from {from} to {to} pass again"),
-            ),
-            Self::CommandMissing { from, to, seq } => says(
-                to,
-                LogKind::Command,
-                format!("command {seq} of {from} never came: a real loss on the wire"),
             ),
             Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
             Self::End { reason, digest } => {

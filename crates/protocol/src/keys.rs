@@ -110,16 +110,22 @@ impl Keys {
         format!("{}/robot/*/waiting", self.root)
     }
 
-    /// Robot to robot: a command; the sender is in the key, so that access control can pin it.
+    /// Robot to medium: a command; target and sender are in the key, so that access control can pin the sender.
     #[must_use]
     pub fn command(&self, to: &RobotName, from: &RobotName) -> String {
         format!("{}/robot/{to}/command/{from}", self.root)
     }
 
-    /// All commands to one robot.
+    /// All commands of the run.
     #[must_use]
-    pub fn commands_to(&self, to: &RobotName) -> String {
-        format!("{}/robot/{to}/command/*", self.root)
+    pub fn commands(&self) -> String {
+        format!("{}/robot/*/command/*", self.root)
+    }
+
+    /// Simulator to robot: what is new for this robot in a tick.
+    #[must_use]
+    pub fn news(&self, robot: &RobotName) -> String {
+        self.robot(robot.as_str(), "news")
     }
 
     /// A key about one robot, or about all of them where its name is `*`.
@@ -131,18 +137,6 @@ impl Keys {
     #[must_use]
     pub fn query(&self, robot: &RobotName, what: &str) -> String {
         format!("{}/robot/{robot}/{what}", self.root)
-    }
-
-    /// Queryable at the simulator: the bodies within the robot's sensing range.
-    #[must_use]
-    pub fn percept(&self, robot: &RobotName) -> String {
-        format!("{}/robot/{robot}/percept", self.root)
-    }
-
-    /// All percepts of the run.
-    #[must_use]
-    pub fn percepts(&self) -> String {
-        format!("{}/robot/*/percept", self.root)
     }
 
     /// Robot to observers: what it chooses to display.

@@ -15,14 +15,14 @@ pub mod name;
 pub mod random;
 pub mod schema;
 
-pub use codec::{Malformed, Message, decode, encode};
+pub use codec::{FieldError, Malformed, Message, decode, encode};
 pub use event::{Event, Line};
 pub use messages::{Epoch, Generation, Seq, Tick};
 pub use name::{BadName, RobotName, RunName};
 
 /// Version of the contract. It is named where two sides first meet (join) and only a change that an old robot
 /// could not survive raises it: unknown fields are ignored, so a new optional field does not.
-pub const PROTOCOL_VERSION: u32 = 1;
+pub const PROTOCOL_VERSION: u32 = 2;
 
 /// Endpoint where a simulator listens and others connect unless told otherwise.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::messages::{
-    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, Panel,
-    Percept, PublicState, RecordedTick, RecordingHeader, Report, Waiting, WorldFrame,
+    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, News,
+    Panel, PublicState, RecordedTick, RecordingHeader, Report, Waiting, WorldFrame,
 };
 
 /// The schema of every message, by the name of its file.
@@ -26,9 +26,9 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("fault_order", one::<crate::messages::FaultOrder>()),
         ("join_answer", one::<JoinAnswer>()),
         ("join_request", one::<JoinRequest>()),
+        ("news", one::<News>()),
         ("log_record", one::<LogRecord>()),
         ("panel", one::<Panel>()),
-        ("percept", one::<Percept>()),
         ("public_state", one::<PublicState>()),
         ("report", one::<Report>()),
         ("recorded_tick", one::<RecordedTick>()),

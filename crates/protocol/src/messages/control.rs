@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::observe::Presence;
 use super::{Epoch, Generation, Point, Tick, finite, short};
-use crate::codec::Message;
+use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 
 /// A request to the simulator. It never goes through the barrier: it is answered at once, also while the clock is held.
@@ -65,17 +65,10 @@ pub enum Control {
     },
     /// Nothing but the status.
     Status,
-    /// A command from outside the roster; it takes effect at a tick boundary.
-    Command {
-        /// To whom.
-        to: RobotName,
-        /// What it says.
-        command: String,
-    },
 }
 
 impl Message for Control {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         match self {
             Self::Speed {
                 factor: Some(factor),
@@ -84,7 +77,6 @@ impl Message for Control {
                 deadline_s: Some(deadline_s),
                 ..
             } => finite(*deadline_s, "deadline_s"),
-            Self::Command { command, .. } => short(command, "command"),
             Self::Init {
                 setup: Some(setup), ..
             } => setup.check(),
@@ -109,15 +101,6 @@ pub enum ControlAnswer {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         fields: Vec<FieldError>,
     },
-}
-
-/// What is wrong with one field of a set-up.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct FieldError {
-    /// The field, as a path in the [`Setup`]: `guests`, `guest_speed_mps`, `robots.Butler`, `obstacles`.
-    pub field: String,
-    /// What is wrong with it and what would be right.
-    pub reason: String,
 }
 
 /// The set-up of a run.
@@ -177,7 +160,7 @@ impl Message for ControlAnswer {}
 
 impl Setup {
     /// Numbers that are numbers and lists that are bounded; whether they make sense is the simulator's to say.
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         finite(self.duration_s, "setup.duration_s")?;
         self.field_m
             .iter()
@@ -229,7 +212,7 @@ impl std::fmt::Display for Phase {
 }
 
 /// What the clock does about a robot that is late.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OnLate {
     /// Hold, and say for whom; never act. The mode for science.
@@ -253,7 +236,7 @@ pub struct FaultOrder {
 }
 
 impl Message for FaultOrder {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         super::few(self.orders.len(), "orders")
     }
 }
@@ -273,7 +256,7 @@ pub struct ProcessOrder {
 }
 
 /// A fault of a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
     /// The process is killed; at the end of the fault it is started again.

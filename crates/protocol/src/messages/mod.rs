@@ -1,4 +1,4 @@
-//! What is said. One module for each pair of speakers.
+//! The messages, one module for each pair of participants.
 
 mod control;
 mod observe;
@@ -7,9 +7,10 @@ mod step;
 
 use std::collections::BTreeMap;
 
+pub use crate::codec::FieldError;
 pub use control::{
-    Awaited, Control, ControlAnswer, FaultKind, FaultOrder, FieldError, LogFile, OnLate, Phase,
-    ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
+    Awaited, Control, ControlAnswer, FaultKind, FaultOrder, LogFile, OnLate, Phase, ProcessOrder,
+    Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
 pub use observe::{
     Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, Presence,
@@ -17,9 +18,8 @@ pub use observe::{
 };
 pub use state::{Answer, PublicState, StateVariables, Variable};
 pub use step::{
-    Clock, Command, CommandId, Correction, End, JoinAnswer, JoinRequest, News, Percept,
-    Performative, Refusal, Report, SensedBody, SensedKind, SensedRobot, SentCommand, Waiting,
-    Welcome,
+    Clock, Command, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS, News,
+    Performative, Refusal, Report, SensedBody, SensedKind, SensedRobot, Waiting, Welcome,
 };
 
 use schemars::JsonSchema;
@@ -31,7 +31,7 @@ pub type Tick = u64;
 pub type Epoch = u32;
 /// Number of a robot's incarnation, from 1; a robot that comes back has a higher one.
 pub type Generation = u32;
-/// Number of a command among those of its sender in an epoch, from 1.
+/// Number of a command in the record, among those of its sender in an epoch, from 1. The simulator counts.
 pub type Seq = u64;
 
 /// Robot parameters as they travel: whatever the scenario says of the robot, lengths and times already in SI units.
@@ -60,7 +60,7 @@ impl Point {
         (dx * dx + dy * dy).sqrt()
     }
 
-    fn check(self, field: &str) -> Result<(), (String, String)> {
+    fn check(self, field: &str) -> Result<(), FieldError> {
         finite(self.x, &format!("{field}.x"))?;
         finite(self.y, &format!("{field}.y"))
     }
@@ -71,46 +71,48 @@ pub const MAX_TEXT_BYTES: usize = 4096;
 /// Most entries of any list or map in a message.
 pub const MAX_ENTRIES: usize = 1024;
 
-fn finite(value: f64, field: &str) -> Result<(), (String, String)> {
+fn finite(value: f64, field: &str) -> Result<(), FieldError> {
     if value.is_finite() {
-        Ok(())
-    } else {
-        Err((field.to_owned(), "not a finite number".to_owned()))
+        return Ok(());
     }
+
+    Err(FieldError::new(field, "not a finite number"))
 }
 
-/// Ticks are integers that every language can hold and that can be counted on from.
-fn counted(tick: Tick, field: &str) -> Result<(), (String, String)> {
+/// Ticks stay below 2^53, so that every language can hold them and add to them exactly.
+fn counted(tick: Tick, field: &str) -> Result<(), FieldError> {
     if tick < 1 << 53 {
-        Ok(())
-    } else {
-        Err((field.to_owned(), "not below 2^53".to_owned()))
+        return Ok(());
     }
+
+    Err(FieldError::new(field, "not below 2^53"))
 }
 
-fn short(text: &str, field: &str) -> Result<(), (String, String)> {
+fn short(text: &str, field: &str) -> Result<(), FieldError> {
     if text.len() <= MAX_TEXT_BYTES {
         return Ok(());
     }
-    Err((
-        field.to_owned(),
-        format!(
-            "{} bytes of text, more than the {MAX_TEXT_BYTES} allowed",
-            text.len()
-        ),
-    ))
+
+    let reason = format!(
+        "{} bytes of text, more than the {MAX_TEXT_BYTES} allowed",
+        text.len()
+    );
+    Err(FieldError::new(field, reason))
 }
 
-fn few(len: usize, field: &str) -> Result<(), (String, String)> {
+fn few(len: usize, field: &str) -> Result<(), FieldError> {
     if len <= MAX_ENTRIES {
         return Ok(());
     }
-    Err((
-        field.to_owned(),
-        format!("{len} entries, more than the {MAX_ENTRIES} allowed"),
-    ))
+
+    let reason = format!("{len} entries, more than the {MAX_ENTRIES} allowed");
+    Err(FieldError::new(field, reason))
 }
 
 fn is_false(flag: &bool) -> bool {
     !*flag
+}
+
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }

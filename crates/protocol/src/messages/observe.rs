@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Awaited, Epoch, Generation, Phase, Point, Seq, StateVariables, Tick, finite, is_false, short,
 };
-use crate::codec::Message;
+use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 
 /// The field at a moment, published at a display rate while somebody watches.
@@ -81,8 +81,6 @@ pub enum Fate {
     Delivered,
     /// The medium lost it.
     Dropped,
-    /// It was really lost on the wire.
-    Missing,
 }
 
 /// A link that the medium has cut, one way.
@@ -216,7 +214,7 @@ pub struct LogRecord {
 }
 
 impl Message for LogRecord {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         short(&self.source, "source")?;
         short(&self.text, "text")
     }
@@ -257,13 +255,13 @@ pub struct Panel {
 pub const MAX_WIDGETS: usize = 64;
 
 impl Message for Panel {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         if self.widgets.len() > MAX_WIDGETS {
             let reason = format!(
                 "{} widgets, more than the {MAX_WIDGETS} allowed",
                 self.widgets.len()
             );
-            return Err(("widgets".to_owned(), reason));
+            return Err(FieldError::new("widgets", reason));
         }
         self.widgets
             .iter()
@@ -339,7 +337,7 @@ pub enum Widget {
 }
 
 impl Widget {
-    fn check(&self, field: &str) -> Result<(), (String, String)> {
+    fn check(&self, field: &str) -> Result<(), FieldError> {
         match self {
             Self::Text { label, text } | Self::Badge { label, text, .. } => {
                 short(label, &format!("{field}.label"))?;

@@ -6,7 +6,9 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Epoch, Performative, Point, Tick, counted, few, finite, short};
+use super::{
+    Epoch, FieldError, MAX_TEXT_BYTES, Performative, Point, Tick, counted, few, finite, short,
+};
 use crate::codec::Message;
 
 /// A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
@@ -90,14 +92,19 @@ impl fmt::Display for Variable {
 /// All that a robot chooses to publish about its inner workings: the seed's hashtable.
 pub type StateVariables = BTreeMap<String, Variable>;
 
-pub(super) fn check_variables(variables: &StateVariables) -> Result<(), (String, String)> {
+pub(super) fn check_variables(variables: &StateVariables) -> Result<(), FieldError> {
     few(variables.len(), "state_variables")?;
     for (name, value) in variables {
         short(name, "state_variables")?;
         match value {
-            Variable::Number(number) => finite(*number, &format!("state_variables.{name}"))?,
-            Variable::Text(text) => short(text, &format!("state_variables.{name}"))?,
-            Variable::Flag(_) => {}
+            // The path is formatted only for a value that is wrong: this runs for every report.
+            Variable::Number(number) if !number.is_finite() => {
+                finite(*number, &format!("state_variables.{name}"))?;
+            }
+            Variable::Text(text) if text.len() > MAX_TEXT_BYTES => {
+                short(text, &format!("state_variables.{name}"))?;
+            }
+            _ => {}
         }
     }
     Ok(())
@@ -125,7 +132,7 @@ pub struct PublicState {
 }
 
 impl Message for PublicState {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")?;
         self.location.check("location")?;
         finite(self.speed_mps, "speed_mps")?;

@@ -1,16 +1,14 @@
 //! Simulator and robots: joining, and the messages of one tick.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::state::check_variables;
 use super::{
-    Epoch, Generation, Parameters, Point, PublicState, Seq, StateVariables, Tick, counted, few,
-    finite, is_false, short,
+    Epoch, Generation, Parameters, Point, PublicState, StateVariables, Tick, counted, few, finite,
+    is_false, is_zero, short,
 };
-use crate::codec::Message;
+use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 
 /// A robot asks to take part.
@@ -24,13 +22,16 @@ pub struct JoinRequest {
     pub name: RobotName,
     /// Identity of this process among all that ever claim the name; any text that no other process has.
     pub instance: String,
+    /// Whether its news list the bodies around it ([`News::bodies`]).
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub bodies: bool,
     /// Language and version of what it is written with, for people.
     #[serde(default)]
     pub sdk: String,
 }
 
 impl Message for JoinRequest {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         short(&self.instance, "instance")?;
         short(&self.sdk, "sdk")
     }
@@ -54,7 +55,7 @@ pub enum JoinAnswer {
 impl Message for JoinAnswer {}
 
 /// Why a robot may not take part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Refusal {
     /// No robot of the scenario has this name.
@@ -104,55 +105,49 @@ pub struct Welcome {
     pub roster: Vec<RobotName>,
     /// Its parameters.
     pub parameters: Parameters,
-    /// What its previous incarnation reported last, if it had one in this epoch. Others may still ask for it: the robot
+    /// The flag of [`Clock::news`] that is its own.
+    #[serde(default)]
+    pub news_flag: u32,
+    /// What its previous incarnation reported last, if it had one in this epoch. Other robots may still query it: the robot
     /// must answer with it until it has reported itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_state: Option<PublicState>,
-    /// What it reported for the tick before that, where it had reported for the tick under way before it was gone: the
-    /// others still ask for this one in this tick.
+    /// What its previous incarnation reported for the tick before that, if it had already reported for the tick that is open:
+    /// the other robots query this state during the open tick.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_before: Option<PublicState>,
-    /// Its commands of this epoch are numbered from the next one on: no incarnation uses a number that a former one may
-    /// have used.
-    #[serde(default)]
-    pub last_seq: Seq,
-    /// Whoever sees a clock repeated repeats the commands of this many ticks back: a clock may name one so late, because
-    /// the medium holds commands back.
-    #[serde(default = "two_ticks")]
-    pub repeat_ticks: Tick,
 }
 
-fn two_ticks() -> Tick {
-    2
-}
+/// The flags of [`Clock::news`]: robot number i of the roster, from 0, has flag `1 << (i % NEWS_FLAGS)`.
+pub const NEWS_FLAGS: usize = 32;
 
-/// The simulator grants a tick. It carries exceptions only: a robot that is not named moved as it proposed and has no
-/// command, and a quiet tick is a small message however many robots there are.
+/// The simulator grants a tick. Its size does not depend on the number of robots.
 ///
-/// The same clock may come twice. Then somebody's message of this tick was lost: every robot repeats its report and
-/// the commands of its last ticks ([`Welcome::repeat_ticks`]), and whoever already has them ignores the repetition.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+/// The same clock may arrive twice: a message of this tick may have been lost. Every robot that has answered it repeats its
+/// commands and its report, and the simulator ignores what it already has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
     /// Epoch; a higher one than before means `init`.
     pub epoch: Epoch,
     /// Tick that is granted.
     pub tick: Tick,
-    /// What is new, by robot.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub news: BTreeMap<RobotName, News>,
+    /// Flags of the robots that have [`News`] of this tick. A robot whose flag is set waits for its news before it acts; a
+    /// robot whose flag is not set has none. Robots may share a flag, and then all of them get news.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub news: u32,
     /// The run is over; no report is awaited.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<End>,
 }
 
 impl Message for Clock {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")
     }
 }
 
 /// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum End {
     /// Its duration is over.
@@ -163,32 +158,64 @@ pub enum End {
     Aborted,
 }
 
-/// What one robot is told with a clock.
+/// What is new for one robot in a tick. It is put before the clock of the tick, on the same session.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct News {
-    /// Where it stands, where that is not what it proposed.
+    /// Epoch of the clock that it belongs to.
+    pub epoch: Epoch,
+    /// Tick of the clock that it belongs to.
+    pub tick: Tick,
+    /// The incarnation of this generation takes part from this tick on. Any other process with this name has been replaced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joined: Option<Generation>,
+    /// Where it stands, if not where it proposed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<Correction>,
-    /// Commands that arrive now, in this order (by sender, then number). One that the medium has doubled is named twice in
-    /// a row and counts as two commands.
+    /// Commands that arrive now, in the order in which they count: by sender, then in the order in which they were sent. One
+    /// that the medium has doubled is listed twice.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub commands: Vec<CommandId>,
-    /// Robots that it cannot query in this tick: the medium has cut it off from them.
+    pub commands: Vec<Delivery>,
+    /// Robots that it cannot query in this tick: the medium has cut the link between the two, or they missed the tick before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unreachable: Vec<RobotName>,
     /// Other robots within its sensing range, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sensed: Vec<SensedRobot>,
-    /// The incarnation of this generation takes part from this tick on. Another one with this name has been replaced.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joined: Option<Generation>,
+    /// All bodies within its sensing range, itself excepted, in a fixed order; only if it asked for them when it joined.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<SensedBody>,
 }
 
 impl News {
-    /// Whether there is nothing to tell.
+    /// Whether there is nothing to send.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        *self == Self::default()
+        let Self {
+            epoch: _,
+            tick: _,
+            joined,
+            correction,
+            commands,
+            unreachable,
+            sensed,
+            bodies,
+        } = self;
+
+        joined.is_none()
+            && correction.is_none()
+            && commands.is_empty()
+            && unreachable.is_empty()
+            && sensed.is_empty()
+            && bodies.is_empty()
+    }
+}
+
+impl Message for News {
+    fn check(&self) -> Result<(), FieldError> {
+        counted(self.tick, "tick")?;
+        self.commands
+            .iter()
+            .try_for_each(|delivery| short(&delivery.command, "commands.command"))
     }
 }
 
@@ -197,18 +224,23 @@ impl News {
 pub struct Correction {
     /// Where it stands instead.
     pub location: Point,
-    /// Whether its move was refused (collision, edge of the field, too fast); else it was placed there.
+    /// Whether its move was refused (collision, edge of the field, too fast); otherwise it was placed there.
     #[serde(default, skip_serializing_if = "is_false")]
     pub blocked: bool,
 }
 
-/// A command, named by its sender and its number.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-pub struct CommandId {
-    /// Who sent it.
+/// A command that arrives at its target.
+#[derive(
+    Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
+pub struct Delivery {
+    /// The sender.
     pub from: RobotName,
-    /// Its number among the sender's commands of this epoch: from 1, or from where its welcome says.
-    pub seq: Seq,
+    /// What it is meant to do.
+    #[serde(default)]
+    pub performative: Performative,
+    /// Its text.
+    pub command: String,
 }
 
 /// Another robot within sensing range.
@@ -242,69 +274,68 @@ pub struct Report {
     /// What it publishes about its inner workings.
     #[serde(default)]
     pub state_variables: StateVariables,
-    /// Commands it sent in this tick, in this order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sent: Vec<SentCommand>,
-    /// Commands that the clock named and that never came.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub missing: Vec<CommandId>,
+    /// How many commands it put for this tick, before this report.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub commands: u32,
     /// Lines for the log: what it says, what it did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log: Vec<String>,
 }
 
 impl Message for Report {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         self.proposal.check("proposal")?;
         finite(self.speed_mps, "speed_mps")?;
         finite(self.direction_rad, "direction_rad")?;
         short(&self.emotion_state, "emotion_state")?;
         short(&self.behavior_state, "behavior_state")?;
         check_variables(&self.state_variables)?;
-        few(self.sent.len(), "sent")?;
-        few(self.missing.len(), "missing")?;
+        few(self.commands as usize, "commands")?;
         few(self.log.len(), "log")?;
-        self.sent
-            .iter()
-            .try_for_each(|sent| short(&sent.command, "sent.command"))?;
         self.log.iter().try_for_each(|line| short(line, "log"))
     }
 }
 
-/// A report's note of a command that went straight to its target.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct SentCommand {
-    /// To whom.
-    pub to: RobotName,
-    /// Its number.
-    pub seq: Seq,
-    /// What it is meant to do.
-    #[serde(default)]
-    pub performative: Performative,
-    /// What it says, for the log; the target has it from the sender.
-    pub command: String,
-}
-
-/// A command on its way from robot to robot (`setRobotCommand`). The target holds it until a clock names it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+/// A command from one robot to another (`setRobotCommand`): put on the key of its target for the medium, which decides
+/// whether and when it arrives. An operator's command needs nothing but the text.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Command {
     /// Epoch in which it was sent.
+    #[serde(default)]
     pub epoch: Epoch,
     /// Tick in which it was sent.
+    #[serde(default)]
     pub tick: Tick,
-    /// Its number among the sender's commands of this epoch, from 1.
-    pub seq: Seq,
+    /// Incarnation that sent it.
+    #[serde(default)]
+    pub generation: Generation,
+    /// Its number among the sender's commands of this tick, from 1.
+    #[serde(default)]
+    pub number: u32,
     /// What it is meant to do.
     #[serde(default)]
     pub performative: Performative,
-    /// What it says.
+    /// Its text.
     pub command: String,
 }
 
 /// What a message between robots is meant to do: the part of KQML that the robots of the paper need (Finin et al. 1994;
 /// the paper's robots spoke KQML, Murphy et al. 2002, abstract). A query of the common robot interface is an `ask-one`
 /// by being a query, and its answer says that it is a `tell`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Default,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Performative {
     /// The sender wants the receiver to make something true of its environment: every `setRobotCommand`.
@@ -335,7 +366,7 @@ impl std::fmt::Display for Performative {
 }
 
 impl Message for Command {
-    fn check(&self) -> Result<(), (String, String)> {
+    fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")?;
         short(&self.command, "command")
     }
@@ -353,23 +384,6 @@ pub struct Waiting {
 }
 
 impl Message for Waiting {}
-
-/// What a robot senses around itself, by its own query to the simulator.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Percept {
-    /// Epoch.
-    pub epoch: Epoch,
-    /// Tick as of which it holds.
-    pub tick: Tick,
-    /// Bodies whose center is within sensing range, in a fixed order.
-    pub bodies: Vec<SensedBody>,
-}
-
-impl Message for Percept {
-    fn check(&self) -> Result<(), (String, String)> {
-        counted(self.tick, "tick")
-    }
-}
 
 /// One sensed body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,0 +1,764 @@
+//! The simulator's side: who takes part, and when a tick is complete.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Reason};
+use protocol::{Epoch, Generation, RobotName, Tick};
+
+use crate::exchange::{Membership, Outcome, Sent};
+use crate::member::{Admission, Lateness, Member, Turn};
+use crate::rules::{Rule, Rules};
+
+/// How long the barrier waits for what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Timing {
+    /// After this long without a report people are told for whom the clock waits.
+    pub announce: Duration,
+    /// A held clock is repeated this often.
+    pub repeat: Duration,
+    /// A robot that was admitted declares its token within this time, or its place is free again.
+    pub token: Duration,
+}
+
+impl Default for Timing {
+    fn default() -> Self {
+        Self {
+            announce: Duration::from_millis(500),
+            repeat: Duration::from_secs(2),
+            token: Duration::from_secs(2),
+        }
+    }
+}
+
+/// A timer of the barrier. Setting it again replaces it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Timer {
+    /// It is time to tell people for whom the clock waits.
+    Announce,
+    /// It is time to repeat the clock.
+    Repeat,
+    /// The robots that have not reported are late.
+    Deadline,
+    /// This robot was admitted and has not declared its token.
+    Token(RobotName),
+}
+
+/// What the barrier wants done.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Output<R, C> {
+    /// Every robot of the roster is connected: grant tick 0.
+    Gathered,
+    /// Put these news, each to its robot with the incarnation that it names, then the clock.
+    Grant {
+        /// Robots that get news, in the order of their names.
+        news: Vec<(RobotName, Option<Generation>)>,
+        /// The clock.
+        clock: Clock,
+    },
+    /// The tick is complete.
+    Complete(Outcome<R, C>),
+    /// The clock is held: tell people for whom, or tell them again because that has changed.
+    Held,
+    /// A clock that was held goes on.
+    Released,
+    /// A robot is late and the run ends because of it.
+    Aborted,
+    /// Call [`Barrier::timer`] after this time.
+    SetTimer(Timer, Duration),
+    /// A message changed nothing.
+    Ignored(Ignored, RobotName),
+}
+
+/// Why a message changed nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Ignored {
+    /// No robot of the roster has this name.
+    UnknownRobot,
+    /// It is of another tick, epoch or incarnation than the open one.
+    Stale,
+    /// It is from a robot without which the clock goes on.
+    Lost,
+    /// More commands than a robot may send in a tick.
+    TooMany,
+}
+
+impl Ignored {
+    /// In words.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::UnknownRobot => "unknown robot",
+            Self::Stale => "stale",
+            Self::Lost => "lost",
+            Self::TooMany => "too many commands",
+        }
+    }
+}
+
+/// Why a robot is not admitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Refused {
+    /// No robot of the roster has this name.
+    UnknownName,
+    /// A connected process is this robot.
+    NameTaken,
+    /// The run is over.
+    Ended,
+}
+
+/// What the barrier is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Phase {
+    /// Robots of the roster are missing.
+    Gathering,
+    /// No tick is open.
+    Between,
+    /// A tick is open: reports are awaited.
+    Open,
+    /// The run is over.
+    Over,
+}
+
+/// Epoch, tick and generation that a robot's message states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Stamp {
+    /// Epoch of the clock that it answers.
+    pub epoch: Epoch,
+    /// Tick of the clock that it answers.
+    pub tick: Tick,
+    /// Incarnation that answers.
+    pub generation: Generation,
+}
+
+/// The simulator's side of the lock-step. `R` is the content of a report, `C` that of a command.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Barrier<R, C> {
+    members: BTreeMap<RobotName, Member<R, C>>,
+    lateness: Lateness,
+    timing: Timing,
+    max_commands: u32,
+    phase: Phase,
+    epoch: Epoch,
+    tick: Tick,
+    /// Robots for which the simulation has news of the open tick.
+    news: BTreeSet<RobotName>,
+    membership: Vec<Membership>,
+    is_announced: bool,
+    pub(crate) rules: Rules,
+}
+
+impl<R: Clone, C: Clone> Barrier<R, C> {
+    /// A barrier for these robots, before the first epoch. A robot sends at most `max_commands` in a tick.
+    #[must_use]
+    pub fn new(
+        roster: impl IntoIterator<Item = RobotName>,
+        lateness: Lateness,
+        timing: Timing,
+        max_commands: u32,
+    ) -> Self {
+        Self {
+            members: roster
+                .into_iter()
+                .map(|name| (name, Member::default()))
+                .collect(),
+            lateness,
+            timing,
+            max_commands,
+            phase: Phase::Gathering,
+            epoch: 0,
+            tick: 0,
+            news: BTreeSet::new(),
+            membership: Vec::new(),
+            is_announced: false,
+            rules: Rules::default(),
+        }
+    }
+
+    /// Begins an epoch: waits until every robot of the roster is connected, then asks for tick 0 by [`Output::Gathered`].
+    /// An open tick is given up.
+    pub fn gather(&mut self, epoch: Epoch, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
+        self.phase = Phase::Gathering;
+        self.epoch = epoch;
+        self.tick = 0;
+        self.lateness = lateness;
+        self.is_announced = false;
+        self.news.clear();
+        self.membership.clear();
+        for member in self.members.values_mut() {
+            member.turn = Turn::default();
+            member.fault = None;
+            member.has_recovered = true;
+        }
+
+        out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
+        self.look_whether_gathered(out);
+    }
+
+    /// Grants a tick. `news` are the robots for which the simulation has something new.
+    pub fn open(&mut self, tick: Tick, news: BTreeSet<RobotName>, out: &mut Vec<Output<R, C>>) {
+        assert!(
+            self.phase == Phase::Between,
+            "a tick is granted when the one before is complete"
+        );
+        self.phase = Phase::Open;
+        self.tick = tick;
+        self.news = news;
+        self.membership.clear();
+        self.is_announced = false;
+        for (name, member) in &mut self.members {
+            member.turn = Turn::default();
+            if tick == 0 {
+                member.begin_epoch();
+            } else if let Some(generation) = member.take_in() {
+                self.membership
+                    .push(Membership::Joined(name.clone(), generation));
+            }
+        }
+
+        self.give_up_those_that_are_out();
+        self.grant(out);
+        self.set_timers(out);
+        self.settle(out);
+    }
+
+    /// A robot asks to take part as the process `instance`.
+    ///
+    /// # Errors
+    /// [`Refused`] says why it may not.
+    pub fn join(
+        &mut self,
+        name: &RobotName,
+        instance: &str,
+        out: &mut Vec<Output<R, C>>,
+    ) -> Result<Admission, Refused> {
+        if self.phase == Phase::Over {
+            return Err(Refused::Ended);
+        }
+        let news_flag = self.news_flag(name);
+        let Some(member) = self.members.get_mut(name) else {
+            return Err(Refused::UnknownName);
+        };
+        if member.is_taken_from(instance) && self.rules.hold(Rule::RefusesTakenName) {
+            return Err(Refused::NameTaken);
+        }
+
+        // The same process asks again: its answer was lost, or it joins a further epoch.
+        let is_new = member.instance.as_deref() != Some(instance);
+        if is_new {
+            member.instance = Some(Arc::from(instance));
+            member.is_reserved = true;
+            if !member.is_seated {
+                member.generation = member.generation.max(1);
+            } else if self.rules.hold(Rule::CountsGenerations) {
+                member.generation += 1;
+            }
+            member.is_coming = member.is_seated;
+            if self.rules.hold(Rule::DropsPredecessor) && !member.turn.is_complete(true) {
+                let is_given_up = member.turn.is_given_up;
+                member.turn = Turn {
+                    is_given_up,
+                    ..Turn::default()
+                };
+            }
+            out.push(Output::SetTimer(
+                Timer::Token(name.clone()),
+                self.timing.token,
+            ));
+        } else if member.is_lost && self.rules.hold(Rule::TakesBack) {
+            member.is_coming = true;
+        }
+
+        Ok(Admission {
+            epoch: self.epoch,
+            generation: member.generation,
+            news_flag,
+        })
+    }
+
+    /// A robot's liveliness token was declared or undeclared.
+    pub fn token(&mut self, name: &RobotName, is_present: bool, out: &mut Vec<Output<R, C>>) {
+        let takes_in_now = self.phase == Phase::Open && self.rules.hold(Rule::TakesInWhileOpen);
+        let policy = self.lateness.of(name);
+        let Some(member) = self.members.get_mut(name) else {
+            out.push(Output::Ignored(Ignored::UnknownRobot, name.clone()));
+            return;
+        };
+
+        member.is_present = is_present;
+        if is_present {
+            // From now on its place is free as soon as its token goes.
+            member.is_reserved = false;
+            member.is_coming |= member.is_lost && self.rules.hold(Rule::TakesBack);
+        }
+        let is_awaited = is_awaited(self.phase, member, self.rules);
+        if is_present && takes_in_now && is_awaited {
+            // The open tick waits for it: it takes the place of a predecessor, or it is back and may have missed the clock.
+            if let Some(generation) = member.take_in() {
+                self.membership
+                    .push(Membership::Joined(name.clone(), generation));
+            }
+            self.repeat(out);
+        }
+        if !is_present && is_awaited && policy == OnLate::Continue {
+            // It will not report in time.
+            self.give_up(name);
+            self.settle(out);
+        }
+        if self.phase == Phase::Gathering {
+            self.look_whether_gathered(out);
+        }
+        if self.is_announced && self.phase != Phase::Between {
+            out.push(Output::Held);
+        }
+    }
+
+    /// A command arrived: the one with this number among those that the robot sent in the tick of `stamp`.
+    pub fn command(
+        &mut self,
+        from: &RobotName,
+        stamp: Stamp,
+        number: u32,
+        command: Sent<C>,
+        out: &mut Vec<Output<R, C>>,
+    ) {
+        let is_open = self.is_open_for(from, stamp);
+        let max_commands = self.max_commands;
+        let Some(member) = self.members.get_mut(from) else {
+            out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
+            return;
+        };
+        if number == 0 || number > max_commands {
+            out.push(Output::Ignored(Ignored::TooMany, from.clone()));
+            return;
+        }
+        if !is_open {
+            out.push(Output::Ignored(Ignored::Stale, from.clone()));
+            return;
+        }
+
+        // The first one counts; a repetition has the same content.
+        member.turn.commands.entry(number).or_insert(command);
+        if member.turn.report.is_some() {
+            self.settle(out);
+        }
+    }
+
+    /// A report arrived, which states how many commands the robot sent in its tick.
+    pub fn report(
+        &mut self,
+        from: &RobotName,
+        stamp: Stamp,
+        commands: u32,
+        report: R,
+        out: &mut Vec<Output<R, C>>,
+    ) {
+        let is_open = self.is_open_for(from, stamp);
+        let Some(member) = self.members.get_mut(from) else {
+            out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
+            return;
+        };
+        if stamp.generation < member.generation {
+            member.has_predecessor = true;
+        } else {
+            member.has_recovered |= member.fault.is_none();
+        }
+        if member.is_lost && stamp.generation == member.generation {
+            member.is_coming |= self.rules.hold(Rule::TakesBack);
+            out.push(Output::Ignored(Ignored::Lost, from.clone()));
+            return;
+        }
+        if commands > self.max_commands {
+            out.push(Output::Ignored(Ignored::TooMany, from.clone()));
+            return;
+        }
+        if !is_open {
+            out.push(Output::Ignored(Ignored::Stale, from.clone()));
+            return;
+        }
+
+        member.turn.waits_for = None;
+        member.turn.report.get_or_insert((commands, report));
+        let counts = self.rules.hold(Rule::CountsCommands);
+        if !member.turn.is_complete(counts) {
+            // Commands are put before their report on one session: what is not here is lost, and is repeated with the report.
+            self.repeat(out);
+            return;
+        }
+        self.settle(out);
+    }
+
+    /// A robot cannot finish its tick because it waits for another robot's answer.
+    pub fn waiting(
+        &mut self,
+        from: &RobotName,
+        epoch: Epoch,
+        tick: Tick,
+        on: RobotName,
+        out: &mut Vec<Output<R, C>>,
+    ) {
+        if self.phase != Phase::Open || (epoch, tick) != (self.epoch, self.tick) {
+            return;
+        }
+        let Some(member) = self.members.get_mut(from) else {
+            out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
+            return;
+        };
+
+        member.turn.waits_for = Some(on);
+        if self.is_announced {
+            out.push(Output::Held);
+        }
+    }
+
+    /// A timer that was set has fired.
+    pub fn timer(&mut self, timer: &Timer, out: &mut Vec<Output<R, C>>) {
+        let is_waiting = matches!(self.phase, Phase::Open | Phase::Gathering);
+        match timer {
+            Timer::Announce if is_waiting && !self.is_announced => {
+                self.is_announced = true;
+                out.push(Output::Held);
+            }
+            Timer::Repeat if self.phase == Phase::Open => {
+                if self.rules.hold(Rule::RepeatsClock) {
+                    self.repeat(out);
+                }
+                out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
+            }
+            Timer::Deadline if self.phase == Phase::Open => self.judge_late(out),
+            Timer::Token(name) => {
+                if let Some(member) = self.members.get_mut(name) {
+                    member.is_reserved = false;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Puts the last clock and its news again.
+    pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
+        if matches!(self.phase, Phase::Open | Phase::Between) && self.epoch > 0 {
+            self.grant(out);
+        }
+    }
+
+    /// The scenario has brought a fault upon a robot's process, or that fault is over. While it lasts, the scenario decides
+    /// what becomes of the robot, and no timer does.
+    pub fn fault(&mut self, robot: &RobotName, fault: Option<FaultKind>) {
+        if let Some(member) = self.members.get_mut(robot) {
+            // A robot that was stopped counts as back when it sends something again.
+            member.has_recovered = fault.is_none() && member.fault != Some(FaultKind::Hang);
+            member.fault = fault;
+        }
+    }
+
+    /// The run is over: returns the clock to put.
+    pub fn end(&mut self, end: End) -> Clock {
+        self.phase = Phase::Over;
+
+        Clock {
+            epoch: self.epoch,
+            tick: self.tick,
+            news: 0,
+            end: Some(end),
+        }
+    }
+
+    /// Changes what the clock does about late robots.
+    pub fn set_lateness(&mut self, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
+        self.lateness = lateness;
+        if self.phase == Phase::Open {
+            self.set_timers(out);
+        }
+    }
+
+    /// What the clock does about late robots.
+    #[must_use]
+    pub fn lateness(&self) -> &Lateness {
+        &self.lateness
+    }
+
+    /// Whether this robot is one of the roster.
+    #[must_use]
+    pub fn has(&self, robot: &RobotName) -> bool {
+        self.members.contains_key(robot)
+    }
+
+    /// The robots of the roster.
+    pub fn roster(&self) -> impl Iterator<Item = &RobotName> {
+        self.members.keys()
+    }
+
+    /// Whether a tick is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.phase == Phase::Open
+    }
+
+    /// Whether people have been told that the clock is held.
+    #[must_use]
+    pub fn is_announced(&self) -> bool {
+        self.is_announced
+    }
+
+    /// The robot's incarnation, and whether it is connected.
+    #[must_use]
+    pub fn presence(&self, robot: &RobotName) -> (Generation, Presence) {
+        let Some(member) = self.members.get(robot) else {
+            return (0, Presence::Gone);
+        };
+        let presence = match (member.is_lost, member.is_present) {
+            (true, _) => Presence::Lost,
+            (false, true) => Presence::Here,
+            (false, false) => Presence::Gone,
+        };
+
+        (member.generation, presence)
+    }
+
+    /// Whether a robot's process is connected.
+    #[must_use]
+    pub fn is_present(&self, robot: &RobotName) -> bool {
+        self.members
+            .get(robot)
+            .is_some_and(|member| member.is_present)
+    }
+
+    /// Whether a robot can take part in the next tick.
+    #[must_use]
+    pub fn is_back(&self, robot: &RobotName) -> bool {
+        self.members.get(robot).is_none_or(Member::is_back)
+    }
+
+    /// The report of a robot for the open tick, if it is here.
+    #[must_use]
+    pub fn open_report(&self, robot: &RobotName) -> Option<&R> {
+        let turn = &self.members.get(robot)?.turn;
+
+        (self.phase == Phase::Open)
+            .then_some(turn.report.as_ref())
+            .flatten()
+            .map(|(_, report)| report)
+    }
+
+    /// The robots for which the clock waits, and why.
+    #[must_use]
+    pub fn awaited(&self) -> Vec<(RobotName, Reason)> {
+        let mut awaited = Vec::new();
+        for (name, member) in &self.members {
+            let reason = match self.phase {
+                Phase::Gathering if !member.is_ready() => Reason::NotJoined,
+                Phase::Open if !is_awaited(self.phase, member, self.rules) => continue,
+                Phase::Open if !member.is_present => Reason::Gone,
+                Phase::Open => match &member.turn.waits_for {
+                    Some(other) => Reason::WaitsFor(other.clone()),
+                    None => Reason::Silent,
+                },
+                _ => continue,
+            };
+            awaited.push((name.clone(), reason));
+        }
+
+        awaited
+    }
+
+    fn look_whether_gathered(&mut self, out: &mut Vec<Output<R, C>>) {
+        if self.members.values().all(Member::is_ready) {
+            self.phase = Phase::Between;
+            if std::mem::take(&mut self.is_announced) {
+                out.push(Output::Released);
+            }
+            out.push(Output::Gathered);
+        }
+    }
+
+    fn news_flag(&self, robot: &RobotName) -> u32 {
+        let index = self.members.keys().position(|name| name == robot);
+
+        1 << (index.unwrap_or_default() % NEWS_FLAGS)
+    }
+
+    /// Whether a message with this stamp counts in the open tick.
+    fn is_open_for(&self, robot: &RobotName, stamp: Stamp) -> bool {
+        let Some(member) = self.members.get(robot) else {
+            return false;
+        };
+        let is_of_epoch = stamp.epoch == self.epoch || !self.rules.hold(Rule::ChecksEpoch);
+        let is_of_tick = stamp.tick == self.tick || !self.rules.hold(Rule::ChecksTick);
+        let is_of_generation =
+            stamp.generation == member.generation || !self.rules.hold(Rule::ChecksGeneration);
+
+        self.phase == Phase::Open
+            && is_of_epoch
+            && is_of_tick
+            && is_of_generation
+            && !member.is_lost
+            && !(member.turn.is_given_up && self.rules.hold(Rule::GivesUpForGood))
+    }
+
+    /// Puts the news and the clock of the tick that was granted last.
+    fn grant(&mut self, out: &mut Vec<Output<R, C>>) {
+        let mut named = BTreeMap::new();
+        for (name, member) in &mut self.members {
+            let is_newcomer = self.tick > 0
+                && member.is_seated
+                && !member.is_lost
+                && !member.has_reported
+                && self.rules.hold(Rule::NamesUntilReported);
+            let is_new_now = self
+                .membership
+                .contains(&Membership::Joined(name.clone(), member.generation));
+            if is_newcomer || is_new_now || std::mem::take(&mut member.has_predecessor) {
+                named.insert(name.clone(), member.generation);
+            }
+        }
+
+        let mut flags = 0;
+        for (index, name) in self.members.keys().enumerate() {
+            if self.news.contains(name) || named.contains_key(name) {
+                flags |= 1_u32 << (index % NEWS_FLAGS);
+            }
+        }
+        let mut news = Vec::new();
+        for (index, name) in self.members.keys().enumerate() {
+            if flags & (1 << (index % NEWS_FLAGS)) != 0 {
+                news.push((name.clone(), named.get(name).copied()));
+            }
+        }
+
+        out.push(Output::Grant {
+            news,
+            clock: Clock {
+                epoch: self.epoch,
+                tick: self.tick,
+                news: if self.rules.hold(Rule::FlagsNews) {
+                    flags
+                } else {
+                    0
+                },
+                end: None,
+            },
+        });
+    }
+
+    fn set_timers(&self, out: &mut Vec<Output<R, C>>) {
+        out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
+        out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
+        let has_deadline = self
+            .members
+            .keys()
+            .any(|name| self.lateness.of(name) != OnLate::Wait);
+        if has_deadline {
+            out.push(Output::SetTimer(Timer::Deadline, self.lateness.deadline));
+        }
+    }
+
+    /// Where the clock goes on without late robots, it does not wait for those that cannot report.
+    fn give_up_those_that_are_out(&mut self) {
+        let tick = self.tick;
+        let lateness = &self.lateness;
+        let out: Vec<RobotName> = self
+            .members
+            .iter()
+            .filter(|(name, member)| {
+                !member.is_lost && member.is_out(tick) && lateness.of(name) == OnLate::Continue
+            })
+            .map(|(name, _)| name.clone())
+            .collect();
+
+        for name in out {
+            self.give_up(&name);
+        }
+    }
+
+    /// The deadline is over: the scenario decides, robot by robot, what follows.
+    fn judge_late(&mut self, out: &mut Vec<Output<R, C>>) {
+        let mut late = Vec::new();
+        for (name, member) in &self.members {
+            if is_awaited(self.phase, member, self.rules) {
+                late.push((name.clone(), self.lateness.of(name)));
+            }
+        }
+        if late.iter().any(|(_, policy)| *policy == OnLate::Abort) {
+            out.push(Output::Aborted);
+            return;
+        }
+
+        for (name, policy) in late {
+            if policy == OnLate::Continue {
+                self.give_up(&name);
+            }
+        }
+        self.settle(out);
+    }
+
+    /// The clock goes on without a robot in the open tick, and from then on if it is lost.
+    fn give_up(&mut self, name: &RobotName) {
+        let lose_after = self.lateness.lose_after;
+        let Some(member) = self.members.get_mut(name) else {
+            return;
+        };
+        if member.miss(lose_after) {
+            self.membership.push(Membership::Lost(name.clone()));
+        }
+    }
+
+    /// Completes the open tick if no robot is awaited any more.
+    fn settle(&mut self, out: &mut Vec<Output<R, C>>) {
+        if self.phase != Phase::Open {
+            return;
+        }
+        let is_awaited = |member: &Member<R, C>| is_awaited(Phase::Open, member, self.rules);
+        let has_report = self
+            .members
+            .values()
+            .any(|member| member.turn.report.is_some());
+        let goes_early = !self.rules.hold(Rule::WaitsForAll) && has_report;
+        if self.members.values().any(is_awaited) && !goes_early {
+            return;
+        }
+
+        self.phase = Phase::Between;
+        if self.is_announced {
+            self.is_announced = false;
+            out.push(Output::Released);
+        }
+        let outcome = self.take_outcome();
+        out.push(Output::Complete(outcome));
+    }
+
+    fn take_outcome(&mut self) -> Outcome<R, C> {
+        let mut reports = BTreeMap::new();
+        for (name, member) in &mut self.members {
+            let turn = std::mem::take(&mut member.turn);
+            if turn.is_given_up {
+                member.turn.is_given_up = true;
+                continue;
+            }
+            let Some((stated, report)) = turn.report else {
+                continue;
+            };
+
+            member.missed = 0;
+            member.has_reported = true;
+            let mut commands = turn.commands;
+            commands.retain(|number, _| *number <= stated);
+            reports.insert(name.clone(), (report, commands.into_values().collect()));
+        }
+        self.membership.sort();
+
+        Outcome {
+            reports,
+            membership: self.membership.clone(),
+        }
+    }
+}
+
+/// Whether the open tick waits for a robot.
+fn is_awaited<R, C>(phase: Phase, member: &Member<R, C>, rules: Rules) -> bool {
+    phase == Phase::Open
+        && !member.is_lost
+        && !member.turn.is_given_up
+        && !member.turn.is_complete(rules.hold(Rule::CountsCommands))
+}

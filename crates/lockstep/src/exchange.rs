@@ -1,0 +1,59 @@
+//! What a tick comes to, and the seam between a simulation and its robots.
+
+use std::collections::BTreeMap;
+
+use protocol::{Generation, RobotName, Tick};
+
+/// A tick as the simulation sees it: news go out, reports come back.
+///
+/// In one process it is a function call. Over the bus the same two steps are spread over time.
+pub trait Exchange<N, R, C> {
+    /// Why a tick was given up.
+    type Error;
+
+    /// Grants a tick: news by robot (only where there is something new), and the time when every robot has answered.
+    ///
+    /// # Errors
+    /// The reason, if the tick cannot be completed.
+    fn exchange(
+        &mut self,
+        tick: Tick,
+        news: BTreeMap<RobotName, N>,
+    ) -> Result<Outcome<R, C>, Self::Error>;
+}
+
+/// What a complete tick came to.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Outcome<R, C> {
+    /// Reports with the commands of the tick, by robot; a robot that missed the tick has none.
+    pub reports: BTreeMap<RobotName, (R, Vec<Sent<C>>)>,
+    /// Robots that began or ceased to take part, in a fixed order.
+    pub membership: Vec<Membership>,
+}
+
+impl<R, C> Default for Outcome<R, C> {
+    fn default() -> Self {
+        Self {
+            reports: BTreeMap::new(),
+            membership: Vec::new(),
+        }
+    }
+}
+
+/// A command that a robot sent.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Sent<C> {
+    /// The target, as the sender named it.
+    pub to: RobotName,
+    /// The content.
+    pub command: C,
+}
+
+/// A robot began or ceased to take part.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Membership {
+    /// An incarnation takes part from this tick on.
+    Joined(RobotName, Generation),
+    /// A robot takes part no more from this tick on.
+    Lost(RobotName),
+}

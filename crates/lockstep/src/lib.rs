@@ -1,0 +1,22 @@
+//! The lock-step as two state machines: [`Barrier`] on the simulator's side, [`Participant`] on a robot's.
+//!
+//! They do no I/O. Whoever drives them feeds what happens (a decoded message, a liveliness token that was declared or
+//! undeclared, a timer that fired) and carries out what they return: messages to put, timers to set, ticks to run. Both are
+//! ordinary values that can be cloned, compared and hashed. The simulator's server and the robots' host drive them over the
+//! bus, [`Exchange`] is the same in one process, the deterministic simulation drives them over a simulated network, and the
+//! model checker explores them. There is no other implementation of the rules.
+//!
+//! The content of messages is a type parameter: the rules depend on epochs, ticks, generations and counts only.
+
+mod barrier;
+mod exchange;
+mod member;
+mod participant;
+mod rules;
+mod states;
+
+pub use barrier::{Barrier, Ignored, Output, Refused, Stamp, Timer, Timing};
+pub use exchange::{Exchange, Membership, Outcome, Sent};
+pub use member::{Admission, Lateness};
+pub use participant::{Action, Answer, Begin, Leave, Participant, Patience, RobotTimer, Turn};
+pub use states::{NoState, StateQuery};

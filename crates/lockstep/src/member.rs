@@ -1,0 +1,190 @@
+//! A robot of the roster as the barrier knows it: its process, whether it takes part, and its turn in the open tick.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use protocol::messages::{FaultKind, OnLate};
+use protocol::{Epoch, Generation, RobotName, Tick};
+
+use crate::exchange::Sent;
+
+/// What the clock does about robots that are late.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Lateness {
+    /// For robots that have no rule of their own.
+    pub on_late: OnLate,
+    /// For single robots.
+    pub own: BTreeMap<RobotName, OnLate>,
+    /// After how long without a report a robot is late.
+    pub deadline: Duration,
+    /// After this many missed ticks in a row a robot is lost, where the clock goes on without it.
+    pub lose_after: u32,
+}
+
+impl Lateness {
+    /// What the clock does when this robot is late.
+    #[must_use]
+    pub fn of(&self, robot: &RobotName) -> OnLate {
+        self.own.get(robot).copied().unwrap_or(self.on_late)
+    }
+}
+
+/// What a robot is admitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Admission {
+    /// The epoch.
+    pub epoch: Epoch,
+    /// Its incarnation.
+    pub generation: Generation,
+    /// Its flag in [`protocol::messages::Clock::news`].
+    pub news_flag: u32,
+}
+
+/// A robot of the roster.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Member<R, C> {
+    /// The process that joined last.
+    pub(crate) instance: Option<Arc<str>>,
+    /// Whether that process has joined and its token is still awaited, so that its place is reserved.
+    pub(crate) is_reserved: bool,
+    /// Its incarnation; 0 before the first.
+    pub(crate) generation: Generation,
+    /// Whether its token is declared.
+    pub(crate) is_present: bool,
+    /// Whether it has had a place in this epoch, so that a further process is a further incarnation.
+    pub(crate) is_seated: bool,
+    /// Whether the clock goes on without it.
+    pub(crate) is_lost: bool,
+    /// Whether it takes part again as soon as its token is declared: a further incarnation, or a lost one that sends again.
+    pub(crate) is_coming: bool,
+    /// Whether this incarnation has reported in this epoch since it was taken in.
+    pub(crate) has_reported: bool,
+    /// Whether an earlier incarnation still sends, and must learn that it has been replaced.
+    pub(crate) has_predecessor: bool,
+    /// The fault that the scenario has brought upon its process.
+    pub(crate) fault: Option<FaultKind>,
+    /// Whether it has sent anything since its fault was over.
+    pub(crate) has_recovered: bool,
+    /// Ticks in a row that it has missed.
+    pub(crate) missed: u32,
+    /// The open tick.
+    pub(crate) turn: Turn<R, C>,
+}
+
+/// What has come from a robot for the open tick.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Turn<R, C> {
+    /// Its commands by number, from 1.
+    pub(crate) commands: BTreeMap<u32, Sent<C>>,
+    /// Its report, and how many commands that states.
+    pub(crate) report: Option<(u32, R)>,
+    /// The robot whose answer it waits for.
+    pub(crate) waits_for: Option<RobotName>,
+    /// Whether the clock goes on without it in this tick.
+    pub(crate) is_given_up: bool,
+}
+
+impl<R, C> Default for Turn<R, C> {
+    fn default() -> Self {
+        Self {
+            commands: BTreeMap::new(),
+            report: None,
+            waits_for: None,
+            is_given_up: false,
+        }
+    }
+}
+
+impl<R, C> Turn<R, C> {
+    /// Whether the report is here, and all commands that it states.
+    pub(crate) fn is_complete(&self, counts_commands: bool) -> bool {
+        let Some((stated, _)) = self.report else {
+            return false;
+        };
+
+        let arrived = self.commands.range(1..=stated).count();
+        arrived == stated as usize || !counts_commands
+    }
+}
+
+impl<R, C> Default for Member<R, C> {
+    fn default() -> Self {
+        Self {
+            instance: None,
+            is_reserved: false,
+            generation: 0,
+            is_present: false,
+            is_seated: false,
+            is_lost: false,
+            is_coming: false,
+            has_reported: false,
+            has_predecessor: false,
+            fault: None,
+            has_recovered: true,
+            missed: 0,
+            turn: Turn::default(),
+        }
+    }
+}
+
+impl<R, C> Member<R, C> {
+    /// Whether it can take part in a new epoch.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.is_present && self.instance.is_some()
+    }
+
+    /// Whether another process has its place: connected, or admitted and about to declare its token.
+    pub(crate) fn is_taken_from(&self, instance: &str) -> bool {
+        let is_other = self.instance.as_deref().is_some_and(|own| own != instance);
+
+        is_other && (self.is_present || self.is_reserved)
+    }
+
+    /// Takes part from tick 0 of an epoch.
+    pub(crate) fn begin_epoch(&mut self) {
+        self.is_seated = true;
+        self.is_lost = false;
+        self.is_coming = false;
+        self.has_reported = false;
+        self.has_predecessor = false;
+        self.missed = 0;
+    }
+
+    /// The incarnation that is to be taken in, if there is one and its process is connected.
+    pub(crate) fn take_in(&mut self) -> Option<Generation> {
+        if !(self.is_coming && self.is_present) {
+            return None;
+        }
+
+        self.is_coming = false;
+        self.is_lost = false;
+        self.has_reported = false;
+        self.missed = 0;
+        Some(self.generation)
+    }
+
+    /// Misses the open tick. Returns whether it is lost now.
+    pub(crate) fn miss(&mut self, lose_after: u32) -> bool {
+        self.turn.is_given_up = true;
+        self.missed += 1;
+
+        // While the scenario keeps its process stopped, its token goes when the lease is over: that is wall clock and decides
+        // nothing.
+        let is_gone = !self.is_present && self.fault != Some(FaultKind::Hang);
+        self.is_lost = self.missed >= lose_after || is_gone;
+        self.is_lost
+    }
+
+    /// Whether the next clock finds it able to take part.
+    pub(crate) fn is_back(&self) -> bool {
+        self.is_present && self.has_recovered && (!self.is_lost || self.is_coming)
+    }
+
+    /// Whether it cannot report for this tick: the scenario keeps its process from running, or it is not connected.
+    pub(crate) fn is_out(&self, tick: Tick) -> bool {
+        let is_stopped = matches!(self.fault, Some(FaultKind::Hang | FaultKind::Crash));
+
+        tick > 0 && (is_stopped || !self.is_present)
+    }
+}

@@ -1,0 +1,622 @@
+//! A robot's side: from the request to join to the end of the run, tick by tick.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use protocol::messages::{Clock, End, Refusal};
+use protocol::{Epoch, Generation, RobotName, Tick};
+
+use crate::exchange::Sent;
+use crate::member::Admission;
+use crate::rules::{Rule, Rules};
+use crate::states::{NoState, StateQuery, States};
+
+/// How long a participant waits for what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Patience {
+    /// How long to try to be admitted.
+    pub join: Duration,
+    /// How long to wait for a simulator that is gone: it has ended, or the link to it is down, which look the same from here.
+    pub gone: Duration,
+}
+
+/// Pause between two requests to join.
+const JOIN_AGAIN: Duration = Duration::from_millis(100);
+/// Pause between two queries to a robot that does not answer.
+const QUERY_AGAIN: Duration = Duration::from_millis(500);
+/// After this long without an answer people are told for whom the robot waits.
+const WAITING_AFTER: Duration = Duration::from_millis(250);
+/// Most news that are kept while their clock is not here. Only the newest clock is ever run.
+const MAX_NEWS: usize = 4;
+/// A robot that was not queried for this many ticks is followed no more.
+const UNUSED_TICKS: Tick = 64;
+
+/// A timer of a participant. Setting it again replaces it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum RobotTimer {
+    /// Ask to join again.
+    Join,
+    /// Give up joining.
+    JoinPatience,
+    /// Give up waiting for a simulator that is gone.
+    Gone,
+    /// Query again.
+    Query,
+    /// Tell people for whom the robot waits.
+    Waiting,
+}
+
+/// What a participant wants done.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Action<N, S, C, R> {
+    /// Ask the simulator to be admitted; answer by [`Participant::admitted`], [`Participant::refused`] or
+    /// [`Participant::unanswered`].
+    Join,
+    /// Declare the liveliness token.
+    DeclareToken,
+    /// Run the robot for a tick; answer by [`Participant::done`].
+    Run(Turn<N>),
+    /// Put what came of a tick, in this order: the commands, the state, the report.
+    Put(Box<Answer<S, C, R>>),
+    /// Query the state of another robot as of this tick, and subscribe to it; answer by [`Participant::heard`].
+    Query {
+        /// The other robot.
+        of: RobotName,
+        /// The tick under way: the answer is the state of the tick before.
+        tick: Tick,
+        /// The epoch.
+        epoch: Epoch,
+    },
+    /// Subscribe no more to the state of another robot.
+    Unfollow(RobotName),
+    /// Put that the robot waits for another robot's answer.
+    PutWaiting {
+        /// The tick under way.
+        tick: Tick,
+        /// The epoch.
+        epoch: Epoch,
+        /// The other robot.
+        on: RobotName,
+    },
+    /// Call [`Participant::timer`] after this time.
+    SetTimer(RobotTimer, Duration),
+    /// Leave the run: withdraw the token, close the session, end.
+    Leave(Leave),
+}
+
+/// A tick that a robot is to run.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Turn<N> {
+    /// The epoch.
+    pub epoch: Epoch,
+    /// The tick.
+    pub tick: Tick,
+    /// How it begins.
+    pub begin: Begin,
+    /// What is new, if anything is.
+    pub news: Option<N>,
+}
+
+/// How a robot's tick begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Begin {
+    /// Tick 0: the robot returns to its initial state.
+    Init,
+    /// The first tick of an incarnation that takes over in the middle of an epoch.
+    TakeOver,
+    /// Any other tick.
+    GoOn,
+}
+
+/// What came of a tick.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Answer<S, C, R> {
+    /// The epoch.
+    pub epoch: Epoch,
+    /// The tick.
+    pub tick: Tick,
+    /// The incarnation that answers.
+    pub generation: Generation,
+    /// The commands, numbered from 1 in this order.
+    pub commands: Vec<Sent<C>>,
+    /// The state that other robots may query.
+    pub state: S,
+    /// The report.
+    pub report: R,
+}
+
+/// Why a robot leaves the run.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Leave {
+    /// The run is over.
+    End(End),
+    /// It was refused.
+    Refused(Refusal),
+    /// No simulator answered in time.
+    NoSimulator,
+    /// The simulator was gone for too long.
+    SimulatorGone,
+    /// Another process has taken its place.
+    Replaced,
+    /// The process itself wants to leave.
+    Stopped,
+}
+
+/// Where a participant stands.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Standing {
+    /// It has asked to join.
+    Joining,
+    /// It was admitted to the epoch and has not run a tick of it.
+    Admitted,
+    /// It takes part.
+    Seated,
+    /// It has left.
+    Left,
+}
+
+/// A query to another robot that has no answer yet.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Asking {
+    of: RobotName,
+    has_told: bool,
+}
+
+/// News as they arrived.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Arrived<N> {
+    joined: Option<Generation>,
+    news: N,
+}
+
+/// A robot's side of the lock-step. `N` is the content of its news, `S` of a state, `C` of a command, `R` of a report.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Participant<N, S, C, R> {
+    patience: Patience,
+    standing: Standing,
+    admission: Option<Admission>,
+    /// Whether the last answer to its request was that the name is taken.
+    is_name_taken: bool,
+    has_token: bool,
+    /// The newest clock that has not been run.
+    pending: Option<Clock>,
+    /// News of ticks that have not been run.
+    news: BTreeMap<(Epoch, Tick), Arrived<N>>,
+    /// The tick that the robot is running.
+    running: Option<(Epoch, Tick)>,
+    /// What came of the last tick.
+    answer: Option<Box<Answer<S, C, R>>>,
+    states: States<S>,
+    asking: Option<Asking>,
+    /// States of other robots, with the tick when each was last asked for.
+    others: BTreeMap<RobotName, States<S>>,
+    followed: BTreeMap<RobotName, Tick>,
+    is_simulator_gone: bool,
+    pub(crate) rules: Rules,
+}
+
+type Out<N, S, C, R> = Vec<Action<N, S, C, R>>;
+
+impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
+    /// A robot that asks to join.
+    #[must_use]
+    pub fn new(patience: Patience, out: &mut Out<N, S, C, R>) -> Self {
+        out.push(Action::SetTimer(RobotTimer::JoinPatience, patience.join));
+        out.push(Action::Join);
+
+        Self {
+            patience,
+            standing: Standing::Joining,
+            admission: None,
+            is_name_taken: false,
+            has_token: false,
+            pending: None,
+            news: BTreeMap::new(),
+            running: None,
+            answer: None,
+            states: States::default(),
+            asking: None,
+            others: BTreeMap::new(),
+            followed: BTreeMap::new(),
+            is_simulator_gone: false,
+            rules: Rules::default(),
+        }
+    }
+
+    /// The simulator has admitted the robot. `states` are the last ones of its predecessor, oldest first: other robots may
+    /// still query them.
+    pub fn admitted(
+        &mut self,
+        admission: Admission,
+        states: impl IntoIterator<Item = (Tick, S)>,
+        out: &mut Out<N, S, C, R>,
+    ) {
+        if self.standing != Standing::Joining {
+            return;
+        }
+
+        let is_new_epoch = self.admission.is_none_or(|old| old.epoch < admission.epoch);
+        if is_new_epoch && self.rules.hold(Rule::ForgetsEpoch) {
+            self.answer = None;
+            self.states.clear();
+            self.others.clear();
+        }
+        self.admission = Some(admission);
+        self.standing = Standing::Admitted;
+        for (tick, state) in states {
+            self.states.add(admission.epoch, tick, state);
+        }
+
+        if !self.has_token {
+            self.has_token = true;
+            out.push(Action::DeclareToken);
+        }
+        self.run_if_possible(out);
+    }
+
+    /// The simulator has refused the robot.
+    pub fn refused(&mut self, reason: Refusal, out: &mut Out<N, S, C, R>) {
+        if self.standing != Standing::Joining {
+            return;
+        }
+
+        // A predecessor that was killed keeps the name until its lease is over.
+        if reason == Refusal::NameTaken {
+            self.is_name_taken = true;
+            out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
+        } else {
+            self.leave(Leave::Refused(reason), out);
+        }
+    }
+
+    /// No simulator has answered the request to join.
+    pub fn unanswered(&mut self, out: &mut Out<N, S, C, R>) {
+        if self.standing == Standing::Joining {
+            out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
+        }
+    }
+
+    /// A clock arrived.
+    pub fn clock(&mut self, clock: Clock, out: &mut Out<N, S, C, R>) {
+        if self.standing == Standing::Left {
+            return;
+        }
+        // Before anything else is looked at, whatever its tick.
+        if let Some(end) = clock.end {
+            self.leave(Leave::End(end), out);
+            return;
+        }
+        let Some(admission) = self.admission else {
+            return; // The clock is repeated when the token is declared.
+        };
+
+        let at = (clock.epoch, clock.tick);
+        if clock.epoch > admission.epoch && self.standing != Standing::Joining {
+            if self.rules.hold(Rule::JoinsNewEpoch) {
+                self.join_epoch(out);
+            } else {
+                return;
+            }
+        }
+        if clock.epoch < admission.epoch && self.rules.hold(Rule::IgnoresLate) {
+            return;
+        }
+        if self.running == Some(at) {
+            return; // It is being answered.
+        }
+        if let Some(answer) = &self.answer
+            && at <= (answer.epoch, answer.tick)
+            && self.rules.hold(Rule::AnswersOnce)
+        {
+            if at == (answer.epoch, answer.tick) && self.running.is_none() {
+                self.repeat(out);
+            }
+            return;
+        }
+        let is_newest = self
+            .pending
+            .is_none_or(|pending| at >= (pending.epoch, pending.tick))
+            && self.running.is_none_or(|running| at > running);
+        if is_newest || !self.rules.hold(Rule::RunsNewest) {
+            self.pending = Some(clock);
+            self.run_if_possible(out);
+        }
+    }
+
+    /// News arrived for the tick that they name. `joined` is the incarnation that takes part from that tick on.
+    pub fn news(
+        &mut self,
+        epoch: Epoch,
+        tick: Tick,
+        joined: Option<Generation>,
+        news: N,
+        out: &mut Out<N, S, C, R>,
+    ) {
+        let Some(admission) = self.admission else {
+            return;
+        };
+        if self.standing == Standing::Left || epoch < admission.epoch {
+            return;
+        }
+        let is_replaced = joined.is_some_and(|generation| generation > admission.generation);
+        if epoch == admission.epoch && is_replaced && self.rules.hold(Rule::EndsWhenReplaced) {
+            self.leave(Leave::Replaced, out);
+            return;
+        }
+        let is_answered = self
+            .answer
+            .as_ref()
+            .is_some_and(|answer| (epoch, tick) <= (answer.epoch, answer.tick));
+        if is_answered || self.running.is_some_and(|running| (epoch, tick) <= running) {
+            return;
+        }
+
+        self.news.insert((epoch, tick), Arrived { joined, news });
+        while self.news.len() > MAX_NEWS {
+            self.news.pop_first();
+        }
+        self.run_if_possible(out);
+    }
+
+    /// The robot has done the tick that it was to run.
+    pub fn done(&mut self, commands: Vec<Sent<C>>, state: S, report: R, out: &mut Out<N, S, C, R>) {
+        let (Some((epoch, tick)), Some(admission)) = (self.running.take(), self.admission) else {
+            return;
+        };
+        self.asking = None;
+        if self.standing == Standing::Left {
+            return;
+        }
+
+        // What was run in an epoch that is over is thrown away.
+        if epoch == admission.epoch {
+            self.states.add(epoch, tick, state.clone());
+            self.answer = Some(Box::new(Answer {
+                epoch,
+                tick,
+                generation: admission.generation,
+                commands,
+                state,
+                report,
+            }));
+            if self.standing != Standing::Joining {
+                self.put(out);
+            }
+        }
+        self.run_if_possible(out);
+    }
+
+    /// Answers another robot's query, at once: also while this robot runs or waits.
+    ///
+    /// # Errors
+    /// [`NoState`] says why there is no answer.
+    pub fn query(&self, query: StateQuery) -> Result<S, NoState> {
+        self.states.answer(query)
+    }
+
+    /// The state of another robot as of the tick before the one that runs: `None` until it is here. The first call begins a
+    /// query.
+    pub fn ask(&mut self, of: &RobotName, out: &mut Out<N, S, C, R>) -> Option<S> {
+        let (epoch, tick) = self.running?;
+        let query = StateQuery {
+            tick: Some(tick),
+            epoch: Some(epoch),
+        };
+        self.followed.insert(of.clone(), tick);
+        let found = self
+            .others
+            .get(of)
+            .and_then(|states| states.answer(query).ok());
+        if found.is_some() {
+            self.asking = None;
+            return found;
+        }
+
+        if self.asking.as_ref().is_none_or(|asking| asking.of != *of) {
+            self.asking = Some(Asking {
+                of: of.clone(),
+                has_told: false,
+            });
+            out.push(Action::Query {
+                of: of.clone(),
+                tick,
+                epoch,
+            });
+            out.push(Action::SetTimer(RobotTimer::Query, QUERY_AGAIN));
+            out.push(Action::SetTimer(RobotTimer::Waiting, WAITING_AFTER));
+        }
+        None
+    }
+
+    /// Another robot's state arrived, queried or followed.
+    pub fn heard(&mut self, of: RobotName, epoch: Epoch, tick: Tick, state: S) {
+        let present = self.running.or_else(|| {
+            let answer = self.answer.as_ref()?;
+            Some((answer.epoch, answer.tick))
+        });
+        // Only states near the present tick are ever asked for.
+        let is_near = present.is_some_and(|(present_epoch, present_tick)| {
+            epoch == present_epoch && tick.abs_diff(present_tick) <= 1
+        });
+        if is_near {
+            self.others.entry(of).or_default().add(epoch, tick, state);
+        }
+    }
+
+    /// Whether the tick that runs is of no use any more: the run is over, a newer clock is here, or the process leaves.
+    #[must_use]
+    pub fn is_interrupted(&self) -> bool {
+        self.standing == Standing::Left
+            || self.standing == Standing::Joining
+            || self.pending.is_some()
+    }
+
+    /// The simulator's liveliness token was declared or undeclared.
+    pub fn simulator(&mut self, is_present: bool, out: &mut Out<N, S, C, R>) {
+        let was_gone = std::mem::replace(&mut self.is_simulator_gone, !is_present);
+        if !is_present && !was_gone {
+            out.push(Action::SetTimer(RobotTimer::Gone, self.patience.gone));
+        }
+    }
+
+    /// A timer that was set has fired.
+    pub fn timer(&mut self, timer: RobotTimer, out: &mut Out<N, S, C, R>) {
+        if self.standing == Standing::Left {
+            return;
+        }
+        match timer {
+            RobotTimer::Join if self.standing == Standing::Joining => out.push(Action::Join),
+            RobotTimer::JoinPatience if self.admission.is_none() => {
+                let leave = if self.is_name_taken {
+                    Leave::Refused(Refusal::NameTaken)
+                } else {
+                    Leave::NoSimulator
+                };
+                self.leave(leave, out);
+            }
+            RobotTimer::Gone if self.is_simulator_gone => self.leave(Leave::SimulatorGone, out),
+            RobotTimer::Query => self.query_again(out),
+            RobotTimer::Waiting => self.tell_waiting(out),
+            _ => {}
+        }
+    }
+
+    /// The process wants to leave.
+    pub fn stop(&mut self, out: &mut Out<N, S, C, R>) {
+        self.leave(Leave::Stopped, out);
+    }
+
+    /// Whether it has left.
+    #[must_use]
+    pub fn has_left(&self) -> bool {
+        self.standing == Standing::Left
+    }
+
+    /// What it was admitted to.
+    #[must_use]
+    pub fn admission(&self) -> Option<Admission> {
+        self.admission
+    }
+
+    fn leave(&mut self, leave: Leave, out: &mut Out<N, S, C, R>) {
+        if self.standing != Standing::Left {
+            self.standing = Standing::Left;
+            out.push(Action::Leave(leave));
+        }
+    }
+
+    /// `init`: the same process, in the next epoch.
+    fn join_epoch(&mut self, out: &mut Out<N, S, C, R>) {
+        self.standing = Standing::Joining;
+        out.push(Action::Join);
+    }
+
+    /// Runs the pending clock if everything that belongs to it is here and it is this robot's turn.
+    fn run_if_possible(&mut self, out: &mut Out<N, S, C, R>) {
+        let (Some(clock), Some(admission)) = (self.pending, self.admission) else {
+            return;
+        };
+        let is_ready = matches!(self.standing, Standing::Admitted | Standing::Seated);
+        if !is_ready || self.running.is_some() || clock.epoch > admission.epoch {
+            return;
+        }
+        let at = (clock.epoch, clock.tick);
+        if clock.epoch < admission.epoch && self.rules.hold(Rule::IgnoresLate) {
+            self.pending = None;
+            return;
+        }
+        let has_news = clock.news & admission.news_flag != 0;
+        let is_here = self.news.contains_key(&at);
+        if has_news && !is_here && self.rules.hold(Rule::WaitsForNews) {
+            return; // They were lost: both are repeated.
+        }
+
+        self.pending = None;
+        let arrived = if self.rules.hold(Rule::MatchesNews) {
+            self.news.remove(&at)
+        } else {
+            self.news.pop_first().map(|(_, arrived)| arrived)
+        };
+        self.news.retain(|of, _| *of > at);
+        let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
+        let begin = match self.standing {
+            Standing::Seated => Begin::GoOn,
+            _ if clock.tick == 0 => Begin::Init,
+            _ if joined == Some(admission.generation) || !self.rules.hold(Rule::WaitsToBeNamed) => {
+                Begin::TakeOver
+            }
+            _ => return, // Its turn comes with the news that name it.
+        };
+
+        self.standing = Standing::Seated;
+        self.running = Some(at);
+        self.unfollow_unused(clock.tick, out);
+        out.push(Action::Run(Turn {
+            epoch: clock.epoch,
+            tick: clock.tick,
+            begin,
+            news: arrived.map(|arrived| arrived.news),
+        }));
+    }
+
+    fn unfollow_unused(&mut self, tick: Tick, out: &mut Out<N, S, C, R>) {
+        let unused: Vec<RobotName> = self
+            .followed
+            .iter()
+            .filter(|(_, last)| tick.abs_diff(**last) >= UNUSED_TICKS)
+            .map(|(name, _)| name.clone())
+            .collect();
+
+        for name in unused {
+            self.followed.remove(&name);
+            self.others.remove(&name);
+            out.push(Action::Unfollow(name));
+        }
+    }
+
+    /// Puts the answer of the last tick.
+    fn put(&self, out: &mut Out<N, S, C, R>) {
+        if let Some(answer) = &self.answer {
+            out.push(Action::Put(answer.clone()));
+        }
+    }
+
+    /// A clock came again that was answered: a message was lost.
+    fn repeat(&self, out: &mut Out<N, S, C, R>) {
+        let Some(answer) = &self.answer else { return };
+        if !self.rules.hold(Rule::RepeatsReport) {
+            return;
+        }
+
+        let mut again = answer.clone();
+        if !self.rules.hold(Rule::RepeatsCommands) {
+            again.commands.clear();
+        }
+        out.push(Action::Put(again));
+    }
+
+    fn query_again(&mut self, out: &mut Out<N, S, C, R>) {
+        let (Some(asking), Some((epoch, tick))) = (&self.asking, self.running) else {
+            return;
+        };
+        out.push(Action::Query {
+            of: asking.of.clone(),
+            tick,
+            epoch,
+        });
+        out.push(Action::SetTimer(RobotTimer::Query, QUERY_AGAIN));
+    }
+
+    fn tell_waiting(&mut self, out: &mut Out<N, S, C, R>) {
+        let (Some(asking), Some((epoch, tick))) = (&mut self.asking, self.running) else {
+            return;
+        };
+        if !std::mem::replace(&mut asking.has_told, true) {
+            out.push(Action::PutWaiting {
+                tick,
+                epoch,
+                on: asking.of.clone(),
+            });
+        }
+    }
+}

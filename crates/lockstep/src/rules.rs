@@ -1,0 +1,85 @@
+//! The rules of the lock-step by name, so that tests can break one of them in the code that runs and show that it is
+//! needed. Outside of this crate's tests every rule holds, at no cost.
+
+/// A rule that tests can break.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    not(test),
+    expect(dead_code, reason = "constructed where a rule is tested")
+)]
+pub(crate) enum Rule {
+    /// A tick is complete when every awaited robot has reported.
+    WaitsForAll,
+    /// A report or command of another epoch does not count.
+    ChecksEpoch,
+    /// A report or command of another tick does not count.
+    ChecksTick,
+    /// A report or command of another incarnation does not count.
+    ChecksGeneration,
+    /// A report counts when all commands that it states have arrived.
+    CountsCommands,
+    /// What an incarnation put for the open tick is dropped when another one takes its place.
+    DropsPredecessor,
+    /// A held clock is repeated.
+    RepeatsClock,
+    /// The news are repeated with the clock.
+    RepeatsNews,
+    /// The clock flags the robots that have news.
+    FlagsNews,
+    /// A newcomer is taken in while the tick that waits for it is open.
+    TakesInWhileOpen,
+    /// A newcomer is named in every tick until it has reported.
+    NamesUntilReported,
+    /// Another process gets another generation.
+    CountsGenerations,
+    /// The name of a connected robot is taken.
+    RefusesTakenName,
+    /// A lost robot that sends again is taken back.
+    TakesBack,
+    /// A robot that was given up is not counted in that tick any more.
+    GivesUpForGood,
+    /// A robot waits for its news where its flag is set.
+    WaitsForNews,
+    /// News count for the tick that they name.
+    MatchesNews,
+    /// A tick that was answered is not run again.
+    AnswersOnce,
+    /// A repeated clock repeats the report.
+    RepeatsReport,
+    /// A repeated clock repeats the commands.
+    RepeatsCommands,
+    /// A clock of an earlier tick or epoch is ignored.
+    IgnoresLate,
+    /// A clock of a later epoch makes a robot join again.
+    JoinsNewEpoch,
+    /// A robot that joined in the middle of an epoch waits until it is named.
+    WaitsToBeNamed,
+    /// A process ends when another one has taken its place.
+    EndsWhenReplaced,
+    /// The token is declared after the welcome.
+    TokenAfterWelcome,
+    /// What was answered in an epoch is forgotten in the next one.
+    ForgetsEpoch,
+    /// Only the newest clock is run.
+    RunsNewest,
+}
+
+/// Which rules hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub(crate) struct Rules {
+    #[cfg(test)]
+    pub(crate) broken: Option<Rule>,
+}
+
+impl Rules {
+    #[cfg(test)]
+    pub(crate) fn hold(self, rule: Rule) -> bool {
+        self.broken != Some(rule)
+    }
+
+    #[cfg(not(test))]
+    #[expect(clippy::unused_self, reason = "the same call as in tests")]
+    pub(crate) const fn hold(self, _: Rule) -> bool {
+        true
+    }
+}
