@@ -3,6 +3,8 @@
 
 use protocol::messages::{Point, Report, StateVariables, Variable};
 use protocol::{RobotName, Tick};
+
+use crate::medium::Underway;
 use xxhash_rust::xxh3::Xxh3;
 
 /// A chain of digests, one a tick; each covers everything before it.
@@ -77,26 +79,27 @@ impl TickDigest {
         }
     }
 
-    /// What a robot reported; nothing for one that did not.
-    pub fn report(&mut self, robot: &RobotName, report: Option<&Report>) {
+    /// What a robot reported, and the commands that it sent; nothing for a robot that did not report.
+    pub fn report(&mut self, robot: &RobotName, report: Option<(&Report, &[Underway])>) {
         self.text(robot.as_str());
-        let Some(report) = report else { return };
+        let Some((report, commands)) = report else {
+            return;
+        };
+
         self.point(report.proposal);
         self.number(report.speed_mps);
         self.number(report.direction_rad);
         self.text(&report.emotion_state);
         self.text(&report.behavior_state);
         self.variables(&report.state_variables);
-        for sent in &report.sent {
-            self.text(sent.to.as_str());
-            self.integer(sent.seq);
-            self.text(sent.performative.name());
-            self.text(&sent.command);
+        for command in commands {
+            self.text(command.to.as_str());
+            self.integer(command.seq);
+            self.text(command.text.performative.name());
+            self.text(&command.text.command);
         }
-        for missing in &report.missing {
-            self.text(missing.from.as_str());
-            self.integer(missing.seq);
+        for line in &report.log {
+            self.text(line);
         }
-        report.log.iter().for_each(|line| self.text(line));
     }
 }

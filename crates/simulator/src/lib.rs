@@ -18,5 +18,5 @@ pub mod units;
 pub use protocol::{Event, Line};
 pub use recorder::{Recorder, RunFolder};
 pub use scenario::{OnLate, Scenario};
-pub use simulation::{Barrier, Exchange, Simulation, TickRecord};
+pub use simulation::{Reports, Simulation, TickRecord};
 pub use summary::Summary;

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::event::{Cause, Event};
-use protocol::messages::{CommandId, Cut};
+use protocol::messages::{CommandText, Cut, Delivery};
 use protocol::random::{Stream, stream, unit};
 use protocol::{RobotName, Seq, Tick};
 
@@ -22,7 +22,44 @@ pub struct Underway {
     pub from: RobotName,
     /// Its number among the sender's.
     pub seq: Seq,
+    /// What it says.
+    pub text: CommandText,
 }
+
+impl Underway {
+    /// The event that it was sent.
+    #[must_use]
+    pub fn event(&self) -> Event {
+        Event::CommandSent {
+            from: self.from.clone(),
+            to: self.to.clone(),
+            seq: self.seq,
+            performative: self.text.performative,
+            command: self.text.command.clone(),
+        }
+    }
+
+    /// Bytes that its delivery takes in the news of its target.
+    fn encoded_bytes(&self) -> usize {
+        let text_bytes = serde_json::to_string(&self.text.command).map_or(0, |json| json.len());
+
+        text_bytes + self.from.as_str().len() + DELIVERY_BYTES
+    }
+}
+
+/// A command that arrives.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Arrival {
+    /// Its number among the sender's.
+    pub seq: Seq,
+    /// What its target gets.
+    pub delivery: Delivery,
+}
+
+/// Bytes of a delivery beside its sender and its text.
+const DELIVERY_BYTES: usize = 64;
+/// Most bytes of commands that arrive at a robot in a tick: the news must fit into a message with everything else.
+const MAX_DELIVERED_BYTES: usize = 512 * 1024;
 
 /// A pair of robots, in the direction of the message.
 type Pair = (RobotName, RobotName);
@@ -31,7 +68,7 @@ type Pair = (RobotName, RobotName);
 #[derive(Debug, Default)]
 pub struct Decision {
     /// Commands that arrive now, by target, each list ordered by sender and number; one that arrives twice is there twice.
-    pub delivered: BTreeMap<RobotName, Vec<CommandId>>,
+    pub delivered: BTreeMap<RobotName, Vec<Arrival>>,
     /// Whom each robot cannot ask during this tick, in the order of names.
     pub unreachable: BTreeMap<RobotName, Vec<RobotName>>,
     /// All that was decided, in a fixed order.
@@ -185,7 +222,18 @@ impl Medium {
 
     /// Decides what becomes of a command, once and for all but for a cut while it is on its way.
     fn dispatch(&mut self, tick: Tick, command: Underway, events: &mut Vec<Event>) {
-        let Underway { to, from, seq } = command.clone();
+        let to = command.to.clone();
+        let from = command.from.clone();
+        let seq = command.seq;
+        if !self.roster.contains(&to) {
+            events.push(Event::CommandDropped {
+                from,
+                to,
+                seq,
+                because: Cause::Unknown,
+            });
+            return;
+        }
         // A person at the console is not on the robots' network.
         if from.is_operator() {
             self.arrivals.entry(tick).or_default().push((command, 1));
@@ -252,31 +300,56 @@ impl Medium {
     }
 
     fn deliver(&mut self, tick: Tick, decision: &mut Decision) {
-        for (command, copies) in self.arrivals.remove(&tick).unwrap_or_default() {
-            let Underway { to, from, seq } = command;
-            let is_cut = self
-                .cut
-                .get(&(from.clone(), to.clone()))
-                .is_some_and(|scope| scope.commands);
-            if is_cut {
-                // A cable that is cut loses what is in it, too.
-                let because = Cause::Partition;
+        let mut arrivals = self.arrivals.remove(&tick).unwrap_or_default();
+        arrivals.sort_by(|(one, _), (other, _)| {
+            (&one.to, &one.from, one.seq).cmp(&(&other.to, &other.from, other.seq))
+        });
+
+        let mut bytes: BTreeMap<RobotName, usize> = BTreeMap::new();
+        for (command, copies) in arrivals {
+            let encoded_bytes = command.encoded_bytes();
+            let Underway {
+                to,
+                from,
+                seq,
+                text,
+            } = command;
+            // A cable that is cut loses what is in it, too.
+            let scope = self.cut.get(&(from.clone(), to.clone()));
+            if scope.is_some_and(|scope| scope.commands) {
                 decision.events.push(Event::CommandDropped {
                     from,
                     to,
                     seq,
-                    because,
+                    because: Cause::Partition,
                 });
                 continue;
             }
-            let id = CommandId { from, seq };
-            decision
-                .delivered
-                .entry(to)
-                .or_default()
-                .extend(std::iter::repeat_n(id, copies));
+
+            for _ in 0..copies {
+                let used = bytes.entry(to.clone()).or_default();
+                if *used + encoded_bytes > MAX_DELIVERED_BYTES {
+                    decision.events.push(Event::CommandDropped {
+                        from: from.clone(),
+                        to: to.clone(),
+                        seq,
+                        because: Cause::Overflow,
+                    });
+                    continue;
+                }
+                *used += encoded_bytes;
+                let delivery = Delivery {
+                    from: from.clone(),
+                    performative: text.performative,
+                    command: text.command.clone(),
+                };
+                decision
+                    .delivered
+                    .entry(to.clone())
+                    .or_default()
+                    .push(Arrival { seq, delivery });
+            }
         }
-        decision.delivered.values_mut().for_each(|ids| ids.sort());
     }
 
     /// One verdict for each asker, target and tick. A query and its answer need both directions.

@@ -9,6 +9,7 @@ mod setup;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
 
 use protocol::messages::{Parameters, Point};
 
@@ -109,6 +110,19 @@ impl Lateness {
     #[must_use]
     pub fn of(&self, robot: &RobotName) -> OnLate {
         self.own.get(robot).copied().unwrap_or(self.on_late)
+    }
+
+    /// The same for the lock-step.
+    #[must_use]
+    pub fn to_lockstep(&self) -> lockstep::Lateness {
+        let deadline = Duration::try_from_secs_f64(self.deadline_s);
+
+        lockstep::Lateness {
+            on_late: self.on_late,
+            own: self.own.clone(),
+            deadline: deadline.unwrap_or(Duration::MAX),
+            lose_after: self.lose_after,
+        }
     }
 }
 

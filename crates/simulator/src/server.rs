@@ -1,39 +1,47 @@
-//! The simulator as a process: who takes part, when a tick is granted, what people ask for.
+//! The simulator as a process: a loop that translates between the bus, the lock-step ([`lockstep::Barrier`]) and the
+//! [`Simulation`].
 //!
 //! One loop, one queue. Everything that can happen is an [`Event`]; the loop sleeps until one arrives or something is
 //! due. Control is answered by the same loop, also while the clock is held, because the loop never waits for a robot.
 
 mod control;
 mod faults;
-mod member;
+mod join;
 mod observers;
+mod timers;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
+use lockstep::{Barrier, Outcome, Output, Sent, Stamp, Timing};
 use protocol::keys::Keys;
-use protocol::messages::{Clock, Command, Correction, End, Performative, Report, Waiting};
-use protocol::{Epoch, Malformed, RobotName, RunName, Tick, decode, encode};
+use protocol::messages::{
+    Clock, Command, CommandText, End, MAX_ENTRIES, Presence, Reason, Report, Waiting,
+};
+use protocol::{Epoch, Generation, Malformed, RobotName, RunName, decode, encode};
 
 use crate::diagnostic::FileError;
 use crate::recorder::{Recorder, RunFolder};
-use crate::scenario::{Lateness, OnLate, Scenario};
-use crate::simulation::{Barrier, Exchange, Membership, Simulation};
-use crate::summary::Summary;
+use crate::scenario::Scenario;
+use crate::simulation::Simulation;
+use crate::summary::{Summary, Wall};
 
 use control::Pace;
-use faults::Orders;
-use member::Member;
+use faults::{Orders, Underway};
 use observers::Observers;
+use timers::Timers;
 
 /// Messages that may queue up before links are slowed down.
 const QUEUE: usize = 65_536;
-/// After this long without a report people are told for whom the clock waits.
-const SAY_AFTER: Duration = Duration::from_millis(500);
-/// While the clock is held it is repeated this often: whatever got lost on the wire is then sent again.
+/// While the clock is held it is repeated this often: what was lost on the wire is then sent again.
 pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
+/// How long the simulator waits at the end of a run for the robots to leave.
+const GOODBYE: Duration = Duration::from_secs(1);
+/// Most commands of the operator that wait for the next tick.
+const MAX_OPERATOR_COMMANDS: usize = 1024;
 
 /// How a simulator process runs.
 #[derive(Debug, Clone)]
@@ -42,7 +50,7 @@ pub struct Options {
     pub run: RunName,
     /// Simulated seconds per second; `None` is as fast as the barrier goes.
     pub speed: Option<f64>,
-    /// Whether the clock waits for `start` once everybody is there.
+    /// Whether the clock waits for `start` once every robot is connected.
     pub is_paused: bool,
     /// While the clock is held it is repeated this often; [`REPEAT_AFTER`] unless a test is in a hurry.
     pub repeat_after: Duration,
@@ -65,22 +73,44 @@ pub enum ServerError {
 /// Everything that can happen to a simulator process.
 pub enum Event {
     /// A robot has done its tick.
-    Report(Result<Report, Malformed>, String),
-    /// A robot waits for another one's answer.
-    Waiting(Result<Waiting, Malformed>, String),
+    Report {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        report: Result<Report, Malformed>,
+    },
+    /// A robot, or the operator, sent a command.
+    Command {
+        /// The sender that the key names.
+        from: String,
+        /// The target that the key names.
+        to: String,
+        /// What was put.
+        command: Result<Command, Malformed>,
+    },
+    /// A robot waits for another robot's answer.
+    Waiting {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        waiting: Result<Waiting, Malformed>,
+    },
     /// A robot asks to take part.
     Join(Query),
-    /// A robot asks what it senses.
-    Percept(Query),
-    /// Somebody asks for something.
+    /// An operator asks for something.
     Control(Query),
-    /// A robot's token came or went.
-    Token(String, bool),
-    /// The process is told to end.
+    /// A robot's liveliness token was declared or undeclared.
+    Token {
+        /// The robot that the key names.
+        robot: String,
+        /// Whether it is declared.
+        is_present: bool,
+    },
+    /// The process is asked to end.
     Terminate,
 }
 
-/// Why a tick, or the wait for one, was given up.
+/// Why an epoch ended.
 #[derive(Debug)]
 pub enum Interrupt {
     /// Start the next epoch with this scenario.
@@ -96,10 +126,21 @@ impl From<BusError> for Interrupt {
         Self::Failed(error.into())
     }
 }
+
 impl From<FileError> for Interrupt {
     fn from(error: FileError) -> Self {
         Self::Failed(error.into())
     }
+}
+
+/// What the loop waits for.
+enum Stage {
+    /// The robots: to join, or to report.
+    Robots,
+    /// The next tick to be due.
+    Grant,
+    /// The launcher, to carry out the faults that are due before the next tick.
+    Faults(Underway),
 }
 
 /// A simulator process.
@@ -111,37 +152,23 @@ pub struct Server {
     events: Receiver<Event>,
     declared: Vec<Declared>,
     clock: Publisher,
+    news: BTreeMap<RobotName, Publisher>,
     observers: Observers,
     orders: Orders,
     pace: Pace,
-    members: BTreeMap<RobotName, Member>,
-    /// What each robot senses, for those who follow it instead of asking every tick.
-    percepts: BTreeMap<RobotName, Publisher>,
-    lateness: Lateness,
-    open: Open,
-    summary_wall: crate::summary::Wall,
-    /// Commands from outside the roster that take effect at the next tick boundary.
-    operator: Vec<(RobotName, String)>,
-    /// Those of the last two ticks with their keys, for targets that missed them.
-    operator_sent: Vec<(String, Command)>,
-}
-
-/// The tick that is under way.
-struct Open {
-    clock: Clock,
-    /// Whether its barrier is open.
-    is_open: bool,
-    since: Instant,
-    /// Who holds the clock up: awaited when people were told, and not waiting for another one.
+    barrier: Barrier<Arc<Report>, CommandText>,
+    outputs: Vec<Output<Arc<Report>, CommandText>>,
+    timers: Timers,
+    stage: Stage,
+    /// Robots whose news list the bodies around them.
+    with_bodies: BTreeSet<RobotName>,
+    /// Since when the loop waits for robots.
+    waiting_since: Instant,
+    /// Robots that hold the clock up: awaited when people were told, and not waiting for another robot.
     culprits: Vec<RobotName>,
-    reports: BTreeMap<RobotName, Report>,
-    membership: Vec<Membership>,
-    waits: BTreeMap<RobotName, RobotName>,
-    /// Robots without which the clock goes on in this tick: it is recorded that they missed it.
-    given_up: BTreeSet<RobotName>,
-    /// Whether people have been told that the clock is held.
-    is_announced: bool,
-    repeated: Instant,
+    wall: Wall,
+    /// Commands from outside the roster that are sent at the next tick boundary.
+    operator: Vec<(RobotName, String)>,
 }
 
 impl Server {
@@ -152,38 +179,36 @@ impl Server {
     pub fn open(bus: Bus, scenario: &Scenario, options: Options) -> Result<Self, BusError> {
         let keys = Keys::new(&options.run);
         let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
-        let now = Instant::now();
+        let mut news = BTreeMap::new();
+        for name in scenario.robots.keys() {
+            news.insert(name.clone(), bus.publisher(&keys.news(name))?);
+        }
+        let timing = Timing {
+            repeat: options.repeat_after,
+            ..Timing::default()
+        };
+        let barrier = Barrier::new(
+            scenario.robots.keys().cloned(),
+            scenario.lateness.to_lockstep(),
+            timing,
+            u32::try_from(MAX_ENTRIES).unwrap_or(u32::MAX),
+        );
+
         let mut server = Self {
             clock: bus.publisher(&keys.clock())?,
+            news,
             observers: Observers::new(&bus, &keys)?,
             orders: Orders::new(bus.publisher(&keys.faults())?),
             pace: Pace::new(options.speed, options.is_paused),
-            percepts: scenario
-                .robots
-                .keys()
-                .map(|name| Ok((name.clone(), bus.publisher(&keys.percept(name))?)))
-                .collect::<Result<_, BusError>>()?,
-            members: scenario
-                .robots
-                .keys()
-                .map(|name| (name.clone(), Member::default()))
-                .collect(),
-            lateness: scenario.lateness.clone(),
-            open: Open {
-                clock: Clock::default(),
-                is_open: false,
-                since: now,
-                culprits: Vec::new(),
-                reports: BTreeMap::new(),
-                membership: Vec::new(),
-                waits: BTreeMap::new(),
-                given_up: BTreeSet::new(),
-                is_announced: false,
-                repeated: now,
-            },
-            summary_wall: crate::summary::Wall::default(),
+            barrier,
+            outputs: Vec::new(),
+            timers: Timers::default(),
+            stage: Stage::Robots,
+            with_bodies: BTreeSet::new(),
+            waiting_since: Instant::now(),
+            culprits: Vec::new(),
+            wall: Wall::default(),
             operator: Vec::new(),
-            operator_sent: Vec::new(),
             declared: Vec::new(),
             options,
             bus,
@@ -191,7 +216,7 @@ impl Server {
             queue,
             events,
         };
-        server.listen()?;
+        server.declare()?;
         Ok(server)
     }
 
@@ -201,28 +226,49 @@ impl Server {
         self.queue.clone()
     }
 
-    fn listen(&mut self) -> Result<(), BusError> {
-        // A send fails only when the process ends; then nobody is left to tell.
+    /// Declares what the simulator subscribes to and answers, its token last.
+    fn declare(&mut self) -> Result<(), BusError> {
+        // A send fails only when the process ends, and then no message matters any more.
         let queue = self.queue();
-        self.declared.push(
-            self.bus
-                .subscribe(&self.keys.reports(), move |key, bytes| {
-                    let robot = Keys::robot_of(key).unwrap_or_default();
-                    let _ = queue.send(Event::Report(decode(key, robot, bytes), robot.to_owned()));
-                })?,
-        );
+        let reports = self
+            .bus
+            .subscribe(&self.keys.reports(), move |key, bytes| {
+                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let report = decode(key, &robot, bytes);
+                let _ = queue.send(Event::Report { robot, report });
+            })?;
+
         let queue = self.queue();
-        self.declared.push(
-            self.bus
-                .subscribe(&self.keys.all_waiting(), move |key, bytes| {
-                    let robot = Keys::robot_of(key).unwrap_or_default();
-                    let _ = queue.send(Event::Waiting(decode(key, robot, bytes), robot.to_owned()));
-                })?,
-        );
+        let commands = self
+            .bus
+            .subscribe(&self.keys.commands(), move |key, bytes| {
+                let to = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let from = Keys::last_chunk(key).to_owned();
+                let command = decode(key, &from, bytes);
+                let _ = queue.send(Event::Command { from, to, command });
+            })?;
+
+        let queue = self.queue();
+        let waiting = self
+            .bus
+            .subscribe(&self.keys.all_waiting(), move |key, bytes| {
+                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let waiting = decode(key, &robot, bytes);
+                let _ = queue.send(Event::Waiting { robot, waiting });
+            })?;
+
+        let queue = self.queue();
+        let tokens = self
+            .bus
+            .liveliness(&self.keys.alive_robots(), move |key, is_present| {
+                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let _ = queue.send(Event::Token { robot, is_present });
+            })?;
+        self.declared.extend([reports, commands, waiting, tokens]);
+
         for (key, event) in [
             (self.keys.join(), Event::Join as fn(Query) -> Event),
             (self.keys.joins(), Event::Join),
-            (self.keys.percepts(), Event::Percept),
             (self.keys.control(), Event::Control),
         ] {
             let queue = self.queue();
@@ -230,14 +276,6 @@ impl Server {
                 let _ = queue.send(event(query));
             })?);
         }
-        let queue = self.queue();
-        self.declared.push(self.bus.liveliness(
-            &self.keys.alive_robots(),
-            move |key, is_there| {
-                let robot = Keys::robot_of(key).unwrap_or_default();
-                let _ = queue.send(Event::Token(robot.to_owned(), is_there));
-            },
-        )?);
         self.declared.push(self.bus.token(&self.keys.alive_sim())?);
         Ok(())
     }
@@ -255,7 +293,7 @@ impl Server {
         loop {
             let mut simulation = Simulation::new(scenario.clone(), epoch)?;
             let mut recorder = Recorder::begin(folder, &self.options.run, &simulation)?;
-            self.summary_wall = crate::summary::Wall::default();
+            self.wall = Wall::default();
             let interrupt = match self.epoch(&mut simulation, &mut recorder) {
                 Ok(()) => Interrupt::End(End::Finished),
                 Err(interrupt) => interrupt,
@@ -265,7 +303,7 @@ impl Server {
                     scenario = *next;
                     epoch += 1;
                 }
-                Interrupt::End(end) => return self.end(end, &simulation, recorder),
+                Interrupt::End(end) => return self.end(end, &mut simulation, recorder),
                 Interrupt::Failed(error) => return Err(error),
             }
         }
@@ -277,96 +315,184 @@ impl Server {
         recorder: &mut Recorder,
     ) -> Result<(), Interrupt> {
         // Nothing of an epoch before may reach into this one.
-        (self.open.is_open, self.open.is_announced) = (false, false);
         self.operator.clear();
-        self.operator_sent.clear();
+        self.outputs.clear();
+        self.culprits.clear();
+        for name in &self.with_bodies {
+            simulation.list_bodies(name, true);
+        }
         self.pace.gather();
-        self.gather(simulation)?;
-        for member in self.members.values_mut() {
-            member.begin_epoch();
-        }
-        self.lateness = simulation.scenario().lateness.clone();
-        let record = simulation.init(self)?;
-        self.observers.note(&record);
-        self.observers.log(&recorder.write(simulation, &record)?);
-        self.pace.ready();
-        let last = simulation.scenario().ticks;
-        while simulation.tick() < last {
-            self.wait_for_grant(simulation)?;
-            self.carry_out_faults(simulation)?;
-            self.forward_operator(simulation);
-            let record = simulation.step(self)?;
-            self.observers.note(&record);
-            self.observers.log(&recorder.write(simulation, &record)?);
-            self.after_tick(simulation);
-        }
-        Ok(())
-    }
+        self.stage = Stage::Robots;
+        self.waiting_since = Instant::now();
+        let lateness = simulation.scenario().lateness.to_lockstep();
+        self.barrier
+            .gather(simulation.epoch(), lateness, &mut self.outputs);
 
-    /// Waits until every robot of the roster has joined and shown that it is ready.
-    fn gather(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
-        self.open.since = Instant::now();
-        while self.members.values().any(|member| !member.is_ready()) {
-            let patience = if self.open.is_announced {
-                REPEAT_AFTER
-            } else {
-                SAY_AFTER
+        loop {
+            while let Ok(event) = self.events.try_recv() {
+                self.handle(event, simulation)?;
+            }
+            while let Some(timer) = self.timers.take_due() {
+                self.barrier.timer(&timer, &mut self.outputs);
+            }
+            self.carry_out(simulation, recorder)?;
+            if simulation.tick() >= simulation.scenario().ticks && !self.is_waiting_for_robots() {
+                return Ok(());
+            }
+
+            let patience = match self.advance(simulation)? {
+                Next::Opened => continue,
+                Next::Wait(patience) => patience,
             };
-            match self.receive(patience) {
-                Some(event) => self.handle(event, simulation)?,
-                // From now on every robot that comes changes what there is to say.
-                None if !self.open.is_announced && self.open.since.elapsed() >= SAY_AFTER => {
-                    self.open.is_announced = true;
-                    self.observers.held(simulation, &self.status(simulation));
-                }
-                None => {}
+            if let Some(event) = self.receive(patience) {
+                self.handle(event, simulation)?;
             }
         }
-        self.open.is_announced = false;
+    }
+
+    fn is_waiting_for_robots(&self) -> bool {
+        matches!(self.stage, Stage::Robots)
+    }
+
+    /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.
+    fn advance(&mut self, simulation: &mut Simulation) -> Result<Next, Interrupt> {
+        match &self.stage {
+            Stage::Robots => return Ok(Next::Wait(self.timers.next())),
+            Stage::Grant => {
+                if let Err(patience) = self.pace.take_grant(simulation.scenario().tick_s) {
+                    return Ok(Next::Wait(patience));
+                }
+                if let Some(underway) = self.order_faults(simulation)? {
+                    self.stage = Stage::Faults(underway);
+                    return Ok(Next::Opened);
+                }
+            }
+            Stage::Faults(_) => {
+                if let Some(patience) = self.await_faults(simulation)? {
+                    return Ok(Next::Wait(Some(patience)));
+                }
+            }
+        }
+
+        for (to, command) in std::mem::take(&mut self.operator) {
+            simulation.command(&to, &command);
+        }
+        let tick = simulation.begin_tick();
+        self.stage = Stage::Robots;
+        self.waiting_since = Instant::now();
+        self.barrier
+            .open(tick, simulation.robots_with_news(), &mut self.outputs);
+        Ok(Next::Opened)
+    }
+
+    /// Carries out what the barrier wants done.
+    fn carry_out(
+        &mut self,
+        simulation: &mut Simulation,
+        recorder: &mut Recorder,
+    ) -> Result<(), Interrupt> {
+        while !self.outputs.is_empty() {
+            for output in std::mem::take(&mut self.outputs) {
+                match output {
+                    Output::Gathered => self.begin(simulation),
+                    Output::Grant { news, clock } => self.put(simulation, &news, clock)?,
+                    Output::Complete(outcome) => self.complete(outcome, simulation, recorder)?,
+                    Output::Held => self.tell_held(simulation),
+                    Output::Released => {
+                        let status = self.status(simulation);
+                        self.observers.released(simulation, &status);
+                    }
+                    Output::Aborted => return Err(Interrupt::End(End::Aborted)),
+                    Output::SetTimer(timer, after) => self.timers.set(timer, after),
+                    Output::Ignored(reason, robot) => self.ignore(reason.as_str(), robot.as_str()),
+                }
+            }
+        }
+
         Ok(())
     }
 
-    /// Puts the commands that came from outside the roster on their way.
-    fn forward_operator(&mut self, simulation: &mut Simulation) {
-        for (to, command) in std::mem::take(&mut self.operator) {
-            let seq = simulation.command(&to, &command);
-            let (epoch, tick) = (simulation.epoch(), simulation.tick());
-            let message = Command {
-                epoch,
-                tick,
-                seq,
-                performative: Performative::Achieve,
-                command,
-            };
-            let key = self.keys.command(&to, &RobotName::operator());
-            self.put_operator(&key, &message);
-            self.operator_sent.push((key, message));
-        }
-        let tick = simulation.tick();
-        self.operator_sent
-            .retain(|(_, command)| command.tick + 2 > tick);
+    /// Every robot of the roster is connected: tick 0.
+    fn begin(&mut self, simulation: &mut Simulation) {
+        simulation.begin_init();
+        self.waiting_since = Instant::now();
+        self.barrier
+            .open(0, simulation.robots_with_news(), &mut self.outputs);
     }
 
-    fn put_operator(&self, key: &str, command: &Command) {
-        if let Err(error) = self.bus.put(key, encode(command)) {
-            tracing::error!("{error}");
+    /// News first, then the clock: on one session they arrive in this order.
+    fn put(
+        &mut self,
+        simulation: &Simulation,
+        news: &[(RobotName, Option<Generation>)],
+        clock: Clock,
+    ) -> Result<(), BusError> {
+        for (name, joined) in news {
+            if let Some(publisher) = self.news.get(name) {
+                publisher.put(encode(&simulation.news(name, *joined)))?;
+            }
         }
+
+        self.clock.put(encode(&clock))
     }
 
-    fn after_tick(&mut self, simulation: &Simulation) {
+    /// A tick is complete.
+    fn complete(
+        &mut self,
+        outcome: Outcome<Arc<Report>, CommandText>,
+        simulation: &mut Simulation,
+        recorder: &mut Recorder,
+    ) -> Result<(), Interrupt> {
+        self.blame_culprits();
+        let record = simulation.end_tick(outcome);
+        self.observers.note(&record);
+        self.observers.log(&recorder.write(simulation, &record)?);
+        if record.tick == 0 {
+            self.pace.ready();
+        }
+        self.stage = Stage::Grant;
+
         if let Some((query, _)) = self.pace.reached(simulation.tick()) {
             self.answer_status(&query, simulation);
         }
         if self.observers.is_frame_due() {
             self.observers.frame(simulation, &self.status(simulation));
         }
+        Ok(())
     }
 
-    /// Tells everybody that the run is over, and writes what came of it.
+    /// The clock is held: people are told for whom, and so is a client that waits for a step.
+    fn tell_held(&mut self, simulation: &Simulation) {
+        if self.culprits.is_empty() && self.barrier.is_open() {
+            for (name, reason) in self.barrier.awaited() {
+                if !matches!(reason, Reason::WaitsFor(_)) {
+                    self.culprits.push(name);
+                }
+            }
+        }
+
+        let status = self.status(simulation);
+        self.observers.held(simulation, &status);
+        if let Some(query) = self.pace.give_up_stepping() {
+            self.answer_status(&query, simulation);
+        }
+    }
+
+    fn blame_culprits(&mut self) {
+        let held_s = self.waiting_since.elapsed().as_secs_f64();
+        for name in std::mem::take(&mut self.culprits) {
+            let held = self.wall.held_up_by.entry(name).or_default();
+            held.ticks += 1;
+            held.waited_s += held_s;
+            held.longest_s = held.longest_s.max(held_s);
+        }
+    }
+
+    /// Puts the end of the run, and writes what came of it.
     fn end(
         mut self,
         end: End,
-        simulation: &Simulation,
+        simulation: &mut Simulation,
         mut recorder: Recorder,
     ) -> Result<Summary, ServerError> {
         self.pace.end();
@@ -376,14 +502,10 @@ impl Server {
         let lines = recorder.write(simulation, &simulation.end(end))?;
         self.observers.log(&lines);
         self.observers.frame(simulation, &self.status(simulation));
-        recorder.summary().wall = std::mem::take(&mut self.summary_wall);
+        recorder.summary().wall = std::mem::take(&mut self.wall);
         let summary = recorder.finish(simulation)?;
-        let clock = Clock {
-            epoch: simulation.epoch(),
-            tick: simulation.tick(),
-            end: Some(end),
-            ..Clock::default()
-        };
+
+        let clock = self.barrier.end(end);
         self.clock.put(encode(&clock))?;
         self.say_goodbye(&clock, simulation);
         self.declared.clear();
@@ -391,299 +513,186 @@ impl Server {
         Ok(summary)
     }
 
-    /// Waits for the robots to go, but not for ever: whoever leaves late finds nobody. One whose link has just lost the
-    /// end of the run hears it again.
-    fn say_goodbye(&mut self, clock: &Clock, simulation: &Simulation) {
-        let deadline = Instant::now() + Duration::from_secs(1);
-        let took_part = |name: &RobotName| {
-            simulation
+    /// Waits for the robots to leave, for a limited time. A robot whose link has just lost the end of the run gets it again.
+    fn say_goodbye(&mut self, clock: &Clock, simulation: &mut Simulation) {
+        let deadline = Instant::now() + GOODBYE;
+        let mut awaited: Vec<RobotName> = Vec::new();
+        for name in self.barrier.roster() {
+            let took_part = simulation
                 .report(name)
-                .is_some_and(|report| report.tick == simulation.tick())
-        };
-        let is_awaited =
-            |(name, member): &(&RobotName, &Member)| member.is_present || took_part(name);
-        let mut awaited: Vec<_> = self
-            .members
-            .iter()
-            .filter(is_awaited)
-            .map(|(name, _)| name.clone())
-            .collect();
+                .is_some_and(|report| report.tick == simulation.tick());
+            if self.barrier.is_present(name) || took_part {
+                awaited.push(name.clone());
+            }
+        }
+
         while !awaited.is_empty() && Instant::now() < deadline {
             let left = deadline.saturating_duration_since(Instant::now());
-            match self.receive(self.options.repeat_after.min(left)) {
-                Some(Event::Token(robot, false)) => awaited.retain(|name| name.as_str() != robot),
-                Some(Event::Token(_, true)) | None => {
+            match self.receive(Some(self.options.repeat_after.min(left))) {
+                Some(Event::Token {
+                    robot,
+                    is_present: false,
+                }) => awaited.retain(|name| name.as_str() != robot),
+                Some(Event::Token { .. }) | None => {
                     if let Err(error) = self.clock.put(encode(clock)) {
                         tracing::debug!("{error}");
                     }
                 }
-                // The run is over: whatever else is asked for changes nothing any more.
+                // The run is over: nothing else changes anything any more.
                 Some(event) => drop(self.handle(event, simulation)),
             }
         }
     }
 
     /// The next event, or `None` after `patience`.
-    fn receive(&self, patience: Duration) -> Option<Event> {
-        self.events.recv_timeout(patience).ok()
+    fn receive(&self, patience: Option<Duration>) -> Option<Event> {
+        match patience {
+            Some(patience) => self.events.recv_timeout(patience).ok(),
+            None => self.events.recv().ok(),
+        }
     }
 
-    /// One event. The arms call; they do not think.
-    fn handle(&mut self, event: Event, simulation: &Simulation) -> Result<(), Interrupt> {
+    /// One event. The arms call; they do not decide.
+    fn handle(&mut self, event: Event, simulation: &mut Simulation) -> Result<(), Interrupt> {
         match event {
-            Event::Report(Ok(report), robot) => self.on_report(&robot, report),
-            Event::Waiting(Ok(waiting), robot) => self.on_waiting(&robot, waiting, simulation),
-            Event::Report(Err(error), _) | Event::Waiting(Err(error), _) => {
-                self.ignore("malformed", &error.to_string());
+            Event::Report {
+                robot,
+                report: Ok(report),
+            } => self.on_report(&robot, report),
+            Event::Command {
+                from,
+                to,
+                command: Ok(command),
+            } => self.on_command(&from, &to, command),
+            Event::Waiting {
+                robot,
+                waiting: Ok(waiting),
+            } => self.on_waiting(&robot, waiting),
+            Event::Report {
+                report: Err(error), ..
             }
+            | Event::Command {
+                command: Err(error),
+                ..
+            }
+            | Event::Waiting {
+                waiting: Err(error),
+                ..
+            } => self.ignore("malformed", &error.to_string()),
             Event::Join(query) => self.on_join(&query, simulation),
-            Event::Percept(query) => self.on_percept(&query, simulation),
-            Event::Token(robot, is_there) => self.on_token(&robot, is_there, simulation)?,
+            Event::Token { robot, is_present } => self.on_token(&robot, is_present),
             Event::Control(query) => self.on_control(query, simulation)?,
             Event::Terminate => return Err(Interrupt::End(End::Stopped)),
         }
+
         Ok(())
     }
 
-    /// A message that changes nothing: counted, and said once in a while.
+    /// Counts a message that changes nothing, and logs it once in a while.
     fn ignore(&mut self, reason: &str, text: &str) {
-        let count = self
-            .summary_wall
-            .ignored
-            .entry(reason.to_owned())
-            .or_default();
+        let count = self.wall.ignored.entry(reason.to_owned()).or_default();
         *count += 1;
         if count.is_power_of_two() {
             tracing::warn!(count = *count, "ignored a message, {reason}: {text}");
         }
     }
 
+    /// The name of a robot of the roster, or `None` after having counted the message.
+    fn known(&mut self, robot: &str) -> Option<RobotName> {
+        let name = RobotName::new(robot)
+            .ok()
+            .filter(|name| self.barrier.has(name));
+        if name.is_none() {
+            self.ignore("unknown robot", robot);
+        }
+
+        name
+    }
+
     fn on_report(&mut self, robot: &str, report: Report) {
-        let open = (self.open.clock.epoch, self.open.clock.tick);
-        let Ok(name) = RobotName::new(robot) else {
-            return self.ignore("unknown robot", robot);
-        };
-        let Some(member) = self.members.get_mut(&name) else {
-            return self.ignore("unknown robot", robot);
-        };
-        if member.is_lost && report.generation == member.generation {
-            member.is_heard_of();
-            return self.ignore("lost", robot);
-        }
-        if report.generation < member.generation {
-            member.hears_predecessor();
-        }
-        let is_due = self.open.is_open && !self.open.given_up.contains(&name);
-        if (report.epoch, report.tick) != open || !is_due || report.generation != member.generation
-        {
-            return self.ignore("stale", robot);
-        }
-        self.open.waits.remove(&name);
-        // The first one counts; a repetition says the same.
-        self.open.reports.entry(name).or_insert(report);
-    }
-
-    fn on_waiting(&mut self, robot: &str, waiting: Waiting, simulation: &Simulation) {
-        let Some((name, _)) = self.members.get_key_value(robot) else {
-            return self.ignore("unknown robot", robot);
-        };
-        if (waiting.epoch, waiting.tick) == (self.open.clock.epoch, self.open.clock.tick) {
-            self.open.waits.insert(name.clone(), waiting.on);
-            if self.open.is_announced {
-                self.observers.held(simulation, &self.status(simulation));
-            }
-        }
-    }
-
-    fn on_percept(&mut self, query: &Query, simulation: &Simulation) {
-        match Keys::robot_of(query.key()).and_then(|name| self.members.get_key_value(name)) {
-            Some((name, _)) => query.reply(query.key(), encode(&simulation.percept(name))),
-            None => query.reply_err("no robot of the roster has this name"),
-        }
-    }
-
-    /// Robots of the open tick whose report is still to come.
-    fn awaited(&self) -> impl Iterator<Item = &RobotName> {
-        let is_awaited = |(name, member): &(&RobotName, &Member)| {
-            let is_settled =
-                self.open.reports.contains_key(*name) || self.open.given_up.contains(*name);
-            self.open.is_open && !member.is_lost && !is_settled
-        };
-        self.members.iter().filter(is_awaited).map(|(name, _)| name)
-    }
-
-    fn is_complete(&self) -> bool {
-        self.awaited().next().is_none()
-    }
-}
-
-impl Barrier for Server {
-    type Interrupt = Interrupt;
-
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, Interrupt> {
-        self.begin_tick(clock, simulation)?;
-        while !self.is_complete() {
-            match self.receive(self.next_look()) {
-                Some(event) => self.handle(event, simulation)?,
-                None => self.look_at_late(simulation)?,
-            }
-        }
-        Ok(self.close_tick(simulation))
-    }
-}
-
-impl Server {
-    fn begin_tick(&mut self, mut clock: Clock, simulation: &Simulation) -> Result<(), Interrupt> {
-        let mut membership = Vec::new();
-        for (name, member) in &mut self.members {
-            if let Some(generation) = member.take_pending() {
-                membership.push(Membership::Joined(name.clone(), generation));
-                introduce(&mut clock, name, generation, simulation);
-            }
-            if let Some(generation) = member.take_reminder() {
-                clock.news.entry(name.clone()).or_default().joined = Some(generation);
-            }
-        }
-        let now = Instant::now();
-        self.open = Open {
-            clock,
-            is_open: true,
-            since: now,
-            culprits: Vec::new(),
-            reports: BTreeMap::new(),
-            membership,
-            waits: BTreeMap::new(),
-            given_up: BTreeSet::new(),
-            is_announced: false,
-            repeated: now,
-        };
-        // Before the clock, on the same way: whoever follows has it when the tick begins.
-        for (name, publisher) in self
-            .percepts
-            .iter()
-            .filter(|(_, publisher)| publisher.has_subscribers())
-        {
-            publisher.put(encode(&simulation.percept(name)))?;
-        }
-        Ok(self.clock.put(encode(&self.open.clock))?)
-    }
-
-    fn close_tick(&mut self, simulation: &Simulation) -> Exchange {
-        self.open.is_open = false;
-        for (name, member) in &mut self.members {
-            member.count_report(self.open.reports.contains_key(name));
-        }
-        let held_s = self.open.since.elapsed().as_secs_f64();
-        for name in std::mem::take(&mut self.open.culprits) {
-            let held = self.summary_wall.held_up_by.entry(name).or_default();
-            held.ticks += 1;
-            held.waited_s += held_s;
-            held.longest_s = held.longest_s.max(held_s);
-        }
-        if std::mem::take(&mut self.open.is_announced) {
-            self.observers
-                .released(simulation, &self.status(simulation));
-        }
-        Exchange {
-            reports: std::mem::take(&mut self.open.reports),
-            membership: std::mem::take(&mut self.open.membership),
-        }
-    }
-
-    /// How long to sleep unless something happens: until people must be told, the clock repeated, a deadline met.
-    fn next_look(&self) -> Duration {
-        let elapsed = self.open.since.elapsed();
-        let announce = (!self.open.is_announced).then(|| SAY_AFTER.saturating_sub(elapsed));
-        let repeat = self
-            .options
-            .repeat_after
-            .saturating_sub(self.open.repeated.elapsed());
-        let acts = self
-            .awaited()
-            .any(|name| self.lateness.of(name) != OnLate::Wait);
-        let deadline = acts.then(|| self.deadline().saturating_sub(elapsed));
-        announce
-            .into_iter()
-            .chain(deadline)
-            .fold(repeat, Duration::min)
-    }
-
-    fn deadline(&self) -> Duration {
-        Duration::try_from_secs_f64(self.lateness.deadline_s).unwrap_or(Duration::MAX)
-    }
-
-    /// Nothing has happened for a while: say for whom the clock waits, ask everybody to repeat, act as the scenario
-    /// says.
-    fn look_at_late(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
-        if self.open.since.elapsed() >= SAY_AFTER && !self.open.is_announced {
-            self.open.is_announced = true;
-            let is_culprit = |name: &&RobotName| !self.open.waits.contains_key(*name);
-            self.open.culprits = self.awaited().filter(is_culprit).cloned().collect();
-            self.observers.held(simulation, &self.status(simulation));
-            // Who steps by hand wants to know that the step hangs, now.
-            if let Some(query) = self.pace.give_up_stepping() {
-                self.answer_status(&query, simulation);
-            }
-        }
-        if self.open.repeated.elapsed() >= self.options.repeat_after {
-            self.repeat_clock()?;
-        }
-        if self.open.since.elapsed() >= self.deadline() {
-            self.judge_late()?;
-        }
-        Ok(())
-    }
-
-    /// The deadline is over: the scenario says, robot by robot, what then.
-    fn judge_late(&mut self) -> Result<(), Interrupt> {
-        let late: Vec<RobotName> = self.awaited().cloned().collect();
-        if late
-            .iter()
-            .any(|name| self.lateness.of(name) == OnLate::Abort)
-        {
-            return Err(Interrupt::End(End::Aborted));
-        }
-        for name in late {
-            if self.lateness.of(&name) == OnLate::Continue {
-                self.give_up(&name);
-            }
-        }
-        Ok(())
-    }
-
-    /// The clock goes on without a robot in this tick, and from now on if it is lost.
-    fn give_up(&mut self, name: &RobotName) {
-        let Some(member) = self.members.get_mut(name) else {
+        let Some(name) = self.known(robot) else {
             return;
         };
-        if member.miss(self.lateness.lose_after) {
-            self.open.membership.push(Membership::Lost(name.clone()));
+        let stamp = Stamp {
+            epoch: report.epoch,
+            tick: report.tick,
+            generation: report.generation,
+        };
+
+        let commands = report.commands;
+        self.barrier
+            .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
+    }
+
+    fn on_command(&mut self, from: &str, to: &str, command: Command) {
+        // Any name will do as a target: the medium drops what goes to robots that do not exist.
+        let Ok(to) = RobotName::new(to) else {
+            return self.ignore("unknown robot", to);
+        };
+        if from == RobotName::operator().as_str() {
+            return self.on_operator(to, command.command);
         }
-        self.open.given_up.insert(name.clone());
+        let Some(from) = self.known(from) else { return };
+        let stamp = Stamp {
+            epoch: command.epoch,
+            tick: command.tick,
+            generation: command.generation,
+        };
+
+        let sent = Sent {
+            to,
+            command: CommandText {
+                performative: command.performative,
+                command: command.command,
+            },
+        };
+        self.barrier
+            .command(&from, stamp, command.number, sent, &mut self.outputs);
     }
 
-    fn repeat_clock(&mut self) -> Result<(), BusError> {
-        self.open.repeated = Instant::now();
-        self.operator_sent
-            .iter()
-            .for_each(|(key, command)| self.put_operator(key, command));
-        self.clock.put(encode(&self.open.clock))
+    fn on_operator(&mut self, to: RobotName, command: String) {
+        if !self.barrier.has(&to) {
+            return self.ignore("unknown robot", to.as_str());
+        }
+        if self.operator.len() >= MAX_OPERATOR_COMMANDS {
+            return self.ignore("too many commands", "of the operator for one tick");
+        }
+
+        self.operator.push((to, command));
     }
 
-    /// The tick as of which a newcomer would take part.
-    fn open_tick(&self) -> Option<Tick> {
-        self.open.is_open.then_some(self.open.clock.tick)
+    fn on_waiting(&mut self, robot: &str, waiting: Waiting) {
+        let Some(name) = self.known(robot) else {
+            return;
+        };
+
+        self.barrier.waiting(
+            &name,
+            waiting.epoch,
+            waiting.tick,
+            waiting.on,
+            &mut self.outputs,
+        );
+    }
+
+    fn on_token(&mut self, robot: &str, is_present: bool) {
+        let Some(name) = self.known(robot) else {
+            return;
+        };
+
+        self.barrier.token(&name, is_present, &mut self.outputs);
+    }
+
+    /// Whether a robot's process is connected, for people.
+    fn presence(&self, name: &RobotName) -> (Generation, Presence) {
+        self.barrier.presence(name)
     }
 }
 
-/// Names a newcomer in a clock, and tells it where it stands.
-fn introduce(clock: &mut Clock, name: &RobotName, generation: u32, simulation: &Simulation) {
-    let news = clock.news.entry(name.clone()).or_default();
-    news.joined = Some(generation);
-    if let (None, Some(location)) = (news.correction, simulation.location(name)) {
-        news.correction = Some(Correction {
-            location,
-            blocked: false,
-        });
-    }
+/// What the loop does next.
+enum Next {
+    /// Something was put: look at what comes of it.
+    Opened,
+    /// Wait for an event, at most for this long.
+    Wait(Option<Duration>),
 }

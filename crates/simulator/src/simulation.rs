@@ -1,62 +1,35 @@
 //! The simulation itself: synchronous, without a network, a function of scenario, seed and reports.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
+use lockstep::{Exchange, Membership, Outcome, Sent};
+use protocol::event::{Blocker, Cause};
 use protocol::messages::{
-    Clock, CommandId, Correction, Cut, End, News, Percept, Performative, Point, ProcessOrder,
-    PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables, Welcome,
+    CommandText, Correction, Cut, Delivery, End, NEWS_FLAGS, News, Performative, Point,
+    ProcessOrder, PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables,
+    Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
-use world::{Blocker, Body, HallError, Verdict, World};
+use world::{Body, HallError, Verdict, World};
 
 use crate::digest::Digest;
-use crate::medium::{Medium, Underway};
+use crate::medium::{Arrival, Medium, Underway};
 use crate::scenario::{Fault, FaultEnd, Scenario, to_wire};
 
-/// More commands than one incarnation ever sends; as many incarnations as ever come fit below 2^53 with it.
-const SEQS_OF_A_GENERATION: Seq = 1_000_000_000;
+/// Most bodies that the news of a robot list: they fit into a message with everything else.
+const MAX_BODIES: usize = 4096;
 
-/// How a clock reaches the robots and their reports come back: over the bus, or by calling them.
-pub trait Barrier {
-    /// Why a tick was given up before it was complete.
-    type Interrupt;
-
-    /// Grants the tick to all robots, and returns when the tick is complete.
-    ///
-    /// # Errors
-    /// The interrupt, if the tick is given up.
-    fn exchange(
-        &mut self,
-        clock: Clock,
-        simulation: &Simulation,
-    ) -> Result<Exchange, Self::Interrupt>;
-}
-
-/// What came of a tick.
-#[derive(Debug, Default)]
-pub struct Exchange {
-    /// The reports, by robot; one that is late or lost has none.
-    pub reports: BTreeMap<RobotName, Report>,
-    /// Who came and went.
-    pub membership: Vec<Membership>,
-}
-
-/// A change of who takes part.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Membership {
-    /// A further incarnation takes part from this tick on.
-    Joined(RobotName, Generation),
-    /// A robot takes part no more from this tick on.
-    Lost(RobotName),
-}
+/// The robots as a simulation meets them: news out, reports and commands back.
+pub type Reports = Outcome<Arc<Report>, CommandText>;
 
 /// A complete tick.
 #[derive(Debug)]
 pub struct TickRecord {
-    /// Which.
+    /// The tick.
     pub tick: Tick,
-    /// What happened in it, in a fixed order; the last one carries the digest.
+    /// What happened in it, in a fixed order; the last event carries the digest.
     pub events: Vec<Event>,
 }
 
@@ -81,18 +54,25 @@ pub struct Simulation {
     now: Tick,
     world: World<Stream>,
     medium: Medium,
-    /// Commands that the clock under way names, by target.
-    arriving: BTreeMap<RobotName, Vec<CommandId>>,
-    /// Whom each robot cannot ask during the tick under way.
+    /// Robots whose news list the bodies around them.
+    with_bodies: BTreeSet<RobotName>,
+    /// Commands that arrive in the tick under way, by target.
+    arriving: BTreeMap<RobotName, Vec<Arrival>>,
+    /// Robots that each robot cannot query during the tick under way.
     unreachable: BTreeMap<RobotName, Vec<RobotName>>,
+    /// News of the tick under way; robots without any have no entry.
+    news: BTreeMap<RobotName, News>,
+    /// What happened in the tick under way so far.
+    events: Vec<Event>,
     /// What each robot reported last.
-    reports: BTreeMap<RobotName, Report>,
+    reports: BTreeMap<RobotName, Arc<Report>>,
     /// Where each robot stood at the last complete tick, in the order of names.
     stood_at: Vec<Point>,
-    /// Robots whose report of the last tick is missing: they propose nothing, and nobody can query them.
+    /// Robots whose report of the last tick is missing: they propose nothing and cannot be queried.
     silent: Vec<RobotName>,
     blocked: Vec<bool>,
-    operator_seq: Seq,
+    /// Commands that each sender has sent in this epoch.
+    sent: BTreeMap<RobotName, Seq>,
     /// What happened between the last tick and the next.
     between: Vec<Event>,
     digest: Digest,
@@ -106,37 +86,69 @@ impl Simulation {
     pub fn new(scenario: Scenario, epoch: Epoch) -> Result<Self, HallError> {
         let world = World::new(&scenario.hall(), stream(scenario.seed, "guests"))?;
         let names = scenario.roster();
+        let medium = Medium::new(
+            scenario.seed,
+            scenario.tick_s,
+            scenario.network.clone(),
+            names.clone(),
+        );
+
         Ok(Self {
             epoch,
             blocked: vec![false; names.len()],
             tick: 0,
             now: 0,
             world,
-            medium: Medium::new(
-                scenario.seed,
-                scenario.tick_s,
-                scenario.network.clone(),
-                names.clone(),
-            ),
+            medium,
             names,
+            with_bodies: BTreeSet::new(),
             arriving: BTreeMap::new(),
             unreachable: BTreeMap::new(),
+            news: BTreeMap::new(),
+            events: Vec::new(),
             reports: BTreeMap::new(),
             stood_at: Vec::new(),
             silent: Vec::new(),
-            operator_seq: 0,
+            sent: BTreeMap::new(),
             between: Vec::new(),
             digest: Digest::default(),
             scenario,
         })
     }
 
-    /// Tick 0: everybody is told to initialize, and proposes where to go.
+    /// Tick 0, by one call: robots initialize, and propose where to go.
     ///
     /// # Errors
-    /// The barrier's interrupt.
-    pub fn init<B: Barrier>(&mut self, barrier: &mut B) -> Result<TickRecord, B::Interrupt> {
-        let mut events = vec![Event::Init {
+    /// Why the exchange was given up.
+    pub fn init<E>(&mut self, robots: &mut E) -> Result<TickRecord, E::Error>
+    where
+        E: Exchange<News, Arc<Report>, CommandText>,
+    {
+        self.begin_init();
+        let news = std::mem::take(&mut self.news);
+        let outcome = robots.exchange(0, news)?;
+
+        Ok(self.end_tick(outcome))
+    }
+
+    /// The next tick, by one call.
+    ///
+    /// # Errors
+    /// Why the exchange was given up; the tick is then incomplete and the epoch is over.
+    pub fn step<E>(&mut self, robots: &mut E) -> Result<TickRecord, E::Error>
+    where
+        E: Exchange<News, Arc<Report>, CommandText>,
+    {
+        let tick = self.begin_tick();
+        let news = std::mem::take(&mut self.news);
+        let outcome = robots.exchange(tick, news)?;
+
+        Ok(self.end_tick(outcome))
+    }
+
+    /// The first half of tick 0: what robots are told before they initialize.
+    pub fn begin_init(&mut self) {
+        self.events = vec![Event::Init {
             seed: self.scenario.seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             protocol: PROTOCOL_VERSION,
@@ -144,312 +156,355 @@ impl Simulation {
         }];
         for name in &self.names {
             let at = self.location(name).unwrap_or_default();
-            events.push(Event::Joined {
+            self.events.push(Event::Joined {
                 robot: name.clone(),
                 generation: None,
                 at,
             });
         }
-        let clock = self.clock(0, &[]);
-        let exchange = barrier.exchange(clock, self)?;
-        Ok(self.record(0, events, exchange))
+
+        self.compose_news(&[]);
     }
 
-    /// One tick (seed, Figure 5): move, medium, clock, barrier, record.
-    ///
-    /// # Errors
-    /// The barrier's interrupt; the tick is then incomplete and the epoch is over.
-    pub fn step<B: Barrier>(&mut self, barrier: &mut B) -> Result<TickRecord, B::Interrupt> {
-        let tick = self.tick + 1;
-        let mut events = std::mem::take(&mut self.between);
+    /// The first half of a tick (paper, Figure 5): bodies move, the medium decides, news are composed. Returns the tick.
+    pub fn begin_tick(&mut self) -> Tick {
+        self.now = self.tick + 1;
+        self.events = std::mem::take(&mut self.between);
 
-        self.now = tick;
         let verdicts = self.world.advance(&self.proposals());
-        self.note_moves(&verdicts, &mut events);
+        self.note_moves(&verdicts);
 
-        let decision = self.medium.decide(tick);
-        events.extend(decision.events);
+        let decision = self.medium.decide(self.now);
+        self.events.extend(decision.events);
         self.arriving = decision.delivered;
         self.unreachable = self.join_silent(decision.unreachable);
 
-        let clock = self.clock(tick, &verdicts);
-        let exchange = barrier.exchange(clock, self)?;
+        self.compose_news(&verdicts);
+        self.now
+    }
 
-        Ok(self.record(tick, events, exchange))
+    /// The second half of a tick: what the robots did becomes the record, and the digest covers it.
+    pub fn end_tick(&mut self, outcome: Reports) -> TickRecord {
+        self.note_membership(outcome.membership);
+        self.note_deliveries(&outcome.reports);
+
+        self.silent.clear();
+        let mut reports = outcome.reports;
+        let mut digest = self.digest.tick(self.now);
+        for body in self.world.robots().iter().chain(self.world.guests()) {
+            digest.place(body.x, body.y);
+        }
+        for name in self.names.clone() {
+            let Some((report, commands)) = reports.remove(&name) else {
+                self.events.push(Event::Missed {
+                    robot: name.clone(),
+                });
+                digest.report(&name, None);
+                self.silent.push(name);
+                continue;
+            };
+            let underway = self.number_commands(&name, commands);
+            digest.report(&name, Some((&report, &underway)));
+            self.note_report(&name, report, underway);
+        }
+
+        self.tick = self.now;
+        self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
+        self.digest.close(&digest);
+        self.events.push(Event::Tick {
+            digest: self.digest.to_string(),
+        });
+        TickRecord {
+            tick: self.tick,
+            events: std::mem::take(&mut self.events),
+        }
+    }
+
+    /// Robots that have news of the tick under way.
+    #[must_use]
+    pub fn robots_with_news(&self) -> BTreeSet<RobotName> {
+        self.news.keys().cloned().collect()
+    }
+
+    /// The news of a robot for the tick under way. `joined` names the incarnation that takes part from this tick on, which
+    /// must learn where it stands.
+    #[must_use]
+    pub fn news(&self, name: &RobotName, joined: Option<Generation>) -> News {
+        let mut news = self.news.get(name).cloned().unwrap_or(News {
+            epoch: self.epoch,
+            tick: self.now,
+            ..News::default()
+        });
+        if joined.is_some() {
+            news.joined = joined;
+            news.correction = news.correction.or_else(|| {
+                let location = self.location(name)?;
+                Some(Correction {
+                    location,
+                    blocked: false,
+                })
+            });
+        }
+
+        news
+    }
+
+    /// Whether the news of a robot list the bodies around it, from the next tick on.
+    pub fn list_bodies(&mut self, name: &RobotName, is_wanted: bool) {
+        if is_wanted {
+            self.with_bodies.insert(name.clone());
+        } else {
+            self.with_bodies.remove(name);
+        }
     }
 
     /// Where each robot wants to be; one that has not reported stays.
     fn proposals(&self) -> Vec<Option<world::Point>> {
-        let proposal = |name: &RobotName| {
+        let mut proposals = Vec::with_capacity(self.names.len());
+        for name in &self.names {
             let report = self
                 .reports
                 .get(name)
-                .filter(|_| !self.silent.contains(name))?;
-            Some(world::Point::new(report.proposal.x, report.proposal.y))
-        };
-        self.names.iter().map(proposal).collect()
+                .filter(|_| !self.silent.contains(name));
+            proposals
+                .push(report.map(|report| world::Point::new(report.proposal.x, report.proposal.y)));
+        }
+
+        proposals
     }
 
-    fn note_moves(&mut self, verdicts: &[Verdict], events: &mut Vec<Event>) {
+    fn note_moves(&mut self, verdicts: &[Verdict]) {
         for (index, verdict) in verdicts.iter().enumerate() {
             let by = self.blocker(*verdict);
             self.blocked[index] = by.is_some();
             if let Some(by) = by {
-                let at = to_wire(self.world.robots()[index]);
-                events.push(Event::Blocked {
+                self.events.push(Event::Blocked {
                     robot: self.names[index].clone(),
                     by,
-                    at,
+                    at: to_wire(self.world.robots()[index]),
                 });
             }
         }
     }
 
-    /// What refused a move, in a word; `None` if it was not refused.
-    fn blocker(&self, verdict: Verdict) -> Option<String> {
+    /// What refused a move; `None` if it was not refused.
+    fn blocker(&self, verdict: Verdict) -> Option<Blocker> {
         Some(match verdict {
             Verdict::Advanced | Verdict::Stayed => return None,
-            Verdict::Blocked { by: Blocker::Edge } => "edge".to_owned(),
-            Verdict::Blocked {
-                by: Blocker::Body(Body::Obstacle(_)),
-            } => "obstacle".to_owned(),
-            Verdict::Blocked {
-                by: Blocker::Body(Body::Guest(_)),
-            } => "guest".to_owned(),
-            Verdict::Blocked {
-                by: Blocker::Body(Body::Robot(index)),
-            } => self.names[index].to_string(),
-            Verdict::TooFast | Verdict::NotFinite => "too_fast".to_owned(),
+            Verdict::Blocked { by } => match by {
+                world::Blocker::Edge => Blocker::Edge,
+                world::Blocker::Body(Body::Obstacle(_)) => Blocker::Obstacle,
+                world::Blocker::Body(Body::Guest(_)) => Blocker::Guest,
+                world::Blocker::Body(Body::Robot(index)) => {
+                    Blocker::Robot(self.names[index].clone())
+                }
+            },
+            Verdict::TooFast | Verdict::NotFinite => Blocker::TooFast,
         })
     }
 
-    /// The clock of a tick: exceptions only.
-    fn clock(&self, tick: Tick, verdicts: &[Verdict]) -> Clock {
-        let mut news = BTreeMap::new();
+    /// The news of the tick under way: exceptions only.
+    fn compose_news(&mut self, verdicts: &[Verdict]) {
+        let mut all = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            let is_refused = verdicts
-                .get(index)
-                .is_some_and(|verdict| self.blocker(*verdict).is_some());
+            let is_refused = !verdicts.is_empty() && self.blocked[index];
             let is_corrected = is_refused || self.silent.contains(name);
-            let correction = is_corrected.then(|| Correction {
-                location: to_wire(self.world.robots()[index]),
-                blocked: is_refused,
-            });
-            let own = News {
-                correction,
-                commands: self.arriving.get(name).cloned().unwrap_or_default(),
+            let news = News {
+                epoch: self.epoch,
+                tick: self.now,
+                joined: None,
+                correction: is_corrected.then(|| Correction {
+                    location: to_wire(self.world.robots()[index]),
+                    blocked: is_refused,
+                }),
+                commands: self.deliveries(name),
                 unreachable: self.unreachable.get(name).cloned().unwrap_or_default(),
                 sensed: self.sensed_robots(index),
-                joined: None,
+                bodies: self.sensed_bodies(index),
             };
-            if !own.is_empty() {
-                news.insert(name.clone(), own);
+            if !news.is_empty() {
+                all.insert(name.clone(), news);
             }
         }
-        Clock {
-            epoch: self.epoch,
-            tick,
-            news,
-            end: None,
-        }
+
+        self.news = all;
     }
 
-    /// Whom each robot cannot ask: those from whom the medium cuts it off, and those whose last report is missing.
+    fn deliveries(&self, to: &RobotName) -> Vec<Delivery> {
+        let Some(arriving) = self.arriving.get(to) else {
+            return Vec::new();
+        };
+
+        arriving
+            .iter()
+            .map(|arrival| arrival.delivery.clone())
+            .collect()
+    }
+
+    /// Robots that each robot cannot query: those from which the medium cuts it off, and those whose last report is missing.
     fn join_silent(
         &self,
         mut cut: BTreeMap<RobotName, Vec<RobotName>>,
     ) -> BTreeMap<RobotName, Vec<RobotName>> {
-        for name in self.names.iter().filter(|_| !self.silent.is_empty()) {
+        if self.silent.is_empty() {
+            return cut;
+        }
+
+        for name in &self.names {
             let others = cut.entry(name.clone()).or_default();
-            others.extend(self.silent.iter().filter(|silent| *silent != name).cloned());
+            for silent in self.silent.iter().filter(|silent| *silent != name) {
+                others.push(silent.clone());
+            }
             others.sort();
             others.dedup();
         }
         cut
     }
 
-    /// The end of a tick: what the robots did, and the digest.
-    fn record(&mut self, tick: Tick, mut events: Vec<Event>, exchange: Exchange) -> TickRecord {
-        let mut membership = exchange.membership;
-        membership.sort();
+    fn note_membership(&mut self, membership: Vec<Membership>) {
         for change in membership {
-            events.push(match change {
-                Membership::Joined(robot, generation) => {
-                    let at = self.location(&robot).unwrap_or_default();
-                    Event::Joined {
-                        robot,
-                        generation: Some(generation),
-                        at,
-                    }
-                }
+            self.events.push(match change {
+                Membership::Joined(robot, generation) => Event::Joined {
+                    at: self.location(&robot).unwrap_or_default(),
+                    robot,
+                    generation: Some(generation),
+                },
                 Membership::Lost(robot) => Event::Lost { robot },
             });
         }
-        self.note_deliveries(&exchange.reports, &mut events);
-        self.silent.clear();
-        let mut reports = exchange.reports;
-        for name in self.names.clone() {
-            match reports.remove(&name) {
-                Some(report) => self.note_report(&name, report, &mut events),
-                None => {
-                    events.push(Event::Missed {
-                        robot: name.clone(),
-                    });
-                    self.silent.push(name);
-                }
-            }
-        }
-        self.tick = tick;
-        self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
-        self.close_digest();
-        events.push(Event::Tick {
-            digest: self.digest.to_string(),
-        });
-        TickRecord { tick, events }
     }
 
-    /// A command that was named has arrived, unless its target says that it never came, or has missed the tick.
-    fn note_deliveries(&mut self, reports: &BTreeMap<RobotName, Report>, events: &mut Vec<Event>) {
-        for (to, ids) in std::mem::take(&mut self.arriving) {
-            for id in ids {
-                let (to, from, seq) = (to.clone(), id.from.clone(), id.seq);
-                let has_arrived = reports
-                    .get(&to)
-                    .is_some_and(|report| !report.missing.contains(&id));
-                events.push(if has_arrived {
+    /// A command has arrived if its target took part in the tick.
+    fn note_deliveries<C>(&mut self, reports: &BTreeMap<RobotName, (Arc<Report>, Vec<Sent<C>>)>) {
+        for (to, arrivals) in std::mem::take(&mut self.arriving) {
+            let has_arrived = reports.contains_key(&to);
+            for Arrival { seq, delivery } in arrivals {
+                let (to, from) = (to.clone(), delivery.from);
+                self.events.push(if has_arrived {
                     Event::CommandDelivered { from, to, seq }
                 } else {
-                    Event::CommandMissing { from, to, seq }
+                    Event::CommandDropped {
+                        from,
+                        to,
+                        seq,
+                        because: Cause::Missed,
+                    }
                 });
             }
         }
     }
 
-    fn note_report(&mut self, robot: &RobotName, report: Report, events: &mut Vec<Event>) {
-        let before = self.reports.get(robot);
-        let change = |from: Option<&String>, to: &String| {
-            (from != Some(to)).then(|| (from.cloned(), to.clone()))
-        };
-        if let Some((from, to)) = change(
-            before.map(|report| &report.emotion_state),
-            &report.emotion_state,
-        ) {
-            events.push(Event::Emotion {
-                robot: robot.clone(),
-                from,
+    /// Gives each command of a sender its number in the record.
+    fn number_commands(
+        &mut self,
+        from: &RobotName,
+        commands: Vec<Sent<CommandText>>,
+    ) -> Vec<Underway> {
+        let mut underway = Vec::with_capacity(commands.len());
+        for Sent { to, command } in commands {
+            let count = self.sent.entry(from.clone()).or_default();
+            *count += 1;
+            underway.push(Underway {
                 to,
+                from: from.clone(),
+                seq: *count,
+                text: command,
             });
         }
-        if let Some((from, to)) = change(
-            before.map(|report| &report.behavior_state),
-            &report.behavior_state,
-        ) {
-            events.push(Event::Behavior {
-                robot: robot.clone(),
-                from,
-                to,
-            });
-        }
-        for sent in &report.sent {
-            let (from, to, seq) = (robot.clone(), sent.to.clone(), sent.seq);
-            let (performative, command) = (sent.performative, sent.command.clone());
-            events.push(Event::CommandSent {
-                from,
-                to,
-                seq,
-                performative,
-                command,
-            });
-            self.medium.accept(Underway {
-                to: sent.to.clone(),
-                from: robot.clone(),
-                seq,
-            });
-        }
-        events.extend(report.log.iter().map(|text| Event::Say {
-            robot: robot.clone(),
-            text: text.clone(),
-        }));
-        self.reports.insert(robot.clone(), report);
+
+        underway
     }
 
-    fn close_digest(&mut self) {
-        let mut tick = self.digest.tick(self.tick);
-        for body in self.world.robots().iter().chain(self.world.guests()) {
-            tick.place(body.x, body.y);
+    fn note_report(&mut self, robot: &RobotName, report: Arc<Report>, underway: Vec<Underway>) {
+        let before = self.reports.insert(robot.clone(), report.clone());
+        let emotion_before = before.as_ref().map(|report| report.emotion_state.clone());
+        let behavior_before = before.as_ref().map(|report| report.behavior_state.clone());
+
+        if emotion_before.as_ref() != Some(&report.emotion_state) {
+            self.events.push(Event::Emotion {
+                robot: robot.clone(),
+                from: emotion_before,
+                to: report.emotion_state.clone(),
+            });
         }
-        for name in &self.names {
-            tick.report(
-                name,
-                self.reports
-                    .get(name)
-                    .filter(|_| !self.silent.contains(name)),
-            );
+        if behavior_before.as_ref() != Some(&report.behavior_state) {
+            self.events.push(Event::Behavior {
+                robot: robot.clone(),
+                from: behavior_before,
+                to: report.behavior_state.clone(),
+            });
         }
-        self.digest.close(&tick);
+        for command in underway {
+            self.events.push(command.event());
+            self.medium.accept(command);
+        }
+        for text in &report.log {
+            self.events.push(Event::Say {
+                robot: robot.clone(),
+                text: text.clone(),
+            });
+        }
     }
 
     /// What the launcher must do to processes before the next tick, in the order of the scenario.
     #[must_use]
     pub fn faults_due(&self) -> Vec<ProcessOrder> {
         let tick = self.tick + 1;
-        let order = |fault: &Fault| {
-            let (robot, kind) = (fault.robot.clone(), fault.kind);
-            let for_s = if let FaultEnd::After(wall_s) = fault.end {
-                Some(wall_s)
-            } else {
-                None
-            };
-            let begins = ProcessOrder {
+        let mut due = Vec::new();
+        for Fault {
+            robot,
+            kind,
+            at,
+            end,
+        } in &self.scenario.faults
+        {
+            let order = |begins, for_s| ProcessOrder {
                 robot: robot.clone(),
-                kind,
-                begins: true,
+                kind: *kind,
+                begins,
                 for_s,
             };
-            let ends = ProcessOrder {
-                robot,
-                kind,
-                begins: false,
-                for_s: None,
-            };
-            let is_over = fault.end == FaultEnd::At(tick);
-            [
-                (fault.at == tick).then_some(begins),
-                is_over.then_some(ends),
-            ]
-            .into_iter()
-            .flatten()
-        };
-        self.scenario.faults.iter().flat_map(order).collect()
+            if *at == tick {
+                let for_s = match end {
+                    FaultEnd::After(wall_s) => Some(*wall_s),
+                    _ => None,
+                };
+                due.push(order(true, for_s));
+            }
+            if *end == FaultEnd::At(tick) {
+                due.push(order(false, None));
+            }
+        }
+
+        due
     }
 
-    /// What was ordered before the next tick has been done; it is told with that tick.
+    /// What was ordered before the next tick has been done; it is recorded with that tick.
     pub fn note_faults(&mut self, orders: &[ProcessOrder]) {
-        let event = |order: &ProcessOrder| Event::Fault {
-            robot: order.robot.clone(),
-            kind: order.kind,
-            begins: order.begins,
-        };
-        self.between.extend(orders.iter().map(event));
+        for order in orders {
+            self.between.push(Event::Fault {
+                robot: order.robot.clone(),
+                kind: order.kind,
+                begins: order.begins,
+            });
+        }
     }
 
-    /// A command from outside the roster; it arrives at the next tick. Returns its number.
-    pub fn command(&mut self, to: &RobotName, command: &str) -> Seq {
-        self.operator_seq += 1;
-        let (from, seq) = (RobotName::operator(), self.operator_seq);
-        self.medium.accept(Underway {
-            to: to.clone(),
-            from: from.clone(),
-            seq,
-        });
-        self.between.push(Event::CommandSent {
-            from,
-            to: to.clone(),
-            seq,
+    /// A command from outside the roster; it arrives at the next tick.
+    pub fn command(&mut self, to: &RobotName, command: &str) {
+        let text = CommandText {
             performative: Performative::Achieve,
             command: command.to_owned(),
-        });
-        seq
+        };
+        let sent = Sent {
+            to: to.clone(),
+            command: text,
+        };
+
+        for underway in self.number_commands(&RobotName::operator(), vec![sent]) {
+            self.between.push(underway.event());
+            self.medium.accept(underway);
+        }
     }
 
     /// The last event of the run.
@@ -464,17 +519,35 @@ impl Simulation {
         }
     }
 
-    /// What a robot is told when it joins.
+    /// What a robot needs to know to take part. `open` is what it has already reported for the tick under way.
     #[must_use]
     pub fn welcome(
         &self,
         run: &RunName,
         name: &RobotName,
         generation: Generation,
+        open: Option<&Report>,
     ) -> Option<Welcome> {
         let spec = self.scenario.robots.get(name)?;
+        let index = self.index(name)?;
+        let location = self.location(name)?;
         let last = self.reports.get(name);
-        let mut welcome = Welcome {
+        let last_state = last.and_then(|report| {
+            let location = self.stood_at.get(index)?;
+            Some(public_state(report, *location))
+        });
+        let open_state = open.map(|report| public_state(report, location));
+
+        // A robot that takes part from the beginning draws from a stream of its name alone, whatever happened to it in an
+        // earlier epoch; a later incarnation must not draw the same numbers again.
+        let is_first = last.is_none() && open.is_none();
+        let stream = if is_first {
+            format!("robot/{name}")
+        } else {
+            format!("robot/{name}#{generation}")
+        };
+
+        Some(Welcome {
             protocol: PROTOCOL_VERSION,
             run: run.clone(),
             name: name.clone(),
@@ -482,40 +555,32 @@ impl Simulation {
             epoch: self.epoch,
             tick: self.tick,
             seed: self.scenario.seed,
-            stream: format!("robot/{name}"),
+            stream,
             tick_s: self.scenario.tick_s,
             field_m: self.scenario.field_m,
             body_m: self.scenario.body_m,
             sensing_range_m: self.scenario.sensing_range_m,
-            location: self.location(name)?,
+            location,
             roster: self.names.clone(),
             parameters: spec.parameters.clone(),
-            last_state: last
-                .zip(self.index(name))
-                .and_then(|(report, index)| Some(public_state(report, *self.stood_at.get(index)?))),
-            state_before: None,
-            last_seq: 0,
-            repeat_ticks: self.scenario.network.longest_delay(self.scenario.tick_s) + 2,
-        };
-        if last.is_some() {
-            set_apart(&mut welcome);
-        }
-        Some(welcome)
+            news_flag: 1 << (index % NEWS_FLAGS),
+            state_before: open_state.as_ref().and(last_state.clone()),
+            last_state: open_state.or(last_state),
+        })
     }
 
-    /// What a robot senses around itself now.
-    #[must_use]
-    pub fn percept(&self, name: &RobotName) -> Percept {
-        let Some(index) = self.index(name) else {
-            return Percept::default();
-        };
-        let center = self.world.robots()[index];
-        let others = self
-            .world
+    /// All bodies within a robot's sensing range, if it wants to know.
+    fn sensed_bodies(&self, of: usize) -> Vec<SensedBody> {
+        if !self.with_bodies.contains(&self.names[of]) {
+            return Vec::new();
+        }
+
+        let center = self.world.robots()[of];
+        self.world
             .near(center, self.scenario.sensing_range_m)
-            .into_iter();
-        let bodies = others
-            .filter(|near| near.body != Body::Robot(index))
+            .into_iter()
+            .filter(|near| near.body != Body::Robot(of))
+            .take(MAX_BODIES)
             .map(|near| SensedBody {
                 kind: match near.body {
                     Body::Obstacle(_) => SensedKind::Obstacle,
@@ -523,24 +588,24 @@ impl Simulation {
                     Body::Robot(_) => SensedKind::Robot,
                 },
                 location: to_wire(near.center),
-            });
-        Percept {
-            epoch: self.epoch,
-            tick: self.now,
-            bodies: bodies.collect(),
-        }
+            })
+            .collect()
     }
 
     fn sensed_robots(&self, of: usize) -> Vec<SensedRobot> {
         let robots = self.world.robots();
-        let is_near = |other: &usize| {
-            *other != of && robots[of].distance_m(robots[*other]) <= self.scenario.sensing_range_m
-        };
-        let sensed = |other: usize| SensedRobot {
-            name: self.names[other].clone(),
-            location: to_wire(robots[other]),
-        };
-        (0..robots.len()).filter(is_near).map(sensed).collect()
+        let mut sensed = Vec::new();
+        for (other, center) in robots.iter().enumerate() {
+            let is_near = robots[of].distance_m(*center) <= self.scenario.sensing_range_m;
+            if other != of && is_near {
+                sensed.push(SensedRobot {
+                    name: self.names[other].clone(),
+                    location: to_wire(*center),
+                });
+            }
+        }
+
+        sensed
     }
 
     fn index(&self, name: &RobotName) -> Option<usize> {
@@ -599,7 +664,7 @@ impl Simulation {
     /// What a robot reported last.
     #[must_use]
     pub fn report(&self, name: &RobotName) -> Option<&Report> {
-        self.reports.get(name)
+        self.reports.get(name).map(Arc::as_ref)
     }
 
     /// What a robot published of itself last.
@@ -627,17 +692,8 @@ impl Simulation {
     }
 }
 
-/// Tells a further incarnation apart from those that took part before it. Who is there from the beginning draws from a
-/// stream of its name alone, whatever happened to it in an earlier epoch; a later incarnation must not draw the same
-/// again. Nor may it use a number that a former one may have used: commands of that one which were never reported may
-/// lie at their targets, or still be under way.
-pub(crate) fn set_apart(welcome: &mut Welcome) {
-    welcome.stream = format!("robot/{}#{}", welcome.name, welcome.generation);
-    welcome.last_seq = SEQS_OF_A_GENERATION * Seq::from(welcome.generation.saturating_sub(1));
-}
-
-/// What the other robots may learn of one that reported this from there.
-pub(crate) fn public_state(report: &Report, location: Point) -> PublicState {
+/// What the other robots may learn of a robot that reported this from there.
+fn public_state(report: &Report, location: Point) -> PublicState {
     PublicState {
         epoch: report.epoch,
         tick: report.tick,

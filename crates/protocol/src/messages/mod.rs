@@ -18,8 +18,8 @@ pub use observe::{
 };
 pub use state::{Answer, PublicState, StateVariables, Variable};
 pub use step::{
-    Clock, Command, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS, News,
-    Performative, Refusal, Report, SensedBody, SensedKind, SensedRobot, Waiting, Welcome,
+    Clock, Command, CommandText, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS,
+    News, Performative, Refusal, Report, SensedBody, SensedKind, SensedRobot, Waiting, Welcome,
 };
 
 use schemars::JsonSchema;

@@ -319,6 +319,15 @@ pub struct Command {
     pub command: String,
 }
 
+/// What a command says.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CommandText {
+    /// What it is meant to do.
+    pub performative: Performative,
+    /// Its text.
+    pub command: String,
+}
+
 /// What a message between robots is meant to do: the part of KQML that the robots of the paper need (Finin et al. 1994;
 /// the paper's robots spoke KQML, Murphy et al. 2002, abstract). A query of the common robot interface is an `ask-one`
 /// by being a query, and its answer says that it is a `tell`.

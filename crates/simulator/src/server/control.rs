@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use bus::Query;
 use protocol::messages::{
-    Awaited, Control, ControlAnswer, End, FieldError, Phase, Reason, RobotStatus, Setup,
-    SetupAnswer, Status,
+    Awaited, Control, ControlAnswer, End, FieldError, Phase, RobotStatus, Setup, SetupAnswer,
+    Status,
 };
 use protocol::random::MAX_SEED;
 use protocol::{RobotName, Tick, decode, encode};
@@ -81,7 +81,7 @@ impl Pace {
     }
 
     /// Takes one tick of what was granted. `Err` says how long to wait at most before looking again.
-    fn take_grant(&mut self, tick_s: f64) -> Result<(), Option<Duration>> {
+    pub(super) fn take_grant(&mut self, tick_s: f64) -> Result<(), Option<Duration>> {
         if self.pending_steps > 0 {
             self.pending_steps -= 1;
             return Ok(());
@@ -111,32 +111,11 @@ impl Pace {
 }
 
 impl Server {
-    /// Returns when the next tick may begin.
-    pub(super) fn wait_for_grant(&mut self, simulation: &Simulation) -> Result<(), Interrupt> {
-        // What people ask for comes before the next tick, also when ticks follow without a pause.
-        while let Ok(event) = self.events.try_recv() {
-            self.handle(event, simulation)?;
-        }
-        loop {
-            let patience = match self.pace.take_grant(simulation.scenario().tick_s) {
-                Ok(()) => return Ok(()),
-                Err(patience) => patience,
-            };
-            let event = match patience {
-                Some(patience) => self.receive(patience),
-                None => self.events.recv().ok(),
-            };
-            if let Some(event) = event {
-                self.handle(event, simulation)?;
-            }
-        }
-    }
-
     /// People ask for something; they are answered at once.
     pub(super) fn on_control(
         &mut self,
         query: Query,
-        simulation: &Simulation,
+        simulation: &mut Simulation,
     ) -> Result<(), Interrupt> {
         let control = match decode::<Control>(query.key(), "an operator", &query.body()) {
             Ok(control) => control,
@@ -202,15 +181,6 @@ impl Server {
                 }
                 (self.pace.speed, self.pace.due) = (*factor, Instant::now());
             }
-            Control::Command { to, command } => {
-                if !self.members.contains_key(to) {
-                    return Err(format!("no robot of this run is called {to}"));
-                }
-                if self.operator.len() >= 1024 {
-                    return Err("1024 commands are waiting for the next tick already".to_owned());
-                }
-                self.operator.push((to.clone(), command.clone()));
-            }
             Control::FaultsDone { epoch, tick } => self.orders.done(*epoch, *tick),
             Control::Late {
                 robot,
@@ -238,18 +208,25 @@ impl Server {
         on_late: Option<OnLate>,
         deadline_s: Option<f64>,
     ) -> Result<(), String> {
-        if let Some(unknown) = robot.filter(|robot| !self.members.contains_key(*robot)) {
+        if let Some(unknown) = robot.filter(|robot| !self.barrier.has(robot)) {
             return Err(format!("no robot of this run is called {unknown}"));
         }
         if deadline_s.is_some_and(|deadline_s| deadline_s <= 0.0) {
             return Err("a deadline is more than zero".to_owned());
         }
+
+        let mut lateness = self.barrier.lateness().clone();
         match (robot, on_late) {
-            (Some(robot), Some(on_late)) => drop(self.lateness.own.insert(robot.clone(), on_late)),
-            (None, Some(on_late)) => self.lateness.on_late = on_late,
+            (Some(robot), Some(on_late)) => {
+                lateness.own.insert(robot.clone(), on_late);
+            }
+            (None, Some(on_late)) => lateness.on_late = on_late,
             (_, None) => {}
         }
-        self.lateness.deadline_s = deadline_s.unwrap_or(self.lateness.deadline_s);
+        if let Some(deadline_s) = deadline_s {
+            lateness.deadline = Duration::try_from_secs_f64(deadline_s).unwrap_or(Duration::MAX);
+        }
+        self.barrier.set_lateness(lateness, &mut self.outputs);
         Ok(())
     }
 
@@ -296,11 +273,11 @@ impl Server {
         }
         self.pace.phase = Phase::Paused;
         self.pace.pending_steps += n;
-        if self.open.is_announced {
+        if self.barrier.is_announced() {
             return self.answer_status(&query, simulation);
         }
         // Only the last one to step is kept waiting; whoever came before is told how far things are.
-        let until = simulation.tick() + self.pace.pending_steps + u64::from(self.open.is_open);
+        let until = simulation.tick() + self.pace.pending_steps + u64::from(self.barrier.is_open());
         if let Some((earlier, _)) = self
             .pace
             .stepping
@@ -318,6 +295,18 @@ impl Server {
     /// How things stand.
     pub(super) fn status(&self, simulation: &Simulation) -> Status {
         let scenario = simulation.scenario();
+        let lateness = self.barrier.lateness();
+        let mut robots = Vec::new();
+        for name in self.barrier.roster() {
+            let (generation, presence) = self.presence(name);
+            robots.push(RobotStatus {
+                name: name.clone(),
+                generation,
+                on_late: lateness.of(name),
+                presence,
+            });
+        }
+
         Status {
             run: self.options.run.clone(),
             epoch: simulation.epoch(),
@@ -328,48 +317,27 @@ impl Server {
             seed: scenario.seed,
             phase: self.pace.phase,
             speed: self.pace.speed,
-            on_late: self.lateness.on_late,
-            deadline_s: self.lateness.deadline_s,
+            on_late: lateness.on_late,
+            deadline_s: lateness.deadline.as_secs_f64(),
             awaiting: self.awaiting(),
-            robots: self
-                .members
-                .iter()
-                .map(|(name, member)| RobotStatus {
-                    name: name.clone(),
-                    generation: member.generation,
-                    on_late: self.lateness.of(name),
-                    presence: member.presence(),
-                })
-                .collect(),
-            ignored: self.summary_wall.ignored.clone(),
+            robots,
+            ignored: self.wall.ignored.clone(),
         }
     }
 
-    /// For whom the clock waits now, and what is known of them.
+    /// The robots for which the clock waits now, and what is known of them.
     fn awaiting(&self) -> Vec<Awaited> {
-        let since_s = self.open.since.elapsed().as_secs_f64();
-        if self.pace.phase == Phase::Gathering && !self.open.is_open {
-            let missing = self.members.iter().filter(|(_, member)| !member.is_ready());
-            return missing
-                .map(|(name, _)| Awaited {
-                    name: name.clone(),
-                    since_s,
-                    because: Reason::NotJoined,
-                })
-                .collect();
-        }
-        let because = |name| match self.open.waits.get(name) {
-            _ if !self.members[name].is_present => Reason::Gone,
-            Some(other) => Reason::WaitsFor(other.clone()),
-            None => Reason::Silent,
-        };
-        self.awaited()
-            .map(|name| Awaited {
-                name: name.clone(),
+        let since_s = self.waiting_since.elapsed().as_secs_f64();
+        let mut awaiting = Vec::new();
+        for (name, because) in self.barrier.awaited() {
+            awaiting.push(Awaited {
+                name,
                 since_s,
-                because: because(name),
-            })
-            .collect()
+                because,
+            });
+        }
+
+        awaiting
     }
 }
 

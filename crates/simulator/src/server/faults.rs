@@ -1,23 +1,25 @@
-//! The faults that a scenario has in store for processes. The simulator says what and when; the launcher does it; the clock
-//! is held meanwhile, so that it happens between the same two ticks every time.
+//! The faults that a scenario has in store for processes. The simulator orders them, the launcher carries them out, and the
+//! clock is held meanwhile, so that each happens between the same two ticks every time.
 
 use std::time::{Duration, Instant};
 
-use bus::Publisher;
+use bus::{BusError, Publisher};
 use protocol::encode;
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
 use protocol::{Epoch, Tick};
 
-use super::{Interrupt, REPEAT_AFTER, Server};
+use super::{REPEAT_AFTER, Server};
 use crate::simulation::Simulation;
 
-/// Longest wait for a launcher to carry out an order, and for a robot to go or to be back; then the run goes on and says
-/// so.
+/// Longest wait for a launcher to carry out an order, and for a robot to go or to come back; then the run goes on and logs
+/// that it did.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Longest wait for a launcher to listen at all: it starts the simulator first, and a fast run may be ahead of it.
+/// Longest wait for a launcher to subscribe: it starts the simulator first, and a fast run may be ahead of it.
 const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
-/// While waiting, this often is looked whether what is waited for has come about.
-const LOOK: Duration = Duration::from_millis(250);
+/// While waiting, the loop looks this often whether what it waits for has come about.
+const LOOK: Duration = Duration::from_millis(20);
+/// A robot whose hang is over gets the clock again this often, and counts as back when it answers.
+const NUDGE: Duration = Duration::from_millis(100);
 
 /// Orders to the launcher.
 pub(super) struct Orders {
@@ -42,82 +44,111 @@ impl Orders {
     }
 }
 
+/// An order that is being carried out.
+pub(super) struct Underway {
+    order: FaultOrder,
+    begun: Instant,
+    /// When it was put last; `None` while no launcher subscribes.
+    put: Option<Instant>,
+    nudged: Instant,
+}
+
 impl Server {
-    /// Has the faults carried out that are due before the next tick.
-    pub(super) fn carry_out_faults(
+    /// Begins to have the faults carried out that are due before the next tick, if there are any.
+    pub(super) fn order_faults(
         &mut self,
         simulation: &mut Simulation,
-    ) -> Result<(), Interrupt> {
+    ) -> Result<Option<Underway>, BusError> {
         let orders = simulation.faults_due();
         if orders.is_empty() {
-            return Ok(());
+            return Ok(None);
         }
+
         simulation.note_faults(&orders);
-        if !self.has_launcher(simulation)? {
-            return Ok(());
+        for order in &orders {
+            let fault = order.begins.then_some(order.kind);
+            self.barrier.fault(&order.robot, fault);
         }
-        let order = FaultOrder {
-            epoch: simulation.epoch(),
-            tick: simulation.tick() + 1,
-            orders,
-        };
-        let message = encode(&order);
-        self.orders.publisher.put(message.clone())?;
-        let (begun, mut repeated) = (Instant::now(), Instant::now());
-        while !self.is_carried_out(&order) {
-            if begun.elapsed() > PATIENCE {
-                tracing::error!(
-                    "the faults before tick {} were not carried out in time",
-                    order.tick
-                );
-                return Ok(());
-            }
-            if repeated.elapsed() > REPEAT_AFTER {
-                repeated = Instant::now();
-                self.orders.publisher.put(message.clone())?;
-                // Who was stopped for long may have nothing left to answer, and is known to be back when it answers.
-                self.repeat_clock()?;
-            }
-            if let Some(event) = self.receive(LOOK) {
-                self.handle(event, simulation)?;
-            }
-        }
-        Ok(())
+        let now = Instant::now();
+        Ok(Some(Underway {
+            order: FaultOrder {
+                epoch: simulation.epoch(),
+                tick: simulation.tick() + 1,
+                orders,
+            },
+            begun: now,
+            put: None,
+            nudged: now,
+        }))
     }
 
-    /// Whether somebody hears the orders. It is waited for once; if nobody comes, the run goes on and has said so.
-    fn has_launcher(&mut self, simulation: &mut Simulation) -> Result<bool, Interrupt> {
-        let begun = Instant::now();
-        while !self.orders.publisher.has_subscribers() {
-            if self.orders.has_complained {
-                return Ok(false);
-            }
-            if begun.elapsed() > LAUNCHER_PATIENCE {
-                self.orders.has_complained = true;
-                tracing::error!(
-                    "the scenario has faults of processes, and no launcher is here to carry them out"
-                );
-            }
-            if let Some(event) = self.receive(LOOK) {
-                self.handle(event, simulation)?;
-            }
+    /// Goes on with the order under way. Returns how long to wait before looking again; `None` when it is carried out.
+    pub(super) fn await_faults(
+        &mut self,
+        simulation: &Simulation,
+    ) -> Result<Option<Duration>, BusError> {
+        let super::Stage::Faults(underway) = &mut self.stage else {
+            return Ok(None);
+        };
+        let Some(put) = underway.put else {
+            let begun = underway.begun;
+            return self.await_launcher(begun);
+        };
+        if underway.begun.elapsed() > PATIENCE {
+            let tick = simulation.tick() + 1;
+            tracing::error!("the faults before tick {tick} were not carried out in time");
+            return Ok(None);
         }
-        Ok(true)
+
+        if put.elapsed() > REPEAT_AFTER {
+            underway.put = Some(Instant::now());
+            self.orders.publisher.put(encode(&underway.order))?;
+        }
+        let is_done = self.orders.done == Some((underway.order.epoch, underway.order.tick));
+        let mut is_carried_out = is_done;
+        for order in &underway.order.orders {
+            is_carried_out &= is_in_effect(&self.barrier, order);
+        }
+        if is_carried_out {
+            return Ok(None);
+        }
+        if is_done && underway.nudged.elapsed() > NUDGE {
+            underway.nudged = Instant::now();
+            self.barrier.repeat(&mut self.outputs);
+        }
+        Ok(Some(LOOK))
     }
 
-    /// Whether the launcher has done its part, and the robots are as they must be: a killed one is gone, one whose fault is
-    /// over is back.
-    fn is_carried_out(&self, order: &FaultOrder) -> bool {
-        let is_so = |order: &ProcessOrder| {
-            let Some(member) = self.members.get(&order.robot) else {
-                return true;
-            };
-            match (order.kind, order.begins) {
-                (FaultKind::Crash, true) => !member.is_present,
-                (_, true) => true,
-                (_, false) => member.is_back(),
+    /// Puts the order as soon as a launcher subscribes. If none does in time, the run goes on and has logged it.
+    fn await_launcher(&mut self, begun: Instant) -> Result<Option<Duration>, BusError> {
+        if self.orders.publisher.has_subscribers() {
+            if let super::Stage::Faults(underway) = &mut self.stage {
+                underway.put = Some(Instant::now());
+                self.orders.publisher.put(encode(&underway.order))?;
             }
-        };
-        self.orders.done == Some((order.epoch, order.tick)) && order.orders.iter().all(is_so)
+            return Ok(Some(LOOK));
+        }
+        if self.orders.has_complained {
+            return Ok(None);
+        }
+        if begun.elapsed() > LAUNCHER_PATIENCE {
+            self.orders.has_complained = true;
+            tracing::error!(
+                "the scenario has faults of processes, and there is no launcher to carry them out"
+            );
+        }
+        Ok(Some(LOOK))
+    }
+}
+
+/// Whether a robot is as the order wants it: a killed one is disconnected, one whose fault is over is back.
+fn is_in_effect<R: Clone, C: Clone>(
+    barrier: &lockstep::Barrier<R, C>,
+    order: &ProcessOrder,
+) -> bool {
+    match (order.kind, order.begins) {
+        (FaultKind::Crash, true) => !barrier.is_present(&order.robot),
+        (_, true) => true,
+        (_, false) => barrier.is_back(&order.robot),
     }
 }

@@ -140,7 +140,6 @@ fn flight(tick: protocol::Tick, event: &Event) -> Option<Flight> {
         } => (from, to, *seq, command.as_str(), Fate::Sent),
         Event::CommandDelivered { from, to, seq } => (from, to, *seq, "", Fate::Delivered),
         Event::CommandDropped { from, to, seq, .. } => (from, to, *seq, "", Fate::Dropped),
-        Event::CommandMissing { from, to, seq } => (from, to, *seq, "", Fate::Missing),
         _ => return None,
     };
     Some(Flight {

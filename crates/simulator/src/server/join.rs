@@ -1,0 +1,122 @@
+//! Joining: a request becomes a welcome or a refusal.
+
+use bus::Query;
+use lockstep::Refused;
+use protocol::keys::Keys;
+use protocol::messages::{JoinAnswer, JoinRequest, Refusal};
+use protocol::{PROTOCOL_VERSION, RobotName, decode, encode};
+
+use super::Server;
+use crate::simulation::Simulation;
+
+/// Why a robot may not take part.
+struct NotAdmitted {
+    reason: Refusal,
+    explanation: String,
+}
+
+impl NotAdmitted {
+    fn new(reason: Refusal, explanation: impl Into<String>) -> Self {
+        Self {
+            reason,
+            explanation: explanation.into(),
+        }
+    }
+}
+
+impl Server {
+    pub(super) fn on_join(&mut self, query: &Query, simulation: &mut Simulation) {
+        let answer = match self.judge_join(query, simulation) {
+            Ok(answer) => answer,
+            Err(NotAdmitted {
+                reason,
+                explanation,
+            }) => {
+                tracing::info!("refused a robot: {explanation}");
+                JoinAnswer::Refused {
+                    reason,
+                    explanation,
+                }
+            }
+        };
+
+        query.reply(query.key(), encode(&answer));
+    }
+
+    fn judge_join(
+        &mut self,
+        query: &Query,
+        simulation: &mut Simulation,
+    ) -> Result<JoinAnswer, NotAdmitted> {
+        let request: JoinRequest = decode(query.key(), "a robot", &query.body())
+            .map_err(|error| NotAdmitted::new(Refusal::Malformed, error.to_string()))?;
+        self.check_request(query, &request)?;
+
+        let name = &request.name;
+        let run = self.options.run.clone();
+        let admission = self
+            .barrier
+            .join(name, &request.instance, &mut self.outputs)
+            .map_err(|refused| self.explain(refused, name))?;
+        if request.bodies {
+            self.with_bodies.insert(name.clone());
+        } else {
+            self.with_bodies.remove(name);
+        }
+        simulation.list_bodies(name, request.bodies);
+
+        let open = self.barrier.open_report(name).map(AsRef::as_ref);
+        let welcome = simulation.welcome(&run, name, admission.generation, open);
+        match welcome {
+            Some(welcome) => Ok(JoinAnswer::Welcome(Box::new(welcome))),
+            None => Err(self.explain(Refused::UnknownName, name)),
+        }
+    }
+
+    /// Checks what does not depend on the other robots.
+    fn check_request(&self, query: &Query, request: &JoinRequest) -> Result<(), NotAdmitted> {
+        let name = &request.name;
+        let run = &self.options.run;
+
+        // Access control sees keys and not messages: both must name the same robot.
+        let asker = Keys::joins_as(query.key());
+        if let Some(asker) = asker.filter(|asker| *asker != name.as_str()) {
+            let explanation = format!("{asker} cannot join as {name}");
+            return Err(NotAdmitted::new(Refusal::Malformed, explanation));
+        }
+        if request.protocol != PROTOCOL_VERSION {
+            let explanation = format!(
+                "{name} speaks version {} of the protocol, this simulator version {PROTOCOL_VERSION}: update the older one",
+                request.protocol
+            );
+            return Err(NotAdmitted::new(Refusal::OtherProtocol, explanation));
+        }
+        if request.run != *run {
+            let explanation = format!("{name} means run {}, this is run {run}", request.run);
+            return Err(NotAdmitted::new(Refusal::OtherRun, explanation));
+        }
+
+        Ok(())
+    }
+
+    fn explain(&self, refused: Refused, name: &RobotName) -> NotAdmitted {
+        match refused {
+            Refused::Ended => {
+                let explanation = format!("run {} is over", self.options.run);
+                NotAdmitted::new(Refusal::Ended, explanation)
+            }
+            Refused::NameTaken => {
+                let explanation = format!("another living process is {name} already");
+                NotAdmitted::new(Refusal::NameTaken, explanation)
+            }
+            Refused::UnknownName => {
+                let roster: Vec<&str> = self.barrier.roster().map(RobotName::as_str).collect();
+                let explanation = format!(
+                    "no robot of this run is called {name}; its robots are {}",
+                    roster.join(", ")
+                );
+                NotAdmitted::new(Refusal::UnknownName, explanation)
+            }
+        }
+    }
+}
