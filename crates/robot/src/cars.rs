@@ -114,10 +114,16 @@ impl<'a> Cars<'a> {
     /// [`BadParameters`] names the parameter that is wrong or unknown.
     pub fn parameters<P: serde::de::DeserializeOwned>(&self) -> Result<P, BadParameters> {
         let map = self.welcome.parameters.clone().into_iter().collect();
-        serde_json::from_value(serde_json::Value::Object(map)).map_err(|error| BadParameters {
+        serde_json::from_value(serde_json::Value::Object(map))
+            .map_err(|error| self.bad_parameters(error))
+    }
+
+    /// The error of a robot that cannot work with its parameters.
+    pub fn bad_parameters(&self, reason: impl std::fmt::Display) -> BadParameters {
+        BadParameters {
             robot: self.welcome.name.clone(),
-            reason: error.to_string(),
-        })
+            reason: reason.to_string(),
+        }
     }
 
     /// The robot's random stream, derived from the seed and its name. A robot that draws from anywhere else does not

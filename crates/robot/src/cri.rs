@@ -3,7 +3,7 @@
 use protocol::messages::{Panel, Point, StateVariables, Variable};
 
 use crate::cars::Cars;
-pub use crate::error::{BadParameters, RobotError};
+pub(crate) use crate::error::{BadParameters, RobotError};
 
 /// A robot.
 ///

@@ -4,8 +4,7 @@ use affect::akr::{FacialExpression, Valence};
 use affect::{Circumstances, EmotionLabel, Feeling, Schemata, StandardEmotion};
 use robot::{Face, Tone, Widget};
 
-/// How a robot without emotions names its state.
-pub(crate) const NEUTRAL: &str = "NEUTRAL";
+use crate::emotion::NEUTRAL;
 
 /// Values in a panel's curve: two minutes of ticks of half a second.
 pub(crate) const SPARKLINE_LEN: usize = 240;

@@ -4,9 +4,11 @@ use affect::progress::{ApproachParameters, RateParameters};
 use affect::{Caution, DynamicsParameters};
 use serde::{Deserialize, Serialize};
 
-use super::Behavior;
-use crate::FT_M;
-use crate::switch::{Switch, not_negative, positive};
+use super::tables::Behavior;
+use crate::bounds::{not_negative, positive};
+use crate::drive::LOOK_S;
+use crate::switch::Switch;
+use crate::units::FT_M;
 
 /// Butler's parameters. A name that is not among them is refused: a misspelled one would silently run another
 /// experiment.
@@ -146,7 +148,7 @@ impl Default for Parameters {
             intercept_any: true,
             query_stale_s: 5.0,
             turn_mean_s: 5.0,
-            look_s: 2.0,
+            look_s: LOOK_S,
             joke_mean_s: 60.0,
             rate: Rate::default(),
             approach: Approach::default(),

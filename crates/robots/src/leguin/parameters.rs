@@ -3,8 +3,10 @@
 use affect::{Caution, IntensityLabel};
 use serde::{Deserialize, Serialize};
 
-use crate::FT_M;
-use crate::switch::{Switch, not_negative, positive};
+use crate::bounds::{not_negative, positive};
+use crate::drive::LOOK_S;
+use crate::switch::Switch;
+use crate::units::FT_M;
 
 /// Leguin's parameters. A name that is not among them is refused: a misspelled one would silently run another
 /// experiment.
@@ -112,7 +114,7 @@ impl Default for Parameters {
             stand_off_m: 3.0 * FT_M,
             query_stale_s: 5.0,
             turn_mean_s: 5.0,
-            look_s: 2.0,
+            look_s: LOOK_S,
             joke_mean_s: 60.0,
             dynamics: Feelings::default(),
         }
