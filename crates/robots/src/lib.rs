@@ -19,6 +19,7 @@ mod classes;
 mod commands;
 pub mod drive;
 mod emotion;
+mod jokes;
 pub mod leguin;
 mod panel;
 pub mod peer;

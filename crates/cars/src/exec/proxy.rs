@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
 
+use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::messages::{Panel, Performative};
 use protocol::random::unit;
-use protocol::codec::MAX_MESSAGE_BYTES;
 use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 use serde_json::Value;
 

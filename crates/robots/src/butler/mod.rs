@@ -339,7 +339,7 @@ impl Butler {
             repeats_call: repeats_call && refiller == Some("WAIT"),
             repeats_go_home: self.is_due(state.since_go_home_s)
                 && refiller == Some("AWAIT_GO_HOME"),
-            has_joke: state.until_joke_s <= 0.0,
+            has_joke: state.jokes.are_due(),
         }
     }
 
@@ -377,8 +377,7 @@ impl Butler {
             }
             Act::Replenish => state.replenish(self.parameters.treat_capacity),
             Act::Joke => {
-                cars.log(format!("jokes: {}", JOKES[state.jokes.one_of(JOKES.len())]));
-                state.until_joke_s = state.jokes.exponential(self.parameters.joke_mean_s);
+                state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
             }
         }
     }

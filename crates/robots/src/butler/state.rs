@@ -11,6 +11,7 @@ use super::parameters::Parameters;
 use super::tables::{Behavior, Measures};
 use crate::chance::Chance;
 use crate::drive::Drive;
+use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
 use crate::published::{count, flag, location, number, saturated};
@@ -37,7 +38,6 @@ pub(super) struct State {
     pub(super) since_call_s: f64,
     pub(super) since_go_home_s: f64,
     pub(super) until_tap_s: f64,
-    pub(super) until_joke_s: f64,
     pub(super) rate: RateEstimator,
     pub(super) approach: ApproachEstimator,
     pub(super) refiller: Peer,
@@ -46,7 +46,7 @@ pub(super) struct State {
     pub(super) measures: Measures,
     pub(super) taps: Chance,
     pub(super) turns: Chance,
-    pub(super) jokes: Chance,
+    pub(super) jokes: Jokes,
     pub(super) intensities: VecDeque<f64>,
 }
 
@@ -68,7 +68,6 @@ impl State {
             since_call_s: 0.0,
             since_go_home_s: 0.0,
             until_tap_s: parameters.treat_mean_s,
-            until_joke_s: parameters.joke_mean_s,
             rate: RateEstimator::new(parameters.rate())?,
             approach: ApproachEstimator::new(parameters.approach())?,
             refiller: Peer::new(&parameters.refiller),
@@ -76,7 +75,7 @@ impl State {
             measures: Measures::default(),
             taps: Chance::new(0),
             turns: Chance::new(1),
-            jokes: Chance::new(2),
+            jokes: Jokes::new(Chance::new(2), parameters.joke_mean_s),
             intensities: VecDeque::new(),
         })
     }
@@ -87,16 +86,15 @@ impl State {
 
         self.taps = Chance::split(cars.random());
         self.turns = Chance::split(cars.random());
-        self.jokes = Chance::split(cars.random());
+        self.jokes = Jokes::new(Chance::split(cars.random()), parameters.joke_mean_s);
         self.until_tap_s = self.taps.exponential(parameters.treat_mean_s);
-        self.until_joke_s = self.jokes.exponential(parameters.joke_mean_s);
     }
 
     /// Advances the timers by one tick.
     pub(super) fn advance(&mut self, tick_s: f64) {
         self.since_call_s += tick_s;
         self.since_go_home_s += tick_s;
-        self.until_joke_s -= tick_s;
+        self.jokes.advance(tick_s);
         if self.treats == 0 {
             self.empty_s += tick_s;
         }

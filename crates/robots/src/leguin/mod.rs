@@ -264,15 +264,13 @@ impl Leguin {
         let parameters = &self.parameters;
         let waiter_is_here = state.waiter.is_within(parameters.exchange_radius_m, cars);
         Context {
-            emotion: parameters
-                .acts_by_emotion()
-                .then(|| self.feeling().emotion),
+            emotion: parameters.acts_by_emotion().then(|| self.feeling().emotion),
             pending: state.pending,
             waiter_is_needy_here: self.is_needed(cars) && waiter_is_here,
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
             sent_home: state.sent_home,
             is_home: self.is_home(),
-            has_joke: state.until_joke_s <= 0.0,
+            has_joke: state.jokes.are_due(),
         }
     }
 
@@ -299,8 +297,7 @@ impl Leguin {
                 state.begin_way();
             }
             Act::Joke => {
-                cars.log(format!("jokes: {}", JOKES[state.jokes.one_of(JOKES.len())]));
-                state.until_joke_s = state.jokes.exponential(self.parameters.joke_mean_s);
+                state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
             }
         }
     }

@@ -9,6 +9,7 @@ use super::tables::{Behavior, Errand, Measures};
 use crate::chance::Chance;
 use crate::commands::{HURRY, REFILL};
 use crate::drive::Drive;
+use crate::jokes::Jokes;
 use crate::peer::Peer;
 use crate::published::{count, flag, location, text};
 
@@ -39,7 +40,6 @@ pub(super) struct State {
     pub(super) trips: u32,
     /// How often she turned back FRUSTRATED.
     pub(super) given_up: u32,
-    pub(super) until_joke_s: f64,
     pub(super) waiter: Peer,
     /// Whether the waiter needed a refill in his last answer.
     pub(super) waiter_needs: bool,
@@ -47,7 +47,7 @@ pub(super) struct State {
     pub(super) waiter_calls: Option<String>,
     pub(super) measures: Measures,
     pub(super) turns: Chance,
-    pub(super) jokes: Chance,
+    pub(super) jokes: Jokes,
 }
 
 impl State {
@@ -67,13 +67,12 @@ impl State {
             waiting_s: 0.0,
             trips: 0,
             given_up: 0,
-            until_joke_s: parameters.joke_mean_s,
             waiter: Peer::new(&parameters.waiter),
             waiter_needs: false,
             waiter_calls: None,
             measures: Measures::default(),
             turns: Chance::new(0),
-            jokes: Chance::new(1),
+            jokes: Jokes::new(Chance::new(1), parameters.joke_mean_s),
         }
     }
 
@@ -85,13 +84,12 @@ impl State {
         self.home = start;
 
         self.turns = Chance::split(cars.random());
-        self.jokes = Chance::split(cars.random());
-        self.until_joke_s = self.jokes.exponential(parameters.joke_mean_s);
+        self.jokes = Jokes::new(Chance::split(cars.random()), parameters.joke_mean_s);
     }
 
     /// Advances the timers by one tick that she spent in this behavior.
     pub(super) fn advance(&mut self, behavior: Behavior, progress_share: f64, tick_s: f64) {
-        self.until_joke_s -= tick_s;
+        self.jokes.advance(tick_s);
         self.waiting_s = if behavior == Behavior::AwaitGoHome {
             self.waiting_s + tick_s
         } else {

@@ -1,4 +1,4 @@
-//! A robot that does nothing but ask.
+//! A robot that only queries another one.
 
 use std::cell::RefCell;
 use std::rc::Rc;

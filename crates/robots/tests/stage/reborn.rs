@@ -1,5 +1,5 @@
-//! Robots that are replaced in mid-run by new ones: made from all that the old ones saved, through text, or only told what
-//! the old ones had published last, as after the loss of a process.
+//! Robots that are replaced in mid-run by new ones: restored from what the old ones saved, through text, or resumed from
+//! what the old ones published last, as after the loss of a process.
 
 use robot::{Action, BadParameters, Cars, Panel, Robot, StateVariables};
 
