@@ -18,10 +18,10 @@ use std::time::{Duration, Instant};
 
 use bus::{Bus, Faults, MemoryNetwork, Traffic};
 use protocol::keys::Keys;
-use protocol::messages::{Control, ControlAnswer, End, Point, StateVariables};
+use protocol::messages::{Control, ControlAnswer, End, StateVariables};
 use protocol::random::{Stream, stream, unit};
 use protocol::{RobotName, RunName, Tick, decode, encode};
-use robot::{BadParameters, Cars, Host, HostOptions, Robot};
+use robot::{Action, BadParameters, Cars, Host, HostOptions, Robot};
 use simulator::server::{Event, Options, Server};
 use simulator::{RunFolder, Scenario, Summary};
 use system_tests::hall::{Hall, scenario};
@@ -107,48 +107,18 @@ impl Mortal {
 }
 
 impl Robot for Mortal {
-    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
-        self.robot.init_robot(cars)
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        self.robot.init(cars)
     }
-    fn speed(&self) -> f64 {
-        self.robot.speed()
-    }
-    fn direction(&self) -> f64 {
-        self.robot.direction()
-    }
-    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
-        self.robot.update_state_variables(cars);
-    }
-    fn state_variables(&self) -> StateVariables {
-        self.robot.state_variables()
-    }
-    fn current_location(&self) -> Point {
-        self.robot.current_location()
-    }
-    fn project_location(&mut self, cars: &mut Cars<'_>) -> Point {
-        // The last thing of a tick: its commands are sent, its report is not.
-        self.live(cars, Phase::End);
-        self.robot.project_location(cars)
-    }
-    fn set_current_location(&mut self, cars: &mut Cars<'_>, location: Point) {
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
         self.live(cars, Phase::Begin);
-        self.robot.set_current_location(cars, location);
+        let action = self.robot.tick(cars);
+        // At the end of a tick its commands are sent, and its report is not.
+        self.live(cars, Phase::End);
+        action
     }
-    fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str) {
-        self.robot.set_command(cars, from, command);
-    }
-    fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
-        self.robot.update_emotion_state(cars);
-    }
-    fn emotion_state(&self) -> &str {
-        self.robot.emotion_state()
-    }
-    fn update_behavior_state(&mut self, cars: &mut Cars<'_>) {
-        self.robot.update_behavior_state(cars);
-    }
-    fn behavior_state(&self) -> &str {
-        self.robot.behavior_state()
-    }
+
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
         self.robot.resume(cars, last);
     }

@@ -10,7 +10,7 @@ use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use clap::Args;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
-use robot::{BadParameters, Cars, Point, Robot, RobotArgs, RobotName, StateVariables};
+use robot::{Action, BadParameters, Cars, Robot, RobotArgs, RobotName};
 use simulator::recorder::SUMMARY;
 use simulator::scenario::{Changes, Scenario};
 use simulator::{RunFolder, Summary};
@@ -283,45 +283,20 @@ pub(crate) fn robot(args: &RobotArgs) -> miette::Result<ExitCode> {
     let names = args
         .names
         .iter()
-        .map(|name| (name.clone(), Box::<Idle>::default() as Box<dyn Robot>));
+        .map(|name| (name.clone(), Box::new(Idle) as Box<dyn Robot>));
     let host = robot::Host::connect(names.collect(), args.options()).into_diagnostic()?;
     host.run().into_diagnostic()?;
     Ok(ExitCode::SUCCESS)
 }
 
-#[derive(Default)]
-struct Idle(Point);
+struct Idle;
 
 impl Robot for Idle {
-    fn init_robot(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
         Ok(())
     }
-    fn speed(&self) -> f64 {
-        0.0
-    }
-    fn direction(&self) -> f64 {
-        0.0
-    }
-    fn update_state_variables(&mut self, _: &mut Cars<'_>) {}
-    fn state_variables(&self) -> StateVariables {
-        StateVariables::new()
-    }
-    fn current_location(&self) -> Point {
-        self.0
-    }
-    fn project_location(&mut self, _: &mut Cars<'_>) -> Point {
-        self.0
-    }
-    fn set_current_location(&mut self, _: &mut Cars<'_>, location: Point) {
-        self.0 = location;
-    }
-    fn set_command(&mut self, _: &mut Cars<'_>, _: &RobotName, _: &str) {}
-    fn update_emotion_state(&mut self, _: &mut Cars<'_>) {}
-    fn emotion_state(&self) -> &str {
-        "CALM"
-    }
-    fn update_behavior_state(&mut self, _: &mut Cars<'_>) {}
-    fn behavior_state(&self) -> &str {
-        "IDLE"
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        Action::stay(cars).emotion("CALM").behavior("IDLE")
     }
 }

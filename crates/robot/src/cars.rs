@@ -1,4 +1,5 @@
-//! What a robot can do during a tick: the calls of the seed's "Inter-Robot Communication", sensing, chance, the log.
+//! What a robot perceives and can call during a tick: its location, commands, sensing, queries to other robots (the
+//! paper's "Inter-Robot Communication"), random numbers, the log.
 
 use std::sync::Arc;
 
@@ -9,33 +10,44 @@ use protocol::messages::{
 use protocol::random::Stream;
 use protocol::{RobotName, Seq, Tick};
 
-use crate::cri::BadParameters;
+use crate::error::BadParameters;
 use crate::seat::{Network, Undelivered};
 
-/// What a robot may write to the log in a tick, all lines together.
+/// Most bytes that a robot may write to the log in a tick, all lines together.
 const MAX_LOG_BYTES: usize = 256 * 1024;
 
-/// Why a call between robots gave nothing.
+/// Why a call to another robot failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
     /// No robot of the roster has this name.
     #[error("no robot is called {0:?}")]
     UnknownRobot(String),
-    /// The network between the two is cut, or the other one is lost.
+    /// The simulated network between the two is cut, or the process of the other robot is lost.
     #[error("{0} is unreachable")]
     Unreachable(RobotName),
-    /// Before tick 1 nobody has reported anything.
+    /// No robot has reported before tick 1.
     #[error("nothing is known before tick 1")]
     TooEarly,
-    /// The epoch is over; whatever this tick comes to is thrown away.
+    /// The epoch is over; the result of this tick is discarded.
     #[error("the epoch is over")]
     Interrupted,
+}
+
+/// A command that arrived in this tick.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReceivedCommand {
+    /// The sender: a robot, or an operator.
+    pub from: RobotName,
+    /// Its text.
+    pub text: String,
 }
 
 /// The simulation, as one robot sees it during one tick.
 pub struct Cars<'a> {
     pub(crate) welcome: &'a Welcome,
     pub(crate) tick: Tick,
+    pub(crate) location: Point,
+    pub(crate) commands: &'a [ReceivedCommand],
     pub(crate) news: &'a News,
     pub(crate) random: &'a mut Stream,
     pub(crate) outbox: &'a mut Outbox,
@@ -51,17 +63,30 @@ pub(crate) struct Outbox {
     pub(crate) sent: Vec<protocol::messages::SentCommand>,
 }
 
-impl Cars<'_> {
-    /// Its own name (`getName`).
+impl<'a> Cars<'a> {
+    /// The robot's own name (`getName`).
     #[must_use]
-    pub fn name(&self) -> &RobotName {
+    pub fn name(&self) -> &'a RobotName {
         &self.welcome.name
     }
 
-    /// What it was told when it joined: field, roster, ranges, where it started.
+    /// What the simulator sent when the robot joined: field, roster, ranges, start.
     #[must_use]
-    pub fn welcome(&self) -> &Welcome {
+    pub fn welcome(&self) -> &'a Welcome {
         self.welcome
+    }
+
+    /// Where the robot stands now, meters: where it proposed to be, or where it was if that place was taken
+    /// (`setCurrentLocation`).
+    #[must_use]
+    pub fn location(&self) -> Point {
+        self.location
+    }
+
+    /// The commands that arrived in this tick, in the order of senders and of their sending (`setCommand`).
+    #[must_use]
+    pub fn commands(&self) -> &'a [ReceivedCommand] {
+        self.commands
     }
 
     /// The current tick; 0 is the initial state.
@@ -83,24 +108,31 @@ impl Cars<'_> {
         self.tick as f64 * self.welcome.tick_s
     }
 
-    /// Its parameters, as the robot's own type: numbers in SI units.
+    /// The parameters of the scenario, as the robot's own type: numbers in SI units.
     ///
     /// # Errors
-    /// [`BadParameters`] says which parameter is wrong or unknown.
+    /// [`BadParameters`] names the parameter that is wrong or unknown.
     pub fn parameters<P: serde::de::DeserializeOwned>(&self) -> Result<P, BadParameters> {
         let map = self.welcome.parameters.clone().into_iter().collect();
-        serde_json::from_value(serde_json::Value::Object(map)).map_err(|error| BadParameters {
-            robot: self.welcome.name.clone(),
-            reason: error.to_string(),
-        })
+        serde_json::from_value(serde_json::Value::Object(map))
+            .map_err(|error| self.bad_parameters(error))
     }
 
-    /// Its own random stream, derived from the seed and its name: the only chance it may use.
+    /// The error of a robot that cannot work with its parameters.
+    pub fn bad_parameters(&self, reason: impl std::fmt::Display) -> BadParameters {
+        BadParameters {
+            robot: self.welcome.name.clone(),
+            reason: reason.to_string(),
+        }
+    }
+
+    /// The robot's random stream, derived from the seed and its name. A robot that draws from anywhere else does not
+    /// repeat with the seed.
     pub fn random(&mut self) -> &mut Stream {
         self.random
     }
 
-    /// Whether its last move was refused, so that it still stands where it was.
+    /// Whether the place it proposed was taken, so that it still stands where it was.
     #[must_use]
     pub fn was_blocked(&self) -> bool {
         self.news
@@ -108,24 +140,23 @@ impl Cars<'_> {
             .is_some_and(|correction| correction.blocked)
     }
 
-    /// Robots within its sensing range now. Sensing is physical: no cut network hides anybody.
+    /// Robots within sensing range now. Sensing is physical: a network that is cut hides none of them.
     #[must_use]
-    pub fn sensed_robots(&self) -> &[SensedRobot] {
+    pub fn sensed_robots(&self) -> &'a [SensedRobot] {
         &self.news.sensed
     }
 
-    /// All bodies within its sensing range now: obstacles, guests, robots. Costs a round trip to the simulator.
+    /// All bodies within sensing range now: obstacles, guests, robots. Costs a round trip to the simulator.
     ///
     /// # Errors
     /// [`CallError::Interrupted`] if the epoch is over.
     pub fn percept(&mut self) -> Result<Percept, CallError> {
-        let (epoch, tick) = (self.welcome.epoch, self.tick);
         self.network
-            .percept(&self.welcome.name, epoch, tick)
+            .percept(&self.welcome.name, self.welcome.epoch, self.tick)
             .map_err(|_| CallError::Interrupted)
     }
 
-    /// Writes a line to the log of the run. It is cut to what a message may hold, and so is their number in a tick.
+    /// Writes a line to the log of the run. Long lines are truncated, and lines beyond the limit of a tick are dropped.
     pub fn log(&mut self, line: impl Into<String>) {
         let mut line = line.into();
         if line.len() > MAX_TEXT_BYTES {
@@ -135,44 +166,48 @@ impl Cars<'_> {
                 .unwrap_or(0);
             line.truncate(end);
         }
-        // Room is left for what the seat itself may have to say, and for the rest of the report.
+
+        // The rest is for the lines that the SDK adds, and for the other fields of the report.
         let bytes: usize = self.log.iter().map(String::len).sum();
         if self.log.len() < MAX_ENTRIES / 2 && bytes + line.len() <= MAX_LOG_BYTES {
             self.log.push(line);
         }
     }
 
-    /// It cannot go on, and says why: whatever this tick comes to is thrown away, and its process leaves the run. The
-    /// first reason counts.
+    /// Ends the robot: the result of this tick is discarded, and its process leaves the run with this reason. The first
+    /// reason counts.
     pub fn give_up(&mut self, reason: impl Into<String>) {
         self.gave_up.get_or_insert(reason.into());
     }
 
-    /// Sends a command to another robot (`setRobotCommand`). It arrives at a later tick, if the network lets it.
+    /// Sends a command to another robot (`setRobotCommand`). It arrives at a later tick, unless the simulated network
+    /// loses it.
     ///
     /// # Errors
-    /// [`CallError::UnknownRobot`] if nobody has this name.
+    /// [`CallError::UnknownRobot`] if no robot has this name.
     pub fn set_robot_command(
         &mut self,
         to: &str,
         command: impl Into<String>,
     ) -> Result<Seq, CallError> {
         let to = self.known(to)?;
+        let command = command.into();
         self.outbox.last_seq += 1;
-        let (seq, performative, command) =
-            (self.outbox.last_seq, Performative::Achieve, command.into());
+        let seq = self.outbox.last_seq;
+
         let message = protocol::messages::Command {
             epoch: self.welcome.epoch,
             tick: self.tick,
             seq,
-            performative,
+            performative: Performative::Achieve,
             command: command.clone(),
         };
         self.network.send(&self.welcome.name, &to, &message);
+
         self.outbox.sent.push(protocol::messages::SentCommand {
             to,
             seq,
-            performative,
+            performative: Performative::Achieve,
             command,
         });
         Ok(seq)
@@ -181,7 +216,7 @@ impl Cars<'_> {
     /// Where another robot stood at the last tick, meters (`getRobotLocation`).
     ///
     /// # Errors
-    /// See [`CallError`]; the same holds for the other queries.
+    /// See [`CallError`].
     pub fn get_robot_location(&mut self, of: &str) -> Result<Point, CallError> {
         self.get_robot_state(of).map(|state| state.location)
     }

@@ -1,102 +1,116 @@
-//! The common robot interface: the seed's Figure 7 as a trait.
+//! What a robot implements: one method from what it perceives to what it does.
 
-use protocol::RobotName;
-use protocol::messages::{Panel, Point, StateVariables};
+use protocol::messages::{Panel, Point, StateVariables, Variable};
 
 use crate::cars::Cars;
+pub(crate) use crate::error::{BadParameters, RobotError};
 
-/// Parameters that a robot cannot work with.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("parameters of {robot}: {reason}")]
-pub struct BadParameters {
-    /// Whose.
-    pub robot: RobotName,
-    /// What is wrong with them.
-    pub reason: String,
-}
-
-/// Why a robot cannot take part any more.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum RobotError {
-    /// It refuses its parameters.
-    #[error(transparent)]
-    Parameters(#[from] BadParameters),
-    /// It gave up in the middle of a tick ([`Cars::give_up`]).
-    #[error("{robot} gives up: {reason}")]
-    GaveUp {
-        /// Which robot.
-        robot: RobotName,
-        /// Why, for people.
-        reason: String,
-    },
-    /// What it says of itself is beyond the limits of a message.
-    #[error("{robot} says too much: {field}: {reason}")]
-    TooMuch {
-        /// Which robot.
-        robot: RobotName,
-        /// Where in its report.
-        field: String,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
-
-/// A robot, as the simulation and the other robots see it (`CARSRobotInterface`; `getName` is [`Cars::name`], since
-/// the roster names a robot).
+/// A robot.
 ///
-/// In each tick the methods are called in the order of the seed's Figure 5: where it stands now, the commands that
-/// arrived, its variables, its emotion, its behavior, where it wants to be next. What it returns from the getters
-/// after that is what the others learn during the next tick.
+/// The SDK calls [`init`](Robot::init), then [`tick`](Robot::tick) once for every tick of the run, beginning with
+/// tick 0. Everything a robot perceives is in [`Cars`]; everything it does is in the [`Action`] that it returns and in
+/// the commands it sent on the way. Its state between ticks is its own.
+///
+/// A robot in the form of the paper's interface of thirteen methods is a [`CarsRobotInterface`](crate::CarsRobotInterface).
 pub trait Robot {
-    /// Back to the initial state, before tick 0 and after every `init` (`initRobot`).
+    /// Returns to the initial state. Called before tick 0, at every start of a new epoch, and in a process that takes
+    /// over from a lost one in the middle of an epoch.
     ///
     /// # Errors
-    /// [`BadParameters`] if the scenario's parameters make no sense to it.
-    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters>;
+    /// [`BadParameters`] if the robot cannot work with the parameters of the scenario.
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters>;
 
-    /// Magnitude of the current velocity, m/s (`getSpeed`).
-    fn speed(&self) -> f64;
+    /// Runs one tick. At tick 0 the robot stands at its start, no command has arrived, and other robots cannot be
+    /// queried yet.
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action;
 
-    /// Direction of motion, radians counter-clockwise from +x (`getDirection`).
-    fn direction(&self) -> f64;
+    /// Continues from the state variables that the lost process published last. Called after [`init`](Robot::init) in
+    /// the process that takes over. By default the robot starts afresh.
+    fn resume(&mut self, _cars: &mut Cars<'_>, _last: &StateVariables) {}
 
-    /// Updates the variables that measure its progress (`updateStateVariables`).
-    fn update_state_variables(&mut self, cars: &mut Cars<'_>);
-
-    /// The variables that others may learn (`getStateVariables`).
-    fn state_variables(&self) -> StateVariables;
-
-    /// Where it stands, meters (`getCurrentLocation`).
-    fn current_location(&self) -> Point;
-
-    /// Where it wants to stand at the next tick, meters (`projectLocation`). It stays where it is if the way is not
-    /// free; what to do about that is its own affair ([`Cars::was_blocked`] tells).
-    fn project_location(&mut self, cars: &mut Cars<'_>) -> Point;
-
-    /// Where it really stands now, meters (`setCurrentLocation`).
-    fn set_current_location(&mut self, cars: &mut Cars<'_>, location: Point);
-
-    /// A command arrived (`setCommand`), in the order of senders and of their numbers.
-    fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str);
-
-    /// The emotion state generator: progress in, emotion out (`updateEmotionState`).
-    fn update_emotion_state(&mut self, cars: &mut Cars<'_>);
-
-    /// Its emotion (`getEmotionState`).
-    fn emotion_state(&self) -> &str;
-
-    /// The behavior state generator: progress and emotion in, behavior out (`updateBehaviorState`).
-    fn update_behavior_state(&mut self, cars: &mut Cars<'_>);
-
-    /// Its behavior (`getBehaviorState`).
-    fn behavior_state(&self) -> &str;
-
-    /// What it chooses to display (the seed's `paintComponent`).
+    /// What the console shows of the robot (the paper's `paintComponent`). By default nothing.
     fn panel(&self) -> Panel {
         Panel::default()
     }
+}
 
-    /// Its previous incarnation was lost in this epoch and had reported these variables last. Called after
-    /// [`Robot::init_robot`]; a robot that does not care starts afresh.
-    fn resume(&mut self, _cars: &mut Cars<'_>, _last: &StateVariables) {}
+/// What a robot does in a tick, and what it publishes: other robots receive it when they query the robot during the
+/// next tick.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Action {
+    /// Where the robot wants to stand at the next tick, meters. If the place is taken, it stays where it is, and
+    /// [`Cars::was_blocked`] holds in the next tick.
+    pub proposal: Point,
+    /// Magnitude of its velocity, m/s.
+    pub speed_mps: f64,
+    /// Direction of motion, radians counter-clockwise from the x axis.
+    pub direction_rad: f64,
+    /// Name of its emotion.
+    pub emotion_state: String,
+    /// Name of its behavior.
+    pub behavior_state: String,
+    /// Further variables that it publishes.
+    pub state_variables: StateVariables,
+}
+
+impl Action {
+    /// Stay here. Emotion and behavior have no name yet, and no variable is published: see [`Action::emotion`],
+    /// [`Action::behavior`] and [`Action::variable`].
+    #[must_use]
+    pub fn stay(cars: &Cars<'_>) -> Self {
+        Self {
+            proposal: cars.location(),
+            ..Self::default()
+        }
+    }
+
+    /// Go straight toward `goal` and stop there. The published speed is `speed_mps` also in the last step, which may be
+    /// shorter; at the goal it is 0.
+    #[must_use]
+    pub fn go(cars: &Cars<'_>, goal: Point, speed_mps: f64) -> Self {
+        let here = cars.location();
+        let distance_m = here.distance_m(goal);
+        if distance_m == 0.0 {
+            return Self::stay(cars);
+        }
+
+        let toward = (
+            (goal.x - here.x) / distance_m,
+            (goal.y - here.y) / distance_m,
+        );
+        let step_m = speed_mps * cars.tick_s();
+        let proposal = if distance_m <= step_m {
+            goal
+        } else {
+            Point::new(here.x + toward.0 * step_m, here.y + toward.1 * step_m)
+        };
+
+        Self {
+            proposal,
+            speed_mps,
+            direction_rad: libm::atan2(toward.1, toward.0),
+            ..Self::default()
+        }
+    }
+
+    /// Publishes this emotion.
+    #[must_use]
+    pub fn emotion(mut self, name: impl Into<String>) -> Self {
+        self.emotion_state = name.into();
+        self
+    }
+
+    /// Publishes this behavior.
+    #[must_use]
+    pub fn behavior(mut self, name: impl Into<String>) -> Self {
+        self.behavior_state = name.into();
+        self
+    }
+
+    /// Publishes this state variable. A number must be finite: JSON has no NaN, so another one is dropped and logged.
+    #[must_use]
+    pub fn variable(mut self, name: impl Into<String>, value: impl Into<Variable>) -> Self {
+        self.state_variables.insert(name.into(), value.into());
+        self
+    }
 }

@@ -1,4 +1,4 @@
-//! The `main` of a robot's program: the same arguments, the same log, the same exit status for all.
+//! The `main` of a robot's program: its arguments, its log, its exit status.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -11,23 +11,23 @@ use protocol::{RobotName, RunName};
 use crate::cri::Robot;
 use crate::host::{Host, HostError, HostOptions};
 
-/// What every robot's program understands.
+/// The arguments of a robot's program.
 #[derive(Debug, Clone, Parser)]
 #[command(
     version,
     about = "A robot of the Cooperative Affective Robot Simulator"
 )]
 pub struct RobotArgs {
-    /// Which robot of the roster this is; several names run several robots in this process.
+    /// The robot of the roster to run; several names run several robots in this process.
     #[arg(long = "name", value_name = "NAME")]
     pub names: Vec<RobotName>,
     /// The run to take part in.
     #[arg(long, env = "CARS_RUN", default_value = "default")]
     pub run: RunName,
-    /// Where its simulator listens.
+    /// Where the simulator listens.
     #[arg(long, env = "CARS_CONNECT", default_value = DEFAULT_ENDPOINT, value_name = "ENDPOINT")]
     pub connect: String,
-    /// How long to try to reach the simulator and to be let in, seconds.
+    /// How long to try to reach the simulator and to join, seconds.
     #[arg(
         long,
         env = "CARS_PATIENCE_S",
@@ -35,7 +35,7 @@ pub struct RobotArgs {
         value_name = "SECONDS"
     )]
     pub patience_s: f64,
-    /// How long to wait for the simulator once it is gone, or the link to it is cut, seconds.
+    /// How long to wait for a simulator that is gone, or whose link is cut, seconds.
     #[arg(
         long,
         env = "CARS_GONE_PATIENCE_S",
@@ -49,17 +49,16 @@ pub struct RobotArgs {
 }
 
 impl RobotArgs {
-    /// How these arguments say to reach a run.
+    /// The options of a host with these arguments.
     #[must_use]
     pub fn options(&self) -> HostOptions {
         let patience =
             Duration::try_from_secs_f64(self.patience_s).unwrap_or(Duration::from_secs(20));
         let gone_patience =
             Duration::try_from_secs_f64(self.gone_patience_s).unwrap_or(Duration::from_secs(600));
-        let (run, connect) = (self.run.clone(), self.connect.clone());
         HostOptions {
-            run,
-            connect,
+            run: self.run.clone(),
+            connect: self.connect.clone(),
             patience,
             gone_patience,
             zenoh_config: self.zenoh_config.clone(),
@@ -67,11 +66,16 @@ impl RobotArgs {
     }
 }
 
-/// Runs a robot's program: `make` builds the robot for a name, `default_name` is used where the command line gives
-/// none. Returns when the run ends; the exit status is 0 if it ended as it should.
+/// Runs a robot's program. `make` builds the robot for a name; `default_name` is its name if the command line has none.
+/// Returns when the run ends, with exit status 0 if no error ended it.
 pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> ExitCode {
     bus::runtime::use_one_thread();
+
     let mut args = RobotArgs::parse();
+    if args.names.is_empty() {
+        args.names.extend(RobotName::new(default_name));
+    }
+
     let filter =
         tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
     tracing_subscriber::fmt()
@@ -80,9 +84,7 @@ pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> 
         .without_time()
         .with_target(false)
         .init();
-    if args.names.is_empty() {
-        args.names.extend(RobotName::new(default_name));
-    }
+
     match take_part(&args, make) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

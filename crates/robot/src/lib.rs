@@ -1,34 +1,29 @@
 //! SDK for robots: the common robot interface and the loop that runs robots in lock-step.
 //!
-//! A robot is one type that implements [`Robot`], whose methods are those of the seed's `CARSRobotInterface`
-//! (Figure 7), and one line that hands it to [`main`]:
+//! A robot is one type that implements [`Robot`], and one line that hands it to [`main`]:
 //!
 //! ```no_run
-//! use robot::{Cars, Point, Robot, StateVariables};
+//! use robot::{Action, BadParameters, Cars, Point, Robot};
 //!
 //! /// Walks to the right and counts its steps.
 //! #[derive(Default)]
-//! struct Walker { at: Point, steps: u32 }
+//! struct Walker { steps: u32 }
 //!
 //! impl Robot for Walker {
-//!     fn init_robot(&mut self, _: &mut Cars<'_>) -> Result<(), robot::BadParameters> {
+//!     fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
 //!         *self = Self::default();
 //!         Ok(())
 //!     }
-//!     fn speed(&self) -> f64 { 0.5 }
-//!     fn direction(&self) -> f64 { 0.0 }
-//!     fn update_state_variables(&mut self, _: &mut Cars<'_>) { self.steps += 1; }
-//!     fn state_variables(&self) -> StateVariables { [("steps".into(), self.steps.into())].into() }
-//!     fn current_location(&self) -> Point { self.at }
-//!     fn project_location(&mut self, cars: &mut Cars<'_>) -> Point {
-//!         Point::new(self.at.x + 0.5 * cars.tick_s(), self.at.y)
+//!
+//!     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+//!         self.steps += 1;
+//!         let [width_m, _] = cars.welcome().field_m;
+//!         let wall = Point::new(width_m, cars.location().y);
+//!         Action::go(cars, wall, 0.5)
+//!             .emotion("CALM")
+//!             .behavior("WALK")
+//!             .variable("steps", self.steps)
 //!     }
-//!     fn set_current_location(&mut self, _: &mut Cars<'_>, location: Point) { self.at = location; }
-//!     fn set_command(&mut self, _: &mut Cars<'_>, _: &robot::RobotName, _: &str) {}
-//!     fn update_emotion_state(&mut self, _: &mut Cars<'_>) {}
-//!     fn emotion_state(&self) -> &str { "CALM" }
-//!     fn update_behavior_state(&mut self, _: &mut Cars<'_>) {}
-//!     fn behavior_state(&self) -> &str { "WALK" }
 //! }
 //!
 //! fn main() -> std::process::ExitCode {
@@ -36,21 +31,28 @@
 //! }
 //! ```
 //!
-//! Robots see nothing of the world but what this crate gives them: it has no dependency on the environment.
+//! A robot that is written against the interface of the paper's Figure 7 implements [`CarsRobotInterface`] instead, and
+//! [`Paper`] makes a [`Robot`] of it.
+//!
+//! A robot perceives the world only through [`Cars`]: this crate does not depend on the environment.
 
 mod board;
 mod cars;
 mod cri;
 mod entry;
+mod error;
+mod figure7;
 mod held;
 mod host;
 mod link;
 mod local;
 mod seat;
 
-pub use cars::{CallError, Cars};
-pub use cri::{BadParameters, Robot, RobotError};
+pub use cars::{CallError, Cars, ReceivedCommand};
+pub use cri::{Action, Robot};
 pub use entry::{RobotArgs, main};
+pub use error::{BadParameters, RobotError};
+pub use figure7::{CarsRobotInterface, Paper};
 pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::{LocalHost, Sense};
 pub use protocol::messages::{

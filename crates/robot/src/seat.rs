@@ -9,8 +9,9 @@ use protocol::messages::{
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Message, RobotName, Tick};
 
-use crate::cars::{Cars, Outbox};
-use crate::cri::{Robot, RobotError};
+use crate::cars::{Cars, Outbox, ReceivedCommand};
+use crate::cri::{Action, Robot};
+use crate::error::RobotError;
 
 /// What a seat needs from outside during a tick.
 pub trait Network {
@@ -50,6 +51,17 @@ pub enum Undelivered {
     Lost,
     /// The epoch is over.
     Interrupted,
+}
+
+/// How a robot begins a tick.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Begin {
+    /// From its initial state.
+    Afresh,
+    /// From its initial state, with the variables that a lost process published last.
+    TakeOver,
+    /// From its state after the tick before.
+    GoOn,
 }
 
 /// A robot that takes part in an epoch.
@@ -106,7 +118,7 @@ impl Seat {
         self.robot.panel()
     }
 
-    /// The first tick of the epoch: initialize, and propose where to go. Nobody has said anything yet.
+    /// The first tick of the epoch: the robot returns to its initial state and acts from its start.
     ///
     /// # Errors
     /// [`RobotError`] if the robot refuses its parameters, or gives up.
@@ -115,13 +127,8 @@ impl Seat {
         clock: &Clock,
         network: &mut dyn Network,
     ) -> Result<(Report, PublicState), RobotError> {
-        let (mut log, welcome) = (Vec::new(), self.welcome.clone());
-        let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
-        self.proposal = welcome.location;
-        let (robot, mut cars) = self.enter(&welcome, clock.tick, &news, &mut log, network);
-        robot.init_robot(&mut cars)?;
-        robot.set_current_location(&mut cars, welcome.location);
-        self.leave(clock.tick, &news, Vec::new(), log, network)
+        self.proposal = self.welcome.location;
+        self.act(clock, network, Begin::Afresh)
     }
 
     /// The first tick of an incarnation that takes over in the middle of an epoch.
@@ -133,19 +140,10 @@ impl Seat {
         clock: &Clock,
         network: &mut dyn Network,
     ) -> Result<(Report, PublicState), RobotError> {
-        let (mut log, welcome) = (Vec::new(), self.welcome.clone());
-        let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
-        let (robot, mut cars) = self.enter(&welcome, clock.tick, &news, &mut log, network);
-        robot.init_robot(&mut cars)?;
-        if let Some(last) = &welcome.last_state {
-            robot.resume(&mut cars, &last.state_variables);
-        }
-        let (mut report, state) = self.tick(clock, network)?;
-        report.log.splice(0..0, log);
-        Ok((report, state))
+        self.act(clock, network, Begin::TakeOver)
     }
 
-    /// One tick, in the order of the seed's Figure 5.
+    /// One tick.
     ///
     /// # Errors
     /// [`RobotError`] if the robot gives up.
@@ -154,127 +152,103 @@ impl Seat {
         clock: &Clock,
         network: &mut dyn Network,
     ) -> Result<(Report, PublicState), RobotError> {
-        let (mut log, mut missing, welcome) = (Vec::new(), Vec::new(), self.welcome.clone());
+        self.act(clock, network, Begin::GoOn)
+    }
+
+    /// Lets the robot perceive and act, and reports what it did.
+    fn act(
+        &mut self,
+        clock: &Clock,
+        network: &mut dyn Network,
+        begin: Begin,
+    ) -> Result<(Report, PublicState), RobotError> {
+        let welcome = self.welcome.clone();
         let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
         let location = news
             .correction
             .map_or(self.proposal, |correction| correction.location);
-        let (robot, mut cars) = self.enter(&welcome, clock.tick, &news, &mut log, network);
+        let received = receive(&welcome, &news, network);
 
-        robot.set_current_location(&mut cars, location);
-        let mut received: Option<(&CommandId, Command)> = None;
-        for id in &news.commands {
-            // One that the medium has doubled is named twice in a row, and is here once.
-            if received.as_ref().is_none_or(|(last, _)| *last != id) {
-                received = cars
-                    .network
-                    .receive(&welcome.name, clock.epoch, id)
-                    .map(|command| (id, command));
-            }
-            match &received {
-                Some((_, command)) => robot.set_command(&mut cars, &id.from, &command.command),
-                None => missing.push(id.clone()),
-            }
+        let mut log = Vec::new();
+        let mut cars = Cars {
+            welcome: &welcome,
+            tick: clock.tick,
+            location,
+            commands: &received.commands,
+            news: &news,
+            random: &mut self.random,
+            outbox: &mut self.outbox,
+            log: &mut log,
+            gave_up: &mut self.gave_up,
+            network,
+        };
+        if begin != Begin::GoOn {
+            self.robot.init(&mut cars)?;
         }
-        robot.update_state_variables(&mut cars);
-        robot.update_emotion_state(&mut cars);
-        robot.update_behavior_state(&mut cars);
+        if begin == Begin::TakeOver
+            && let Some(last) = &welcome.last_state
+        {
+            self.robot.resume(&mut cars, &last.state_variables);
+        }
+        let mut action = Action::default();
+        if cars.gave_up.is_none() {
+            action = self.robot.tick(&mut cars);
+        }
 
-        self.leave(clock.tick, &news, missing, log, network)
-    }
-
-    /// The robot, and the simulation as it sees it in this tick.
-    fn enter<'a>(
-        &'a mut self,
-        welcome: &'a Welcome,
-        tick: Tick,
-        news: &'a News,
-        log: &'a mut Vec<String>,
-        network: &'a mut dyn Network,
-    ) -> (&'a mut dyn Robot, Cars<'a>) {
-        let Self {
-            robot,
-            random,
-            outbox,
-            gave_up,
-            ..
-        } = self;
-        (
-            robot.as_mut(),
-            Cars {
-                welcome,
-                tick,
-                news,
-                random,
-                outbox,
-                log,
-                gave_up,
-                network,
-            },
-        )
-    }
-
-    /// The end of every tick: where to go next, and what to tell.
-    fn leave(
-        &mut self,
-        tick: Tick,
-        news: &News,
-        missing: Vec<CommandId>,
-        mut log: Vec<String>,
-        network: &mut dyn Network,
-    ) -> Result<(Report, PublicState), RobotError> {
-        let welcome = self.welcome.clone();
-        let (robot, mut cars) = self.enter(&welcome, tick, news, &mut log, network);
-        let location = robot.current_location();
-        let projected = robot.project_location(&mut cars);
-        let (speed_mps, direction_rad) = (robot.speed(), crate::published_angle(robot.direction()));
-        let (emotion_state, behavior_state) = (
-            robot.emotion_state().to_owned(),
-            robot.behavior_state().to_owned(),
-        );
-        let mut state_variables = robot.state_variables();
         if let Some(reason) = self.gave_up.take() {
             return Err(RobotError::GaveUp {
                 robot: welcome.name.clone(),
                 reason,
             });
         }
+        self.publish(clock.tick, location, action, received.missing, log)
+    }
 
-        // A number that is none cannot travel. The run goes on, and its log says whose fault it is.
-        if !(projected.x.is_finite() && projected.y.is_finite()) {
+    /// Makes the report and the public state of an action, once they are fit to be sent.
+    fn publish(
+        &mut self,
+        tick: Tick,
+        location: Point,
+        mut action: Action,
+        missing: Vec<CommandId>,
+        mut log: Vec<String>,
+    ) -> Result<(Report, PublicState), RobotError> {
+        // JSON has no NaN: a number that is not finite is replaced or dropped, and logged.
+        let proposal = action.proposal;
+        if !(proposal.x.is_finite() && proposal.y.is_finite()) {
             log.push("error: the projected location is not a number; staying".to_owned());
         }
-        state_variables.retain(|name, value| {
-            let can_travel = value.as_f64().is_none_or(f64::is_finite);
-            if !can_travel {
+        self.proposal = Point::new(
+            finite_or(proposal.x, location.x),
+            finite_or(proposal.y, location.y),
+        );
+        action.state_variables.retain(|name, value| {
+            let is_finite = value.as_f64().is_none_or(f64::is_finite);
+            if !is_finite {
                 log.push(format!(
                     "error: state variable {name} is not a finite number; left out"
                 ));
             }
-            can_travel
+            is_finite
         });
-        let finite_or = |value: f64, instead: f64| if value.is_finite() { value } else { instead };
-        self.proposal = Point::new(
-            finite_or(projected.x, location.x),
-            finite_or(projected.y, location.y),
-        );
 
         let state = PublicState {
-            epoch: welcome.epoch,
+            epoch: self.welcome.epoch,
             tick,
             location,
-            speed_mps: finite_or(speed_mps, 0.0),
-            direction_rad: finite_or(direction_rad, 0.0),
-            state_variables,
-            emotion_state,
-            behavior_state,
+            speed_mps: finite_or(action.speed_mps, 0.0),
+            direction_rad: finite_or(crate::published_angle(action.direction_rad), 0.0),
+            state_variables: action.state_variables,
+            emotion_state: action.emotion_state,
+            behavior_state: action.behavior_state,
         };
         let report = self.report(&state, missing, log);
-        // A simulator would refuse it and wait for another one.
+
+        // The simulator would refuse a report beyond the limits, and wait for another one.
         match report.check() {
             Ok(()) => Ok((report, state)),
             Err((field, reason)) => Err(RobotError::TooMuch {
-                robot: welcome.name.clone(),
+                robot: self.welcome.name.clone(),
                 field,
                 reason,
             }),
@@ -297,4 +271,38 @@ impl Seat {
             log,
         }
     }
+}
+
+/// The commands that a clock named.
+#[derive(Default)]
+struct Received {
+    commands: Vec<ReceivedCommand>,
+    /// Those that never came.
+    missing: Vec<CommandId>,
+}
+
+/// Takes the commands that the news name from the network.
+fn receive(welcome: &Welcome, news: &News, network: &mut dyn Network) -> Received {
+    let mut received = Received::default();
+    let mut last: Option<(&CommandId, Command)> = None;
+    for id in &news.commands {
+        // A command that the medium has doubled is named twice in a row; the network holds it once.
+        if last.as_ref().is_none_or(|(last_id, _)| *last_id != id) {
+            last = network
+                .receive(&welcome.name, welcome.epoch, id)
+                .map(|command| (id, command));
+        }
+        match &last {
+            Some((_, command)) => received.commands.push(ReceivedCommand {
+                from: id.from.clone(),
+                text: command.command.clone(),
+            }),
+            None => received.missing.push(id.clone()),
+        }
+    }
+    received
+}
+
+fn finite_or(value: f64, fallback: f64) -> f64 {
+    if value.is_finite() { value } else { fallback }
 }

@@ -5,7 +5,7 @@
 
 use protocol::Message;
 use protocol::messages::{Clock, JoinAnswer};
-use robot::{BadParameters, Cars, LocalHost, Percept, Point, Robot, RobotName, StateVariables};
+use robot::{Action, BadParameters, Cars, LocalHost, Percept, Point, Robot};
 
 /// Whether it has a variable that is too long.
 struct Chatterbox(bool);
@@ -14,45 +14,28 @@ struct Chatterbox(bool);
 const SILENT_AT: u64 = 3;
 
 impl Robot for Chatterbox {
-    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         (0..5000).for_each(|_| cars.log("\u{e9}".repeat(5000)));
         Ok(())
     }
-    fn speed(&self) -> f64 {
-        f64::NAN
-    }
-    fn direction(&self) -> f64 {
-        0.0
-    }
-    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
         if cars.tick() == SILENT_AT {
             cars.give_up("there is nothing left to say");
             cars.give_up("the first reason counts");
         }
-    }
-    fn state_variables(&self) -> StateVariables {
+
         let secret = "s".repeat(if self.0 { 5000 } else { 0 });
-        [
-            ("x".to_owned(), f64::INFINITY.into()),
-            ("secret".to_owned(), secret.into()),
-        ]
-        .into()
-    }
-    fn current_location(&self) -> Point {
-        Point::new(1.0, 1.0)
-    }
-    fn project_location(&mut self, _: &mut Cars<'_>) -> Point {
-        Point::new(f64::NAN, 1.0)
-    }
-    fn set_current_location(&mut self, _: &mut Cars<'_>, _: Point) {}
-    fn set_command(&mut self, _: &mut Cars<'_>, _: &RobotName, _: &str) {}
-    fn update_emotion_state(&mut self, _: &mut Cars<'_>) {}
-    fn emotion_state(&self) -> &str {
-        "CALM"
-    }
-    fn update_behavior_state(&mut self, _: &mut Cars<'_>) {}
-    fn behavior_state(&self) -> &str {
-        "TALK"
+        let action = Action {
+            proposal: Point::new(f64::NAN, 1.0),
+            speed_mps: f64::NAN,
+            ..Action::stay(cars)
+        };
+        action
+            .emotion("CALM")
+            .behavior("TALK")
+            .variable("x", f64::INFINITY)
+            .variable("secret", secret)
     }
 }
 

@@ -1,11 +1,11 @@
-//! A robot's own chance: one stream for each thing that it leaves to chance, so that a blocked step does not change
-//! when the next guest takes a treat.
+//! Random numbers for robots: one stream for each purpose, so that a blocked step does not change when the next guest
+//! takes a treat.
 
 use rand::{Rng, SeedableRng};
 use robot::Stream;
 use serde::{Deserialize, Serialize};
 
-/// A random stream that remembers how far it has come, so that it can be saved and continued.
+/// A random stream that counts its draws, so that it can be saved and continued.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Position", into = "Position")]
 pub struct Chance {
@@ -13,7 +13,7 @@ pub struct Chance {
     stream: Stream,
 }
 
-/// All that is to be saved of a stream.
+/// What is saved of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Position {
@@ -38,7 +38,7 @@ impl From<Chance> for Position {
 }
 
 impl Chance {
-    /// A stream whose seed is the next number of `parent`, the stream that the robot was given.
+    /// A stream whose seed is the next number of `parent`, the robot's own stream.
     pub fn split(parent: &mut Stream) -> Self {
         Self::from(Position {
             key: parent.next_u64(),
@@ -64,17 +64,18 @@ impl Chance {
         -libm::log(1.0 - self.uniform()) * mean
     }
 
-    /// Uniform between half of `mean` and one and a half: chance by the four basic operations alone, for what
-    /// decides where a body goes.
+    /// Uniform between 0.5 and 1.5 times `mean`. It uses the basic operations alone, as everything must that decides
+    /// where a body goes.
     pub fn around(&mut self, mean: f64) -> f64 {
         mean * (0.5 + self.uniform())
     }
 
-    /// A direction, all equally probable, as a unit vector: a place in the unit disc, drawn until it is inside and not
-    /// so near to the middle that its direction would be coarse.
+    /// A direction as a unit vector, all directions equally probable: a point of a square, drawn until it is in the unit
+    /// disc and not so near to its center that the direction would be coarse.
     pub fn direction(&mut self) -> (f64, f64) {
         loop {
-            let (x, y) = (2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0);
+            let x = 2.0 * self.uniform() - 1.0;
+            let y = 2.0 * self.uniform() - 1.0;
             let square = x * x + y * y;
             if (1e-6..=1.0).contains(&square) {
                 let length = square.sqrt();
@@ -83,7 +84,7 @@ impl Chance {
         }
     }
 
-    /// One of `count` things; `count` is not 0.
+    /// An index below `count`, which must not be 0.
     pub fn one_of(&mut self, count: usize) -> usize {
         // Counts are small, so the product stays exact enough; the minimum guards the rounding at the upper end.
         ((self.uniform() * count as f64) as usize).min(count - 1)

@@ -1,10 +1,10 @@
-//! How a robot moves: a random walk, straight drives around whoever stands in the way, standing still.
+//! How a robot moves: a random walk, straight drives around bodies in the way, standing still.
 //!
-//! What reaches the wire is made by + - * / and the square root alone, which are the same on every machine and in every
-//! language; a heading is a unit vector and never an angle. The seed leaves to the robots what they do about a
-//! collision; the ways here are chosen \[I\].
+//! Locations are computed with + - * / and square roots only, which give the same result on every machine and in every
+//! language; a heading is a unit vector and never an angle. The paper leaves open what a robot does about a collision;
+//! the ways here are chosen \[I\].
 
-use robot::{Cars, Percept, Point};
+use robot::{Action, Cars, Percept, Point};
 use serde::{Deserialize, Serialize};
 
 use crate::chance::Chance;
@@ -22,31 +22,32 @@ const OFFSETS: [(f64, f64); 6] = [
 /// Shares of a step that are tried, the longest first \[I\].
 const SHARES: [f64; 2] = [1.0, 0.5];
 
-/// How deep two bodies may overlap and still count as touching, meters; as the collision rule has it.
+/// How deep two bodies may overlap and still count as touching, meters; as in the simulator's collision rule.
 const TOUCH_M: f64 = 1e-9;
 
-/// New headings tried in a tick before a walker stays where it is \[I\].
+/// Time for which a robot looks around before each step after it was blocked, seconds \[I\].
+pub const LOOK_S: f64 = 2.0;
+
+/// New headings tried in a tick of a random walk before the robot stays where it is \[I\].
 const WALK_TRIES: u32 = 8;
 
-/// Where a robot is heading, and how it got past the last obstacle.
+/// A robot's drive: its heading, and how it got past the last obstacle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Legs {
+pub struct Drive {
     heading: (f64, f64),
-    speed_mps: f64,
     /// The side on which it last found a way: 1 for left, -1 for right.
     side: f64,
-    /// For how long it goes on looking around before each step, seconds.
+    /// Time for which it still looks around before each step, seconds.
     careful_s: f64,
-    /// When the walk turns next, seconds.
+    /// Time until the random walk turns, seconds.
     turn_s: f64,
 }
 
-impl Default for Legs {
+impl Default for Drive {
     fn default() -> Self {
         Self {
             heading: (1.0, 0.0),
-            speed_mps: 0.0,
             side: 1.0,
             careful_s: 0.0,
             turn_s: 0.0,
@@ -57,124 +58,130 @@ impl Default for Legs {
 /// A straight drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Course {
-    /// Where to.
+    /// Where to, meters.
     pub goal: Point,
-    /// How near is near enough, meters.
+    /// Distance from the goal at which the drive stops, meters.
     pub stop_m: f64,
-    /// How fast, m/s.
+    /// Speed, m/s.
     pub speed_mps: f64,
-    /// For how long to look around before each step after one was refused, seconds.
+    /// Time for which the robot looks around before each step after it was blocked, seconds.
     pub look_s: f64,
 }
 
-impl Legs {
-    /// Magnitude of the motion that was decided last, m/s.
+impl Course {
+    /// A drive right to this goal, which looks around for [`LOOK_S`] after it was blocked.
     #[must_use]
-    pub fn speed_mps(&self) -> f64 {
-        self.speed_mps
+    pub fn to(goal: Point, speed_mps: f64) -> Self {
+        Self {
+            goal,
+            stop_m: 0.0,
+            speed_mps,
+            look_s: LOOK_S,
+        }
     }
+}
 
-    /// Its direction, radians.
-    #[must_use]
-    pub fn direction_rad(&self) -> f64 {
-        libm::atan2(self.heading.1, self.heading.0)
-    }
-
+impl Drive {
     /// Stands still.
-    pub fn stay(&mut self, at: Point) -> Point {
-        self.speed_mps = 0.0;
-        at
+    #[must_use]
+    pub fn stay(&self, cars: &Cars<'_>) -> Action {
+        self.move_to(cars.location(), 0.0)
     }
 
-    /// A step of a random walk: straight on, with a new heading when its time has come, when the last step was refused,
-    /// or where the field ends.
-    pub fn walk(
+    /// A step of a random walk: straight on, with a new heading when its time has come, after the robot was blocked, and
+    /// at the edge of the field.
+    pub fn wander(
         &mut self,
         cars: &Cars<'_>,
-        at: Point,
         speed_mps: f64,
         turn_mean_s: f64,
         chance: &mut Chance,
-    ) -> Point {
+    ) -> Action {
         self.turn_s -= cars.tick_s();
         let mut turns = self.turn_s <= 0.0 || cars.was_blocked();
         let step_m = speed_mps * cars.tick_s();
+
         for _ in 0..WALK_TRIES {
             if turns {
                 self.heading = chance.direction();
                 self.turn_s = chance.around(turn_mean_s);
             }
-            let there = stepped(at, self.heading, step_m);
-            if is_on_field(cars, there) {
-                self.speed_mps = speed_mps;
-                return there;
+            let target = stepped(cars.location(), self.heading, step_m);
+            if is_on_field(cars, target) {
+                return self.move_to(target, speed_mps);
             }
             turns = true;
         }
-        self.stay(at)
+        self.stay(cars)
     }
 
-    /// A step of a straight drive; for a while after a refused step it looks around first and steps aside where
-    /// somebody stands in the way.
-    pub fn drive(&mut self, cars: &mut Cars<'_>, at: Point, course: Course) -> Point {
+    /// A step of a straight drive. For a while after it was blocked the robot looks around first, and steps aside if a
+    /// body is in the way.
+    pub fn follow(&mut self, cars: &mut Cars<'_>, course: Course) -> Action {
+        let here = cars.location();
         let tick_s = cars.tick_s();
         if cars.was_blocked() {
             self.careful_s = course.look_s.max(tick_s);
         }
-        let away_m = at.distance_m(course.goal);
-        let step_m = (course.speed_mps * tick_s).min(away_m - course.stop_m);
+
+        let distance_m = here.distance_m(course.goal);
+        let step_m = (course.speed_mps * tick_s).min(distance_m - course.stop_m);
         if step_m <= 0.0 {
-            return self.stay(at);
+            return self.stay(cars);
         }
         let straight = (
-            (course.goal.x - at.x) / away_m,
-            (course.goal.y - at.y) / away_m,
+            (course.goal.x - here.x) / distance_m,
+            (course.goal.y - here.y) / distance_m,
         );
-        let free = if self.careful_s > 0.0 {
-            self.careful_s -= tick_s;
-            // Without an answer the epoch is over, and nobody will use the step.
-            let percept = cars.percept().unwrap_or_default();
-            // A narrow gap may take a short step where a long one does not fit.
-            let shorter = SHARES.iter().map(|share| step_m * share);
-            shorter.into_iter().find_map(|step_m| {
-                let heading = self.free_heading(cars, &percept, at, straight, step_m)?;
-                Some((heading, step_m))
-            })
-        } else {
-            Some((straight, step_m))
-        };
-        let Some((heading, step_m)) = free else {
-            return self.stay(at);
-        };
-        self.heading = heading;
-        self.speed_mps = step_m / tick_s;
-        stepped(at, heading, step_m)
+        if self.careful_s <= 0.0 {
+            return self.step(here, straight, step_m, tick_s);
+        }
+
+        self.careful_s -= tick_s;
+        // Without a percept the epoch is over, and the step is discarded.
+        let percept = cars.percept().unwrap_or_default();
+        // A narrow gap may take a short step where a long one does not fit.
+        for share in SHARES {
+            let short_m = step_m * share;
+            if let Some(heading) = self.free_heading(cars, &percept, straight, short_m) {
+                return self.step(here, heading, short_m, tick_s);
+            }
+        }
+        self.stay(cars)
     }
 
-    /// The heading nearest to the straight one whose step is free, on the side that worked last before the other.
+    fn step(&mut self, here: Point, heading: (f64, f64), step_m: f64, tick_s: f64) -> Action {
+        self.heading = heading;
+        self.move_to(stepped(here, heading, step_m), step_m / tick_s)
+    }
+
+    /// A move along the present heading.
+    fn move_to(&self, proposal: Point, speed_mps: f64) -> Action {
+        Action {
+            proposal,
+            speed_mps,
+            direction_rad: libm::atan2(self.heading.1, self.heading.0),
+            ..Action::default()
+        }
+    }
+
+    /// The heading nearest to the straight one whose step is free. Of two that are equally near, the one on the side
+    /// that was free last.
     fn free_heading(
         &mut self,
         cars: &Cars<'_>,
         percept: &Percept,
-        at: Point,
         straight: (f64, f64),
         step_m: f64,
     ) -> Option<(f64, f64)> {
-        let is_free = |heading| {
-            let there = stepped(at, heading, step_m);
-            let apart_m = cars.welcome().body_m - TOUCH_M;
-            let overlaps = |body: Point| {
-                (body.x - there.x).abs() < apart_m && (body.y - there.y).abs() < apart_m
-            };
-            is_on_field(cars, there) && !percept.bodies.iter().any(|body| overlaps(body.location))
-        };
-        if is_free(straight) {
+        let here = cars.location();
+        if is_free(cars, percept, stepped(here, straight, step_m)) {
             return Some(straight);
         }
         for (cos, sin) in OFFSETS {
             for side in [self.side, -self.side] {
                 let heading = turned(straight, cos, side * sin);
-                if is_free(heading) {
+                if is_free(cars, percept, stepped(here, heading, step_m)) {
                     self.side = side;
                     return Some(heading);
                 }
@@ -182,6 +189,16 @@ impl Legs {
         }
         None
     }
+}
+
+/// Whether a body with this center is on the field and overlaps no other.
+fn is_free(cars: &Cars<'_>, percept: &Percept, center: Point) -> bool {
+    let apart_m = cars.welcome().body_m - TOUCH_M;
+    is_on_field(cars, center)
+        && percept.bodies.iter().all(|body| {
+            (body.location.x - center.x).abs() >= apart_m
+                || (body.location.y - center.y).abs() >= apart_m
+        })
 }
 
 fn stepped(at: Point, heading: (f64, f64), step_m: f64) -> Point {

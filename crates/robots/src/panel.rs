@@ -1,16 +1,15 @@
-//! What the robots' panels have in common.
+//! Widgets that the panels of the robots share.
 
 use affect::akr::{FacialExpression, Valence};
 use affect::{Circumstances, EmotionLabel, Feeling, Schemata, StandardEmotion};
 use robot::{Face, Tone, Widget};
 
-/// How a robot without emotions names its state.
-pub(crate) const NEUTRAL: &str = "NEUTRAL";
+use crate::emotion::NEUTRAL;
 
 /// Values in a panel's curve: two minutes of ticks of half a second.
 pub(crate) const SPARKLINE_LEN: usize = 240;
 
-/// Face, name and strength of a feeling, and the robot's account of it.
+/// Face, name and intensity of a feeling, and its cause in words.
 pub(crate) fn feeling(
     feeling: Option<Feeling<StandardEmotion>>,
     label_cuts: &[f64; 4],
@@ -25,13 +24,14 @@ pub(crate) fn feeling(
             emotion(NEUTRAL, Tone::Neutral),
         ];
     };
-    let (name, intensity) = (feeling.emotion.name(), feeling.intensity);
+    let name = feeling.emotion.name();
+    let intensity = feeling.intensity;
+    let instance = Schemata::standard().emotion(name, intensity, circumstances);
+
     let mut widgets = Vec::new();
-    let told = Schemata::standard().emotion(name, intensity, circumstances);
-    if let Ok(told) = &told {
-        let face = face(told.components().facial_expression);
+    if let Ok(instance) = &instance {
         widgets.push(Widget::Face {
-            face,
+            face: face(instance.components().facial_expression),
             intensity: intensity.value(),
         });
     }
@@ -42,11 +42,10 @@ pub(crate) fn feeling(
         min: 0.0,
         max: 1.0,
     });
-    if let Ok(told) = &told {
-        let text = told.components().causal_chain.spoken();
+    if let Ok(instance) = &instance {
         widgets.push(Widget::Text {
             label: "why".to_owned(),
-            text,
+            text: instance.components().causal_chain.spoken(),
         });
     }
     widgets
@@ -79,12 +78,12 @@ pub(crate) fn table(rows: &[(&str, String)]) -> Widget {
     }
 }
 
-/// A time for people.
+/// A duration, as text.
 pub(crate) fn seconds(value_s: f64) -> String {
     format!("{value_s:.1} s")
 }
 
-/// A flag for people.
+/// A flag, as text.
 pub(crate) fn yes(flag: bool) -> &'static str {
     if flag { "yes" } else { "no" }
 }

@@ -1,42 +1,43 @@
-//! What a robot knows of another one: by asking (which a cut network prevents) and by sensing (which nothing prevents).
+//! What a robot knows of another one: by querying it, which a cut network prevents, and by sensing it, which nothing
+//! prevents.
 
 use std::sync::Arc;
 
 use robot::{Cars, Point, PublicState};
 use serde::{Deserialize, Serialize};
 
-/// A peer, as far as it is known.
+/// Another robot, as far as it is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Peer {
     name: String,
-    /// The first place where it was ever known to be.
+    /// The first location at which it was known to be.
     first: Option<Point>,
     /// The last one.
     last: Option<Point>,
-    /// Whether that one was sensed in this tick.
+    /// Whether the last location was sensed in this tick.
     is_sensed: bool,
-    /// Whether the last place was searched in vain.
+    /// Whether the last location was searched without finding it.
     is_missing: bool,
-    /// Its behavior, when it last answered.
+    /// Its behavior in its last answer.
     behavior: Option<String>,
-    /// How long ago it last answered, seconds.
-    unheard_s: f64,
-    /// How long ago its place was last known, seconds.
-    unseen_s: f64,
+    /// Time since its last answer, seconds.
+    unanswered_s: f64,
+    /// Time since its location was last known, seconds.
+    unlocated_s: f64,
 }
 
-/// What one tick told of a peer.
+/// What one tick revealed of a peer.
 #[derive(Debug, Clone)]
-pub struct News {
+pub struct Observation {
     /// Its answer; `None` if it is unreachable.
     pub state: Option<Arc<PublicState>>,
-    /// Seconds since its place was known before, if it is known now.
-    pub seen_after_s: Option<f64>,
+    /// Seconds since its location was known before, if it is known now.
+    pub located_after_s: Option<f64>,
 }
 
 impl Peer {
-    /// A peer of whom nothing is known yet.
+    /// A peer of which nothing is known yet.
     #[must_use]
     pub fn new(name: &str) -> Self {
         Self {
@@ -46,8 +47,8 @@ impl Peer {
             is_sensed: false,
             is_missing: false,
             behavior: None,
-            unheard_s: 0.0,
-            unseen_s: 0.0,
+            unanswered_s: 0.0,
+            unlocated_s: 0.0,
         }
     }
 
@@ -57,67 +58,70 @@ impl Peer {
         &self.name
     }
 
-    /// Asks and looks around: once a tick, one round trip. Where it is sensed counts for more than where it says it was,
-    /// because the answer is a tick old. Without an answer, a place within sensing range at which it is not sensed is
-    /// one at which it is not.
-    pub fn look(&mut self, cars: &mut Cars<'_>, own: Point) -> News {
-        self.unheard_s += cars.tick_s();
-        self.unseen_s += cars.tick_s();
+    /// Queries the peer and senses it: once a tick, one round trip. The sensed location takes precedence, because an
+    /// answer is a tick old. Without an answer, a peer whose last location is within sensing range and which is not
+    /// sensed is missing.
+    pub fn observe(&mut self, cars: &mut Cars<'_>) -> Observation {
+        self.unanswered_s += cars.tick_s();
+        self.unlocated_s += cars.tick_s();
+
         let state = cars.get_robot_state(&self.name).ok();
         if let Some(state) = &state {
             self.behavior = Some(state.behavior_state.clone());
-            self.unheard_s = 0.0;
+            self.unanswered_s = 0.0;
         }
+
         let sensed = cars
             .sensed_robots()
             .iter()
-            .find(|robot| robot.name.as_str() == self.name);
-        let sensed = sensed.map(|robot| robot.location);
+            .find(|robot| robot.name.as_str() == self.name)
+            .map(|robot| robot.location);
         self.is_sensed = sensed.is_some();
-        let place = sensed.or(state.as_ref().map(|state| state.location));
-        let seen_after_s = place
-            .is_some()
-            .then(|| std::mem::replace(&mut self.unseen_s, 0.0));
+
+        let location = sensed.or(state.as_ref().map(|state| state.location));
+        let located_after_s = location.map(|_| std::mem::replace(&mut self.unlocated_s, 0.0));
         let range_m = cars.welcome().sensing_range_m;
-        let was_searched = self
+        let is_in_view = self
             .last
-            .is_some_and(|last| own.distance_m(last) <= range_m);
-        self.is_missing = place.is_none() && (self.is_missing || was_searched);
-        self.last = place.or(self.last);
+            .is_some_and(|last| cars.location().distance_m(last) <= range_m);
+        self.is_missing = location.is_none() && (self.is_missing || is_in_view);
+        self.last = location.or(self.last);
         self.first = self.first.or(self.last);
-        News {
+
+        Observation {
             state,
-            seen_after_s,
+            located_after_s,
         }
     }
 
-    /// The last place where it was known to be.
+    /// The last location at which it was known to be.
     #[must_use]
-    pub fn place(&self) -> Option<Point> {
+    pub fn location(&self) -> Option<Point> {
         self.last
     }
 
-    /// The first place where it was ever known to be.
+    /// The first location at which it was known to be.
     #[must_use]
-    pub fn first_place(&self) -> Option<Point> {
+    pub fn first_location(&self) -> Option<Point> {
         self.first
     }
 
-    /// Whether it was looked for where it was last known to be, and not found.
+    /// Whether its last location was searched without finding it.
     #[must_use]
     pub fn is_missing(&self) -> bool {
         self.is_missing
     }
 
-    /// Whether it stands within `radius_m`, as far as can be told. Sensing decides, being exact and of this tick; the
-    /// answer to a question decides only where sensing does not reach so far.
+    /// Whether it stands within `radius_m`, as far as is known. Sensing decides, being exact and of this tick; an
+    /// answer decides only where sensing does not reach as far.
     #[must_use]
-    pub fn is_within(&self, radius_m: f64, own: Point, sensing_range_m: f64) -> bool {
-        let is_certain = self.is_sensed || (sensing_range_m < radius_m && self.unseen_s == 0.0);
+    pub fn is_within(&self, radius_m: f64, cars: &Cars<'_>) -> bool {
+        let sensing_is_short = cars.welcome().sensing_range_m < radius_m;
+        let is_certain = self.is_sensed || (sensing_is_short && self.unlocated_s == 0.0);
         is_certain
             && self
                 .last
-                .is_some_and(|place| own.distance_m(place) <= radius_m)
+                .is_some_and(|last| cars.location().distance_m(last) <= radius_m)
     }
 
     /// Its behavior, unless its last answer is older than `stale_s`.
@@ -128,9 +132,9 @@ impl Peer {
             .filter(|_| !self.is_unknown(stale_s))
     }
 
-    /// Whether what goes on inside it cannot be known: it never answered, or not for longer than `stale_s`.
+    /// Whether its behavior is unknown: it never answered, or not for longer than `stale_s`.
     #[must_use]
     pub fn is_unknown(&self, stale_s: f64) -> bool {
-        self.behavior.is_none() || self.unheard_s > stale_s
+        self.behavior.is_none() || self.unanswered_s > stale_s
     }
 }

@@ -1,8 +1,8 @@
-//! On or off, as a parameter file says it.
+//! A parameter with the values `on` and `off`.
 
 use serde::{Deserialize, Serialize};
 
-/// A part of a robot that an experiment can do without.
+/// Whether a part of a robot takes part in an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Switch {
@@ -18,21 +18,4 @@ impl Switch {
     pub fn is_on(self) -> bool {
         self == Self::On
     }
-}
-
-/// Refuses a parameter that must be a number above zero.
-pub(crate) fn positive(name: &str, value: f64) -> Result<(), String> {
-    if value > 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(format!("{name} must be above 0, not {value}"))
-    }
-}
-
-/// Refuses a parameter that must be a number of at least zero.
-pub(crate) fn not_negative(name: &str, value: f64) -> Result<(), String> {
-    if value >= 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(format!("{name} must be at least 0, not {value}"))
 }

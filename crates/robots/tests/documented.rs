@@ -203,7 +203,7 @@ fn t09_hurry_on_the_way_makes_her_concerned_and_faster() {
 }
 
 #[test]
-fn t10_intercepting_brings_them_nearer_and_serves_nobody() {
+fn t10_intercepting_brings_them_nearer_and_serves_no_guest() {
     for seed in 0..16 {
         let mut stage = deaf(seed, "");
         assert!(stage.step_until(120.0, |stage| stage.behavior("Butler") == "INTERCEPT"));
@@ -439,7 +439,7 @@ fn t18_butler_calms_down_when_leguin_gets_on_again() {
                 Role::new("Leguin", "Leguin", feet(4.0, 4.0), ""),
             ];
             let mut stage = Stage::new(seed, cast);
-            // Bodies all around her: nobody gets through.
+            // Bodies all around her: she cannot get out.
             stage.obstacles = (0..8)
                 .flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))])
                 .collect();

@@ -1,12 +1,12 @@
-//! The levels at which an emotion acts (the seed's Table 3), each switched off in a robot for an experiment: what is felt
-//! stays, what it does goes.
+//! The levels at which an emotion acts (the paper's Table 3), each switched off in a robot for an experiment: the emotion
+//! stays, its effect goes.
 
 mod stage;
 
 use robots::FT_M;
 use stage::{Role, Stage, feet};
 
-/// Too far around her to be passed.
+/// Obstacles around her, without a gap.
 fn wall() -> Vec<robot::Point> {
     (0..8)
         .flat_map(|i| [feet(2.0 * f64::from(i), 8.0), feet(8.0, 2.0 * f64::from(i))])
@@ -25,7 +25,7 @@ fn walled(seed: u64, butler: &str, leguin: &str) -> Stage {
     stage
 }
 
-/// Where everybody is, what everybody does and says, for ten minutes.
+/// Location, behavior and sent commands of all robots, for ten minutes.
 fn deeds(mut stage: Stage) -> Vec<String> {
     let mut deeds = Vec::new();
     for _ in 0..1200 {
@@ -139,7 +139,7 @@ fn any_levels_together_make_a_team_that_works() {
         );
         distinct.push(deeds(make()));
     }
-    // Butler's word and Leguin's speed are the levels that show on an open field, where nobody has to give up.
+    // Butler's word and Leguin's speed are the levels that show on an open field, where no robot has to give up.
     distinct.sort();
     distinct.dedup();
     assert!(distinct.len() >= 3, "{} different runs", distinct.len());

@@ -74,7 +74,7 @@ fn party(parameters: &str) -> Stage {
     stage
 }
 
-/// What she feels, what she does and how far from the party she is, over one minute.
+/// Her emotion, her behavior and her distance from the party, over one minute.
 fn minute(mut stage: Stage) -> Vec<(String, String, f64)> {
     let mut minute = Vec::new();
     for _ in 0..120 {

@@ -54,7 +54,7 @@ fn a_need_that_arises_beside_a_waiting_leguin_is_met_at_once_by_both() {
 }
 
 #[test]
-fn an_exchange_that_one_side_enters_is_entered_by_the_other_whoever_is_cut_off_when() {
+fn an_exchange_that_one_side_enters_is_entered_by_the_other_at_any_cut() {
     for seed in [1, 2] {
         let meeting = first_meeting(seed);
         for asker in ["Butler", "Leguin"] {
@@ -82,8 +82,8 @@ fn an_exchange_that_one_side_enters_is_entered_by_the_other_whoever_is_cut_off_w
 }
 
 #[test]
-fn commands_that_come_a_tick_early_or_late_leave_nobody_standing() {
-    // Each command is lost and said again by somebody else some ticks later.
+fn commands_that_come_a_tick_early_or_late_leave_no_robot_waiting() {
+    // Each command is lost, and sent again by an operator some ticks later.
     for delay in 1..12 {
         let mut stage = Stage::pair(11, "", "");
         stage.drops = Box::new(|_| true);

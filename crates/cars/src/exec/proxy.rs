@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
 
-use protocol::messages::{Panel, Performative, Point, StateVariables};
+use protocol::codec::MAX_MESSAGE_BYTES;
+use protocol::messages::{Panel, Performative};
 use protocol::random::unit;
-use protocol::{RobotName, codec::MAX_MESSAGE_BYTES};
-use robot::{BadParameters, CallError, Cars, Robot};
+use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 use serde_json::Value;
 
 use super::line::{Answered, Arrived, Done, Query, Said, Told, quote};
@@ -23,10 +23,6 @@ const MAX_REPORTED: usize = MAX_MESSAGE_BYTES - (1 << 17);
 pub(super) struct Proxy {
     program: Arc<Program>,
     heard: Receiver<Heard>,
-    /// Where it stands.
-    location: Point,
-    /// What arrived in this tick.
-    commands: Vec<Arrived>,
     /// What the program said last.
     done: Done,
     panel: Panel,
@@ -34,12 +30,9 @@ pub(super) struct Proxy {
 
 impl Proxy {
     pub(super) fn new(program: Arc<Program>, heard: Receiver<Heard>) -> Self {
-        let (location, commands) = (Point::default(), Vec::new());
         Self {
             program,
             heard,
-            location,
-            commands,
             done: Done::default(),
             panel: Panel::default(),
         }
@@ -135,12 +128,27 @@ impl Proxy {
         }
     }
 
-    /// Takes over what came of an exchange.
-    fn conclude(&mut self, cars: &mut Cars<'_>, outcome: Result<Done, String>) {
-        match outcome {
-            Ok(done) => self.done = done,
-            Err(reason) => cars.give_up(reason),
+    /// One tick of the program. Tick 0 has begun with the line `init`.
+    fn exchange(&mut self, cars: &mut Cars<'_>) -> Result<Done, String> {
+        if cars.tick() > 0 {
+            let commands: Vec<Arrived> = cars.commands().iter().map(arrived).collect();
+            self.begin(&Told::Tick {
+                tick: cars.tick(),
+                location: cars.location(),
+                blocked: cars.was_blocked(),
+                commands: &commands,
+                sensed: cars.sensed_robots(),
+            })?;
         }
+        self.converse(cars)
+    }
+}
+
+fn arrived(command: &ReceivedCommand) -> Arrived {
+    Arrived {
+        from: command.from.clone(),
+        performative: Performative::Achieve,
+        command: command.text.clone(),
     }
 }
 
@@ -168,77 +176,32 @@ fn word_for(error: &CallError) -> &'static str {
 }
 
 impl Robot for Proxy {
-    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
-        (self.done, self.panel, self.commands) = (Done::default(), Panel::default(), Vec::new());
-        let (welcome, tick) = (cars.welcome(), cars.tick());
-        self.location = welcome.location;
-        let begun = self.begin(&Told::init(welcome, tick, cars.sensed_robots()));
-        // An incarnation that takes over has a tick before it, and answers that one.
-        let outcome = match begun {
-            Ok(()) if tick == 0 => self.converse(cars),
-            Ok(()) => return Ok(()),
-            Err(reason) => Err(reason),
-        };
-        self.conclude(cars, outcome);
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        self.done = Done::default();
+        self.panel = Panel::default();
+
+        let welcome = cars.welcome();
+        let begun = self.begin(&Told::init(welcome, cars.tick(), cars.sensed_robots()));
+        if let Err(reason) = begun {
+            cars.give_up(reason);
+        }
         Ok(())
     }
 
-    fn set_current_location(&mut self, _: &mut Cars<'_>, location: Point) {
-        self.location = location;
-    }
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        match self.exchange(cars) {
+            Ok(done) => self.done = done,
+            Err(reason) => cars.give_up(reason),
+        }
 
-    fn set_command(&mut self, _: &mut Cars<'_>, from: &RobotName, command: &str) {
-        let (from, command) = (from.clone(), command.to_owned());
-        self.commands.push(Arrived {
-            from,
-            performative: Performative::Achieve,
-            command,
-        });
-    }
-
-    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
-        let commands = std::mem::take(&mut self.commands);
-        let begun = self.begin(&Told::Tick {
-            tick: cars.tick(),
-            location: self.location,
-            blocked: cars.was_blocked(),
-            commands: &commands,
-            sensed: cars.sensed_robots(),
-        });
-        let outcome = begun.and_then(|()| self.converse(cars));
-        self.conclude(cars, outcome);
-    }
-
-    fn update_emotion_state(&mut self, _: &mut Cars<'_>) {}
-
-    fn update_behavior_state(&mut self, _: &mut Cars<'_>) {}
-
-    fn project_location(&mut self, _: &mut Cars<'_>) -> Point {
-        self.done.proposal.unwrap_or(self.location)
-    }
-
-    fn current_location(&self) -> Point {
-        self.location
-    }
-
-    fn speed(&self) -> f64 {
-        self.done.speed_mps
-    }
-
-    fn direction(&self) -> f64 {
-        self.done.direction_rad
-    }
-
-    fn state_variables(&self) -> StateVariables {
-        self.done.state_variables.clone()
-    }
-
-    fn emotion_state(&self) -> &str {
-        &self.done.emotion_state
-    }
-
-    fn behavior_state(&self) -> &str {
-        &self.done.behavior_state
+        Action {
+            proposal: self.done.proposal.unwrap_or(cars.location()),
+            speed_mps: self.done.speed_mps,
+            direction_rad: self.done.direction_rad,
+            emotion_state: self.done.emotion_state.clone(),
+            behavior_state: self.done.behavior_state.clone(),
+            state_variables: self.done.state_variables.clone(),
+        }
     }
 
     fn panel(&self) -> Panel {

@@ -1,33 +1,35 @@
-//! What Butler can be told about himself. SI units; a parameter file may say `"4 ft"`.
+//! Butler's parameters, in SI units. A parameter file may have text with a unit: `"4 ft"`.
 
 use affect::progress::{ApproachParameters, RateParameters};
 use affect::{Caution, DynamicsParameters};
 use serde::{Deserialize, Serialize};
 
-use super::Behavior;
-use crate::FT_M;
-use crate::switch::{Switch, not_negative, positive};
+use super::tables::Behavior;
+use crate::bounds::{not_negative, positive};
+use crate::drive::LOOK_S;
+use crate::switch::Switch;
+use crate::units::FT_M;
 
 /// Butler's parameters. A name that is not among them is refused: a misspelled one would silently run another
 /// experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Parameters {
-    /// Whom he calls. Default "Leguin" \[D\].
+    /// The robot he calls. Default "Leguin" \[D\].
     pub refiller: String,
-    /// What he offers, in words for his panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
+    /// The name of what he offers, for his panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
     pub goods: String,
-    /// What he wants, in words that follow "I want". Default "to serve the guests" \[I\].
+    /// His goal, as words that follow "I want" in his panel. Default "to serve the guests" \[I\].
     pub goal: String,
     /// Whether he has emotions. `off` is a baseline that calls by the same measure of progress, and neither asks to
     /// hurry nor intercepts. Default on \[I\].
     pub affect: Switch,
-    /// Whether what he feels has a say in what he does: the schematic level \[D: Murphy et al. 2002, abstract\]. `off`
-    /// has him feel and show his emotions, and act as the one without. Default on \[I\].
+    /// Whether his emotion acts on his behavior: the schematic level \[D: Murphy et al. 2002, abstract\]. With `off` he
+    /// has emotions and publishes them, and acts as without. Default on \[I\].
     pub schematic: Switch,
-    /// Whether he repeats a message that shows no effect, by a timer. Default off \[I\].
+    /// Whether he repeats a command that has no visible effect, by a timer. Default off \[I\].
     pub resend: Switch,
-    /// After how long he repeats it, s. Default 5 \[I\].
+    /// Time after which he repeats it, s. Default 5 \[I\].
     pub resend_s: f64,
     /// How cautious he is, 0 to 1. Default 0.5 \[I\]; that there is this trait \[D\].
     pub caution: Caution,
@@ -35,12 +37,12 @@ pub struct Parameters {
     pub treat_capacity: u32,
     /// Mean time from one treat to the next, s. Default 1 \[I\]; that it is exponential \[D\].
     pub treat_mean_s: f64,
-    /// Behaviors in which guests take treats. Default SERVE and GO_BACK \[D: seed; that he stops serving to intercept:
+    /// Behaviors in which guests take treats. Default SERVE and GO_BACK \[D: the paper; that he stops serving to intercept:
     /// Murphy et al. 2002, abstract\].
     pub consume_in: Vec<Behavior>,
     /// Distance within which an exchange is possible, m. Default 4 ft \[D\].
     pub exchange_radius_m: f64,
-    /// How long an exchange takes, s. Default 2 \[I\].
+    /// Duration of an exchange, s. Default 2 \[I\].
     pub exchange_s: f64,
     /// Speed while serving, m/s. Default 1 ft/s \[I\].
     pub v_serve_mps: f64,
@@ -48,31 +50,31 @@ pub struct Parameters {
     pub v_intercept_mps: f64,
     /// Speed on the way back to the start, m/s. Default 2 ft/s \[I\].
     pub v_goback_mps: f64,
-    /// The refiller's speed as far as he can foresee it, m/s. Default 3 ft/s \[I\].
+    /// The speed of the refiller that he assumes, m/s. Default 3 ft/s \[I\].
     pub v_refill_mps: f64,
     /// Time for which he assumes that the refiller reloads, s. Default 2 \[I\].
     pub reload_s: f64,
-    /// Where the refiller's table is, m. Default: where the refiller is first known to be \[I\].
+    /// Location of the refiller's table, m. Default: where the refiller is first known to be \[I\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<[f64; 2]>,
-    /// How near to the start he has come back, m. Default 1.5 ft \[I\].
+    /// Distance from the start within which he has come back, m. Default 1.5 ft \[I\].
     pub arrive_m: f64,
-    /// How near he drives to a refiller who could exchange and does not yet, m. Default 3 ft \[I\].
+    /// Distance at which he stops before a refiller who could exchange and does not yet, m. Default 3 ft \[I\].
     pub stand_off_m: f64,
-    /// How near he drives to a refiller who first has to go home, m. Default 8 ft \[I\]: nearer, he and the guests
-    /// between them pin her down.
+    /// Distance at which he stops before a refiller who has to go home first, m. Default 8 ft \[I\]: if he
+    /// comes nearer, she cannot get past him and the guests.
     pub leave_room_m: f64,
     /// Whether he intercepts a refiller who is still at the table. Default true \[I\].
     pub intercept_any: bool,
-    /// Age at which what he heard of the refiller counts as unknown, s. Default 5 \[I\].
+    /// Age at which the last answer of the refiller no longer counts, s. Default 5 \[I\].
     pub query_stale_s: f64,
     /// Mean time from one turn of the random walk to the next, s. Default 5 \[I\].
     pub turn_mean_s: f64,
-    /// For how long he looks around before each step after one was refused, s. Default 2 \[I\].
+    /// Time for which he looks around before each step after he was blocked, s. Default 2 \[I\].
     pub look_s: f64,
     /// Mean time from one joke to the next while he is HAPPY and serves, s. Default 60 \[I\].
     pub joke_mean_s: f64,
-    /// Estimate of the rate at which treats go; `prior_interval_s` is set to `treat_mean_s`.
+    /// Estimate of the rate at which treats are taken; `prior_interval_s` is set to `treat_mean_s`.
     pub rate: Rate,
     /// Estimate of the speed at which the refiller approaches; it starts at `v_refill_mps`.
     pub approach: Approach,
@@ -80,13 +82,13 @@ pub struct Parameters {
     pub dynamics: DynamicsParameters,
 }
 
-/// How the rate at which treats go is estimated.
+/// How the rate at which treats are taken is estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rate {
-    /// How far back treats count, s of serving. Default 15 \[I\].
+    /// Length of the window of the estimate, seconds of serving. Default 15 \[I\].
     pub window_s: f64,
-    /// How many treats the expectation is worth. Default 5 \[I\].
+    /// Weight of the expected rate, in treats. Default 5 \[I\].
     pub prior_n: f64,
 }
 
@@ -94,7 +96,7 @@ pub struct Rate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Approach {
-    /// Least speed that counts for an arrival time, m/s. Default 0.3 ft/s \[I\].
+    /// Least speed that an arrival time is computed with, m/s. Default 0.3 ft/s \[I\].
     pub floor_mps: f64,
     /// Time constant, s. Default 3 \[I\].
     pub tau_s: f64,
@@ -146,7 +148,7 @@ impl Default for Parameters {
             intercept_any: true,
             query_stale_s: 5.0,
             turn_mean_s: 5.0,
-            look_s: 2.0,
+            look_s: LOOK_S,
             joke_mean_s: 60.0,
             rate: Rate::default(),
             approach: Approach::default(),
@@ -156,10 +158,12 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Says what is wrong with the values, if anything is; those of estimators and dynamics are checked by what is made
-    /// of them.
+    /// Checks the values, except those of estimators and dynamics, which are checked where they are used.
+    ///
+    /// # Errors
+    /// The first value that is wrong.
     pub(super) fn check(&self) -> Result<(), String> {
-        // Each treat is an event of its own: more than a thousand a second are no guests.
+        // Each treat is an event of its own: this bounds their number in a tick.
         if !(self.treat_mean_s >= 1e-3 && self.treat_mean_s.is_finite()) {
             return Err(format!(
                 "treat_mean_s must be at least 0.001 s, not {}",
@@ -187,7 +191,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// Whether the guards of his behaviors see what he feels.
+    /// Whether the guards of his behaviors see his emotion.
     pub(super) fn acts_by_emotion(&self) -> bool {
         self.affect.is_on() && self.schematic.is_on()
     }

@@ -1,8 +1,8 @@
-//! What Butler feels and what he does, as tables.
+//! Butler's emotion and behavior, as tables.
 //!
 //! One tick is: state variables, then emotion (from them), then behavior (from them and the emotion), then the next
-//! place. Guards see the state as it was when the tick's behavior began to be decided: a need that is raised in a tick
-//! is seen by Butler in the next one, as it is by the refiller, to whom it is published.
+//! motion. Guards see the state as it was before the rows of this tick: a need that is raised in a tick is seen by
+//! Butler in the next one, as it is by the refiller, who receives what he publishes.
 
 use affect::StandardEmotion::{self, Concerned, Confident, Frustrated, Happy};
 use affect::behavior::{
@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
 pub enum Behavior {
-    /// Wanders about and offers treats \[D\].
+    /// Wanders around and offers treats \[D\].
     Serve,
-    /// Drives straight at the refiller \[D\].
+    /// Drives straight to the refiller \[D\].
     Intercept,
     /// Takes over treats from the refiller \[D\].
     Exchange,
@@ -44,10 +44,10 @@ impl Behavior {
     }
 }
 
-/// What a row of the table has Butler do.
+/// What a row of the behavior table makes Butler do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
-    /// Lets the refiller see that he needs her.
+    /// Publishes that he needs the refiller.
     RaiseNeed,
     /// Sends "refill".
     CallRefill,
@@ -55,18 +55,18 @@ pub enum Act {
     CallHurry,
     /// Sends "go home".
     SendHome,
-    /// Takes the new treats; the need and what was done about it are over.
+    /// Takes the new treats, and resets the need and the calls.
     Replenish,
     /// Tells a joke.
     Joke,
 }
 
-/// What a row's guard can see.
+/// What the guard of a row sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Context {
-    /// What he feels; `None` if that has no say.
+    /// His emotion; `None` if it does not act on behavior.
     pub emotion: Option<StandardEmotion>,
-    /// Where emotion has no say: whether the need presses as much as what would make him CONFIDENT.
+    /// If emotion does not act on behavior: whether the need is as great as the one that would make him CONFIDENT.
     pub is_pressed: bool,
     /// Whether he needs the refiller.
     pub need: bool,
@@ -74,7 +74,7 @@ pub struct Context {
     pub called: bool,
     /// Whether he has asked her to hurry.
     pub hurried: bool,
-    /// Whether she is within the exchange radius and ready for an exchange, as far as can be known.
+    /// Whether she is within the exchange radius and ready for an exchange, as far as is known.
     pub refiller_is_ready_here: bool,
     /// Whether she is on her way to him.
     pub refiller_comes: bool,
@@ -84,11 +84,11 @@ pub struct Context {
     pub exchange_is_over: bool,
     /// Whether he is back at the start.
     pub is_at_start: bool,
-    /// By the timer: whether a call is to be repeated.
+    /// Whether the timer repeats a call.
     pub repeats_call: bool,
-    /// By the timer: whether "go home" is to be repeated.
+    /// Whether the timer repeats "go home".
     pub repeats_go_home: bool,
-    /// Whether he has thought of a joke.
+    /// Whether the time for a joke has come.
     pub has_joke: bool,
 }
 
@@ -97,16 +97,16 @@ impl Context {
         self.emotion.is_some_and(|emotion| emotion.reaches(least))
     }
 
-    /// CONFIDENT or worse; where emotion has no say, the same measure of progress \[I\].
+    /// CONFIDENT or worse; if emotion does not act on behavior, the same measure of progress \[I\].
     fn wants_refill(&self) -> bool {
         self.feels(Confident) || self.is_pressed
     }
 }
 
-/// The behaviors in which he can call and be met.
+/// The behaviors in which he can call and meet the refiller.
 const AFOOT: &[Behavior] = &[Serve, Intercept, GoBack];
 
-/// The behavior state generator: the waiter's column of the seed's Table 2 and its experiment section as rows.
+/// The behavior state generator: the waiter's column of the paper's Table 2 and its experiment section as rows.
 #[rustfmt::skip]
 pub const TABLE: &[Row<Behavior, Context, Act>] = &[
     Row { from: AFOOT, when: |c| c.wants_refill() && !c.need, act: &[Act::RaiseNeed], then: Stay },
@@ -128,19 +128,19 @@ pub const TABLE: &[Row<Behavior, Context, Act>] = &[
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measures {
-    /// Estimated rate at which treats go, 1/s.
+    /// Estimated rate at which treats are taken, 1/s.
     pub rate_per_s: f64,
     /// Time until the tray is empty, s.
     pub time_to_empty_s: f64,
     /// Time until the refiller can be here, s.
     pub time_to_refill_s: f64,
-    /// How the two compare: above 1 she comes too late.
+    /// The ratio of the two: above 1 she comes too late.
     pub need_ratio: f64,
     /// Whether an exchange has just been completed.
     pub exchange_is_over: bool,
 }
 
-/// The emotion state generator's view of the measures: the need presses, unless an exchange is under way; that it is
+/// Appraises the measures for the emotion state generator: the need counts, unless an exchange is under way; that one is
 /// completed is the most important positive input.
 pub fn appraise(measures: &Measures, behavior: &Behavior) -> Stimulus {
     let need = if *behavior == Exchange {
@@ -151,6 +151,6 @@ pub fn appraise(measures: &Measures, behavior: &Behavior) -> Stimulus {
     let event = measures
         .exchange_is_over
         .then_some(ProgressEvent::GoalAchieved);
-    // That the tray runs empty is the refiller's doing, once he feels it at all [D: FRUSTRATED at the assistant].
+    // He blames the refiller for an empty tray [D: FRUSTRATED at the assistant].
     Stimulus::need(need).with_event(event).with_blame(true)
 }

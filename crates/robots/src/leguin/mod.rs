@@ -1,5 +1,5 @@
 //! Leguin, the refiller: waits at the table until she is called, brings treats, hurries when she is asked to, and goes home
-//! when she is sent or has had enough.
+//! when she is sent home or is frustrated.
 
 mod parameters;
 mod state;
@@ -7,18 +7,20 @@ mod tables;
 
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
-use affect::{
-    Circumstances, EmotionGenerator, EmotionLabel, Feeling, RuleGenerator, StandardEmotion,
+use affect::{Circumstances, Feeling, RuleGenerator, StandardEmotion};
+use robot::{
+    Action, BadParameters, Cars, Panel, Point, ReceivedCommand, Robot, StateVariables, Widget,
 };
-use robot::{BadParameters, Cars, Panel, Point, Robot, RobotName, StateVariables, Widget};
 use serde::{Deserialize, Serialize};
 
 pub use parameters::{Feelings, Parameters};
 pub use tables::{Act, Behavior, Context, EMOTIONS, Errand, Measures, TABLE, intensity};
 
+use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
-use crate::panel::{self, NEUTRAL};
-use crate::{GO_HOME, HURRY, REFILL, shortened};
+use crate::emotion::Emotion;
+use crate::panel;
+use crate::published::{flag, text};
 use state::State;
 
 const JOKES: &[&str] = &[
@@ -31,14 +33,13 @@ const JOKES: &[&str] = &[
 /// The refiller.
 pub struct Leguin {
     parameters: Parameters,
-    /// Without emotions it never runs, and stays as it starts.
-    esg: RuleGenerator<Measures, Behavior, StandardEmotion>,
+    emotion: Emotion<RuleGenerator<Measures, Behavior, StandardEmotion>>,
     bsg: BehaviorGenerator<Behavior, Context, Act>,
     haste: SensoryMotor,
     state: State,
 }
 
-/// All that changes in Leguin; a Leguin that is restored from it continues identically.
+/// Everything that changes in Leguin: restored from it, she continues identically.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saved {
@@ -48,7 +49,7 @@ pub struct Saved {
 }
 
 impl Default for Leguin {
-    /// A Leguin with the default parameters. The simulation's own come with [`Robot::init_robot`].
+    /// A Leguin with the default parameters; [`Robot::init`] replaces them with those of the scenario.
     fn default() -> Self {
         match Self::new(Parameters::default()) {
             Ok(leguin) => leguin,
@@ -56,6 +57,60 @@ impl Default for Leguin {
                 unreachable!("the default parameters, which a test checks, are refused: {reason}")
             }
         }
+    }
+}
+
+impl Robot for Leguin {
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        *self = Self::new(cars.parameters()?).map_err(|reason| cars.bad_parameters(reason))?;
+        self.state.begin(&self.parameters, cars);
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        self.state.at = cars.location();
+        for command in cars.commands() {
+            self.obey(command, cars);
+        }
+
+        // No time has passed at tick 0.
+        if cars.tick() > 0 {
+            self.update_progress(cars);
+            self.update_emotion(cars);
+            self.update_behavior(cars);
+        }
+
+        let motion = self.drive(cars);
+        let intensity = self.feeling().intensity;
+        let behavior = self.behavior();
+        Action {
+            emotion_state: self.emotion.name().to_owned(),
+            behavior_state: behavior.name().to_owned(),
+            state_variables: self.state.published(intensity, behavior, self.goal()),
+            ..motion
+        }
+    }
+
+    fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
+        self.state.take_over(last);
+
+        let name = text(last, "behavior");
+        let behavior = Behavior::ALL
+            .into_iter()
+            .find(|behavior| Some(behavior.name()) == name);
+        self.bsg = BehaviorGenerator::new(TABLE, behavior.unwrap_or(Behavior::GoHome));
+        cars.log("is back, and takes over where the last one was lost");
+    }
+
+    fn panel(&self) -> Panel {
+        let mut widgets = self.feeling_widgets();
+        widgets.push(panel::behavior(self.behavior().name()));
+        widgets.push(self.progress_table());
+        widgets.extend([REFILL, HURRY, GO_HOME].map(|command| Widget::Button {
+            label: command.to_owned(),
+            command: command.to_owned(),
+        }));
+        Panel { widgets }
     }
 }
 
@@ -67,43 +122,44 @@ impl Leguin {
     pub fn new(parameters: Parameters) -> Result<Self, String> {
         parameters.check()?;
         let esg = RuleGenerator::new(EMOTIONS, intensity, StandardEmotion::Happy);
+
         // The sensory-motor level: concern speeds her up at once, nothing else changes her speed.
         let onset = parameters.dynamics.th_concerned;
-        let haste = SensoryMotorParameters {
+        let haste = SensoryMotor::new(SensoryMotorParameters {
             negative_gain: parameters.hurry_mult,
             positive_gain: 1.0,
             onset,
             full: onset,
-        };
-        let haste = SensoryMotor::new(haste).map_err(|error| error.to_string())?;
-        let state = State::new(&parameters);
+        })
+        .map_err(|error| error.to_string())?;
+
         Ok(Self {
-            parameters,
-            esg,
+            emotion: Emotion::new(parameters.affect, esg),
             bsg: BehaviorGenerator::new(TABLE, Behavior::Wait),
             haste,
-            state,
+            state: State::new(&parameters),
+            parameters,
         })
     }
 
-    /// What she feels; without emotions a steady state without intensity.
+    /// Her feeling; without emotions a steady one of intensity 0.
     #[must_use]
     pub fn feeling(&self) -> Feeling<StandardEmotion> {
-        self.esg.feeling()
+        self.emotion.feeling()
     }
 
-    /// What she does.
+    /// Her behavior.
     #[must_use]
     pub fn behavior(&self) -> Behavior {
         *self.bsg.current()
     }
 
-    /// All that changes in her.
+    /// Everything that changes in her.
     #[must_use]
     pub fn save(&self) -> Saved {
         Saved {
             state: self.state.clone(),
-            feeling: self.feeling(),
+            feeling: self.emotion.save(),
             behavior: self.bsg.state().clone(),
         }
     }
@@ -111,34 +167,79 @@ impl Leguin {
     /// Continues from a saved state; the parameters must be those it was saved with.
     ///
     /// # Errors
-    /// The saved emotion is none that a Leguin of these parameters can have.
+    /// A Leguin of these parameters cannot have the saved emotion.
     pub fn restore(&mut self, saved: Saved) -> Result<(), String> {
-        if !self.parameters.affect.is_on() && saved.feeling != self.feeling() {
-            return Err("the saved emotion does not fit these parameters".to_owned());
-        }
-        self.esg.restore(saved.feeling);
+        self.emotion.restore(saved.feeling)?;
         self.bsg.restore(saved.behavior);
         self.state = saved.state;
         Ok(())
     }
 
-    fn watch_waiter(&mut self, cars: &mut Cars<'_>) {
+    fn obey(&mut self, command: &ReceivedCommand, cars: &mut Cars<'_>) {
+        let behavior = self.behavior();
         let state = &mut self.state;
-        if let Some(waiter) = state.waiter.look(cars, state.at).state {
-            let said = &waiter.state_variables;
-            state.waiter_needs = said
-                .get("need")
-                .and_then(robot::Variable::as_bool)
-                .unwrap_or(false);
-            state.waiter_calls = said
-                .get("refiller")
-                .and_then(|name| name.as_str())
-                .map(str::to_owned);
+        match (command.text.as_str(), behavior) {
+            // A call to come is obsolete once she is there.
+            (REFILL | HURRY, Behavior::Exchange) | (REFILL, Behavior::Refill) => {}
+            (REFILL, _) => state.pending = state.pending.or(Some(Errand::Refill)),
+            (HURRY, _) => state.pending = Some(Errand::Hurry),
+            // The waiter may complete the exchange a tick before her.
+            (GO_HOME, Behavior::Exchange | Behavior::AwaitGoHome) => state.sent_home = true,
+            (GO_HOME, _) => {}
+            _ => {
+                let text = shortened(&command.text);
+                let from = &command.from;
+                cars.log(format!("does not understand {text:?} from {from}"));
+            }
         }
     }
 
-    /// Whether the waiter wants treats of her. Where he cannot be asked she takes it that he does, unless he is known to
-    /// call for somebody else: Vonda does not step in for Leguin.
+    fn update_progress(&mut self, cars: &mut Cars<'_>) {
+        let behavior = self.behavior();
+        let parameters = &self.parameters;
+        self.bsg.advance(cars.tick_s());
+        self.state
+            .advance(behavior, parameters.progress_share, cars.tick_s());
+
+        let gain = parameters.gain();
+        let blocked = if behavior == Behavior::Refill {
+            self.state.blocked_s * gain / parameters.block_patience_s
+        } else {
+            0.0
+        };
+        self.state.measures = Measures {
+            hurried: self.state.hurried,
+            blocked,
+            waiting: self.state.waiting_s * gain / parameters.await_patience_s,
+            th_concerned: parameters.dynamics.th_concerned,
+        };
+        self.observe_waiter(cars);
+    }
+
+    /// The emotion state generator.
+    fn update_emotion(&mut self, cars: &Cars<'_>) {
+        self.emotion
+            .update(&self.state.measures, self.bsg.current(), cars.tick_s());
+    }
+
+    /// The behavior state generator.
+    fn update_behavior(&mut self, cars: &mut Cars<'_>) {
+        let context = self.context(cars);
+        for act in self.bsg.update(&context).actions {
+            self.perform(act, cars);
+        }
+    }
+
+    fn observe_waiter(&mut self, cars: &mut Cars<'_>) {
+        let state = &mut self.state;
+        if let Some(waiter) = state.waiter.observe(cars).state {
+            state.waiter_needs = flag(&waiter.state_variables, "need");
+            state.waiter_calls = text(&waiter.state_variables, "refiller").map(str::to_owned);
+        }
+    }
+
+    /// Whether the waiter wants treats from her. If he cannot be queried she assumes that he does, unless he is known to
+    /// call for another robot: Vonda does not step in for Leguin.
     fn is_needed(&self, cars: &Cars<'_>) -> bool {
         let state = &self.state;
         let calls_another = state
@@ -149,26 +250,27 @@ impl Leguin {
             && (state.waiter_needs || state.waiter.is_unknown(self.parameters.query_stale_s))
     }
 
-    /// Whether she is back at the table: at her place, or near it if somebody stands there and does not go.
+    /// Whether she is back at the table: at her place, or near it if a body stands there and does not leave.
     fn is_home(&self) -> bool {
-        let (state, parameters) = (&self.state, &self.parameters);
-        let away_m = state.at.distance_m(state.home);
+        let state = &self.state;
+        let parameters = &self.parameters;
+        let distance_m = state.at.distance_m(state.home);
         let is_kept_away = state.blocked_s >= parameters.settle_s;
-        away_m <= parameters.arrive_m || (away_m <= parameters.settle_m && is_kept_away)
+        distance_m <= parameters.arrive_m || (distance_m <= parameters.settle_m && is_kept_away)
     }
 
     fn context(&self, cars: &Cars<'_>) -> Context {
-        let (state, parameters) = (&self.state, &self.parameters);
-        let (radius_m, range_m) = (parameters.exchange_radius_m, cars.welcome().sensing_range_m);
+        let state = &self.state;
+        let parameters = &self.parameters;
+        let waiter_is_here = state.waiter.is_within(parameters.exchange_radius_m, cars);
         Context {
             emotion: parameters.acts_by_emotion().then(|| self.feeling().emotion),
             pending: state.pending,
-            waiter_is_needy_here: self.is_needed(cars)
-                && state.waiter.is_within(radius_m, state.at, range_m),
+            waiter_is_needy_here: self.is_needed(cars) && waiter_is_here,
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
             sent_home: state.sent_home,
             is_home: self.is_home(),
-            has_joke: state.until_joke_s <= 0.0,
+            has_joke: state.jokes.are_due(),
         }
     }
 
@@ -176,132 +278,48 @@ impl Leguin {
         let state = &mut self.state;
         match act {
             Act::TakeErrand => state.hurried = state.pending.take() == Some(Errand::Hurry),
-            Act::Hurry => (state.hurried, state.pending) = (true, None),
-            Act::FinishErrand => {
-                (state.hurried, state.pending, state.sent_home) = (false, None, false)
+            Act::Hurry => {
+                state.hurried = true;
+                state.pending = None;
             }
-            Act::TurnHome => (state.trips, state.sent_home) = (state.trips + 1, false),
+            Act::FinishErrand => {
+                state.hurried = false;
+                state.pending = None;
+                state.sent_home = false;
+            }
+            Act::TurnHome => {
+                state.trips += 1;
+                state.sent_home = false;
+            }
             Act::GiveUp => {
-                (state.given_up, state.hurried) = (state.given_up + 1, false);
+                state.given_up += 1;
+                state.hurried = false;
                 state.begin_way();
             }
             Act::Joke => {
-                cars.log(format!("jokes: {}", JOKES[state.jokes.one_of(JOKES.len())]));
-                state.until_joke_s = state.jokes.exponential(self.parameters.joke_mean_s);
+                state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
             }
         }
     }
 
     /// Where she is going.
     fn goal(&self) -> Option<Point> {
+        let waiter = &self.state.waiter;
         match self.behavior() {
-            Behavior::Refill => self
-                .state
-                .waiter
-                .place()
-                .filter(|_| !self.state.waiter.is_missing()),
+            Behavior::Refill if waiter.is_missing() => None,
+            Behavior::Refill => waiter.location(),
             Behavior::GoHome => Some(self.state.home),
             Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => None,
         }
     }
 
-    /// On the way to the waiter; if he is not where he was last known to be, in search of him.
-    fn refill(&mut self, cars: &mut Cars<'_>) -> Point {
-        let (parameters, goal) = (&self.parameters, self.goal());
-        let haste = if parameters.sensory_motor.is_on() {
-            self.haste.gain(self.feeling().affect())
-        } else {
-            1.0
-        };
-        let speed_mps = parameters.v_refill_mps * haste;
-        let State {
-            legs,
-            turns,
-            at,
-            aim,
-            ..
-        } = &mut self.state;
-        if !self.bsg.has_lasted(parameters.prep_s) {
-            return legs.stay(*at);
-        }
-        let Some(goal) = goal else {
-            // Toward nowhere: whatever she does now is no progress.
-            *aim = Some((*at, speed_mps * cars.tick_s()));
-            return legs.walk(cars, *at, speed_mps, parameters.turn_mean_s, turns);
-        };
-        self.approach(cars, goal, self.parameters.stand_off_m, speed_mps)
-    }
-
-    /// A step of the way, remembering what would be progress.
-    fn approach(&mut self, cars: &mut Cars<'_>, goal: Point, stop_m: f64, speed_mps: f64) -> Point {
-        let State { legs, at, aim, .. } = &mut self.state;
-        let step_m = (speed_mps * cars.tick_s()).min(at.distance_m(goal) - stop_m);
-        *aim = (step_m > 0.0).then_some((goal, step_m));
-        legs.drive(
-            cars,
-            *at,
-            Course {
-                goal,
-                stop_m,
-                speed_mps,
-                look_s: self.parameters.look_s,
-            },
-        )
-    }
-}
-
-impl Robot for Leguin {
-    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
-        let bad = |reason| BadParameters {
-            robot: cars.name().clone(),
-            reason,
-        };
-        *self = Self::new(cars.parameters()?).map_err(bad)?;
-        self.state.begin(&self.parameters, cars);
-        Ok(())
-    }
-
-    fn speed(&self) -> f64 {
-        self.state.legs.speed_mps()
-    }
-
-    fn direction(&self) -> f64 {
-        self.state.legs.direction_rad()
-    }
-
-    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
-        let (behavior, parameters) = (self.behavior(), &self.parameters);
-        self.bsg.advance(cars.tick_s());
-        self.state
-            .pass(behavior, parameters.progress_share, cars.tick_s());
-        let gain = parameters.gain();
-        self.state.measures = Measures {
-            hurried: self.state.hurried,
-            blocked: if behavior == Behavior::Refill {
-                self.state.blocked_s * gain / parameters.block_patience_s
-            } else {
-                0.0
-            },
-            waiting: self.state.waiting_s * gain / parameters.await_patience_s,
-            th_concerned: parameters.dynamics.th_concerned,
-        };
-        self.watch_waiter(cars);
-    }
-
-    fn state_variables(&self) -> StateVariables {
-        self.state
-            .published(self.feeling().intensity, self.behavior(), self.goal())
-    }
-
-    fn current_location(&self) -> Point {
-        self.state.at
-    }
-
-    fn project_location(&mut self, cars: &mut Cars<'_>) -> Point {
-        (self.state.before, self.state.aim) = (self.state.at, None);
+    /// The motion that her behavior wants.
+    fn drive(&mut self, cars: &mut Cars<'_>) -> Action {
+        self.state.before = self.state.at;
+        self.state.aim = None;
         match self.behavior() {
             Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => {
-                self.state.legs.stay(self.state.at)
+                self.state.drive.stay(cars)
             }
             Behavior::Refill => self.refill(cars),
             Behavior::GoHome => {
@@ -310,82 +328,79 @@ impl Robot for Leguin {
         }
     }
 
-    fn set_current_location(&mut self, _: &mut Cars<'_>, location: Point) {
-        self.state.at = location;
-    }
-
-    fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str) {
-        let (behavior, state) = (self.behavior(), &mut self.state);
-        match (command, behavior) {
-            // What was meant to bring her about is over once she is there.
-            (REFILL | HURRY, Behavior::Exchange) | (REFILL, Behavior::Refill) => {}
-            (REFILL, _) => state.pending = state.pending.or(Some(Errand::Refill)),
-            (HURRY, _) => state.pending = Some(Errand::Hurry),
-            // The waiter may be done with the exchange a tick before her.
-            (GO_HOME, Behavior::Exchange | Behavior::AwaitGoHome) => state.sent_home = true,
-            (GO_HOME, _) => {}
-            _ => cars.log(format!(
-                "does not understand {:?} from {from}",
-                shortened(command)
-            )),
+    /// Drives to the waiter; searches for him if he is not where he was last known to be.
+    fn refill(&mut self, cars: &mut Cars<'_>) -> Action {
+        if !self.bsg.has_lasted(self.parameters.prep_s) {
+            return self.state.drive.stay(cars);
         }
-    }
 
-    fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
-        if self.parameters.affect.is_on() {
-            self.esg
-                .update(&self.state.measures, self.bsg.current(), cars.tick_s());
+        let speed_mps = self.parameters.v_refill_mps * self.haste();
+        if let Some(goal) = self.goal() {
+            return self.approach(cars, goal, self.parameters.stand_off_m, speed_mps);
         }
+
+        // A search has no goal: no step of it is progress.
+        let turn_mean_s = self.parameters.turn_mean_s;
+        let state = &mut self.state;
+        state.aim = Some((state.at, speed_mps * cars.tick_s()));
+        state
+            .drive
+            .wander(cars, speed_mps, turn_mean_s, &mut state.turns)
     }
 
-    fn emotion_state(&self) -> &str {
-        if self.parameters.affect.is_on() {
-            self.feeling().emotion.name()
+    /// The factor of her emotion on her speed.
+    fn haste(&self) -> f64 {
+        if self.parameters.sensory_motor.is_on() {
+            self.haste.gain(self.feeling().affect())
         } else {
-            NEUTRAL
+            1.0
         }
     }
 
-    fn update_behavior_state(&mut self, cars: &mut Cars<'_>) {
-        let context = self.context(cars);
-        for act in self.bsg.update(&context).actions {
-            self.perform(act, cars);
-        }
-    }
-
-    fn behavior_state(&self) -> &str {
-        self.behavior().name()
-    }
-
-    fn panel(&self) -> Panel {
-        let (state, behavior) = (&self.state, self.behavior());
-        // On the way it is the crowd that blocks her, unless it is the waiter who presses.
-        let is_crowd = behavior == Behavior::Refill && !state.hurried;
-        let other = if is_crowd {
-            "the crowd"
-        } else {
-            self.parameters.waiter.as_str()
+    /// A step toward a goal, which is remembered to measure progress.
+    fn approach(
+        &mut self,
+        cars: &mut Cars<'_>,
+        goal: Point,
+        stop_m: f64,
+        speed_mps: f64,
+    ) -> Action {
+        let state = &mut self.state;
+        let step_m = (speed_mps * cars.tick_s()).min(state.at.distance_m(goal) - stop_m);
+        state.aim = (step_m > 0.0).then_some((goal, step_m));
+        let course = Course {
+            goal,
+            stop_m,
+            speed_mps,
+            look_s: self.parameters.look_s,
         };
-        let goal = format!(
-            "to bring {} to {}",
-            self.parameters.goods, self.parameters.waiter
-        );
+        state.drive.follow(cars, course)
+    }
+
+    fn feeling_widgets(&self) -> Vec<Widget> {
+        // On the way the crowd blocks her, unless the waiter has told her to hurry.
+        let is_crowd = self.behavior() == Behavior::Refill && !self.state.hurried;
+        let waiter = self.parameters.waiter.as_str();
+        let goal = format!("to bring {} to {waiter}", self.parameters.goods);
         let circumstances = Circumstances {
-            other: Some(other),
+            other: Some(if is_crowd { "the crowd" } else { waiter }),
             goal: Some(&goal),
             ..Circumstances::default()
         };
-        let feeling = self.parameters.affect.is_on().then(|| self.feeling());
-        let mut widgets = panel::feeling(
-            feeling,
+        panel::feeling(
+            self.emotion.shown(),
             &self.parameters.dynamics.label_cuts,
             &circumstances,
-        );
-        widgets.push(panel::behavior(behavior.name()));
-        let distance = self.goal().map_or("-".to_owned(), |goal| {
-            format!("{:.1} m", state.at.distance_m(goal))
-        });
-        widgets.push(panel::table(&[
+        )
+    }
+
+    fn progress_table(&self) -> Widget {
+        let state = &self.state;
+        let distance = match self.goal() {
+            Some(goal) => format!("{:.1} m", state.at.distance_m(goal)),
+            None => "-".to_owned(),
+        };
+        panel::table(&[
             ("waiter", self.parameters.waiter.clone()),
             ("way to go", distance),
             ("hurried", panel::yes(state.hurried).to_owned()),
@@ -395,21 +410,6 @@ impl Robot for Leguin {
                 "trips, given up",
                 format!("{}, {}", state.trips, state.given_up),
             ),
-        ]));
-        widgets.extend([REFILL, HURRY, GO_HOME].map(|command| Widget::Button {
-            label: command.to_owned(),
-            command: command.to_owned(),
-        }));
-        Panel { widgets }
-    }
-
-    fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
-        self.state.take_over(last);
-        let name = last.get("behavior").and_then(|name| name.as_str());
-        let behavior = Behavior::ALL
-            .into_iter()
-            .find(|behavior| Some(behavior.name()) == name);
-        self.bsg = BehaviorGenerator::new(TABLE, behavior.unwrap_or(Behavior::GoHome));
-        cars.log("is back, and takes over where the last one was lost");
+        ])
     }
 }

@@ -1,33 +1,35 @@
-//! What Leguin can be told about herself. SI units; a parameter file may say `"4 ft"`.
+//! Leguin's parameters, in SI units. A parameter file may have text with a unit: `"4 ft"`.
 
 use affect::{Caution, IntensityLabel};
 use serde::{Deserialize, Serialize};
 
-use crate::FT_M;
-use crate::switch::{Switch, not_negative, positive};
+use crate::bounds::{not_negative, positive};
+use crate::drive::LOOK_S;
+use crate::switch::Switch;
+use crate::units::FT_M;
 
 /// Leguin's parameters. A name that is not among them is refused: a misspelled one would silently run another
 /// experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Parameters {
-    /// Whose tray she refills. Default "Butler" \[D\].
+    /// The robot whose tray she refills. Default "Butler" \[D\].
     pub waiter: String,
-    /// What she brings, in words for her panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
+    /// The name of what she brings, for her panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
     pub goods: String,
     /// Whether she has emotions. `off` is a baseline that never hurries and never gives up. Default on \[I\].
     pub affect: Switch,
-    /// Whether what she feels changes how fast she is: the sensory-motor level \[D: Murphy et al. 2002, abstract\]. `off`
-    /// has her obey "hurry" in feeling alone. Default on \[I\].
+    /// Whether her emotion acts on her speed: the sensory-motor level \[D: Murphy et al. 2002, abstract\]. With `off`,
+    /// "hurry" changes her emotion and not her speed. Default on \[I\].
     pub sensory_motor: Switch,
-    /// Whether what she feels has a say in what she does: the schematic level \[D: the same\]. `off` has her feel and show
-    /// her emotions, and never give up or joke. Default on \[I\].
+    /// Whether her emotion acts on her behavior: the schematic level \[D: the same\]. With `off` she has emotions and
+    /// publishes them, and never gives up or jokes. Default on \[I\].
     pub schematic: Switch,
     /// How cautious she is, 0 to 1. Default 0.5 \[I\]; that there is this trait \[D\].
     pub caution: Caution,
     /// Distance within which an exchange is possible, m. Default 4 ft \[D\].
     pub exchange_radius_m: f64,
-    /// How long an exchange takes, s. Default 2 \[I\].
+    /// Duration of an exchange, s. Default 2 \[I\].
     pub exchange_s: f64,
     /// Speed on the way to the waiter and home, m/s. Default 3 ft/s \[I\].
     pub v_refill_mps: f64,
@@ -37,26 +39,26 @@ pub struct Parameters {
     /// Time from a call until she leaves the table, s. Default 1 \[I\].
     pub prep_s: f64,
     /// Time without progress after which she is FRUSTRATED with the way, s; divided by her gain. Default 60 \[I\]: well
-    /// above the waiter's own time to frustration, or she turns back before he can come to meet her.
+    /// above the time after which the waiter is FRUSTRATED, or she turns back before he can come to meet her.
     pub block_patience_s: f64,
     /// Time without being sent home after which she is FRUSTRATED with the waiter, s; divided by her gain. Default
     /// 20 \[I\].
     pub await_patience_s: f64,
     /// Share of a step that counts as progress. Default 0.1 \[I\].
     pub progress_share: f64,
-    /// How near to her place at the table she has come home, m. Default 1.5 ft \[I\].
+    /// Distance from her place at the table within which she has come home, m. Default 1.5 ft \[I\].
     pub arrive_m: f64,
-    /// Time without progress after which she makes do with a place near her own, s. Default 5 \[I\].
+    /// Time without progress after which a place near her own is home as well, s. Default 5 \[I\].
     pub settle_s: f64,
-    /// How near that place must be, m. Default 6 ft \[I\]: three bodies.
+    /// Distance from her own place within which this holds, m. Default 6 ft \[I\]: three bodies.
     pub settle_m: f64,
-    /// How near she drives to a waiter who does not exchange, m. Default 3 ft \[I\].
+    /// Distance at which she stops before a waiter who does not exchange, m. Default 3 ft \[I\].
     pub stand_off_m: f64,
-    /// Age at which what she heard of the waiter counts as unknown, s. Default 5 \[I\].
+    /// Age at which the last answer of the waiter no longer counts, s. Default 5 \[I\].
     pub query_stale_s: f64,
     /// Mean time from one turn to the next while she searches for a waiter of whom nothing is known, s. Default 5 \[I\].
     pub turn_mean_s: f64,
-    /// For how long she looks around before each step after one was refused, s. Default 2 \[I\].
+    /// Time for which she looks around before each step after she was blocked, s. Default 2 \[I\].
     pub look_s: f64,
     /// Mean time from one joke to the next while she is HAPPY and waits, s. Default 60 \[I\]; that she jokes \[D\].
     pub joke_mean_s: f64,
@@ -72,7 +74,7 @@ pub struct Feelings {
     pub caution_gain_base: f64,
     /// What full caution adds to the gain (dimensionless). Default 1 \[I\].
     pub caution_gain_slope: f64,
-    /// Intensity of the concern of one who is told to hurry. Default 0.45 \[I\], where Butler's begins.
+    /// Intensity of her concern if she was commanded to hurry. Default 0.45 \[I\], where Butler's begins.
     pub th_concerned: f64,
     /// Intensities at which low, medium, high and very high begin. Default 0.2, 0.4, 0.6, 0.8 \[I\].
     pub label_cuts: [f64; 4],
@@ -112,7 +114,7 @@ impl Default for Parameters {
             stand_off_m: 3.0 * FT_M,
             query_stale_s: 5.0,
             turn_mean_s: 5.0,
-            look_s: 2.0,
+            look_s: LOOK_S,
             joke_mean_s: 60.0,
             dynamics: Feelings::default(),
         }
@@ -130,8 +132,10 @@ impl Parameters {
         self.dynamics.caution_gain_base + self.dynamics.caution_gain_slope * self.caution.value()
     }
 
-    /// Says what is wrong with the values, if anything is; `hurry_mult` and `th_concerned` are checked by what is made of
-    /// them.
+    /// Checks the values, except `hurry_mult` and `th_concerned`, which are checked where they are used.
+    ///
+    /// # Errors
+    /// The first value that is wrong.
     pub(super) fn check(&self) -> Result<(), String> {
         positive("exchange_radius_m", self.exchange_radius_m)?;
         positive("block_patience_s", self.block_patience_s)?;

@@ -1,48 +1,53 @@
-//! What Leguin remembers from tick to tick besides emotion and behavior, and what of it she publishes.
+//! What Leguin remembers from tick to tick besides emotion and behavior, and what she publishes of it.
 
 use affect::Intensity;
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
-use super::{Behavior, Errand, Measures, Parameters};
+use super::parameters::Parameters;
+use super::tables::{Behavior, Errand, Measures};
 use crate::chance::Chance;
-use crate::drive::Legs;
+use crate::commands::{HURRY, REFILL};
+use crate::drive::Drive;
+use crate::jokes::Jokes;
 use crate::peer::Peer;
+use crate::published::{count, flag, location, text};
 
 /// Leguin's memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct State {
+    /// Where she stands.
     pub(super) at: Point,
     /// Where she stood before the last move.
     pub(super) before: Point,
-    /// Where she was driving then, and how far she meant to get.
+    /// The goal of that move, and the length of its step.
     pub(super) aim: Option<(Point, f64)>,
     /// Her place at the table.
     pub(super) home: Point,
-    pub(super) legs: Legs,
+    pub(super) drive: Drive,
     pub(super) hurried: bool,
     pub(super) sent_home: bool,
     pub(super) pending: Option<Errand>,
-    /// How far she has come on this way, toward where it led at each moment.
+    /// How far she has come on this way, measured toward its goal at each moment.
     pub(super) way_m: f64,
-    /// How far at best.
+    /// The maximum of `way_m` on this way.
     pub(super) best_way_m: f64,
-    /// How long ago that was.
+    /// Time since the last progress.
     pub(super) blocked_s: f64,
-    /// How long she has waited to be sent home.
+    /// Time for which she has waited to be sent home.
     pub(super) waiting_s: f64,
     pub(super) trips: u32,
     /// How often she turned back FRUSTRATED.
     pub(super) given_up: u32,
-    pub(super) until_joke_s: f64,
     pub(super) waiter: Peer,
-    /// Whether the waiter needed a refill when he last answered, and of whom.
+    /// Whether the waiter needed a refill in his last answer.
     pub(super) waiter_needs: bool,
+    /// Whom he called for.
     pub(super) waiter_calls: Option<String>,
     pub(super) measures: Measures,
     pub(super) turns: Chance,
-    pub(super) jokes: Chance,
+    pub(super) jokes: Jokes,
 }
 
 impl State {
@@ -52,7 +57,7 @@ impl State {
             before: Point::default(),
             aim: None,
             home: Point::default(),
-            legs: Legs::default(),
+            drive: Drive::default(),
             hurried: false,
             sent_home: false,
             pending: None,
@@ -62,37 +67,42 @@ impl State {
             waiting_s: 0.0,
             trips: 0,
             given_up: 0,
-            until_joke_s: parameters.joke_mean_s,
             waiter: Peer::new(&parameters.waiter),
             waiter_needs: false,
             waiter_calls: None,
             measures: Measures::default(),
             turns: Chance::new(0),
-            jokes: Chance::new(1),
+            jokes: Jokes::new(Chance::new(1), parameters.joke_mean_s),
         }
     }
 
-    /// The first tick: home is where she starts, and her chance.
+    /// Sets what depends on the run: her start, which is her home, and her random streams.
     pub(super) fn begin(&mut self, parameters: &Parameters, cars: &mut Cars<'_>) {
-        self.at = cars.welcome().location;
-        (self.before, self.home) = (self.at, self.at);
+        let start = cars.welcome().location;
+        self.at = start;
+        self.before = start;
+        self.home = start;
+
         self.turns = Chance::split(cars.random());
-        self.jokes = Chance::split(cars.random());
-        self.until_joke_s = self.jokes.exponential(parameters.joke_mean_s);
+        self.jokes = Jokes::new(Chance::split(cars.random()), parameters.joke_mean_s);
     }
 
-    /// A tick went by in this behavior: was there progress, how long has she waited?
-    pub(super) fn pass(&mut self, behavior: Behavior, progress_share: f64, tick_s: f64) {
-        self.until_joke_s -= tick_s;
+    /// Advances the timers by one tick that she spent in this behavior.
+    pub(super) fn advance(&mut self, behavior: Behavior, progress_share: f64, tick_s: f64) {
+        self.jokes.advance(tick_s);
         self.waiting_s = if behavior == Behavior::AwaitGoHome {
             self.waiting_s + tick_s
         } else {
             0.0
         };
-        if !matches!(behavior, Behavior::Refill | Behavior::GoHome) {
+
+        let is_on_the_way = matches!(behavior, Behavior::Refill | Behavior::GoHome);
+        if !is_on_the_way {
             self.begin_way();
-        } else if let Some((goal, step_m)) = self.aim {
-            // Her own share of what brings them together: the waiter's motion is not hers. To and fro is no progress.
+            return;
+        }
+        if let Some((goal, step_m)) = self.aim {
+            // Only her own motion toward the goal counts: the waiter's is not hers. To and fro is no progress.
             self.way_m += self.before.distance_m(goal) - self.at.distance_m(goal);
             let is_progress = self.way_m >= self.best_way_m + progress_share * step_m;
             self.best_way_m = self.best_way_m.max(self.way_m);
@@ -104,12 +114,14 @@ impl State {
         }
     }
 
-    /// What she did before counts no more.
+    /// Begins to measure progress anew.
     pub(super) fn begin_way(&mut self) {
-        (self.blocked_s, self.way_m, self.best_way_m) = (0.0, 0.0, 0.0);
+        self.blocked_s = 0.0;
+        self.way_m = 0.0;
+        self.best_way_m = 0.0;
     }
 
-    /// What others may learn, and what a later incarnation will need.
+    /// The state variables: what other robots may query, and what a later incarnation needs.
     pub(super) fn published(
         &self,
         intensity: Intensity,
@@ -118,8 +130,8 @@ impl State {
     ) -> StateVariables {
         let distance_m = goal.map_or(0.0, |goal| self.at.distance_m(goal));
         let pending = match self.pending {
-            Some(Errand::Refill) => crate::REFILL,
-            Some(Errand::Hurry) => crate::HURRY,
+            Some(Errand::Refill) => REFILL,
+            Some(Errand::Hurry) => HURRY,
             None => "",
         };
         [
@@ -140,22 +152,16 @@ impl State {
         .into()
     }
 
-    /// What a lost incarnation knew.
+    /// Continues from what a lost incarnation published.
     pub(super) fn take_over(&mut self, last: &StateVariables) {
-        let number = |name: &str| last.get(name).and_then(robot::Variable::as_f64);
-        let count = |name: &str| number(name).map_or(0, |value| value as u32);
-        self.hurried = last
-            .get("hurried")
-            .and_then(robot::Variable::as_bool)
-            .unwrap_or(false);
-        self.pending = match last.get("pending").and_then(|value| value.as_str()) {
-            Some(crate::REFILL) => Some(Errand::Refill),
-            Some(crate::HURRY) => Some(Errand::Hurry),
+        self.hurried = flag(last, "hurried");
+        self.pending = match text(last, "pending") {
+            Some(REFILL) => Some(Errand::Refill),
+            Some(HURRY) => Some(Errand::Hurry),
             _ => None,
         };
-        (self.trips, self.given_up) = (count("trips"), count("given_up"));
-        if let (Some(x), Some(y)) = (number("home_x_m"), number("home_y_m")) {
-            self.home = Point::new(x, y);
-        }
+        self.trips = count(last, "trips");
+        self.given_up = count(last, "given_up");
+        self.home = location(last, "home_x_m", "home_y_m").unwrap_or(self.home);
     }
 }

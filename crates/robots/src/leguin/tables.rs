@@ -1,7 +1,7 @@
-//! What Leguin feels and what she does, as tables.
+//! Leguin's emotion and behavior, as tables.
 //!
 //! One tick is: state variables, then emotion (from them), then behavior (from them and the emotion), then the next
-//! place. So "hurry" on the way is taken by the behavior table in the tick in which it arrives, and felt in the next.
+//! motion. So "hurry" on the way acts on the behavior table in the tick in which it arrives, and on emotion in the next.
 
 use affect::EmotionRow;
 use affect::Intensity;
@@ -47,7 +47,7 @@ impl Behavior {
     }
 }
 
-/// What she was told to do and has not begun yet.
+/// What she was commanded to do and has not begun yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Errand {
@@ -61,17 +61,17 @@ pub enum Errand {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measures {
-    /// Whether she was told to hurry.
+    /// Whether she was commanded to hurry.
     pub hurried: bool,
-    /// Time without progress on the way, as a share of her patience with that.
+    /// Time without progress on the way, as a share of the time after which she is FRUSTRATED with it.
     pub blocked: f64,
-    /// Time for which she has waited to be sent home, as a share of her patience with that.
+    /// Time for which she has waited to be sent home, as a share of the time after which she is FRUSTRATED with it.
     pub waiting: f64,
-    /// Intensity of the concern of one who is told to hurry.
+    /// Intensity of her concern if she was commanded to hurry.
     pub th_concerned: f64,
 }
 
-/// The emotion state generator: the refiller's column of the seed's Table 2. The first row that holds counts.
+/// The emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts.
 #[rustfmt::skip]
 pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
     EmotionRow { during: &[Wait, Exchange, GoHome], when: |_| true, feel: Happy },
@@ -83,7 +83,7 @@ pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
     EmotionRow { during: &[AwaitGoHome], when: |_| true, feel: Confident },
 ];
 
-/// How strongly she feels it \[I\].
+/// The intensity of her emotion \[I\].
 pub fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
     let hurry = if measures.hurried {
         measures.th_concerned
@@ -93,14 +93,14 @@ pub fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
     Intensity::saturating(hurry.max(measures.blocked).max(measures.waiting))
 }
 
-/// What a row of the table has Leguin do.
+/// What a row of the behavior table makes Leguin do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
-    /// Sets out on the errand that she was told.
+    /// Begins the pending errand.
     TakeErrand,
     /// Hurries from now on.
     Hurry,
-    /// What she was told before the exchange is done with.
+    /// Forgets the commands that led to the exchange.
     FinishErrand,
     /// Turns back.
     GiveUp,
@@ -110,22 +110,22 @@ pub enum Act {
     Joke,
 }
 
-/// What a row's guard can see.
+/// What the guard of a row sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Context {
-    /// What she feels; `None` if that has no say.
+    /// Her emotion; `None` if it does not act on behavior.
     pub emotion: Option<StandardEmotion>,
-    /// What she was told to do and has not begun.
+    /// What she was commanded to do and has not begun.
     pub pending: Option<Errand>,
-    /// Whether the waiter needs her, as far as can be known, and is within the exchange radius.
+    /// Whether the waiter needs her, as far as is known, and is within the exchange radius.
     pub waiter_is_needy_here: bool,
     /// Whether an exchange has lasted as long as it takes.
     pub exchange_is_over: bool,
-    /// Whether she was told to go home after the exchange.
+    /// Whether she was commanded to go home after the exchange.
     pub sent_home: bool,
     /// Whether she is back at the table.
     pub is_home: bool,
-    /// Whether she has thought of a joke.
+    /// Whether the time for a joke has come.
     pub has_joke: bool,
 }
 

@@ -1,9 +1,9 @@
-//! A robot that does nothing but ask.
+//! A robot that only queries another one.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use robot::{BadParameters, Cars, Point, PublicState, Robot, RobotName, StateVariables};
+use robot::{Action, BadParameters, Cars, PublicState, Robot};
 
 use super::{Role, Stage, feet};
 
@@ -35,38 +35,15 @@ pub(crate) fn answers(seed: u64, of: &str) -> PublicState {
 }
 
 impl Robot for Asker {
-    fn init_robot(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
         Ok(())
     }
-    fn speed(&self) -> f64 {
-        0.0
-    }
-    fn direction(&self) -> f64 {
-        0.0
-    }
-    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
         *self.heard.borrow_mut() = cars
             .get_robot_state(&self.of)
             .ok()
             .map(|state| (*state).clone());
-    }
-    fn state_variables(&self) -> StateVariables {
-        StateVariables::new()
-    }
-    fn current_location(&self) -> Point {
-        feet(25.0, 25.0)
-    }
-    fn project_location(&mut self, _: &mut Cars<'_>) -> Point {
-        feet(25.0, 25.0)
-    }
-    fn set_current_location(&mut self, _: &mut Cars<'_>, _: Point) {}
-    fn set_command(&mut self, _: &mut Cars<'_>, _: &RobotName, _: &str) {}
-    fn update_emotion_state(&mut self, _: &mut Cars<'_>) {}
-    fn emotion_state(&self) -> &str {
-        "CURIOUS"
-    }
-    fn update_behavior_state(&mut self, _: &mut Cars<'_>) {}
-    fn behavior_state(&self) -> &str {
-        "ASK"
+        Action::stay(cars).emotion("CURIOUS").behavior("ASK")
     }
 }

@@ -1,5 +1,6 @@
-//! An open field in memory, for robots alone: no simulator, and no guests but those that a test places. Bodies that would overlap stay; commands arrive at
-//! the next tick, unless the test drops them; questions are answered, unless the test cuts them.
+//! An open field in memory, for robots alone: no simulator, and no guests but those that a test places. Bodies that would
+//! overlap stay; commands arrive at the next tick, unless the test drops them; queries are answered, unless the test cuts
+//! them.
 
 #![allow(dead_code, reason = "each test file uses its own part of the stage")]
 #![expect(
@@ -95,7 +96,7 @@ pub(crate) struct Stage {
     pub(crate) sent: Vec<Sent>,
     /// Whether a command is lost.
     pub(crate) drops: Drops,
-    /// Whether, at this tick, the first robot cannot ask the second.
+    /// Whether, at this tick, the first robot cannot query the second.
     pub(crate) cuts: Cuts,
     operator_seq: u64,
     underway: BTreeMap<RobotName, Vec<Value>>,
@@ -150,7 +151,7 @@ impl Stage {
         self.exchange(&blocked);
     }
 
-    /// Steps until `is_over`, and says whether that came within `limit_s`.
+    /// Steps until `is_over`; returns whether that came within `limit_s`.
     pub(crate) fn step_until(
         &mut self,
         limit_s: f64,
@@ -210,7 +211,7 @@ impl Stage {
         self.at(a).distance_m(self.at(b)) / FT_M
     }
 
-    /// What a robot said, in order.
+    /// The commands that a robot sent, in order.
     pub(crate) fn commands_of(&self, robot: &str) -> Vec<&str> {
         self.sent
             .iter()

@@ -1,0 +1,39 @@
+//! Why a robot cannot take part, or cannot go on.
+
+use protocol::RobotName;
+
+/// Parameters that a robot cannot work with.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("parameters of {robot}: {reason}")]
+pub struct BadParameters {
+    /// The robot that refuses them.
+    pub robot: RobotName,
+    /// What is wrong with them.
+    pub reason: String,
+}
+
+/// Why a robot leaves the run.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RobotError {
+    /// It refuses its parameters.
+    #[error(transparent)]
+    Parameters(#[from] BadParameters),
+    /// It gave up during a tick ([`crate::Cars::give_up`]).
+    #[error("{robot} gives up: {reason}")]
+    GaveUp {
+        /// The robot.
+        robot: RobotName,
+        /// The reason it gave.
+        reason: String,
+    },
+    /// Its report exceeds the limits of a message.
+    #[error("{robot} says too much: {field}: {reason}")]
+    TooMuch {
+        /// The robot.
+        robot: RobotName,
+        /// The field of its report.
+        field: String,
+        /// Which limit the field exceeds.
+        reason: String,
+    },
+}
