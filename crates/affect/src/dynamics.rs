@@ -327,7 +327,7 @@ impl<E: EmotionLabel> Dynamics<E> {
         stimulus: &Stimulus,
         dt_s: f64,
     ) -> E {
-        // Before the dwell time is over, too: this also measures how long the next rung's condition has held.
+        // This also measures how long the next rung's condition has held, so it must run before the dwell time is over.
         let may_climb = self.may_climb(index, state, stimulus, dt_s);
 
         if !state.has_lasted(self.parameters.dwell_s) {

@@ -99,7 +99,7 @@ pub enum ParameterError {
     #[error("{0}")]
     Syntax(String),
     /// A parameter that must be positive and finite.
-    #[error("{name} must be a positive number, not {value}")]
+    #[error("{name} must be above 0, not {value}")]
     NotPositive {
         /// The parameter.
         name: &'static str,
@@ -107,7 +107,7 @@ pub enum ParameterError {
         value: f64,
     },
     /// A parameter that must be finite and not negative.
-    #[error("{name} must be a number of 0 or more, not {value}")]
+    #[error("{name} must be at least 0, not {value}")]
     Negative {
         /// The parameter.
         name: &'static str,
@@ -230,18 +230,12 @@ mod tests {
 
     #[test]
     fn invalid_values_are_rejected_with_a_reason() {
-        assert_eq!(
-            refusal("tau_up_s = 0.0"),
-            "tau_up_s must be a positive number, not 0"
-        );
+        assert_eq!(refusal("tau_up_s = 0.0"), "tau_up_s must be above 0, not 0");
         assert_eq!(
             refusal("dwell_s = -1.0"),
-            "dwell_s must be a number of 0 or more, not -1"
+            "dwell_s must be at least 0, not -1"
         );
-        assert_eq!(
-            refusal("rho_max = nan"),
-            "rho_max must be a positive number, not NaN"
-        );
+        assert_eq!(refusal("rho_max = nan"), "rho_max must be above 0, not NaN");
 
         assert!(refusal("th_confident = 0.5").contains("0.5 is followed by 0.45"));
         assert!(refusal("th_angry = 1.5").contains("ascending order"));

@@ -260,14 +260,14 @@ fn fill(template: &str, circumstances: &Circumstances<'_>) -> Option<String> {
 }
 
 fn check_slots(name: &str, text: &str) -> Result<(), SchemaError> {
-    let Some(slots) = slots(text) else {
-        return Err(SchemaError::OpenBrace {
-            name: name.to_owned(),
-            text: text.to_owned(),
-        });
-    };
+    for slot in slots(text) {
+        let Some(slot) = slot else {
+            return Err(SchemaError::OpenBrace {
+                name: name.to_owned(),
+                text: text.to_owned(),
+            });
+        };
 
-    for slot in slots {
         if !SLOTS.contains(&slot) {
             return Err(SchemaError::UnknownSlot {
                 name: name.to_owned(),
@@ -279,23 +279,22 @@ fn check_slots(name: &str, text: &str) -> Result<(), SchemaError> {
     Ok(())
 }
 
-/// The placeholders in a text, or `None` if a brace is unmatched.
-fn slots(text: &str) -> Option<Vec<&str>> {
+/// The placeholders in a text, in order, with `None` for an unmatched brace.
+fn slots(text: &str) -> Vec<Option<&str>> {
     let mut slots = Vec::new();
 
     let mut pieces = text.split('{');
-    if pieces.next()?.contains('}') {
-        return None;
+    if pieces.next().is_some_and(|before| before.contains('}')) {
+        slots.push(None);
     }
     for piece in pieces {
-        let (slot, after) = piece.split_once('}')?;
-        if after.contains('}') {
-            return None;
+        match piece.split_once('}') {
+            Some((slot, after)) if !after.contains('}') => slots.push(Some(slot)),
+            _ => slots.push(None),
         }
-        slots.push(slot);
     }
 
-    Some(slots)
+    slots
 }
 
 /// A set of schemata, indexed by the name of the emotion.

@@ -29,16 +29,21 @@ impl Course {
         let direction_rad = rng.random::<f64>() * TAU;
         let speed_mps = guests.speed_mps.sample(rng);
         let duration_s = guests.duration_s.sample(rng);
-        let (sin, cos) = libm::sincos(direction_rad);
 
         Self {
             direction_rad,
             speed_mps,
             duration_s,
             ticks_left: whole_ticks(duration_s, tick_s),
-            step_m: Point::new(cos, sin) * (speed_mps * tick_s),
+            step_m: displacement(direction_rad, speed_mps * tick_s),
         }
     }
+}
+
+fn displacement(direction_rad: f64, distance_m: f64) -> Point {
+    let (sin, cos) = libm::sincos(direction_rad);
+
+    Point::new(cos, sin) * distance_m
 }
 
 /// The number of ticks after which a duration has passed; at least one, so that every course moves the guest.

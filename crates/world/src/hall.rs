@@ -127,17 +127,23 @@ pub struct Hall {
 }
 
 impl Hall {
+    /// Number of obstacles, robots and guests; `usize::MAX` if it overflows.
+    fn body_count(&self) -> usize {
+        let fixed = self.obstacles.len();
+        let robots = self.robots.len();
+
+        fixed
+            .saturating_add(robots)
+            .saturating_add(self.guests.count)
+    }
+
     /// Checks every number and count that can be validated without placing a body.
     pub(crate) fn check(&self) -> Result<(), HallError> {
         self.field.check()?;
         in_range("tick_s", self.tick_s, TICK_MIN_S, TICK_MAX_S)?;
         in_range("max_speed_mps", self.max_speed_mps, 0.0, SPEED_MAX_MPS)?;
 
-        let count = self
-            .obstacles
-            .len()
-            .saturating_add(self.robots.len())
-            .saturating_add(self.guests.count);
+        let count = self.body_count();
         if count > BODIES_MAX {
             return Err(HallError::TooManyBodies {
                 count,

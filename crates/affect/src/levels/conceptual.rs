@@ -256,7 +256,7 @@ impl Conceptual {
 
         let mut glances = Vec::with_capacity(candidates.len());
         for candidate in candidates {
-            // At a glance, every action is expected to change nothing.
+            // The first assessment does not project outcomes.
             glances.push(self.value(candidate, 0.0, &condition, memory));
         }
         let count = self.weighable(candidates.len(), condition.pressure);
