@@ -1,14 +1,17 @@
 //! The behavior state generator (BSG): a table of guarded transitions.
 //!
-//! A guard sees a context by shared reference: the progress measures, and the current [`Feeling`], which is a
-//! copy. So a BSG cannot write emotion. The context is the snapshot from the start of the step, and stays the
-//! same for all rows: what an action changes is seen by guards one step later, and rows cannot depend on
-//! each other in hidden ways.
+//! Guards receive a shared reference to a context, which holds the progress measures and a copy of the current
+//! [`Feeling`]. A BSG therefore cannot change the emotion. The context is a snapshot taken at the start of the step
+//! and is the same for all rows: guards see the effects of actions one step later, so rows cannot depend on each
+//! other in hidden ways.
 //!
-//! **Meaning of a table.** Rows are read from the top. A row *applies* if it is for the current state and
-//! its guard holds. An applying row has its actions performed; then [`Then::Stay`] reads on, and
-//! [`Then::Go`] moves to the next state and ends the step. So any number of rows that stay may act in a step,
-//! the first row that goes wins, and rows below it are not read. Without a row that goes, the state stays.
+//! # Evaluation
+//!
+//! Rows are evaluated from top to bottom. A row *applies* if it includes the current state and its guard holds. The
+//! actions of a row that applies are performed. Evaluation then continues with the next row for [`Then::Stay`],
+//! while [`Then::Go`] changes the state and ends the step. Several `Stay` rows can thus act in one step, but only
+//! the first `Go` row takes effect, and rows below it are not evaluated. The state does not change if no `Go` row
+//! applies.
 //!
 //! ```
 //! use affect::StandardEmotion::{self, Confident, Frustrated};
@@ -39,7 +42,7 @@
 //! struct Context { feeling: Feeling<StandardEmotion> }
 //! const TABLE: &[Row<u8, Context, u8>] = &[Row {
 //!     from: &[0],
-//!     when: |c| { c.feeling.intensity = Intensity::MAX; true }, // a BSG never writes emotion: does not compile
+//!     when: |c| { c.feeling.intensity = Intensity::MAX; true }, // does not compile: a BSG cannot change the emotion
 //!     act: &[],
 //!     then: Then::Stay,
 //! }];
@@ -51,39 +54,39 @@ use crate::scalar::has_elapsed;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What follows when a row applies.
+/// What happens after the actions of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Then<S> {
-    /// Read on with the next row.
+    /// Continue with the next row.
     Stay,
-    /// Move to this state (which may be the current one) and read no further.
+    /// Change to this state, which may be the current one, and stop.
     Go(S),
 }
 
 /// One row of a behavior table.
 pub struct Row<S: 'static, C: 'static, A: 'static> {
-    /// The states in which the row counts.
+    /// The states in which the row can apply.
     pub from: &'static [S],
-    /// The condition.
+    /// The guard.
     pub when: fn(&C) -> bool,
-    /// What to do if it holds, in this order.
+    /// Actions to perform if the row applies, in order.
     pub act: &'static [A],
-    /// Where that leads.
+    /// What happens after the actions.
     pub then: Then<S>,
 }
 
-/// What a step of the table decided.
+/// The result of evaluating a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decision<S, A> {
-    /// The actions of all rows that applied, in order. Performing them is the robot's part.
+    /// Actions of all rows that applied, in order. The robot performs them.
     pub actions: Vec<A>,
-    /// The state to go to, if a row went.
+    /// The next state, if a `Go` row applied.
     pub next: Option<S>,
-    /// Indices of the rows that applied: why this was decided.
+    /// Indices of the rows that applied, which explain the decision.
     pub rows: Vec<usize>,
 }
 
-/// Reads a table once, without changing anything.
+/// Evaluates a table once, without side effects.
 pub fn decide<S: Clone + PartialEq, C, A: Clone>(
     rows: &'static [Row<S, C, A>],
     state: &S,
@@ -94,21 +97,26 @@ pub fn decide<S: Clone + PartialEq, C, A: Clone>(
         next: None,
         rows: Vec::new(),
     };
+
     for (index, row) in rows.iter().enumerate() {
-        if !(row.from.contains(state) && (row.when)(context)) {
+        let applies = row.from.contains(state) && (row.when)(context);
+        if !applies {
             continue;
         }
+
         decision.actions.extend_from_slice(row.act);
         decision.rows.push(index);
+
         if let Then::Go(next) = &row.then {
             decision.next = Some(next.clone());
             break;
         }
     }
+
     decision
 }
 
-/// All that a behavior generator remembers from one step to the next.
+/// The state of a behavior generator between steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BehaviorState<S> {
@@ -116,7 +124,7 @@ pub struct BehaviorState<S> {
     lasting_s: f64,
 }
 
-/// A table and the state it has led to. Owns the behavior, and nothing else.
+/// A behavior table with its current state.
 pub struct BehaviorGenerator<S: 'static, C: 'static, A: 'static> {
     rows: &'static [Row<S, C, A>],
     state: BehaviorState<S>,
@@ -139,47 +147,51 @@ impl<S: Clone + PartialEq, C, A: Clone> BehaviorGenerator<S, C, A> {
         &self.state.current
     }
 
-    /// For how long, in seconds, it has lasted.
+    /// How long the current behavior has lasted, in seconds.
     pub fn lasting_s(&self) -> f64 {
         self.state.lasting_s
     }
 
-    /// Whether it has lasted `seconds` or more; use this and not a comparison, because sums of steps
-    /// such as 0.1 s are not exact.
+    /// Whether the current behavior has lasted at least `seconds`.
+    ///
+    /// Prefer this to comparing [`lasting_s`](Self::lasting_s), because sums of steps such as 0.1 s are not exact.
     pub fn has_lasted(&self, seconds: f64) -> bool {
         has_elapsed(self.state.lasting_s, seconds)
     }
 
-    /// Lets `dt_s` seconds pass. Belongs before the context is made, so that a guard can ask how long the
-    /// behavior has lasted by now.
+    /// Advances the time by `dt_s` seconds.
+    ///
+    /// Call this before building the context, so that guards see how long the behavior has lasted.
     pub fn advance(&mut self, dt_s: f64) {
         self.state.lasting_s += dt_s;
     }
 
-    /// Decides, and goes where the decision leads. Going to the current state starts its time anew.
+    /// Evaluates the table and changes to the next state. `Go` to the current state resets its time.
     pub fn update(&mut self, context: &C) -> Decision<S, A> {
         let decision = decide(self.rows, &self.state.current, context);
+
         if let Some(next) = &decision.next {
             self.state = BehaviorState {
                 current: next.clone(),
                 lasting_s: 0.0,
             };
         }
+
         decision
     }
 
-    /// All that is to be saved of it.
+    /// The state to save.
     pub fn state(&self) -> &BehaviorState<S> {
         &self.state
     }
 
-    /// Continues from a saved state.
+    /// Resumes from a saved state.
     pub fn restore(&mut self, state: BehaviorState<S>) {
         self.state = state;
     }
 }
 
-// Derived implementations would ask the same of contexts and actions, of which nothing is owned.
+// Derived implementations would add bounds on contexts and actions, although no value of them is stored.
 
 impl<S: Clone, C, A> Clone for BehaviorGenerator<S, C, A> {
     fn clone(&self) -> Self {
@@ -258,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_stay_fall_through_and_the_first_that_goes_wins() {
+    fn stay_rows_fall_through_and_the_first_go_row_wins() {
         assert_eq!(
             decided(A, true, true),
             (vec!["note need", "greet", "give"], Some(B), vec![0, 1])
@@ -280,11 +292,9 @@ mod tests {
         for _ in 0..20 {
             bsg.advance(0.1);
         }
-        assert!(
-            bsg.has_lasted(2.0) && !bsg.has_lasted(2.01),
-            "{}",
-            bsg.lasting_s()
-        );
+        assert!(bsg.has_lasted(2.0), "{}", bsg.lasting_s());
+        assert!(!bsg.has_lasted(2.01), "{}", bsg.lasting_s());
+
         bsg.update(&Context {
             need: false,
             near: true,
@@ -297,8 +307,10 @@ mod tests {
         let mut bsg = BehaviorGenerator::new(ROWS, A);
         bsg.advance(0.3);
         let saved = serde_json::to_string(bsg.state()).unwrap();
+
         let mut other = BehaviorGenerator::new(ROWS, B);
         other.restore(serde_json::from_str(&saved).unwrap());
+
         assert_eq!(other.state(), bsg.state());
     }
 }

@@ -1,11 +1,11 @@
-//! How an emotion changes with time: the intensity filter and the state machine over a [`Ladder`].
+//! How an emotion changes over time: the intensity filter and the state machine over a [`Ladder`].
 //!
-//! Documented is the shape of the rule [D: S]: positive progress keeps a
-//! robot HAPPY, negative progress worries it increasingly until it is FRUSTRATED, and from there a positive
-//! input leads back as far as it is important. The numbers are parameters \[I\].
+//! The general behavior is documented [D: S]: positive progress keeps a robot HAPPY, negative progress worries it
+//! more and more until it is FRUSTRATED, and a positive input then leads back by as much as the input is important.
+//! The numbers are parameters \[I\].
 //!
-//! [`Dynamics`] is the rule and never changes; [`EmotionState`] is all that does. Saving that one value and
-//! restoring it continues identically.
+//! [`Dynamics`] holds the immutable rule, and [`EmotionState`] holds everything that changes. Saving and restoring
+//! the state resumes the dynamics exactly.
 
 use crate::label::{EmotionLabel, Feeling, StandardEmotion};
 use crate::ladder::{Ladder, Place};
@@ -13,28 +13,30 @@ use crate::parameters::{DynamicsParameters, ParameterError};
 use crate::scalar::{Caution, Intensity, has_elapsed};
 use serde::{Deserialize, Serialize};
 
-/// What presses on the robot during one step.
+/// The continuous input to the dynamics during one step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Drive {
-    /// A need ratio (dimensionless, 0 or more): how much later help comes than it is needed.
+    /// The time until help arrives divided by the time until it is needed; dimensionless, 0 or more.
     Need(f64),
-    /// Nothing presses, so intensity falls.
+    /// No need: the intensity falls.
     Rest,
-    /// No measure is to be had, so intensity stays. A need that is not a number counts as this.
+    /// No measure is available: the intensity stays the same. A need of NaN is treated the same way.
     Hold,
 }
 
-/// Something that happens to a goal at one moment. The two classes are documented [D: S], as is that a
-/// positive input counts by its importance; how much intensity each moves is chosen here \[I\].
+/// A discrete event that affects a goal.
+///
+/// The two classes are documented [D: S], and so is that the effect of a positive input depends on its importance.
+/// How much each event changes the intensity is chosen here \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProgressEvent {
-    /// A step toward the goal: takes its importance from the intensity.
+    /// A step toward the goal; its importance is subtracted from the intensity.
     Positive(Intensity),
-    /// A setback: adds its importance times the gain to the intensity.
+    /// A setback; its importance, multiplied by the gain, is added to the intensity.
     Negative(Intensity),
-    /// The goal is reached, the most important positive input: back to the start at once, intensity 0.
+    /// The goal is achieved, the most important positive input: returns to the initial emotion with intensity 0.
     GoalAchieved,
 }
 
@@ -42,23 +44,23 @@ pub enum ProgressEvent {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Belief {
-    /// It has not thought about it.
+    /// The robot has not formed a belief.
     #[default]
     Unstated,
-    /// "I can do this."
+    /// The robot believes that it can achieve its goal.
     Can,
-    /// "I cannot do this."
+    /// The robot believes that it cannot achieve its goal.
     Cannot,
 }
 
-/// Whether what presses now is better or worse than what is already felt.
+/// Direction in which the current input moves the intensity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trend {
-    /// Positive progress: intensity falls.
+    /// Positive progress: the intensity falls.
     Positive,
-    /// Negative progress: intensity rises.
+    /// Negative progress: the intensity rises.
     Negative,
-    /// Neither.
+    /// The intensity stays the same.
     Level,
 }
 
@@ -67,16 +69,16 @@ pub enum Trend {
 pub struct Stimulus {
     /// The continuous input.
     pub drive: Drive,
-    /// What happened in this step.
+    /// The event that happened in this step, if any.
     pub event: Option<ProgressEvent>,
-    /// A belief formed in this step; the previous one stays if there is none.
+    /// The belief formed in this step. `None` keeps the previous one.
     pub belief: Option<Belief>,
-    /// Whether somebody else is to blame for the need (agency: other).
+    /// Whether another agent is to blame for the need (agency: other).
     pub blames_other: bool,
 }
 
 impl Stimulus {
-    /// Only a continuous input.
+    /// A stimulus with only a continuous input.
     pub fn new(drive: Drive) -> Self {
         Self {
             drive,
@@ -86,23 +88,23 @@ impl Stimulus {
         }
     }
 
-    /// A need ratio (dimensionless).
+    /// A stimulus with a need ratio (dimensionless).
     pub fn need(ratio: f64) -> Self {
         Self::new(Drive::Need(ratio))
     }
 
-    /// Nothing presses.
+    /// A stimulus without need.
     pub fn rest() -> Self {
         Self::new(Drive::Rest)
     }
 
-    /// The same, with something that happened.
+    /// Sets the event.
     #[must_use]
     pub fn with_event(self, event: Option<ProgressEvent>) -> Self {
         Self { event, ..self }
     }
 
-    /// The same, with a belief.
+    /// Sets the belief.
     #[must_use]
     pub fn with_belief(self, belief: Belief) -> Self {
         Self {
@@ -111,7 +113,7 @@ impl Stimulus {
         }
     }
 
-    /// The same, saying whether somebody else is to blame.
+    /// Sets whether another agent is to blame.
     #[must_use]
     pub fn with_blame(self, blames_other: bool) -> Self {
         Self {
@@ -121,7 +123,7 @@ impl Stimulus {
     }
 }
 
-/// All that the dynamics remember from one step to the next.
+/// The state of the dynamics between steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EmotionState<E> {
@@ -129,13 +131,13 @@ pub struct EmotionState<E> {
     intensity: Intensity,
     /// Time since the emotion last changed, or since the start, in seconds.
     unchanged_s: f64,
-    /// Time for which the condition of the next rung has held, in seconds.
+    /// Time for which the condition of the next rung has held without interruption, in seconds.
     pressing_s: f64,
     belief: Belief,
 }
 
 impl<E: EmotionLabel> EmotionState<E> {
-    /// What is felt.
+    /// The current feeling.
     pub fn feeling(&self) -> Feeling<E> {
         Feeling {
             emotion: self.emotion,
@@ -143,12 +145,12 @@ impl<E: EmotionLabel> EmotionState<E> {
         }
     }
 
-    /// For how long, in seconds, this emotion has been felt.
+    /// How long the current emotion has lasted, in seconds.
     pub fn unchanged_s(&self) -> f64 {
         self.unchanged_s
     }
 
-    /// What the robot believes about its ability.
+    /// The robot's current belief about its ability.
     pub fn belief(&self) -> Belief {
         self.belief
     }
@@ -166,7 +168,7 @@ impl<E: EmotionLabel> EmotionState<E> {
     }
 }
 
-/// The rule by which an emotion changes, for one robot's parameters and caution.
+/// The rule by which an emotion changes, for one robot with its parameters and caution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics<E> {
     ladder: Ladder<E>,
@@ -185,14 +187,16 @@ impl Dynamics<StandardEmotion> {
 }
 
 impl<E: EmotionLabel> Dynamics<E> {
-    /// Dynamics over a ladder of one's own. Of the parameters, the `th_` thresholds and `anger_s` are
-    /// not used: the ladder brings its own.
+    /// Creates dynamics over a custom ladder.
+    ///
+    /// The `th_` thresholds and `anger_s` of the parameters are ignored, because the ladder has its own.
     pub fn new(
         ladder: Ladder<E>,
         parameters: &DynamicsParameters,
         caution: Caution,
     ) -> Result<Self, ParameterError> {
         parameters.check()?;
+
         Ok(Self {
             ladder,
             gain: parameters.gain(caution),
@@ -210,12 +214,12 @@ impl<E: EmotionLabel> Dynamics<E> {
         &self.parameters
     }
 
-    /// How strongly this robot reacts, g(caution).
+    /// How strongly this robot reacts, `g(caution)`; dimensionless.
     pub fn gain(&self) -> f64 {
         self.gain
     }
 
-    /// The state at the beginning: the lowest emotion, intensity 0, no belief.
+    /// The initial state: the lowest emotion, intensity 0, no belief.
     pub fn start(&self) -> EmotionState<E> {
         EmotionState {
             emotion: self.ladder.start(),
@@ -226,29 +230,33 @@ impl<E: EmotionLabel> Dynamics<E> {
         }
     }
 
-    /// Whether `state` belongs to these dynamics, for instance after it was read from a file: its emotion is
-    /// one of the ladder's, and its times are times. [`Dynamics::step`] takes any state, and moves one
-    /// that does not belong to the rung its intensity names.
+    /// Whether `state` is valid for these dynamics: its emotion is on the ladder, and its times are finite and not
+    /// negative.
+    ///
+    /// Use it to validate a state that was read from a file. [`Dynamics::step`] accepts any state, and moves an
+    /// emotion that is not on the ladder to the rung for its intensity.
     pub fn accepts(&self, state: &EmotionState<E>) -> bool {
-        let is_time = |seconds: f64| seconds >= 0.0 && seconds.is_finite();
-        self.ladder.place(state.emotion) != Place::Elsewhere
-            && is_time(state.unchanged_s)
-            && is_time(state.pressing_s)
+        let is_on_ladder = self.ladder.place(state.emotion) != Place::Elsewhere;
+
+        is_on_ladder && is_duration(state.unchanged_s) && is_duration(state.pressing_s)
     }
 
-    /// The intensity toward which `drive` pulls: `min(1, g * need / rho_max)`; none when it holds.
+    /// The intensity that `drive` moves toward: `min(1, g * need / rho_max)`.
+    ///
+    /// `None` if the drive leaves the intensity unchanged.
     pub fn target(&self, drive: Drive) -> Option<Intensity> {
         match drive {
             Drive::Need(ratio) if ratio.is_nan() => None,
-            Drive::Need(ratio) => Some(Intensity::saturating(
-                self.gain * ratio / self.parameters.rho_max,
-            )),
+            Drive::Need(ratio) => {
+                let target = self.gain * ratio / self.parameters.rho_max;
+                Some(Intensity::saturating(target))
+            }
             Drive::Rest => Some(Intensity::MIN),
             Drive::Hold => None,
         }
     }
 
-    /// Whether `drive` is positive or negative progress for a robot that feels as `state` says.
+    /// Whether `drive` is positive or negative progress for a robot in this state.
     pub fn trend(&self, state: &EmotionState<E>, drive: Drive) -> Trend {
         match self.target(drive) {
             Some(target) if target > state.intensity => Trend::Negative,
@@ -257,10 +265,11 @@ impl<E: EmotionLabel> Dynamics<E> {
         }
     }
 
-    /// One step of `dt_s` seconds: the belief, then the intensity, then at most one change of emotion.
+    /// Advances the state by `dt_s` seconds: updates the belief, then the intensity, then the emotion at most once.
     pub fn step(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
         state.belief = stimulus.belief.unwrap_or(state.belief);
         state.unchanged_s += dt_s;
+
         let place = self.ladder.place(state.emotion);
         if stimulus.event == Some(ProgressEvent::GoalAchieved) && place != Place::Discouraged {
             state.intensity = Intensity::MIN;
@@ -268,7 +277,9 @@ impl<E: EmotionLabel> Dynamics<E> {
             state.change_to(self.ladder.start());
             return;
         }
-        self.feel(state, stimulus, dt_s);
+
+        self.update_intensity(state, stimulus, dt_s);
+
         let next = match place {
             Place::Rung(index) => self.next_from_rung(index, state, stimulus, dt_s),
             Place::Discouraged => self.next_from_discouraged(state),
@@ -278,29 +289,37 @@ impl<E: EmotionLabel> Dynamics<E> {
         state.change_to(next);
     }
 
-    /// First-order filter: rises with `tau_up_s / g`, falls with `tau_down_s`; events move it at once.
-    fn feel(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
+    /// Filters the drive into the intensity, then adds the effect of the event.
+    fn update_intensity(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
         let mut intensity = state.intensity.value();
-        if let Some(target) = self.target(stimulus.drive).map(Intensity::value) {
-            let rises = target > intensity;
-            let tau_s = if rises {
-                self.parameters.tau_up_s / self.gain
-            } else {
-                self.parameters.tau_down_s
-            };
-            intensity += (target - intensity) * (1.0 - libm::exp(-dt_s / tau_s));
+
+        if let Some(target) = self.target(stimulus.drive) {
+            intensity = self.filter(intensity, target.value(), dt_s);
         }
-        match stimulus.event {
-            Some(ProgressEvent::Positive(importance)) => intensity -= importance.value(),
-            Some(ProgressEvent::Negative(importance)) => {
-                intensity += self.gain * importance.value()
-            }
-            Some(ProgressEvent::GoalAchieved) | None => {}
-        }
-        state.intensity = Intensity::saturating(intensity);
+
+        let jump = match stimulus.event {
+            Some(ProgressEvent::Positive(importance)) => -importance.value(),
+            Some(ProgressEvent::Negative(importance)) => self.gain * importance.value(),
+            Some(ProgressEvent::GoalAchieved) | None => 0.0,
+        };
+
+        state.intensity = Intensity::saturating(intensity + jump);
     }
 
-    /// Up by one rung, or down by as many as intensity has fallen below; neither before the dwell time.
+    /// First-order filter with time constant `tau_up_s / g` when rising and `tau_down_s` when falling.
+    fn filter(&self, intensity: f64, target: f64, dt_s: f64) -> f64 {
+        let tau_s = if target > intensity {
+            self.parameters.tau_up_s / self.gain
+        } else {
+            self.parameters.tau_down_s
+        };
+        let share = 1.0 - libm::exp(-dt_s / tau_s);
+
+        intensity + (target - intensity) * share
+    }
+
+    /// Climbs by at most one rung, or falls by as many rungs as the intensity requires, but not before the dwell
+    /// time is over.
     fn next_from_rung(
         &self,
         index: usize,
@@ -308,32 +327,48 @@ impl<E: EmotionLabel> Dynamics<E> {
         stimulus: &Stimulus,
         dt_s: f64,
     ) -> E {
+        // This also measures how long the next rung's condition has held, so it must run before the dwell time is over.
         let may_climb = self.may_climb(index, state, stimulus, dt_s);
+
         if !state.has_lasted(self.parameters.dwell_s) {
             return state.emotion;
         }
-        if let Some(beliefs) = self.ladder.beliefs() {
-            let is_low_enough = self
-                .ladder
-                .discouraging_rung()
-                .is_some_and(|from| index >= from);
-            if state.belief == Belief::Cannot && is_low_enough {
-                return beliefs.discouraged;
-            }
+
+        if let Some(discouraged) = self.discouraged_from(index, state.belief) {
+            return discouraged;
         }
-        let rungs = self.ladder.rungs();
-        if may_climb {
-            return rungs[index + 1].emotion;
-        }
-        let mut lower = index;
-        while lower > 0 && state.intensity.value() < rungs[lower].enter - self.parameters.hysteresis
-        {
-            lower -= 1;
-        }
-        rungs[lower].emotion
+
+        let reached = if may_climb {
+            index + 1
+        } else {
+            self.fall_from(index, state.intensity.value())
+        };
+        self.ladder.rungs()[reached].emotion
     }
 
-    /// Whether the next rung's condition holds, and has held as long as it asks. Keeps the time.
+    /// The emotion that follows a rung because the robot believes that it cannot achieve its goal, if any.
+    fn discouraged_from(&self, index: usize, belief: Belief) -> Option<E> {
+        let beliefs = self.ladder.beliefs()?;
+        let from = self.ladder.discouraging_rung()?;
+
+        (belief == Belief::Cannot && index >= from).then_some(beliefs.discouraged)
+    }
+
+    /// The highest rung, not above `index`, that is not left at this intensity.
+    fn fall_from(&self, index: usize, intensity: f64) -> usize {
+        let rungs = self.ladder.rungs();
+
+        let mut lower = index;
+        while lower > 0 && intensity < rungs[lower].enter - self.parameters.hysteresis {
+            lower -= 1;
+        }
+
+        lower
+    }
+
+    /// Whether the next rung's condition holds and has held for as long as required.
+    ///
+    /// Updates the time for which it has held.
     fn may_climb(
         &self,
         index: usize,
@@ -344,21 +379,24 @@ impl<E: EmotionLabel> Dynamics<E> {
         let Some(next) = self.ladder.rungs().get(index + 1) else {
             return false;
         };
+
         let intensity = state.intensity.value();
         let is_blamed = stimulus.blames_other || !next.needs_blame;
         if next.hold_s == 0.0 {
             return is_blamed && intensity >= next.enter;
         }
+
         let is_pressing = is_blamed && intensity > next.enter;
         state.pressing_s = if is_pressing {
             state.pressing_s + dt_s
         } else {
             0.0
         };
+
         is_pressing && has_elapsed(state.pressing_s, next.hold_s)
     }
 
-    /// Discouragement yields to one thing only, the belief that one can [D: S].
+    /// Discouragement only ends with the belief that the robot can achieve its goal [D: S].
     fn next_from_discouraged(&self, state: &EmotionState<E>) -> E {
         match self.ladder.beliefs() {
             Some(beliefs) if state.belief == Belief::Can => beliefs.hopeful,
@@ -366,26 +404,36 @@ impl<E: EmotionLabel> Dynamics<E> {
         }
     }
 
-    /// Hope ends with the belief or with time; the rung below the discouraging one is the worst it
-    /// falls to \[I\].
+    /// Hope ends when the belief changes or after `hope_s`.
+    ///
+    /// After `hope_s`, the emotion follows from the intensity, up to the rung below the discouraging one \[I\].
     fn next_from_hopeful(&self, state: &EmotionState<E>) -> E {
         let Some(beliefs) = self.ladder.beliefs() else {
             return state.emotion;
         };
-        if state.belief == Belief::Cannot && state.has_lasted(self.parameters.dwell_s) {
+
+        let dwell_s = self.parameters.dwell_s;
+        if state.belief == Belief::Cannot && state.has_lasted(dwell_s) {
             return beliefs.discouraged;
         }
-        if !state.has_lasted(self.parameters.hope_s.max(self.parameters.dwell_s)) {
+
+        let hope_s = self.parameters.hope_s.max(dwell_s);
+        if !state.has_lasted(hope_s) {
             return state.emotion;
         }
-        let limit = self
-            .ladder
-            .discouraging_rung()
-            .map_or(0, |from| from.saturating_sub(1));
+
+        let from = self.ladder.discouraging_rung().unwrap_or(0);
+        let limit = from.saturating_sub(1);
         self.rung_by_intensity(state, limit)
     }
 
     fn rung_by_intensity(&self, state: &EmotionState<E>, limit: usize) -> E {
-        self.ladder.rungs()[self.ladder.rung_for(state.intensity.value(), limit)].emotion
+        let index = self.ladder.rung_for(state.intensity.value(), limit);
+
+        self.ladder.rungs()[index].emotion
     }
+}
+
+fn is_duration(seconds: f64) -> bool {
+    seconds >= 0.0 && seconds.is_finite()
 }

@@ -1,45 +1,46 @@
-//! What an emotion is called, and what a robot feels at one moment.
+//! Labels for emotions, and the feeling of a robot at one moment.
 //!
-//! The dynamics and the generators work with any set of emotions. A robot that needs an emotion nobody
-//! else has declares an enum and implements [`EmotionLabel`]; the others take [`StandardEmotion`].
+//! Dynamics and generators work with any set of emotions. A robot with emotions of its own declares an enum and
+//! implements [`EmotionLabel`]; other robots use [`StandardEmotion`].
 
 use crate::akr::{Affect, Valence};
 use crate::scalar::Intensity;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// A set of emotions, one value for each.
+/// A set of emotions, with one value for each.
 ///
-/// Names are what logs, panels, peers and the schemata use; they are spelled in capitals by custom [D: S].
+/// Logs, panels, other robots and the schemata refer to emotions by name. By convention, names are in capitals
+/// [D: S].
 pub trait EmotionLabel: Copy + Eq + Debug {
-    /// The name under which the emotion is published and its schema is found.
+    /// The name under which the emotion is published and its schema is looked up.
     fn name(self) -> &'static str;
 
-    /// Pleasant or unpleasant: all that the sensory-motor level learns of an emotion besides its intensity.
+    /// Whether the emotion is pleasant. The sensory-motor level sees only this and the intensity.
     fn valence(self) -> Valence;
 }
 
 /// The emotions of the documented robots.
 ///
-/// HAPPY, CONFIDENT, CONCERNED, FRUSTRATED are those of the waiter and refiller, HAPPY, CONCERNED,
-/// FRUSTRATED, ANGRY those of the dynamics example, DISCOURAGED and HOPEFUL those of the belief example
-/// [D: S]. The valence of each is chosen here \[I\].
+/// The waiter and the refiller have HAPPY, CONFIDENT, CONCERNED and FRUSTRATED, the paper's example of the dynamics
+/// has HAPPY, CONCERNED, FRUSTRATED and ANGRY, and its example of beliefs has DISCOURAGED and HOPEFUL [D: S]. The
+/// valences are chosen here \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub enum StandardEmotion {
-    /// All goes as wished; the start of both documented state sets.
+    /// Everything goes well. The initial emotion of both documented state sets.
     Happy,
-    /// Help will be needed, and is expected to come.
+    /// Help will be needed and is expected to arrive.
     Confident,
     /// Progress is too slow.
     Concerned,
-    /// The present strategy does not work.
+    /// The current strategy does not work.
     Frustrated,
-    /// Somebody else is to blame for it, and has been for long.
+    /// Another agent has been to blame for the lack of progress for a long time.
     Angry,
-    /// Convinced of being unable.
+    /// The robot believes that it cannot achieve its goal.
     Discouraged,
-    /// Convinced of being able after all.
+    /// The robot believes that it can achieve its goal after all.
     Hopeful,
 }
 
@@ -55,10 +56,11 @@ impl StandardEmotion {
         Self::Hopeful,
     ];
 
-    /// Whether this emotion is at least as serious as `other` on the scale HAPPY, CONFIDENT, CONCERNED,
-    /// FRUSTRATED, ANGRY (the order of the seed's Table 2, with ANGRY above \[I\]).
+    /// Whether this emotion is at least as serious as `other`.
     ///
-    /// DISCOURAGED and HOPEFUL come from beliefs and have no place on that scale: the answer is then no.
+    /// The scale is HAPPY, CONFIDENT, CONCERNED, FRUSTRATED, ANGRY: the order of the paper's Table 2, with ANGRY
+    /// added at the end \[I\]. DISCOURAGED and HOPEFUL come from beliefs and are not on the scale; if either emotion is
+    /// one of them, the result is `false`.
     pub fn reaches(self, other: Self) -> bool {
         match (self.severity(), other.severity()) {
             (Some(mine), Some(others)) => mine >= others,
@@ -101,20 +103,20 @@ impl EmotionLabel for StandardEmotion {
     }
 }
 
-/// What is felt now: an emotion, experienced with an intensity.
+/// An emotion, experienced with an intensity.
 ///
-/// The published taxonomy has a node of this name, the experience of an emotion [D: F2]. It is a copy:
-/// whoever holds one can read it, and cannot change what the robot feels.
+/// The published taxonomy has a node of this name, the experience of an emotion [D: F2]. A feeling is a copy, so
+/// code that receives one cannot change what the robot feels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Feeling<E> {
-    /// Which emotion.
+    /// The emotion.
     pub emotion: E,
-    /// How strongly.
+    /// How strongly it is felt.
     pub intensity: Intensity,
 }
 
 impl<E: EmotionLabel> Feeling<E> {
-    /// The coarse part of it, valence and intensity.
+    /// Valence and intensity, without the particular emotion.
     pub fn affect(&self) -> Affect {
         Affect {
             valence: self.emotion.valence(),
@@ -136,7 +138,10 @@ mod tests {
                 assert_eq!(upper.reaches(*lower), j >= i);
             }
         }
-        assert!(!Discouraged.reaches(Happy) && !Hopeful.reaches(Happy) && !Angry.reaches(Hopeful));
+
+        assert!(!Discouraged.reaches(Happy));
+        assert!(!Hopeful.reaches(Happy));
+        assert!(!Angry.reaches(Hopeful));
     }
 
     #[test]

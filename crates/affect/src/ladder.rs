@@ -1,7 +1,7 @@
-//! The order of emotions: which follows which, and at what intensity.
+//! Ladders, which order emotions by the intensity that leads to them.
 //!
-//! Intensity alone does not say what is felt. A ladder does: rungs in ascending order, each with the
-//! intensity that enters it, and beside it the two emotions that come from beliefs.
+//! A ladder maps intensity to emotions. It consists of rungs in ascending order, each with the intensity that enters
+//! it, and optionally of two emotions that come from beliefs.
 
 use crate::label::{EmotionLabel, StandardEmotion};
 use crate::parameters::{DynamicsParameters, ParameterError, StateSet, ascending, not_negative};
@@ -12,16 +12,17 @@ use StandardEmotion::{Angry, Concerned, Confident, Discouraged, Frustrated, Happ
 pub struct Rung<E> {
     /// The emotion.
     pub emotion: E,
-    /// Intensity that enters it; without meaning for the lowest rung.
+    /// Intensity at which the rung is entered; unused for the lowest rung.
     pub enter: f64,
-    /// How long, in seconds, intensity must stay above `enter` first; 0 for at once.
+    /// How long, in seconds, the intensity must exceed `enter` before the rung is entered. With 0, the rung is entered
+    /// as soon as the intensity reaches `enter`.
     pub hold_s: f64,
-    /// Whether it is entered only while somebody else is to blame.
+    /// Whether the rung is only entered while another agent is to blame.
     pub needs_blame: bool,
 }
 
 impl<E> Rung<E> {
-    /// A rung that is entered as soon as intensity reaches `enter`.
+    /// A rung that is entered as soon as the intensity reaches `enter`.
     pub fn new(emotion: E, enter: f64) -> Self {
         Self {
             emotion,
@@ -32,14 +33,14 @@ impl<E> Rung<E> {
     }
 }
 
-/// The two emotions that follow beliefs and not intensity [D: S].
+/// The two emotions that follow from beliefs rather than from intensity [D: S].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeliefEmotions<E> {
-    /// Felt, and kept, while the robot believes that it cannot [D: S].
+    /// Entered, and kept, while the robot believes that it cannot achieve its goal [D: S].
     pub discouraged: E,
-    /// Follows as soon as it believes that it can [D: S].
+    /// Follows `discouraged` as soon as the robot believes that it can [D: S].
     pub hopeful: E,
-    /// The lowest rung from which "cannot" discourages \[I\].
+    /// The lowest rung from which the belief leads to `discouraged` \[I\].
     pub from: E,
 }
 
@@ -50,7 +51,7 @@ pub struct Ladder<E> {
     beliefs: Option<BeliefEmotions<E>>,
 }
 
-/// Where an emotion stands with respect to a ladder.
+/// The position of an emotion relative to a ladder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Place {
     Rung(usize),
@@ -60,33 +61,43 @@ pub(crate) enum Place {
 }
 
 impl<E: EmotionLabel> Ladder<E> {
-    /// Builds a ladder from rungs in ascending order, the first of which is where a robot starts.
+    /// Builds a ladder from rungs in ascending order. Robots start on the first one.
     ///
-    /// Refused are an empty ladder, thresholds that do not ascend within `(0, 1]` (the first rung has
-    /// none), and an emotion that occurs twice.
+    /// # Errors
+    ///
+    /// Returns an error if there are no rungs, if the thresholds of the second and later rungs do not ascend within
+    /// `(0, 1]`, if a hold time is invalid, or if an emotion occurs twice.
     pub fn new(rungs: Vec<Rung<E>>) -> Result<Self, ParameterError> {
         let Some((_, above)) = rungs.split_first() else {
             return Err(ParameterError::NoRungs);
         };
-        ascending(&above.iter().map(|rung| rung.enter).collect::<Vec<_>>())?;
+
+        let thresholds: Vec<f64> = above.iter().map(|rung| rung.enter).collect();
+        ascending(&thresholds)?;
         for rung in above {
             not_negative("hold_s", rung.hold_s)?;
         }
+
         let ladder = Self {
             rungs,
             beliefs: None,
         };
-        ladder.distinct()?;
+        ladder.check_distinct()?;
         Ok(ladder)
     }
 
-    /// Adds the two emotions that follow beliefs.
+    /// Adds the two emotions that follow from beliefs.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if `from` is not on the ladder, or if an emotion then occurs twice.
     pub fn with_beliefs(mut self, beliefs: BeliefEmotions<E>) -> Result<Self, ParameterError> {
         if self.rungs.iter().all(|rung| rung.emotion != beliefs.from) {
             return Err(ParameterError::NotOnLadder(beliefs.from.name()));
         }
+
         self.beliefs = Some(beliefs);
-        self.distinct()?;
+        self.check_distinct()?;
         Ok(self)
     }
 
@@ -95,32 +106,30 @@ impl<E: EmotionLabel> Ladder<E> {
         &self.rungs
     }
 
-    /// The emotions that follow beliefs, if this ladder has them.
+    /// The emotions that follow from beliefs, if this ladder has any.
     pub fn beliefs(&self) -> Option<&BeliefEmotions<E>> {
         self.beliefs.as_ref()
     }
 
-    /// The emotion in which a robot starts, and to which an achieved goal returns it.
+    /// The initial emotion, to which an achieved goal returns.
     pub fn start(&self) -> E {
         self.rungs[0].emotion
     }
 
-    /// The highest rung, not above rung `limit`, that `intensity` alone reaches.
+    /// Index of the highest rung, at most `limit`, that is reached by intensity alone.
     pub(crate) fn rung_for(&self, intensity: f64, limit: usize) -> usize {
-        let is_reached =
-            |rung: &&Rung<E>| intensity >= rung.enter && rung.hold_s == 0.0 && !rung.needs_blame;
-        self.rungs
-            .iter()
-            .skip(1)
-            .take_while(is_reached)
-            .count()
-            .min(limit)
+        let above = self.rungs.iter().skip(1);
+        let reached = above
+            .take_while(|rung| intensity >= rung.enter && rung.hold_s == 0.0 && !rung.needs_blame);
+
+        reached.count().min(limit)
     }
 
     pub(crate) fn place(&self, emotion: E) -> Place {
         if let Some(index) = self.rungs.iter().position(|rung| rung.emotion == emotion) {
             return Place::Rung(index);
         }
+
         match &self.beliefs {
             Some(beliefs) if beliefs.discouraged == emotion => Place::Discouraged,
             Some(beliefs) if beliefs.hopeful == emotion => Place::Hopeful,
@@ -128,34 +137,41 @@ impl<E: EmotionLabel> Ladder<E> {
         }
     }
 
-    /// Index of the rung from which "cannot" discourages; none without beliefs.
+    /// Index of the lowest rung from which a belief leads to discouragement; `None` without such beliefs.
     pub(crate) fn discouraging_rung(&self) -> Option<usize> {
         let from = self.beliefs.as_ref()?.from;
         self.rungs.iter().position(|rung| rung.emotion == from)
     }
 
-    fn distinct(&self) -> Result<(), ParameterError> {
-        let mut seen: Vec<E> = self.rungs.iter().map(|rung| rung.emotion).collect();
+    fn check_distinct(&self) -> Result<(), ParameterError> {
+        let mut emotions: Vec<E> = self.rungs.iter().map(|rung| rung.emotion).collect();
         if let Some(beliefs) = &self.beliefs {
-            seen.extend([beliefs.discouraged, beliefs.hopeful]);
+            emotions.extend([beliefs.discouraged, beliefs.hopeful]);
         }
-        for (index, emotion) in seen.iter().enumerate() {
-            if seen[..index].contains(emotion) {
+
+        for (index, emotion) in emotions.iter().enumerate() {
+            if emotions[..index].contains(emotion) {
                 return Err(ParameterError::Repeated(emotion.name()));
             }
         }
+
         Ok(())
     }
 }
 
 impl Ladder<StandardEmotion> {
-    /// The ladder of the documented robots, in the state set that the parameters name.
+    /// The ladder of the documented robots, with the state set that the parameters select.
     ///
-    /// `murphy4` climbs in the order of the seed's Table 2 [D: S]. In `akr4` HAPPY takes the place of
-    /// CONFIDENT, and ANGRY follows FRUSTRATED once intensity has been extreme for long and somebody else
-    /// is to blame; the seed shows that state and not how it is entered \[I\].
+    /// `murphy4` follows the order of the paper's Table 2 [D: S]. `akr4` has no CONFIDENT, and ANGRY follows
+    /// FRUSTRATED after the intensity has been extreme for a long time and another agent is to blame. The paper shows
+    /// that state but not how it is entered \[I\].
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the parameters are invalid.
     pub fn standard(parameters: &DynamicsParameters) -> Result<Self, ParameterError> {
         parameters.check()?;
+
         let happy = Rung::new(Happy, 0.0);
         let confident = Rung::new(Confident, parameters.th_confident);
         let concerned = Rung::new(Concerned, parameters.th_concerned);
@@ -166,15 +182,18 @@ impl Ladder<StandardEmotion> {
             hold_s: parameters.anger_s,
             needs_blame: true,
         };
+
         let rungs = match parameters.state_set {
             StateSet::Murphy4 => vec![happy, confident, concerned, frustrated],
             StateSet::Akr4 => vec![happy, concerned, frustrated, angry],
         };
+
         let beliefs = BeliefEmotions {
             discouraged: Discouraged,
             hopeful: Hopeful,
             from: Frustrated,
         };
+
         Self::new(rungs)?.with_beliefs(beliefs)
     }
 }
@@ -194,44 +213,49 @@ mod tests {
                 ..Default::default()
             };
             let ladder = Ladder::standard(&parameters).unwrap();
-            assert_eq!(
-                ladder
-                    .rungs()
-                    .iter()
-                    .map(|rung| rung.emotion)
-                    .collect::<Vec<_>>(),
-                emotions
-            );
+            let climbed: Vec<StandardEmotion> =
+                ladder.rungs().iter().map(|rung| rung.emotion).collect();
+
+            assert_eq!(climbed, emotions);
             assert_eq!(ladder.start(), Happy);
         }
     }
 
     #[test]
-    fn a_ladder_that_would_be_ambiguous_is_refused() {
-        let refusal = |rungs| Ladder::new(rungs).unwrap_err();
-        assert_eq!(refusal(vec![]), ParameterError::NoRungs);
+    fn an_ambiguous_ladder_is_rejected() {
+        let empty: Vec<Rung<StandardEmotion>> = vec![];
+        assert_eq!(Ladder::new(empty), Err(ParameterError::NoRungs));
+
+        let repeated = vec![
+            Rung::new(Happy, 0.0),
+            Rung::new(Concerned, 0.5),
+            Rung::new(Happy, 0.6),
+        ];
         assert_eq!(
-            refusal(vec![
-                Rung::new(Happy, 0.0),
-                Rung::new(Concerned, 0.5),
-                Rung::new(Happy, 0.6)
-            ]),
-            ParameterError::Repeated("HAPPY")
+            Ladder::new(repeated),
+            Err(ParameterError::Repeated("HAPPY"))
         );
+
+        let level = vec![
+            Rung::new(Happy, 0.0),
+            Rung::new(Concerned, 0.5),
+            Rung::new(Angry, 0.5),
+        ];
         assert!(matches!(
-            refusal(vec![
-                Rung::new(Happy, 0.0),
-                Rung::new(Concerned, 0.5),
-                Rung::new(Angry, 0.5)
-            ]),
-            ParameterError::NotAscending { .. }
+            Ladder::new(level),
+            Err(ParameterError::NotAscending { .. })
         ));
+    }
+
+    #[test]
+    fn beliefs_must_start_from_a_rung() {
         let beliefs = BeliefEmotions {
             discouraged: Discouraged,
             hopeful: Hopeful,
             from: Angry,
         };
         let ladder = Ladder::new(vec![Rung::new(Happy, 0.0)]).unwrap();
+
         assert_eq!(
             ladder.with_beliefs(beliefs),
             Err(ParameterError::NotOnLadder("ANGRY"))

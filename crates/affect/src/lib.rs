@@ -1,24 +1,24 @@
-//! Affective Knowledge Representation (AKR): what a robot needs to have emotions, without the robot.
+//! Affective Knowledge Representation (AKR): the building blocks of robots with emotions.
 //!
-//! Emotion-based control is easy to tell and hard to repeat: what is felt, from which measures, with which
-//! thresholds, and what it does to behavior usually lies scattered in a robot's code. This crate holds these
-//! parts separately, each usable alone, all of them pure: no clock, no randomness, no input or output, and
-//! no knowledge of any simulator or robot. The same inputs give the same feelings on every machine.
+//! Emotion-based control is easy to describe but hard to reproduce. Emotions, progress measures, thresholds and
+//! effects on behavior are usually scattered throughout a robot's code. This crate provides them as separate parts
+//! that can each be used alone. All of them are pure: they use no clock, randomness or I/O, and do not depend on any
+//! simulator or robot. The same inputs give the same emotions on every machine.
 //!
-//! | To | use |
+//! | Task | Item |
 //! | --- | --- |
-//! | name a personality, a mood, an emotion, and be told what is illegal | [`akr`] |
-//! | look up an emotion's components, and let a robot account for it in words | [`Schemata`] |
-//! | measure progress | [`progress`] |
-//! | let a feeling rise and fall with progress, events and beliefs | [`Dynamics`], [`Ladder`] |
-//! | generate emotion from progress (ESG) | [`EmotionGenerator`] and the types that implement it |
-//! | generate behavior from progress and emotion (BSG) | [`behavior`] |
-//! | let emotion act on motor output, on the set of behaviors, on deliberation | [`levels`] |
+//! | Describe and validate a personality, a mood or an emotion | [`akr`] |
+//! | Look up the components of an emotion and explain it in words | [`Schemata`] |
+//! | Measure progress | [`progress`] |
+//! | Change a feeling over time with progress, events and beliefs | [`Dynamics`], [`Ladder`] |
+//! | Generate emotion from progress (ESG) | [`EmotionGenerator`] and its implementations |
+//! | Generate behavior from progress and emotion (BSG) | [`behavior`] |
+//! | Let emotion affect motor output, active behaviors and deliberation | [`levels`] |
 //!
 //! # Sources
 //!
-//! Much of the original work was not readable, so each item says where it comes from: **\[D: code\]** is
-//! documented, **\[I\]** is inferred or chosen here. Every chosen number is a parameter.
+//! Much of the original work was not readable, so each item states its source: **\[D: code\]** marks what is
+//! documented, and **\[I\]** what is inferred or chosen here. Every chosen number is a parameter.
 //!
 //! | Code | Source |
 //! | --- | --- |
@@ -29,10 +29,11 @@
 //! | N | Guzzi et al.: artificial emotions for multi-robot systems, GECCO 2018 (code) |
 //! | W | W3C: vocabularies for EmotionML |
 //!
-//! # A robot with emotions of its own
+//! # A robot with custom emotions
 //!
-//! This is a guide that waits for visitors and becomes bored. It brings its own set of emotions, a schema for one
-//! of them, and composes the rest. A whole robot, as a process of a simulation, is in `docs/new-robot.md`.
+//! This example is a museum guide that waits for visitors and becomes bored. It defines its own set of emotions and a
+//! schema for one of them; the rest comes from this crate. See `docs/new-robot.md` for a complete robot that runs as a
+//! process of a simulation.
 //!
 //! ```
 //! use affect::akr::Valence;
@@ -61,7 +62,7 @@
 //! #[derive(Debug, Clone, Copy, PartialEq)]
 //! enum Act { Sigh, Greet }
 //!
-//! /// Progress measure: time without visitors, against the time that is bearable.
+//! /// Progress measures: the time without visitors and the time that the guide can bear.
 //! struct Measures { alone_s: f64, bearable_s: f64, visitor_came: bool }
 //! struct Context { feeling: Feeling<Mind>, visitor_came: bool, has_sighed: bool }
 //!
@@ -112,22 +113,31 @@
 //! let dynamics = Dynamics::new(Ladder::new(rungs)?, &DynamicsParameters::default(), Caution::default())?;
 //! let mut esg = DynamicGenerator::new(dynamics, appraise);
 //! let mut bsg = BehaviorGenerator::new(TABLE, Task::Wait);
-//! let (mut acts, mut measures) = (vec![], Measures { alone_s: 0.0, bearable_s: 10.0, visitor_came: false });
+//!
+//! let mut measures = Measures { alone_s: 0.0, bearable_s: 10.0, visitor_came: false };
+//! let mut acts = Vec::new();
 //! while *bsg.current() == Task::Wait {
-//!     // One tick: state variables, then emotion, then behavior.
+//!     // One tick: update the state variables, then the emotion, then the behavior.
 //!     measures.alone_s += 0.5;
 //!     bsg.advance(0.5);
+//!
 //!     let feeling = esg.update(&measures, bsg.current(), 0.5);
+//!
 //!     let has_sighed = acts.contains(&Act::Sigh);
 //!     let context = Context { feeling, visitor_came: measures.visitor_came, has_sighed };
 //!     acts.extend(bsg.update(&context).actions);
 //! }
-//! assert_eq!((esg.feeling().emotion, &acts[..]), (Mind::Bored, &[Act::Sigh][..]));
+//! assert_eq!(esg.feeling().emotion, Mind::Bored);
+//! assert_eq!(acts, [Act::Sigh]);
 //!
-//! let circumstances =
-//!     Circumstances { other: Some("the group"), goal: Some("to show the exhibits"), ..Default::default() };
-//! let name = esg.feeling().emotion.name();
-//! let bored = Schemata::from_toml(SCHEMA)?.emotion(name, esg.feeling().intensity, &circumstances)?;
+//! let circumstances = Circumstances {
+//!     other: Some("the group"),
+//!     goal: Some("to show the exhibits"),
+//!     ..Default::default()
+//! };
+//! let feeling = esg.feeling();
+//! let schemata = Schemata::from_toml(SCHEMA)?;
+//! let bored = schemata.emotion(feeling.emotion.name(), feeling.intensity, &circumstances)?;
 //! assert_eq!(
 //!     bored.components().causal_chain.spoken(),
 //!     "I want to show the exhibits; the group did not come; because of this I want to be somewhere else."

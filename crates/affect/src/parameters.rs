@@ -1,27 +1,27 @@
-//! Every constant of the emotion dynamics, in one place and with a name.
+//! The constants of the emotion dynamics.
 //!
-//! The equations and thresholds of the original robots are in a paper whose body this project could not
-//! read. So each number below is a choice \[I\] unless marked otherwise, and whoever holds the original
-//! tables only edits a file.
+//! The equations and thresholds of the original robots were published in an article whose body was not available to
+//! this project. Each number below is therefore a choice \[I\] unless marked otherwise. With the original tables at
+//! hand, only a parameter file has to be edited.
 
 use crate::scalar::{Caution, IntensityLabel};
 use serde::{Deserialize, Serialize};
 
-/// Which emotions the standard ladder has. Both sets are documented [D: S].
+/// The set of emotions on the standard ladder. Both sets are documented [D: S].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StateSet {
     /// HAPPY, CONFIDENT, CONCERNED, FRUSTRATED: the waiter and the refiller.
     #[default]
     Murphy4,
-    /// HAPPY, CONCERNED, FRUSTRATED, ANGRY: the example of the seed's dynamics section.
+    /// HAPPY, CONCERNED, FRUSTRATED, ANGRY: the example in the paper's section on dynamics.
     Akr4,
 }
 
 /// The constants of the emotion dynamics.
 ///
-/// Deserializes from a table in which any field may be absent; an unknown field is an error, since a
-/// misspelled parameter would silently run another experiment.
+/// Deserializes from a table in which any field may be absent. Unknown fields are errors, because a misspelled
+/// parameter would silently run a different experiment.
 ///
 /// ```
 /// let parameters = affect::DynamicsParameters::from_toml("tau_up_s = 2.0\nstate_set = 'akr4'")?;
@@ -32,18 +32,19 @@ pub enum StateSet {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DynamicsParameters {
-    /// Which emotions there are. Default `murphy4`; both sets [D: S].
+    /// The set of emotions. Default `murphy4`; both sets [D: S].
     pub state_set: StateSet,
-    /// Need ratio (dimensionless) at which intensity saturates for gain 1. Default 2 \[I\].
+    /// Need ratio (dimensionless) at which the intensity saturates with a gain of 1. Default 2 \[I\].
     pub rho_max: f64,
     /// Gain (dimensionless) of a robot without caution. Default 0.5 \[I\].
     pub caution_gain_base: f64,
-    /// What full caution adds to the gain (dimensionless). Default 1 \[I\]; that it is not negative, so that a
-    /// more cautious robot's feelings rise faster [D: S].
+    /// Increase of the gain (dimensionless) at full caution. Default 1 \[I\].
+    ///
+    /// It must not be negative, because the emotions of a more cautious robot rise faster [D: S].
     pub caution_gain_slope: f64,
-    /// Time constant, in seconds, with which intensity rises; divided by the gain. Default 1.5 \[I\].
+    /// Time constant of rising intensity, in seconds, which is divided by the gain. Default 1.5 \[I\].
     pub tau_up_s: f64,
-    /// Time constant, in seconds, with which intensity falls. Default 3 \[I\].
+    /// Time constant of falling intensity, in seconds. Default 3 \[I\].
     pub tau_down_s: f64,
     /// Intensity at which CONFIDENT is entered. Default 0.25 \[I\].
     pub th_confident: f64,
@@ -51,20 +52,21 @@ pub struct DynamicsParameters {
     pub th_concerned: f64,
     /// Intensity at which FRUSTRATED is entered. Default 0.75 \[I\].
     pub th_frustrated: f64,
-    /// Intensity that must be exceeded for `anger_s` before ANGRY is entered. Default 0.95 \[I\].
+    /// Intensity that must be exceeded for `anger_s` to enter ANGRY. Default 0.95 \[I\].
     pub th_angry: f64,
-    /// How long, in seconds, intensity must exceed `th_angry` while somebody else is to blame. Default
-    /// 15 \[I\].
+    /// How long, in seconds, the intensity must exceed `th_angry` while another agent is to blame. Default 15 \[I\].
     pub anger_s: f64,
-    /// An emotion is left when intensity is this far below the threshold that entered it. Default 0.08 \[I\];
-    /// the pattern of an enter and a leave threshold [D: N].
+    /// How far the intensity must fall below the threshold of an emotion to leave it. Default 0.08 \[I\].
+    ///
+    /// The use of separate thresholds to enter and to leave an emotion is documented [D: N].
     pub hysteresis: f64,
-    /// Least time, in seconds, between two changes of emotion. Default 1 \[I\].
+    /// Minimum time between two changes of emotion, in seconds. Default 1 \[I\].
     pub dwell_s: f64,
-    /// How long, in seconds, hope lasts without success. Default 15 \[I\].
+    /// How long HOPEFUL lasts without success, in seconds. Default 15 \[I\].
     pub hope_s: f64,
-    /// Intensities at which low, medium, high and very high begin. Default 0.2, 0.4, 0.6, 0.8 \[I\]; that
-    /// there are five labels [D: S].
+    /// Lower bounds of the labels low, medium, high and very high. Default 0.2, 0.4, 0.6, 0.8 \[I\].
+    ///
+    /// That there are five labels is documented [D: S].
     pub label_cuts: [f64; 4],
 }
 
@@ -90,75 +92,92 @@ impl Default for DynamicsParameters {
     }
 }
 
-/// Parameters with which the dynamics would have no meaning.
+/// Invalid parameters of the dynamics, a ladder, a level or an estimator.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParameterError {
-    /// The text is not TOML, or not a table of these parameters.
+    /// The text is not valid TOML, or not a table of these parameters.
     #[error("{0}")]
     Syntax(String),
-    /// A length of time or a ratio that must be above zero and finite.
-    #[error("{name} must be a number above 0, not {value}")]
+    /// A parameter that must be positive and finite.
+    #[error("{name} must be above 0, not {value}")]
     NotPositive {
         /// The parameter.
         name: &'static str,
         /// Its value.
         value: f64,
     },
-    /// A length of time or a ratio that must not be below zero.
-    #[error("{name} must be a number of at least 0, not {value}")]
+    /// A parameter that must be finite and not negative.
+    #[error("{name} must be at least 0, not {value}")]
     Negative {
         /// The parameter.
         name: &'static str,
         /// Its value.
         value: f64,
     },
-    /// Thresholds that do not ascend would let the robot skip an emotion.
-    #[error("thresholds must ascend within [0, 1]: {lower} is followed by {upper}")]
+    /// Thresholds that do not ascend. The robot could skip an emotion.
+    #[error(
+        "thresholds must be in ascending order within [0, 1], but {lower} is followed by {upper}"
+    )]
     NotAscending {
         /// The value that comes first.
         lower: f64,
         /// The value that comes after it.
         upper: f64,
     },
-    /// A ladder needs an emotion to start from.
+    /// A ladder without rungs, on which no robot could start.
     #[error("a ladder of emotions needs at least one rung")]
     NoRungs,
-    /// An emotion has two places, so that its next one would be ambiguous.
+    /// An emotion that occurs more than once, so that the next emotion would be ambiguous.
     #[error("{0} occurs more than once in the set of emotions")]
     Repeated(&'static str),
-    /// The belief "cannot" discourages from an emotion that is not on the ladder.
-    #[error("{0} is not on the ladder, so nobody can become discouraged from there")]
+    /// Discouragement starts from an emotion that is not on the ladder.
+    #[error("{0} is not on the ladder, so discouragement cannot start from it")]
     NotOnLadder(&'static str),
 }
 
 impl DynamicsParameters {
-    /// Reads and checks parameters from TOML text.
+    /// Parses and validates parameters from TOML text.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text is not a valid table of parameters.
     pub fn from_toml(text: &str) -> Result<Self, ParameterError> {
         let parameters: Self =
             toml::from_str(text).map_err(|error| ParameterError::Syntax(error.to_string()))?;
         parameters.check()?;
+
         Ok(parameters)
     }
 
-    /// How strongly a robot of this caution reacts: `0.5 + caution` with the defaults.
+    /// How strongly a robot of this caution reacts (dimensionless): `0.5 + caution` with the defaults.
     pub fn gain(&self, caution: Caution) -> f64 {
         self.caution_gain_base + self.caution_gain_slope * caution.value()
     }
 
-    /// Says what is wrong with the values, if anything is. Thresholds are checked with the ladder they make.
+    /// Validates the values.
+    ///
+    /// # Errors
+    ///
+    /// Returns the first [`ParameterError`] found.
     pub fn check(&self) -> Result<(), ParameterError> {
         positive("rho_max", self.rho_max)?;
         positive("caution_gain_base", self.caution_gain_base)?;
         positive("tau_up_s", self.tau_up_s)?;
         positive("tau_down_s", self.tau_down_s)?;
+
         not_negative("caution_gain_slope", self.caution_gain_slope)?;
         not_negative("anger_s", self.anger_s)?;
         not_negative("hysteresis", self.hysteresis)?;
         not_negative("dwell_s", self.dwell_s)?;
         not_negative("hope_s", self.hope_s)?;
+
         ascending(&self.label_cuts)?;
-        let [confident, concerned] = [self.th_confident, self.th_concerned];
-        ascending(&[confident, concerned, self.th_frustrated, self.th_angry])
+        ascending(&[
+            self.th_confident,
+            self.th_concerned,
+            self.th_frustrated,
+            self.th_angry,
+        ])
     }
 }
 
@@ -178,16 +197,18 @@ pub(crate) fn not_negative(name: &'static str, value: f64) -> Result<(), Paramet
     }
 }
 
-/// Strictly ascending, above 0 and not above 1.
+/// Checks that the values are strictly ascending, above 0 and at most 1.
 pub(crate) fn ascending(values: &[f64]) -> Result<(), ParameterError> {
     let mut lower = 0.0;
+
     for &upper in values {
-        let follows = upper > lower && upper <= 1.0;
-        if !follows {
+        let ascends = upper > lower && upper <= 1.0;
+        if !ascends {
             return Err(ParameterError::NotAscending { lower, upper });
         }
         lower = upper;
     }
+
     Ok(())
 }
 
@@ -208,28 +229,25 @@ mod tests {
     }
 
     #[test]
-    fn senseless_values_are_refused_with_a_reason() {
-        assert_eq!(
-            refusal("tau_up_s = 0.0"),
-            "tau_up_s must be a number above 0, not 0"
-        );
+    fn invalid_values_are_rejected_with_a_reason() {
+        assert_eq!(refusal("tau_up_s = 0.0"), "tau_up_s must be above 0, not 0");
         assert_eq!(
             refusal("dwell_s = -1.0"),
-            "dwell_s must be a number of at least 0, not -1"
+            "dwell_s must be at least 0, not -1"
         );
-        assert_eq!(
-            refusal("rho_max = nan"),
-            "rho_max must be a number above 0, not NaN"
-        );
+        assert_eq!(refusal("rho_max = nan"), "rho_max must be above 0, not NaN");
+
         assert!(refusal("th_confident = 0.5").contains("0.5 is followed by 0.45"));
-        assert!(refusal("th_angry = 1.5").contains("must ascend"));
+        assert!(refusal("th_angry = 1.5").contains("ascending order"));
         assert!(refusal("caution = 0.5").contains("unknown field"));
     }
 
     #[test]
     fn gain_grows_with_caution() {
         let parameters = DynamicsParameters::default();
-        let gain = |caution| parameters.gain(Caution::saturating(caution));
-        assert_eq!([gain(0.0), gain(0.5), gain(1.0)], [0.5, 1.0, 1.5]);
+
+        for (caution, gain) in [(0.0, 0.5), (0.5, 1.0), (1.0, 1.5)] {
+            assert_eq!(parameters.gain(Caution::saturating(caution)), gain);
+        }
     }
 }

@@ -1,8 +1,8 @@
-//! Progress measures: how fast a stock empties, when help arrives, and how the two compare.
+//! Progress measures: how fast a stock is used up, when help arrives, and the ratio between the two.
 //!
-//! An emotion generator needs a measure of progress, and the published one is not readable. These are the
-//! pieces of a measure chosen for this project [I throughout]: pure, in SI units, and of use to any
-//! robot that consumes something and waits for somebody.
+//! An emotion generator needs a measure of progress, and the published one was not readable. This module provides
+//! the building blocks of a measure chosen for this project [I throughout]. They are pure functions and small
+//! estimators in SI units, for any robot that consumes a stock and waits for another robot.
 
 use crate::parameters::{ParameterError, not_negative, positive};
 use serde::{Deserialize, Serialize};
@@ -12,11 +12,11 @@ use std::collections::VecDeque;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RateParameters {
-    /// How far back, in seconds of observed time, events count. Default 15 \[I\].
+    /// Length of the sliding window, in seconds of observed time. Default 15 \[I\].
     pub window_s: f64,
-    /// How many events the prior is worth. Default 5 \[I\].
+    /// Weight of the prior, as a number of events. Default 5 \[I\].
     pub prior_n: f64,
-    /// Mean time between events, in seconds, before any was seen. Default 1 \[I\].
+    /// Mean time between events assumed by the prior, in seconds. Default 1 \[I\].
     pub prior_interval_s: f64,
 }
 
@@ -30,11 +30,11 @@ impl Default for RateParameters {
     }
 }
 
-/// Estimates how often something happens, from what happened lately and a prior.
+/// Estimates the rate of events from recent observations and a prior.
 ///
-/// `(prior_n + k) / (prior_n * prior_interval + min(window, observed time))`, where `k` events fell into
-/// the last window of observed time. Time that was not observed does not count: the robot advances the
-/// estimator only while events can happen.
+/// The estimate is `(prior_n + k) / (prior_n * prior_interval_s + min(window_s, observed_s))` for `k` events in the
+/// last `window_s` of observed time. Robots advance the estimator only while events can happen; other time is not
+/// observed.
 ///
 /// ```
 /// use affect::progress::{RateEstimator, RateParameters};
@@ -55,11 +55,16 @@ pub struct RateEstimator {
 }
 
 impl RateEstimator {
-    /// An estimator that has seen nothing yet.
+    /// Creates an estimator without observations.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error unless all parameters are positive.
     pub fn new(parameters: RateParameters) -> Result<Self, ParameterError> {
         positive("window_s", parameters.window_s)?;
         positive("prior_n", parameters.prior_n)?;
         positive("prior_interval_s", parameters.prior_interval_s)?;
+
         Ok(Self {
             parameters,
             observed_s: 0.0,
@@ -67,29 +72,35 @@ impl RateEstimator {
         })
     }
 
-    /// `dt_s` seconds were observed, at the end of which `events` had happened.
+    /// Records `dt_s` seconds of observed time, with `events` events at their end.
     pub fn advance(&mut self, dt_s: f64, events: u32) {
         self.observed_s += dt_s;
-        self.recent_s.extend((0..events).map(|_| self.observed_s));
+        for _ in 0..events {
+            self.recent_s.push_back(self.observed_s);
+        }
+
         let begin_s = self.observed_s - self.parameters.window_s;
         while self.recent_s.front().is_some_and(|&at_s| at_s <= begin_s) {
             self.recent_s.pop_front();
         }
     }
 
-    /// Events for each second of observed time; always above zero.
+    /// Estimated events per second of observed time; always positive.
     pub fn per_second(&self) -> f64 {
         let RateParameters {
             window_s,
             prior_n,
             prior_interval_s,
         } = self.parameters;
-        // The window holds at most a few thousand events, which f64 represents exactly.
-        let seen = self.recent_s.len() as f64;
-        (prior_n + seen) / (prior_n * prior_interval_s + self.observed_s.min(window_s))
+
+        // The window holds a few thousand events at most, which f64 represents exactly.
+        let events = prior_n + self.recent_s.len() as f64;
+        let time_s = prior_n * prior_interval_s + self.observed_s.min(window_s);
+
+        events / time_s
     }
 
-    /// Observed time so far, in seconds.
+    /// Total observed time, in seconds.
     pub fn observed_s(&self) -> f64 {
         self.observed_s
     }
@@ -99,9 +110,9 @@ impl RateEstimator {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ApproachParameters {
-    /// Speed assumed until the peer has been seen to come, in m/s. Default 3 ft/s = 0.9144 m/s \[I\].
+    /// Speed assumed until the peer has been observed approaching, in m/s. Default 3 ft/s = 0.9144 m/s \[I\].
     pub expected_mps: f64,
-    /// Least speed used for an arrival time, in m/s. Default 0.3 ft/s = 0.09144 m/s \[I\].
+    /// Minimum speed used for arrival times, in m/s. Default 0.3 ft/s = 0.09144 m/s \[I\].
     pub floor_mps: f64,
     /// Time constant of the estimate, in seconds. Default 3 \[I\].
     pub tau_s: f64,
@@ -117,7 +128,7 @@ impl Default for ApproachParameters {
     }
 }
 
-/// Estimates how fast a peer comes nearer, and remembers how far away it last was.
+/// Estimates the speed at which a peer approaches, and stores its last known distance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ApproachEstimator {
     parameters: ApproachParameters,
@@ -126,11 +137,16 @@ pub struct ApproachEstimator {
 }
 
 impl ApproachEstimator {
-    /// An estimator that expects the peer to come at the expected speed.
+    /// Creates an estimator that starts with the expected speed and no known distance.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the floor or the time constant is not positive, or the expected speed is negative.
     pub fn new(parameters: ApproachParameters) -> Result<Self, ParameterError> {
         positive("floor_mps", parameters.floor_mps)?;
         positive("tau_s", parameters.tau_s)?;
         not_negative("expected_mps", parameters.expected_mps)?;
+
         Ok(Self {
             parameters,
             speed_mps: parameters.expected_mps,
@@ -138,8 +154,10 @@ impl ApproachEstimator {
         })
     }
 
-    /// The peer was at `distance_m` metres at the end of the last `dt_s` seconds. The speed is learned only
-    /// while the peer `is_coming`: before, it says nothing about how fast it would come.
+    /// Records the distance of the peer, in meters, at the end of the last `dt_s` seconds.
+    ///
+    /// The speed is updated only while the peer `is_coming`. At other times its motion does not show how fast it would
+    /// approach.
     pub fn observe(&mut self, distance_m: f64, is_coming: bool, dt_s: f64) {
         if let Some(before_m) = self.distance_m
             && is_coming
@@ -147,33 +165,35 @@ impl ApproachEstimator {
         {
             self.learn((before_m - distance_m) / dt_s, dt_s);
         }
+
         self.distance_m = Some(distance_m);
     }
 
-    /// Nothing was heard of the peer for `dt_s` seconds: the distance stays, the speed fades to the
-    /// floor, so that silence raises concern.
+    /// Records that nothing is known of the peer for the last `dt_s` seconds.
+    ///
+    /// The distance stays the same, and the speed decays to the floor, so that missing information raises concern.
     pub fn observe_silence(&mut self, dt_s: f64) {
         if self.speed_mps > self.parameters.floor_mps {
             self.learn(self.parameters.floor_mps, dt_s);
         }
     }
 
-    /// Forgets what was learned of the speed, for instance when a new errand begins. Keeps the distance.
+    /// Resets the speed to the expected speed, for instance when a new task begins. Keeps the distance.
     pub fn expect_again(&mut self) {
         self.speed_mps = self.parameters.expected_mps;
     }
 
-    /// Estimated closing speed in m/s; negative when the peer goes away.
+    /// Estimated speed of approach, in m/s; negative if the peer moves away.
     pub fn speed_mps(&self) -> f64 {
         self.speed_mps
     }
 
-    /// The last known distance in metres.
+    /// Last known distance, in meters.
     pub fn distance_m(&self) -> Option<f64> {
         self.distance_m
     }
 
-    /// Seconds until the peer is within `reach_m` metres; none before it was ever seen.
+    /// Estimated time until the peer is within `reach_m` meters, in seconds. `None` if its distance is unknown.
     pub fn arrival_s(&self, reach_m: f64) -> Option<f64> {
         let speed_mps = self.speed_mps.max(self.parameters.floor_mps);
         self.distance_m
@@ -182,22 +202,25 @@ impl ApproachEstimator {
 
     fn learn(&mut self, closing_mps: f64, dt_s: f64) {
         let share = (dt_s / self.parameters.tau_s).min(1.0);
+
         self.speed_mps += (closing_mps - self.speed_mps) * share;
     }
 }
 
-/// Seconds until `stock` pieces are used up at `per_second` pieces a second.
+/// Time until `stock` pieces are used up at `per_second` pieces per second, in seconds.
 pub fn time_to_empty_s(stock: f64, per_second: f64) -> f64 {
     stock / per_second
 }
 
-/// Seconds until `distance_m` metres are covered at `speed_mps`; 0 when it is already covered.
+/// Time to cover `distance_m` meters at `speed_mps`, in seconds; 0 for a negative distance.
 pub fn time_to_arrive_s(distance_m: f64, speed_mps: f64) -> f64 {
     distance_m.max(0.0) / speed_mps
 }
 
-/// Seconds until a peer arrives that first goes `to_depot_m` metres to a depot, reloads there for
-/// `reload_s` seconds, and comes `from_depot_m` metres.
+/// Time until a peer arrives by way of a depot, in seconds.
+///
+/// The peer covers `to_depot_m` meters to the depot, reloads for `reload_s` seconds, and covers `from_depot_m` meters
+/// from there.
 pub fn time_to_arrive_by_depot_s(
     to_depot_m: f64,
     reload_s: f64,
@@ -207,10 +230,10 @@ pub fn time_to_arrive_by_depot_s(
     time_to_arrive_s(to_depot_m + from_depot_m, speed_mps) + reload_s
 }
 
-/// How much longer help takes than the stock lasts (dimensionless): above 1 it comes too late.
+/// The time until help arrives divided by the time the stock lasts (dimensionless). Above 1, help arrives too late.
 ///
-/// An empty stock counts as lasting half of the mean time between two pieces, so that the ratio stays finite
-/// and still grows with the time help takes.
+/// An empty stock is treated as lasting half of the mean time between two pieces. The ratio then stays finite and
+/// still grows with the time until help arrives.
 pub fn need_ratio(time_to_refill_s: f64, time_to_empty_s: f64, per_second: f64) -> f64 {
     time_to_refill_s / time_to_empty_s.max(0.5 / per_second)
 }
@@ -220,7 +243,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_event_counts_until_it_is_a_window_old() {
+    fn events_older_than_the_window_are_dropped() {
         let parameters = RateParameters {
             window_s: 2.0,
             prior_n: 1.0,
@@ -237,12 +260,13 @@ mod tests {
     }
 
     #[test]
-    fn senseless_constants_are_refused() {
+    fn invalid_parameters_are_rejected() {
         let rate = RateParameters {
             prior_n: 0.0,
             ..Default::default()
         };
         assert!(RateEstimator::new(rate).is_err());
+
         let approach = ApproachParameters {
             floor_mps: 0.0,
             ..Default::default()
@@ -251,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn the_speed_is_learned_only_from_a_peer_that_comes() {
+    fn the_speed_is_learned_only_from_an_approaching_peer() {
         let parameters = ApproachParameters {
             expected_mps: 1.0,
             floor_mps: 0.1,
@@ -259,33 +283,36 @@ mod tests {
         };
         let mut approach = ApproachEstimator::new(parameters).unwrap();
         assert_eq!(approach.arrival_s(1.0), None);
-        approach.observe(10.0, true, 1.0); // first sight: no speed to be had
+
+        approach.observe(10.0, true, 1.0); // first observation: the speed is unknown
         approach.observe(10.0, false, 1.0);
         assert_eq!(approach.speed_mps(), 1.0);
         assert_eq!(approach.arrival_s(1.0), Some(9.0));
-        approach.observe(10.0, true, 1.0); // it should come, and stands
+
+        approach.observe(10.0, true, 1.0); // expected to approach, but stationary
         assert_eq!(approach.speed_mps(), 0.5);
+
         approach.expect_again();
-        assert_eq!(
-            (approach.speed_mps(), approach.distance_m()),
-            (1.0, Some(10.0))
-        );
+        assert_eq!(approach.speed_mps(), 1.0);
+        assert_eq!(approach.distance_m(), Some(10.0));
     }
 
     #[test]
-    fn silence_fades_to_the_floor_and_never_raises() {
+    fn the_speed_decays_to_the_floor_in_silence_and_never_rises() {
         let mut approach = ApproachEstimator::new(ApproachParameters::default()).unwrap();
         approach.observe(5.0, false, 0.5);
         for _ in 0..1000 {
             approach.observe_silence(0.5);
         }
         assert!((approach.speed_mps() - 0.09144).abs() < 1e-9);
+
         for _ in 0..10 {
             let distance_m = approach.distance_m().unwrap();
             approach.observe(distance_m + 1.0, true, 0.5);
         }
         let receding_mps = approach.speed_mps();
         assert!(receding_mps < 0.0);
+
         approach.observe_silence(0.5);
         assert_eq!(approach.speed_mps(), receding_mps);
         assert!(approach.arrival_s(0.0).unwrap().is_finite());

@@ -1,22 +1,23 @@
-//! Numbers that mean something: intensity and caution, both in `[0, 1]`.
+//! Intensity and caution, the types for numbers in `[0, 1]`.
 //!
-//! A bare `f64` would let a robot author pass a distance where a degree of feeling is meant. These two
-//! types cannot hold anything outside their interval, and not a NaN either.
+//! Separate types prevent mixing up these quantities with others, such as distances. Their values are never NaN or
+//! outside the interval.
 
 use serde::{Deserialize, Serialize};
 
-/// A number that does not belong to the interval its type stands for.
+/// A number outside the interval of its type.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{what} must lie in [0, 1], not {value}")]
 pub struct OutOfRange {
-    /// Which quantity was meant.
+    /// The quantity.
     pub what: &'static str,
-    /// The number that was refused.
+    /// The rejected number.
     pub value: f64,
 }
 
-/// Whether `elapsed_s` seconds make up `needed_s`. Sums of steps such as 0.1 s fall short of what they mean by
-/// far less than the slack, and no step is as short as it.
+/// Whether at least `needed_s` seconds have elapsed, with an allowance for rounding errors.
+///
+/// The slack is much larger than the rounding errors in sums of steps such as 0.1 s, and shorter than any step.
 pub(crate) fn has_elapsed(elapsed_s: f64, needed_s: f64) -> bool {
     const SLACK_S: f64 = 1e-9;
     elapsed_s + SLACK_S >= needed_s
@@ -35,7 +36,11 @@ macro_rules! unit_interval {
             /// The upper end, 1.
             pub const MAX: Self = Self(1.0);
 
-            /// Takes a number of `[0, 1]` and refuses every other, NaN included.
+            /// Creates a value from a number in `[0, 1]`.
+            ///
+            /// # Errors
+            ///
+            /// Returns [`OutOfRange`] for any other number, including NaN.
             pub fn new(value: f64) -> Result<Self, OutOfRange> {
                 if (0.0..=1.0).contains(&value) {
                     Ok(Self(value))
@@ -44,12 +49,12 @@ macro_rules! unit_interval {
                 }
             }
 
-            /// Takes any number and moves it to the nearest end of the interval; NaN becomes 0.
+            /// Creates a value from any number, clamped to `[0, 1]`. NaN becomes 0.
             pub fn saturating(value: f64) -> Self {
                 if value > 0.0 { Self(value.min(1.0)) } else { Self(0.0) }
             }
 
-            /// The plain number.
+            /// The value as a number.
             pub fn value(self) -> f64 {
                 self.0
             }
@@ -72,27 +77,27 @@ macro_rules! unit_interval {
 }
 
 unit_interval! {
-    /// How strongly something is felt, 0 (not at all) to 1 (as strongly as possible).
+    /// How strongly something is felt, from 0 (not at all) to 1 (as strongly as possible).
     ///
-    /// That intensity may be a scalar inside and one of five labels outside is documented [D: S]; the
+    /// It is documented that intensity can be a scalar internally and one of five labels externally [D: S]. The
     /// interval is chosen here \[I\].
     Intensity, "intensity"
 }
 
 unit_interval! {
-    /// The one personality trait that the documented robots have: how fast their feelings rise.
+    /// The only personality trait of the documented robots: how fast the intensity of their emotions rises.
     ///
-    /// Name and direction (more caution, faster rise) are documented [D: S]; the interval is chosen here \[I\].
+    /// The name and the direction (more caution, faster rise) are documented [D: S]. The interval is chosen here \[I\].
     Caution, "caution"
 }
 
 impl Intensity {
-    /// The label, by the cut points of [`IntensityLabel::CUTS`].
+    /// The label for this intensity, using the cut points [`IntensityLabel::CUTS`].
     pub fn label(self) -> IntensityLabel {
         self.label_by(&IntensityLabel::CUTS)
     }
 
-    /// The label, by cut points of one's own, in ascending order.
+    /// The label for this intensity, using custom cut points in ascending order.
     pub fn label_by(self, cuts: &[f64; 4]) -> IntensityLabel {
         let reached = cuts.iter().filter(|cut| self.0 >= **cut).count();
         IntensityLabel::ALL[reached]
@@ -112,24 +117,24 @@ impl Default for Caution {
     }
 }
 
-/// The five degrees of intensity [D: S], weakest first.
+/// The five labels of intensity [D: S], weakest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IntensityLabel {
-    /// Below the first cut.
+    /// Below the first cut point.
     VeryLow,
-    /// From the first cut.
+    /// From the first cut point.
     Low,
-    /// From the second cut.
+    /// From the second cut point.
     Medium,
-    /// From the third cut.
+    /// From the third cut point.
     High,
-    /// From the fourth cut.
+    /// From the fourth cut point.
     VeryHigh,
 }
 
 impl IntensityLabel {
-    /// Lower ends of low, medium, high and very high \[I\]: five equal parts.
+    /// Lower bounds of low, medium, high and very high, which give five equal intervals \[I\].
     pub const CUTS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
     /// Every label, weakest first.
@@ -158,17 +163,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_outside_the_interval_are_refused_or_saturated() {
-        assert!(Intensity::new(1.0).is_ok() && Intensity::new(0.0).is_ok());
+    fn numbers_outside_the_interval_are_rejected_or_clamped() {
+        assert!(Intensity::new(1.0).is_ok());
+        assert!(Intensity::new(0.0).is_ok());
+
         for wrong in [-0.1, 1.1, f64::NAN, f64::INFINITY] {
-            assert!(
-                Intensity::new(wrong).is_err() && Caution::new(wrong).is_err(),
-                "{wrong}"
-            );
+            assert!(Intensity::new(wrong).is_err(), "{wrong}");
+            assert!(Caution::new(wrong).is_err(), "{wrong}");
         }
+
         assert_eq!(Intensity::saturating(7.0), Intensity::MAX);
         assert_eq!(Intensity::saturating(-7.0), Intensity::MIN);
         assert_eq!(Intensity::saturating(f64::NAN), Intensity::MIN);
+
         assert_eq!(
             Caution::new(2.0).map_err(|error| error.to_string()),
             Err("caution must lie in [0, 1], not 2".to_owned())
@@ -177,13 +184,16 @@ mod tests {
 
     #[test]
     fn a_cut_point_belongs_to_the_stronger_label() {
-        let label = |value| Intensity::saturating(value).label().name();
-        assert_eq!(label(0.0), "very low");
-        assert_eq!(label(0.199), "very low");
-        assert_eq!(label(0.2), "low");
-        assert_eq!(label(0.4), "medium");
-        assert_eq!(label(0.6), "high");
-        assert_eq!(label(0.8), "very high");
-        assert_eq!(label(1.0), "very high");
+        for (value, label) in [
+            (0.0, "very low"),
+            (0.199, "very low"),
+            (0.2, "low"),
+            (0.4, "medium"),
+            (0.6, "high"),
+            (0.8, "very high"),
+            (1.0, "very high"),
+        ] {
+            assert_eq!(Intensity::saturating(value).label().name(), label);
+        }
     }
 }

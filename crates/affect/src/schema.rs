@@ -1,9 +1,9 @@
-//! Emotion schemata: what is the same in every instance of an emotion, as data.
+//! Emotion schemata: the components that all instances of an emotion share, as data.
 //!
-//! A schema holds all components but those of the moment (intensity, who the other agent is, what the
-//! goal is called); with these it gives an [`Emotion`]. The schemata of [`StandardEmotion`] are a TOML file
-//! of this crate, in which every value says whether it is documented. A robot with an emotion of its
-//! own writes a table for it and reads that with [`Schemata::from_toml`].
+//! A schema contains all components of an emotion except those that depend on the situation: the intensity, the
+//! other agent, and the description of the goal. Together with these it produces an [`Emotion`]. The schemata of
+//! [`StandardEmotion`] are in a TOML file of this crate, which marks each value as documented or chosen. A robot with
+//! an emotion of its own defines a table for it and loads it with [`Schemata::from_toml`].
 //!
 //! [`StandardEmotion`]: crate::StandardEmotion
 
@@ -18,51 +18,53 @@ use std::sync::OnceLock;
 
 const STANDARD: &str = include_str!("schemata.toml");
 
-/// Words that a causal chain may ask for, with what they stand for.
+/// Placeholders that a causal chain can contain: the goal, the other agent, and the amount left.
 const SLOTS: [&str; 3] = ["g", "a", "n"];
 
-/// Why a text is no set of schemata, or an emotion cannot be made from one.
+/// Why schemata are invalid, or an emotion cannot be created from one.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SchemaError {
-    /// The text is not TOML, or not a table of schemata.
+    /// The text is not valid TOML, or not a table of schemata.
     #[error("{0}")]
     Syntax(String),
-    /// A causal chain asks for a word that does not exist.
-    #[error("the causal chain of {name} asks for {{{slot}}}; known are {{g}}, {{a}} and {{n}}")]
+    /// A causal chain contains an unknown placeholder.
+    #[error(
+        "unknown placeholder {{{slot}}} in the causal chain of {name}; expected {{g}}, {{a}} or {{n}}"
+    )]
     UnknownSlot {
-        /// The emotion.
+        /// Name of the emotion.
         name: String,
-        /// What it asks for.
+        /// The placeholder, without braces.
         slot: String,
     },
-    /// A brace without its counterpart.
-    #[error("a brace is not closed in the causal chain of {name}: {text}")]
+    /// A causal chain contains an unmatched brace.
+    #[error("unmatched brace in the causal chain of {name}: {text}")]
     OpenBrace {
-        /// The emotion.
+        /// Name of the emotion.
         name: String,
-        /// The clause.
+        /// The text of the clause.
         text: String,
     },
-    /// No schema has this name.
-    #[error("there is no schema for {0}")]
+    /// There is no schema with this name.
+    #[error("no schema for {0}")]
     Unknown(String),
     /// The components contradict each other.
     #[error(transparent)]
     Refused(#[from] Refusal),
 }
 
-/// Who is responsible, before anybody has a name.
+/// The agent responsible, by role; the name is known only to an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AgencyRole {
-    /// The agent that feels it.
+    /// The agent that feels the emotion.
     #[serde(rename = "self")]
     Oneself,
     /// Another agent.
     Other,
 }
 
-/// The valence of every instance, or none in particular.
+/// The valence of all instances of an emotion, unless it depends on the situation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SchemaValence {
@@ -70,42 +72,42 @@ pub enum SchemaValence {
     Positive,
     /// Always unpleasant.
     Negative,
-    /// As the circumstances are; legal for surprise only [D: S].
+    /// Depends on the circumstances; only valid for surprise [D: S].
     Either,
 }
 
-/// What is the same in every instance of one emotion.
+/// The components that all instances of one emotion share.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schema {
-    /// The face that goes with it.
+    /// Facial expression.
     pub facial_expression: FacialExpression,
-    /// Pleasant, unpleasant, or either.
+    /// Valence, or that it can be either.
     pub valence: SchemaValence,
-    /// How long it lasts; minutes if absent [D: S].
+    /// How long the emotion lasts; minutes by default [D: S].
     #[serde(default = "minutes")]
     pub duration: Duration,
-    /// Who is responsible.
+    /// The agent responsible for the eliciting event.
     pub agency: AgencyRole,
-    /// What it is about.
+    /// What the emotion is about.
     pub focality: Focality,
-    /// Whether the event was expected.
+    /// Whether the eliciting event was expected.
     pub novelty: Novelty,
-    /// How far the agent controls what happens.
+    /// How much control the agent has over what happens.
     pub controllability: Degree,
-    /// How far what happens can be changed at all.
+    /// How much of what happens can be changed at all.
     pub modifiability: Degree,
-    /// Whether the agent is sure of what happens.
+    /// Whether the agent is certain of what happens.
     pub certainty: Certainty,
-    /// Whether it agrees with the norms of others.
+    /// Whether what happens agrees with the norms of others.
     pub external_norms: Compatibility,
-    /// Whether it agrees with the agent's own standards.
+    /// Whether what happens agrees with the agent's own standards.
     pub internal_standards: Compatibility,
-    /// What it inclines the agent to do.
+    /// What the emotion inclines the agent to do.
     pub action_tendency: ActionTendency,
-    /// How it stands with the goal.
+    /// Status of the goal.
     pub goal: GoalStatus,
-    /// The account, with `{g}`, `{a}` and `{n}` where words of the moment belong.
+    /// The clauses of the causal chain, with the placeholders `{g}` (goal), `{a}` (other agent) and `{n}` (amount).
     pub causal_chain: Vec<Clause>,
 }
 
@@ -113,16 +115,16 @@ fn minutes() -> Duration {
     Duration::Minutes
 }
 
-/// What an instance of an emotion knows besides its schema. All of it may be unknown.
+/// The situation in which an emotion is felt. Every field may be unknown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Circumstances<'a> {
-    /// The other agent: who is responsible if the schema says other, and `{a}` in the causal chain.
+    /// The other agent, `{a}` in the causal chain. Required if the schema holds another agent responsible.
     pub other: Option<&'a str>,
-    /// The goal in words that follow "I want", `{g}`; for instance "to serve the guests".
+    /// The goal, `{g}` in the causal chain, in words that follow "I want", such as "to serve the guests".
     pub goal: Option<&'a str>,
-    /// How much is left, `{n}`; for instance "7 treats".
+    /// The amount left, `{n}` in the causal chain, such as "7 treats".
     pub amount: Option<&'a str>,
-    /// The valence, for a schema that leaves it open.
+    /// The valence, for a schema that allows either.
     pub valence: Option<Valence>,
 }
 
@@ -138,31 +140,30 @@ impl Circumstances<'_> {
 }
 
 impl Schema {
-    /// An instance of this emotion, called `name`.
+    /// Creates an instance of this emotion with the given name.
     ///
     /// # Errors
-    /// The components contradict each other, or the emotion points to another agent who is not named.
+    ///
+    /// Returns a [`Refusal`] if the components contradict each other, or if the schema needs circumstances that are
+    /// not given.
     pub fn emotion(
         &self,
         name: &str,
         intensity: Intensity,
         circumstances: &Circumstances<'_>,
     ) -> Result<Emotion, Refusal> {
-        let own = || name.to_owned();
-        let agency = match (self.agency, circumstances.other) {
-            (AgencyRole::Oneself, _) => Agency::Oneself,
-            (AgencyRole::Other, Some(other)) => Agency::Other(other.to_owned()),
-            (AgencyRole::Other, None) => return Err(Refusal::AgentUnnamed { name: own() }),
-        };
-        let valence = match self.valence {
-            SchemaValence::Positive => Valence::Positive,
-            SchemaValence::Negative => Valence::Negative,
-            SchemaValence::Either => circumstances
-                .valence
-                .ok_or(Refusal::ValenceOpen { name: own() })?,
-        };
+        let agency = self.agency_in(circumstances);
+        let agency = agency.ok_or_else(|| Refusal::AgentUnnamed {
+            name: name.to_owned(),
+        })?;
+
+        let valence = self.valence_in(circumstances);
+        let valence = valence.ok_or_else(|| Refusal::ValenceOpen {
+            name: name.to_owned(),
+        })?;
+
         Emotion::new(Components {
-            name: own(),
+            name: name.to_owned(),
             facial_expression: self.facial_expression,
             valence,
             intensity,
@@ -180,72 +181,93 @@ impl Schema {
         })
     }
 
-    /// The causal chain in words. A clause that speaks of something unknown is left out.
-    pub fn account(&self, circumstances: &Circumstances<'_>) -> Account {
-        let told = |clause: &Clause| {
-            let text = fill(&clause.text, circumstances)?;
-            Some(Clause {
-                kind: clause.kind,
-                text,
-            })
-        };
-        Account {
-            goal: self.goal,
-            clauses: self.causal_chain.iter().filter_map(told).collect(),
+    fn agency_in(&self, circumstances: &Circumstances<'_>) -> Option<Agency> {
+        match self.agency {
+            AgencyRole::Oneself => Some(Agency::Oneself),
+            AgencyRole::Other => {
+                let other = circumstances.other?;
+                Some(Agency::Other(other.to_owned()))
+            }
         }
     }
 
-    /// Refuses what no instance could ever be, so that a file is found wrong when it is read.
+    fn valence_in(&self, circumstances: &Circumstances<'_>) -> Option<Valence> {
+        match self.valence {
+            SchemaValence::Positive => Some(Valence::Positive),
+            SchemaValence::Negative => Some(Valence::Negative),
+            SchemaValence::Either => circumstances.valence,
+        }
+    }
+
+    /// The causal chain in words. Clauses that mention unknown circumstances are left out.
+    pub fn account(&self, circumstances: &Circumstances<'_>) -> Account {
+        let mut clauses = Vec::new();
+
+        for clause in &self.causal_chain {
+            if let Some(text) = fill(&clause.text, circumstances) {
+                clauses.push(Clause {
+                    kind: clause.kind,
+                    text,
+                });
+            }
+        }
+
+        Account {
+            goal: self.goal,
+            clauses,
+        }
+    }
+
+    /// Rejects schemata without any valid instance, so that errors are reported when a file is loaded.
     fn check(&self, name: &str) -> Result<(), SchemaError> {
         for clause in &self.causal_chain {
             check_slots(name, &clause.text)?;
         }
-        if self.valence == SchemaValence::Either
-            && self.facial_expression != FacialExpression::Surprised
-        {
-            return Err(Refusal::ValenceOpen {
-                name: name.to_owned(),
-            }
-            .into());
+
+        let is_surprise = self.facial_expression == FacialExpression::Surprised;
+        if self.valence == SchemaValence::Either && !is_surprise {
+            let name = name.to_owned();
+            return Err(Refusal::ValenceOpen { name }.into());
         }
-        let anybody = Circumstances {
+
+        let example = Circumstances {
             other: Some("-"),
             valence: Some(Valence::Positive),
             ..Default::default()
         };
-        self.emotion(name, Intensity::MIN, &anybody)?;
+        self.emotion(name, Intensity::MIN, &example)?;
+
         Ok(())
     }
 }
 
-/// Puts words into a template, once: a word that looks like a slot stays as it is. None if one is unknown.
+/// Replaces the placeholders of a template. Returns `None` if the circumstances lack one of them.
+///
+/// Text that has been inserted is not expanded again.
 fn fill(template: &str, circumstances: &Circumstances<'_>) -> Option<String> {
     let mut text = String::new();
     let mut rest = template;
+
     while let Some((before, after)) = rest.split_once('{') {
         let (slot, tail) = after.split_once('}')?;
         text.push_str(before);
         text.push_str(circumstances.word(slot)?);
         rest = tail;
     }
+
     text.push_str(rest);
     Some(text)
 }
 
 fn check_slots(name: &str, text: &str) -> Result<(), SchemaError> {
-    let open_brace = || SchemaError::OpenBrace {
-        name: name.to_owned(),
-        text: text.to_owned(),
-    };
-    let mut pieces = text.split('{');
-    if pieces.next().is_some_and(|before| before.contains('}')) {
-        return Err(open_brace());
-    }
-    for piece in pieces {
-        let (slot, after) = piece.split_once('}').ok_or_else(open_brace)?;
-        if after.contains('}') {
-            return Err(open_brace());
-        }
+    for slot in slots(text) {
+        let Some(slot) = slot else {
+            return Err(SchemaError::OpenBrace {
+                name: name.to_owned(),
+                text: text.to_owned(),
+            });
+        };
+
         if !SLOTS.contains(&slot) {
             return Err(SchemaError::UnknownSlot {
                 name: name.to_owned(),
@@ -253,10 +275,29 @@ fn check_slots(name: &str, text: &str) -> Result<(), SchemaError> {
             });
         }
     }
+
     Ok(())
 }
 
-/// Schemata by name.
+/// The placeholders in a text, in order, with `None` for an unmatched brace.
+fn slots(text: &str) -> Vec<Option<&str>> {
+    let mut slots = Vec::new();
+
+    let mut pieces = text.split('{');
+    if pieces.next().is_some_and(|before| before.contains('}')) {
+        slots.push(None);
+    }
+    for piece in pieces {
+        match piece.split_once('}') {
+            Some((slot, after)) if !after.contains('}') => slots.push(Some(slot)),
+            _ => slots.push(None),
+        }
+    }
+
+    slots
+}
+
+/// A set of schemata, indexed by the name of the emotion.
 ///
 /// ```
 /// use affect::{Circumstances, Intensity, Schemata};
@@ -286,41 +327,49 @@ impl Schemata {
         SCHEMATA.get_or_init(|| match Self::from_toml(STANDARD) {
             Ok(schemata) => schemata,
             Err(error) => {
-                unreachable!(
-                    "the crate's own schemata.toml, which its tests read, is wrong: {error}"
-                )
+                unreachable!("schemata.toml is part of this crate and tested, but invalid: {error}")
             }
         })
     }
 
-    /// Reads and checks schemata from TOML text: a table for each emotion.
+    /// Parses and validates schemata from TOML text with one table per emotion.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text cannot be parsed or if a schema has no valid instance.
     pub fn from_toml(text: &str) -> Result<Self, SchemaError> {
         let by_name: BTreeMap<String, Schema> =
             toml::from_str(text).map_err(|error| SchemaError::Syntax(error.to_string()))?;
+
         for (name, schema) in &by_name {
             schema.check(name)?;
         }
+
         Ok(Self { by_name })
     }
 
-    /// These schemata with those of `other` added; where both have one, that of `other` counts.
+    /// Adds the schemata of `other`, which replace those with the same name.
     #[must_use]
     pub fn with(mut self, other: Self) -> Self {
         self.by_name.extend(other.by_name);
         self
     }
 
-    /// The schema of this name.
+    /// The schema with this name.
     pub fn get(&self, name: &str) -> Option<&Schema> {
         self.by_name.get(name)
     }
 
-    /// Every name, in alphabetical order.
+    /// All names, in alphabetical order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.by_name.keys().map(String::as_str)
     }
 
-    /// An instance of the emotion called `name`.
+    /// Creates an instance of the emotion with this name.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if there is no such schema, or if it does not fit the circumstances.
     pub fn emotion(
         &self,
         name: &str,
@@ -330,6 +379,8 @@ impl Schemata {
         let schema = self
             .get(name)
             .ok_or_else(|| SchemaError::Unknown(name.to_owned()))?;
-        Ok(schema.emotion(name, intensity, circumstances)?)
+        let emotion = schema.emotion(name, intensity, circumstances)?;
+
+        Ok(emotion)
     }
 }

@@ -1,8 +1,8 @@
-//! The rules of the dynamics, one by one, and what must hold under any input.
+//! Each rule of the dynamics, and the invariants that hold for any input.
 
 #![expect(
     clippy::unwrap_used,
-    reason = "helpers of tests, where a panic is the failure"
+    reason = "test helpers may panic; clippy.toml only exempts `#[test]` functions"
 )]
 
 use affect::StandardEmotion::{
@@ -21,6 +21,7 @@ fn dynamics(state_set: StateSet) -> Dynamics<StandardEmotion> {
         state_set,
         ..Default::default()
     };
+
     Dynamics::standard(&parameters, Caution::default()).unwrap()
 }
 
@@ -31,8 +32,19 @@ struct Robot {
 
 impl Robot {
     fn new(state_set: StateSet) -> Self {
-        let dynamics = dynamics(state_set);
+        Self::with_dynamics(dynamics(state_set))
+    }
+
+    fn with_caution(caution: f64) -> Self {
+        let parameters = DynamicsParameters::default();
+        let caution = Caution::saturating(caution);
+
+        Self::with_dynamics(Dynamics::standard(&parameters, caution).unwrap())
+    }
+
+    fn with_dynamics(dynamics: Dynamics<StandardEmotion>) -> Self {
         let state = dynamics.start();
+
         Self { dynamics, state }
     }
 
@@ -41,15 +53,17 @@ impl Robot {
         self.state.feeling().emotion
     }
 
-    /// Steps for `seconds` and gives every emotion that was entered.
+    /// Steps for `seconds` and returns the emotions that were entered.
     fn entered(&mut self, stimulus: Stimulus, seconds: f64) -> Vec<StandardEmotion> {
         let mut entered = Vec::new();
+
         for _ in 0..(seconds / DT_S) as u32 {
             let before = self.state.feeling().emotion;
             if self.step(stimulus) != before {
                 entered.push(self.state.feeling().emotion);
             }
         }
+
         entered
     }
 
@@ -77,35 +91,45 @@ fn positive_input_keeps_happy_and_negative_leads_to_frustrated() {
 }
 
 #[test]
-fn the_filter_rises_with_caution_and_falls_without() {
+fn the_filter_rises_with_the_gain_and_falls_without_it() {
     let parameters = DynamicsParameters::default();
-    let share = |seconds: f64| 1.0 - libm::exp(-DT_S / seconds);
+
     for (caution, gain) in [(0.0, 0.5), (1.0, 1.5)] {
         let dynamics = Dynamics::standard(&parameters, Caution::new(caution).unwrap()).unwrap();
         let mut state = dynamics.start();
+
         dynamics.step(&mut state, &Stimulus::need(1.0), DT_S);
-        let risen = gain * 0.5 * share(1.5 / gain);
+        let risen = gain * 0.5 * filter_share(1.5 / gain);
         assert_eq!(state.feeling().intensity.value(), risen);
+
         dynamics.step(&mut state, &Stimulus::rest(), DT_S);
-        assert!((state.feeling().intensity.value() - risen * (1.0 - share(3.0))).abs() < 1e-15);
+        let fallen = risen * (1.0 - filter_share(3.0));
+        assert!((state.feeling().intensity.value() - fallen).abs() < 1e-15);
     }
 }
 
+/// The share of the remaining difference that a filter covers in one step.
+fn filter_share(tau_s: f64) -> f64 {
+    1.0 - libm::exp(-DT_S / tau_s)
+}
+
 #[test]
-fn without_a_measure_intensity_stays() {
+fn intensity_does_not_change_without_a_measure() {
     let mut robot = Robot::new(StateSet::Murphy4);
     robot.entered(Stimulus::need(1.0), 5.0);
     let before = robot.state.feeling();
+
     for stimulus in [Stimulus::new(Drive::Hold), Stimulus::need(f64::NAN)] {
         assert_eq!(robot.entered(stimulus, 5.0), []);
         assert_eq!(robot.state.feeling(), before);
     }
+
     robot.entered(Stimulus::need(f64::INFINITY), 60.0);
     assert!(robot.intensity() > 0.999);
 }
 
 #[test]
-fn t18_a_positive_input_leads_back_as_far_as_it_is_important() {
+fn t18_a_positive_input_leads_back_by_its_importance() {
     for (value, expected) in [
         (0.1, Frustrated),
         (0.4, Concerned),
@@ -114,8 +138,10 @@ fn t18_a_positive_input_leads_back_as_far_as_it_is_important() {
     ] {
         let mut robot = Robot::new(StateSet::Murphy4);
         robot.entered(Stimulus::need(9.0), 60.0);
+
         let event = ProgressEvent::Positive(importance(value));
         let emotion = robot.step(Stimulus::new(Drive::Hold).with_event(Some(event)));
+
         assert_eq!(
             emotion,
             expected,
@@ -126,7 +152,7 @@ fn t18_a_positive_input_leads_back_as_far_as_it_is_important() {
 }
 
 #[test]
-fn a_setback_counts_with_the_gain() {
+fn a_setback_is_multiplied_by_the_gain() {
     let mut robot = Robot::new(StateSet::Murphy4);
     let event = ProgressEvent::Negative(importance(0.3));
     robot.step(Stimulus::new(Drive::Hold).with_event(Some(event)));
@@ -134,57 +160,60 @@ fn a_setback_counts_with_the_gain() {
 }
 
 #[test]
-fn an_achieved_goal_makes_happy_at_once() {
+fn an_achieved_goal_leads_to_happy_immediately() {
     let mut robot = Robot::new(StateSet::Murphy4);
     while robot.step(Stimulus::need(9.0)) != Frustrated {}
-    // Not even the dwell time holds it back.
+
+    // The dwell time does not delay it.
     let emotion = robot.step(Stimulus::need(9.0).with_event(Some(ProgressEvent::GoalAchieved)));
     assert_eq!((emotion, robot.intensity()), (Happy, 0.0));
     assert_eq!(robot.step(Stimulus::need(9.0)), Happy);
 }
 
 #[test]
-fn anger_needs_extreme_intensity_for_long_and_somebody_to_blame() {
+fn anger_needs_lasting_extreme_intensity_and_an_agent_to_blame() {
     let blaming = Stimulus::need(9.0).with_blame(true);
     let mut robot = Robot::new(StateSet::Akr4);
     assert_eq!(
         robot.entered(Stimulus::need(9.0), 120.0),
         [Concerned, Frustrated]
     );
+
     assert_eq!(robot.entered(blaming, 14.5), []);
-    assert_eq!(robot.entered(Stimulus::need(9.0), 0.5), []); // the blame ends: time starts anew
+    // Without blame, the time starts over.
+    assert_eq!(robot.entered(Stimulus::need(9.0), 0.5), []);
     assert_eq!(robot.entered(blaming, 14.5), []);
     assert_eq!(robot.entered(blaming, 0.5), [Angry]);
     assert_eq!(
         robot.entered(Stimulus::rest(), 120.0),
         [Frustrated, Concerned, Happy]
     );
-    // murphy4 has no anger at all.
-    assert!(
-        !Robot::new(StateSet::Murphy4)
-            .entered(blaming, 600.0)
-            .contains(&Angry)
-    );
+
+    // There is no anger in murphy4.
+    let mut robot = Robot::new(StateSet::Murphy4);
+    assert!(!robot.entered(blaming, 600.0).contains(&Angry));
 }
 
 #[test]
-fn anger_begins_anew_after_another_emotion() {
+fn the_time_until_anger_starts_over_after_another_emotion() {
     let blaming = Stimulus::need(9.0).with_blame(true);
     let mut robot = Robot::new(StateSet::Akr4);
     while robot.step(blaming) != Frustrated {}
     robot.entered(blaming, 14.0);
+
     assert_eq!(
         robot.entered(blaming.with_belief(Belief::Cannot), 1.0),
         [Discouraged]
     );
     assert_eq!(robot.step(blaming.with_belief(Belief::Can)), Hopeful);
+
     while robot.step(blaming) != Frustrated {}
     assert_eq!(robot.entered(blaming, 14.5), []);
     assert_eq!(robot.entered(blaming, 0.5), [Angry]);
 }
 
 #[test]
-fn t19_cannot_keeps_discouraged_and_can_gives_hope() {
+fn t19_discouragement_lasts_until_the_robot_believes_that_it_can() {
     for state_set in [StateSet::Murphy4, StateSet::Akr4] {
         let mut robot = Robot::new(state_set);
         robot.entered(Stimulus::need(9.0), 60.0);
@@ -192,7 +221,8 @@ fn t19_cannot_keeps_discouraged_and_can_gives_hope() {
             robot.entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 5.0),
             [Discouraged]
         );
-        // For ever, whatever happens outside.
+
+        // External events have no effect.
         let achieved = Stimulus::rest().with_event(Some(ProgressEvent::GoalAchieved));
         assert_eq!(robot.entered(achieved, 3600.0), []);
         assert_eq!(robot.entered(Stimulus::need(9.0), 3600.0), []);
@@ -200,6 +230,7 @@ fn t19_cannot_keeps_discouraged_and_can_gives_hope() {
             robot.entered(Stimulus::rest().with_belief(Belief::Unstated), 60.0),
             []
         );
+
         assert_eq!(
             robot.step(Stimulus::rest().with_belief(Belief::Can)),
             Hopeful
@@ -209,7 +240,7 @@ fn t19_cannot_keeps_discouraged_and_can_gives_hope() {
 }
 
 #[test]
-fn cannot_discourages_only_who_is_frustrated() {
+fn only_a_frustrated_robot_becomes_discouraged() {
     let mut robot = Robot::new(StateSet::Murphy4);
     assert_eq!(
         robot.entered(Stimulus::need(1.2).with_belief(Belief::Cannot), 60.0),
@@ -222,43 +253,49 @@ fn cannot_discourages_only_who_is_frustrated() {
 }
 
 #[test]
-fn hope_ends_with_success_with_doubt_or_with_time() {
-    let hopeful = || {
-        let mut robot = Robot::new(StateSet::Murphy4);
-        robot.entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 60.0);
-        robot.step(Stimulus::need(9.0).with_belief(Belief::Can));
-        assert_eq!(robot.state.feeling().emotion, Hopeful);
-        robot
-    };
+fn hope_ends_with_success_with_discouragement_or_with_time() {
     let achieved = Stimulus::need(9.0).with_event(Some(ProgressEvent::GoalAchieved));
-    assert_eq!(hopeful().step(achieved), Happy);
-    assert_eq!(
-        hopeful().entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 5.0),
-        [Discouraged]
-    );
-    let mut robot = hopeful();
+    assert_eq!(hopeful_robot().step(achieved), Happy);
+
+    let cannot = Stimulus::need(9.0).with_belief(Belief::Cannot);
+    assert_eq!(hopeful_robot().entered(cannot, 5.0), [Discouraged]);
+
+    let mut robot = hopeful_robot();
     assert_eq!(robot.entered(Stimulus::need(9.0), 14.5), []);
     assert_eq!(robot.entered(Stimulus::need(9.0), 0.5), [Concerned]);
-    let mut robot = hopeful();
+
+    let mut robot = hopeful_robot();
     assert_eq!(robot.entered(Stimulus::rest(), 15.0), [Happy]);
 }
 
+fn hopeful_robot() -> Robot {
+    let mut robot = Robot::new(StateSet::Murphy4);
+
+    robot.entered(Stimulus::need(9.0).with_belief(Belief::Cannot), 60.0);
+    robot.step(Stimulus::need(9.0).with_belief(Belief::Can));
+    assert_eq!(robot.state.feeling().emotion, Hopeful);
+
+    robot
+}
+
 #[test]
-fn a_state_of_another_ladder_finds_its_place() {
+fn a_state_of_another_ladder_moves_to_a_rung() {
     let other = Robot::new(StateSet::Murphy4);
     let mut robot = Robot::new(StateSet::Akr4);
     robot.state = other.state;
     robot.entered(Stimulus::need(9.0), 2.0);
+
     let json = r#"{"emotion":"CONFIDENT","intensity":0.5,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
     robot.state = serde_json::from_str(json).unwrap();
     assert!(!robot.dynamics.accepts(&robot.state));
     assert_eq!(robot.step(Stimulus::new(Drive::Hold)), Concerned);
+
     let wrong = json.replace("0.5", "1.5");
     assert!(serde_json::from_str::<EmotionState<StandardEmotion>>(&wrong).is_err());
 }
 
 #[test]
-fn progress_is_positive_or_negative_by_what_is_felt() {
+fn progress_is_positive_or_negative_relative_to_the_feeling() {
     let mut robot = Robot::new(StateSet::Murphy4);
     assert_eq!(
         robot.dynamics.trend(&robot.state, Drive::Need(1.0)),
@@ -268,6 +305,7 @@ fn progress_is_positive_or_negative_by_what_is_felt() {
         robot.dynamics.trend(&robot.state, Drive::Rest),
         Trend::Level
     );
+
     robot.entered(Stimulus::need(1.0), 5.0);
     assert_eq!(
         robot.dynamics.trend(&robot.state, Drive::Need(0.1)),
@@ -287,7 +325,7 @@ fn rung(ladder: &Ladder<StandardEmotion>, emotion: StandardEmotion) -> usize {
         .unwrap()
 }
 
-/// Any course of needs, rests and events, with somebody to blame now and then.
+/// Any sequence of needs and events, sometimes with an agent to blame.
 fn any_course() -> impl Strategy<Value = Vec<Stimulus>> {
     let event = prop_oneof![
         8 => Just(None),
@@ -297,7 +335,8 @@ fn any_course() -> impl Strategy<Value = Vec<Stimulus>> {
     ];
     let stimulus = (0.0..8.0, event, any::<bool>())
         .prop_map(|(need, event, blame)| Stimulus::need(need).with_event(event).with_blame(blame));
-    // Each stimulus lasts for a while, so that the filter gets somewhere.
+
+    // Each stimulus lasts for several steps, so that the filter makes progress.
     prop::collection::vec((stimulus, 1_usize..12), 1..60).prop_map(|spans| {
         spans
             .into_iter()
@@ -311,16 +350,19 @@ fn any_set() -> impl Strategy<Value = StateSet> {
 }
 
 proptest! {
-    /// No up-move skips a rung; every move but an achieved goal waits for the dwell time and respects the
-    /// thresholds with their hysteresis.
+    /// No move upward skips a rung. Every move except for an achieved goal waits for the dwell time and respects the
+    /// thresholds and their hysteresis.
     #[test]
     fn moves_follow_the_ladder(course in any_course(), state_set in any_set(), dt_s in 0.05..1.0) {
         let dynamics = dynamics(state_set);
-        let (ladder, parameters) = (dynamics.ladder(), dynamics.parameters());
+        let ladder = dynamics.ladder();
+        let parameters = dynamics.parameters();
+
         let mut state = dynamics.start();
         for stimulus in course {
             let before = state.clone();
             dynamics.step(&mut state, &stimulus, dt_s);
+
             let intensity = state.feeling().intensity.value();
             let from = rung(ladder, before.feeling().emotion);
             let to = rung(ladder, state.feeling().emotion);
@@ -331,6 +373,7 @@ proptest! {
             if from == to {
                 continue;
             }
+
             prop_assert!(before.unchanged_s() + dt_s + 1e-9 >= parameters.dwell_s);
             prop_assert!(to <= from + 1, "skipped from {} to {}", from, to);
             if to > from {
@@ -341,44 +384,44 @@ proptest! {
         }
     }
 
-    /// An intensity that swings by less than the hysteresis around a threshold changes the emotion once.
+    /// An intensity that oscillates around a threshold by less than the hysteresis changes the emotion once.
     #[test]
-    fn a_small_swing_does_not_flap(
+    fn small_oscillations_do_not_change_the_emotion(
         swings in prop::collection::vec(-1.0_f64..1.0, 1..200),
         index in 1_usize..4,
     ) {
         let dynamics = dynamics(StateSet::Murphy4);
         let enter = dynamics.ladder().rungs()[index].enter;
         let mut state = dynamics.start();
-        // Climb to the threshold and settle a little above it; gain is 1, so need = intensity * rho_max.
+
+        // Settle slightly above the threshold. The gain is 1, so the need is the intensity times rho_max.
         for _ in 0..200 {
             dynamics.step(&mut state, &Stimulus::need((enter + 0.01) * 2.0), DT_S);
         }
         prop_assert_eq!(rung(dynamics.ladder(), state.feeling().emotion), index);
+
         for swing in swings {
             dynamics.step(&mut state, &Stimulus::need((enter + 0.039 * swing) * 2.0), DT_S);
             prop_assert_eq!(rung(dynamics.ladder(), state.feeling().emotion), index);
         }
     }
 
-    /// For one and the same course of need, a more cautious robot never feels less while need grows.
+    /// While the same need grows, the intensity of a more cautious robot is never lower.
     #[test]
     fn t04_caution_never_slows_the_rise(low in 0.0..1.0, high in 0.0..1.0, slope in 0.01..1.0) {
-        let (low, high) = if low <= high { (low, high) } else { (high, low) };
-        let parameters = DynamicsParameters::default();
-        let make = |caution| Dynamics::standard(&parameters, Caution::saturating(caution)).unwrap();
-        let (calm, anxious) = (make(low), make(high));
-        let (mut calm_state, mut anxious_state) = (calm.start(), anxious.start());
+        let mut calm = Robot::with_caution(f64::min(low, high));
+        let mut anxious = Robot::with_caution(f64::max(low, high));
+
         for tick in 0..100 {
             let stimulus = Stimulus::need(slope * f64::from(tick) * DT_S);
-            calm.step(&mut calm_state, &stimulus, DT_S);
-            anxious.step(&mut anxious_state, &stimulus, DT_S);
-            let intensity = |state: &EmotionState<StandardEmotion>| state.feeling().intensity.value();
-            prop_assert!(intensity(&anxious_state) >= intensity(&calm_state) - 1e-12);
+            calm.step(stimulus);
+            anxious.step(stimulus);
+
+            prop_assert!(anxious.intensity() >= calm.intensity() - 1e-12);
         }
     }
 
-    /// Whatever the moment, what was written down and read again continues identically.
+    /// A state that is saved and restored at any time continues identically.
     #[test]
     fn t23_a_saved_state_continues(course in any_course(), cut in 0.0..1.0, state_set in any_set()) {
         let dynamics = dynamics(state_set);
@@ -387,8 +430,10 @@ proptest! {
         for stimulus in &course[..cut] {
             dynamics.step(&mut state, stimulus, DT_S);
         }
+
         let text = serde_json::to_string(&state).unwrap();
         let mut restored: EmotionState<StandardEmotion> = serde_json::from_str(&text).unwrap();
+
         for stimulus in &course[cut..] {
             dynamics.step(&mut state, stimulus, DT_S);
             dynamics.step(&mut restored, stimulus, DT_S);

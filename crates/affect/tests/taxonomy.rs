@@ -1,8 +1,8 @@
-//! What the taxonomy allows and refuses, and the schemata of the standard emotions.
+//! What the taxonomy accepts and rejects, and the schemata of the standard emotions.
 
 #![expect(
     clippy::unwrap_used,
-    reason = "helpers of tests, where a panic is the failure"
+    reason = "test helpers may panic; clippy.toml only exempts `#[test]` functions"
 )]
 
 use affect::akr::{
@@ -42,6 +42,7 @@ fn t22_every_standard_emotion_has_legal_components() {
     for label in StandardEmotion::ALL {
         let emotion = emotion(label.name());
         let components = emotion.components();
+
         assert_eq!(components.duration, Duration::Minutes);
         assert_eq!(
             components.valence,
@@ -57,14 +58,15 @@ fn t22_every_standard_emotion_has_legal_components() {
 }
 
 #[test]
-fn t22_frustrated_points_to_the_other_and_happy_to_the_self() {
+fn t22_frustrated_blames_the_other_agent_and_happy_the_self() {
     assert_eq!(
         emotion("FRUSTRATED").components().agency,
         Agency::Other("Leguin".to_owned())
     );
     assert_eq!(emotion("HAPPY").components().agency, Agency::Oneself);
-    let nobody = Circumstances::default();
-    let refusal = Schemata::standard().emotion("FRUSTRATED", Intensity::MAX, &nobody);
+
+    let unknown = Circumstances::default();
+    let refusal = Schemata::standard().emotion("FRUSTRATED", Intensity::MAX, &unknown);
     let expected = Refusal::AgentUnnamed {
         name: "FRUSTRATED".to_owned(),
     };
@@ -82,46 +84,51 @@ fn schemata_have_the_tendencies_of_table_2() {
 }
 
 #[test]
-fn an_emotion_signals_what_its_tendency_inclines_to() {
-    let signal = |name| emotion(name).components().causal_chain.goal.signal();
-    for name in ["HAPPY", "CONFIDENT", "CONCERNED", "HOPEFUL"] {
-        assert_eq!(signal(name), Signal::Continue, "{name}");
+fn the_signal_of_an_emotion_matches_its_tendency() {
+    for (name, signal) in [
+        ("HAPPY", Signal::Continue),
+        ("CONFIDENT", Signal::Continue),
+        ("CONCERNED", Signal::Continue),
+        ("HOPEFUL", Signal::Continue),
+        ("FRUSTRATED", Signal::ChangeCourse),
+        ("ANGRY", Signal::ChangeCourse),
+        ("DISCOURAGED", Signal::Disengage),
+    ] {
+        let emotion = emotion(name);
+        let goal = emotion.components().causal_chain.goal;
+        assert_eq!(goal.signal(), signal, "{name}");
     }
-    assert_eq!(
-        (signal("FRUSTRATED"), signal("ANGRY")),
-        (Signal::ChangeCourse, Signal::ChangeCourse)
-    );
-    assert_eq!(signal("DISCOURAGED"), Signal::Disengage);
 }
 
 #[test]
 fn an_emotion_is_neither_mood_nor_personality() {
-    assert!(refused("ANGRY", |c| c.duration = Duration::Lifetime).contains("ANGRY lasts minutes"));
-    assert!(
-        refused("ANGRY", |c| c.duration = Duration::Days).contains("what lasts days is a mood")
-    );
-    assert!(
-        refused("ANGRY", |c| c.focality = Focality::Global).contains("about an event or an object")
-    );
-    assert!(
-        refused("ANGRY", |c| c.agency = Agency::Other(String::new())).contains("must be named")
-    );
-    assert_eq!(
-        refused("ANGRY", |c| c.name.clear()),
-        "an emotion has a name"
-    );
+    let refusal = refused("ANGRY", |c| c.duration = Duration::Lifetime);
+    assert!(refusal.contains("ANGRY must last minutes"), "{refusal}");
+
+    let refusal = refused("ANGRY", |c| c.duration = Duration::Days);
+    assert!(refusal.contains("only moods last days"), "{refusal}");
+
+    let refusal = refused("ANGRY", |c| c.focality = Focality::Global);
+    assert!(refusal.contains("about an event or an object"), "{refusal}");
+
+    let refusal = refused("ANGRY", |c| c.agency = Agency::Other(String::new()));
+    assert!(refusal.contains("must be named"), "{refusal}");
+
+    let refusal = refused("ANGRY", |c| c.name.clear());
+    assert_eq!(refusal, "an emotion must have a name");
 }
 
 #[test]
 fn a_face_does_not_contradict_the_valence() {
-    let expected = "HAPPY is Negative, which a Happy face contradicts";
+    let refusal = refused("HAPPY", |c| c.valence = Valence::Negative);
     assert_eq!(
-        refused("HAPPY", |c| c.valence = Valence::Negative),
-        expected
+        refusal,
+        "HAPPY has Negative valence, which contradicts its Happy face"
     );
-    assert!(
-        refused("ANGRY", |c| c.facial_expression = FacialExpression::Happy).contains("contradicts")
-    );
+
+    let refusal = refused("ANGRY", |c| c.facial_expression = FacialExpression::Happy);
+    assert!(refusal.contains("contradicts"), "{refusal}");
+
     for valence in [Valence::Positive, Valence::Negative] {
         let mut components = emotion("ANGRY").components().clone();
         components.facial_expression = FacialExpression::Surprised;
@@ -131,12 +138,13 @@ fn a_face_does_not_contradict_the_valence() {
 }
 
 #[test]
-fn an_emotion_read_from_text_is_checked_too() {
+fn a_deserialized_emotion_is_validated_too() {
     let text = serde_json::to_string(&emotion("CONCERNED")).unwrap();
     assert_eq!(
         serde_json::from_str::<Emotion>(&text).unwrap(),
         emotion("CONCERNED")
     );
+
     for (from, to) in [
         ("minutes", "lifetime"),
         ("\"event\",\"novelty", "\"global\",\"novelty"),
@@ -144,6 +152,7 @@ fn an_emotion_read_from_text_is_checked_too() {
     ] {
         let wrong = text.replace(from, to);
         assert_ne!(wrong, text);
+
         assert!(serde_json::from_str::<Emotion>(&wrong).is_err(), "{wrong}");
     }
 }
@@ -154,35 +163,39 @@ fn a_mood_lasts_days_is_global_and_has_no_agency() {
         valence: Valence::Negative,
         intensity: Intensity::MAX,
     });
-    assert_eq!(
-        (mood.duration(), mood.focality()),
-        (Duration::Days, Focality::Global)
-    );
+    assert_eq!(mood.duration(), Duration::Days);
+    assert_eq!(mood.focality(), Focality::Global);
+
     let text = serde_json::to_string(&mood).unwrap();
     assert_eq!(serde_json::from_str::<Mood>(&text).unwrap(), mood);
-    let refusal = |line: &str| {
+
+    for (line, expected) in [
+        ("agency = { other = 'Leguin' }", "a mood has no agency"),
+        ("duration = 'minutes'", "a mood lasts days"),
+        ("focality = 'event'", "a mood is global"),
+        ("novelty = 'match'", "unknown field"),
+    ] {
         let text = format!("valence = 'negative'\nintensity = 1.0\n{line}");
-        toml::from_str::<Mood>(&text).unwrap_err().to_string()
-    };
-    assert!(refusal("agency = { other = 'Leguin' }").contains("a mood has no agency"));
-    assert!(refusal("duration = 'minutes'").contains("a mood lasts days"));
-    assert!(refusal("focality = 'event'").contains("a mood is global"));
-    assert!(refusal("novelty = 'match'").contains("unknown field"));
+        let refusal = toml::from_str::<Mood>(&text).unwrap_err().to_string();
+        assert!(refusal.contains(expected), "{refusal}");
+    }
 }
 
 #[test]
 fn a_personality_lasts_a_lifetime() {
     let personality = Personality::with_caution(Caution::MAX);
-    assert_eq!(
-        (personality.duration(), personality.focality()),
-        (Duration::Lifetime, Focality::Global)
-    );
-    assert!(
-        personality.cares_about(Valence::Negative) && personality.cares_about(Valence::Positive)
-    );
+    assert_eq!(personality.duration(), Duration::Lifetime);
+    assert_eq!(personality.focality(), Focality::Global);
+    assert!(personality.cares_about(Valence::Negative));
+    assert!(personality.cares_about(Valence::Positive));
+}
+
+#[test]
+fn a_personality_can_be_read_from_a_file() {
     let text = "caution = 0.2\ntraits = ['prudent', { other = 'shy' }]\nstrategy = 'tit_for_tat'\n\
                 preferences = ['like_positive']";
     let read: Personality = toml::from_str(text).unwrap();
+
     assert_eq!(
         read.traits.iter().collect::<Vec<_>>(),
         [&Trait::Prudent, &Trait::Other("shy".to_owned())]
@@ -193,8 +206,10 @@ fn a_personality_lasts_a_lifetime() {
         [&Preference::LikePositive]
     );
     assert!(!read.cares_about(Valence::Negative));
+
     let json = serde_json::to_string(&read).unwrap();
     assert_eq!(serde_json::from_str::<Personality>(&json).unwrap(), read);
+
     for wrong in [
         "duration = 'days'",
         "focality = 'event'",
@@ -206,14 +221,14 @@ fn a_personality_lasts_a_lifetime() {
 }
 
 #[test]
-fn a_clause_about_something_unknown_is_left_out() {
-    let knowing = Circumstances {
+fn a_clause_about_unknown_circumstances_is_left_out() {
+    let known = Circumstances {
         goal: Some("to explore"),
         other: Some("Vonda"),
         ..Default::default()
     };
     let concerned = Schemata::standard()
-        .emotion("CONCERNED", Intensity::MIN, &knowing)
+        .emotion("CONCERNED", Intensity::MIN, &known)
         .unwrap();
     let spoken = concerned.components().causal_chain.spoken();
     assert!(
@@ -221,7 +236,10 @@ fn a_clause_about_something_unknown_is_left_out() {
         "{spoken}"
     );
     assert!(spoken.ends_with("I feel bad."));
-    // Words are put in once, whatever they look like.
+}
+
+#[test]
+fn inserted_words_are_not_expanded_again() {
     let odd = Circumstances {
         goal: Some("{a} and {x"),
         other: Some("Vonda"),
@@ -235,7 +253,7 @@ fn a_clause_about_something_unknown_is_left_out() {
     assert!(spoken.starts_with("I want {a} and {x;"), "{spoken}");
 }
 
-/// A schema of one's own, with one line replaced.
+/// A custom schema in which `from` is replaced by `to`.
 fn own(from: &str, to: &str) -> Result<Schemata, SchemaError> {
     let text = r#"
         [AMAZED]
@@ -254,44 +272,56 @@ fn own(from: &str, to: &str) -> Result<Schemata, SchemaError> {
         causal_chain = [{ kind = "event", text = "I did not know {n}" }]
     "#;
     assert!(text.contains(from));
+
     Schemata::from_toml(&text.replace(from, to))
 }
 
 #[test]
-fn surprise_alone_may_be_either() {
+fn only_surprise_may_have_either_valence() {
     let schemata = own("", "").unwrap().with(Schemata::standard().clone());
     assert_eq!(schemata.names().count(), 8);
-    let either = |valence| {
+
+    for valence in [Valence::Positive, Valence::Negative] {
         let circumstances = Circumstances {
-            valence,
+            valence: Some(valence),
             amount: Some("this"),
             ..Default::default()
         };
-        schemata.emotion("AMAZED", Intensity::MAX, &circumstances)
-    };
-    for valence in [Valence::Positive, Valence::Negative] {
-        assert_eq!(either(Some(valence)).unwrap().components().valence, valence);
+        let amazed = schemata.emotion("AMAZED", Intensity::MAX, &circumstances);
+        assert_eq!(amazed.unwrap().components().valence, valence);
     }
-    assert!(
-        either(None)
-            .unwrap_err()
-            .to_string()
-            .contains("AMAZED needs a valence of its own")
-    );
+
+    let error = schemata.emotion("AMAZED", Intensity::MAX, &OTHER);
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("AMAZED must have a valence"), "{error}");
+
     assert!(own("\"surprised\"", "\"happy\"").is_err());
     assert!(schemata.emotion("BORED", Intensity::MAX, &OTHER).is_err());
 }
 
 #[test]
-fn a_schema_that_no_instance_could_fit_is_refused_when_it_is_read() {
-    let refusal = |from: &str, to: &str| own(from, to).unwrap_err().to_string();
-    assert!(refusal("\"object\"", "\"global\"").contains("AMAZED is about an event or an object"));
-    assert!(refusal("goal =", "duration = \"days\"\ngoal =").contains("AMAZED lasts minutes"));
-    assert!(refusal("{n}", "{m}").contains("asks for {m}"));
-    assert!(refusal("{n}", "{n").contains("brace is not closed"));
-    assert!(refusal("{n}", "n}").contains("brace is not closed"));
-    assert!(refusal("agency = \"self\"", "").contains("agency"));
-    assert!(refusal("goal =", "gaol = 1\ngoal =").contains("gaol"));
+fn a_schema_without_valid_instances_is_rejected_when_loaded() {
+    for (from, to, expected) in [
+        (
+            "\"object\"",
+            "\"global\"",
+            "AMAZED must be about an event or an object",
+        ),
+        (
+            "goal =",
+            "duration = \"days\"\ngoal =",
+            "AMAZED must last minutes",
+        ),
+        ("{n}", "{m}", "unknown placeholder {m}"),
+        ("{n}", "{n", "unmatched brace"),
+        ("{n}", "n}", "unmatched brace"),
+        ("agency = \"self\"", "", "agency"),
+        ("goal =", "gaol = 1\ngoal =", "gaol"),
+    ] {
+        let error = own(from, to).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+
     let happy = own("\"surprised\"", "\"happy\"").unwrap_err();
     assert_eq!(
         happy,

@@ -1,13 +1,15 @@
-//! Every body on the field, numbered, with the one test of collision.
+//! All bodies on the field, and the collision test that applies to each of them.
 //!
-//! Obstacles come first, then robots, then guests, in one sequence of numbers. So "the first in the order of
-//! kind and index" is "the smallest number", and all kinds obey the same test.
+//! Bodies share one sequence of numbers: obstacles first, then robots, then guests. The first body in the order
+//! of [`Body`] is therefore the one with the smallest number, and every kind goes through the same test.
 
 use crate::grid::Grid;
 use crate::hall::Field;
 use crate::point::Point;
 
-/// A body, by its kind and its index in that kind's list. Ordered by kind as listed here, then by index.
+/// A body, identified by its kind and its index among bodies of that kind.
+///
+/// Ordered by kind, in the order of the variants, then by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Body {
     /// A fixed obstacle.
@@ -18,21 +20,22 @@ pub enum Body {
     Guest(usize),
 }
 
-/// What kept a body from its proposed location.
+/// What prevented a body from moving to its proposed location.
 ///
-/// If several things did, the edge is named first, otherwise the first body in the order of [`Body`].
+/// When several obstructions apply, this is the edge if it is one of them, and otherwise the first body in the
+/// order of [`Body`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Blocker {
     /// The edge of the field.
     Edge,
-    /// A body that is there.
+    /// A body that occupies part of the proposed location.
     Body(Body),
 }
 
-/// A body found by [`World::near`](crate::World::near).
+/// A body returned by [`World::near`](crate::World::near).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Near {
-    /// Which one.
+    /// The body's kind and index.
     pub body: Body,
     /// Its center, m.
     pub center: Point,
@@ -41,18 +44,21 @@ pub struct Near {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Bodies {
     field: Field,
-    /// Numbers below this are obstacles.
+    /// Number of the first robot; obstacles are numbered below it.
     robots_from: usize,
-    /// Numbers from this on are guests.
+    /// Number of the first guest.
     guests_from: usize,
     centers: Vec<Point>,
     grid: Grid,
 }
 
 impl Bodies {
-    /// An empty field that will hold so many bodies of each kind, pushed in that order.
+    /// An empty field with room for the given number of bodies of each kind.
+    ///
+    /// Bodies must then be pushed in this order: obstacles, robots, guests.
     pub(crate) fn new(field: Field, obstacles: usize, robots: usize, guests: usize) -> Self {
         let count = obstacles + robots + guests;
+
         Self {
             field,
             robots_from: obstacles,
@@ -66,13 +72,13 @@ impl Bodies {
         &self.field
     }
 
-    /// Puts the next body here, unseen: the caller has tested that it may be here.
+    /// Adds the next body without a collision test; the caller has already made sure that it fits.
     pub(crate) fn push(&mut self, center: Point) {
         self.centers.push(center);
         self.grid.push(center);
     }
 
-    /// Takes the guests off the field again.
+    /// Removes all guests.
     pub(crate) fn remove_guests(&mut self) {
         while self.centers.len() > self.guests_from {
             self.centers.pop();
@@ -92,54 +98,65 @@ impl Bodies {
         &self.centers[self.guests_from..]
     }
 
-    /// The body that a new body at this center would overlap, the first of them in the order of [`Body`].
+    /// The first body, in the order of [`Body`], that a new body at this center would overlap.
     pub(crate) fn hit(&self, center: Point) -> Option<Body> {
         self.first_hit(center, usize::MAX).map(|id| self.body(id))
     }
 
-    /// How far right the bodies reach that a new body at this center would overlap, by the center of the last.
-    pub(crate) fn hit_until_x_m(&self, center: Point) -> Option<f64> {
-        let mut until_x_m = None;
+    /// The largest x, in meters, of the centers that a new body at this center would overlap.
+    pub(crate) fn rightmost_hit_x_m(&self, center: Point) -> Option<f64> {
+        let mut rightmost_x_m = None;
+
         self.grid.visit_around(center, self.field.body_m, |id| {
             let other = self.centers[id];
-            if self.field.overlap(center, other) && until_x_m.is_none_or(|x_m| x_m < other.x) {
-                until_x_m = Some(other.x);
+            let is_farther = rightmost_x_m.is_none_or(|x_m| x_m < other.x);
+
+            if is_farther && self.field.overlap(center, other) {
+                rightmost_x_m = Some(other.x);
             }
         });
-        until_x_m
+
+        rightmost_x_m
     }
 
-    /// Moves a robot there, or leaves it where it is and says why.
+    /// Moves a robot to `to`, or leaves it in place and returns what blocks it.
     pub(crate) fn advance_robot(&mut self, index: usize, to: Point) -> Result<(), Blocker> {
         self.advance(self.robots_from + index, to)
     }
 
-    /// Moves a guest on by this step, or leaves it where it is and says why.
+    /// Moves a guest by `step`, or leaves it in place and returns what blocks it.
     pub(crate) fn advance_guest(&mut self, index: usize, step: Point) -> Result<(), Blocker> {
         let id = self.guests_from + index;
-        self.advance(id, self.centers[id] + step)
+        let to = self.centers[id] + step;
+
+        self.advance(id, to)
     }
 
-    /// The rule of collision (seed, "Obstacles"): the offending body is not advanced.
+    /// The collision rule of the paper ("Obstacles"): a body that would collide is not advanced.
     fn advance(&mut self, id: usize, to: Point) -> Result<(), Blocker> {
         if !self.field.contains(to) {
             return Err(Blocker::Edge);
         }
+
         if let Some(other) = self.first_hit(to, id) {
             return Err(Blocker::Body(self.body(other)));
         }
+
         self.centers[id] = to;
         self.grid.relocate(id, to);
         Ok(())
     }
 
+    /// The smallest number of a body, other than `except`, that a body at this center would overlap.
     fn first_hit(&self, center: Point, except: usize) -> Option<usize> {
         let mut first = usize::MAX;
+
         self.grid.visit_around(center, self.field.body_m, |id| {
             if id < first && id != except && self.field.overlap(center, self.centers[id]) {
                 first = id;
             }
         });
+
         (first != usize::MAX).then_some(first)
     }
 
@@ -153,23 +170,34 @@ impl Bodies {
         }
     }
 
-    /// All bodies with their center within `range_m` of `point`, in the order of [`Body`].
+    /// All bodies whose center is within `range_m` of `point`, in the order of [`Body`].
     pub(crate) fn near(&self, point: Point, range_m: f64) -> Vec<Near> {
-        let mut ids = Vec::new();
-        if point.is_finite() && range_m >= 0.0 {
-            self.grid.visit_around(point, range_m, |id| {
-                if (self.centers[id] - point).length_squared_m2() <= range_m * range_m {
-                    ids.push(id);
-                }
-            });
-        }
-        ids.sort_unstable();
-        ids.into_iter()
+        self.ids_near(point, range_m)
+            .into_iter()
             .map(|id| Near {
                 body: self.body(id),
                 center: self.centers[id],
             })
             .collect()
+    }
+
+    fn ids_near(&self, point: Point, range_m: f64) -> Vec<usize> {
+        let is_meaningful = point.is_finite() && range_m >= 0.0;
+        if !is_meaningful {
+            return Vec::new();
+        }
+
+        let mut ids = Vec::new();
+        self.grid.visit_around(point, range_m, |id| {
+            let offset = self.centers[id] - point;
+            if offset.length_squared_m2() <= range_m * range_m {
+                ids.push(id);
+            }
+        });
+
+        // The grid visits bodies in no particular order.
+        ids.sort_unstable();
+        ids
     }
 }
 
@@ -181,10 +209,11 @@ mod tests {
     use rand::SeedableRng;
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// How many bodies the guests are compared with in one tick, each guest with itself included.
+    /// How many bodies the guests are compared with in one tick; each guest is also compared with itself.
     fn comparisons(guests: usize) -> usize {
         let side_m = (8.0 * guests as f64).sqrt();
         let still = Triangular::new(0.0, 0.0, 0.0).unwrap();
+
         let hall = Hall {
             field: Field {
                 size_m: (side_m, side_m),
@@ -200,7 +229,9 @@ mod tests {
             tick_s: 0.1,
             max_speed_mps: 1.0,
         };
-        let bodies = place(&hall, &mut Xoshiro256PlusPlus::seed_from_u64(3)).unwrap();
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        let bodies = place(&hall, &mut rng).unwrap();
+
         let mut count = 0;
         for &center in bodies.guests() {
             bodies
@@ -213,10 +244,11 @@ mod tests {
     #[test]
     fn work_grows_linearly_with_the_crowd() {
         for guests in [100, 1_000, 10_000, 100_000] {
-            let each = comparisons(guests) as f64 / guests as f64;
+            let per_guest = comparisons(guests) as f64 / guests as f64;
+
             assert!(
-                (1.0..2.5).contains(&each),
-                "{each} comparisons for each of {guests} guests"
+                (1.0..2.5).contains(&per_guest),
+                "{per_guest} comparisons for each of {guests} guests"
             );
         }
     }

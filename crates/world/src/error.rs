@@ -1,42 +1,45 @@
-//! What can be wrong with a hall, with the index and the place, so that the caller can put the name to it.
+//! Errors in the description of a hall.
+//!
+//! They carry indices and positions, so that a caller that knows the bodies' names can report them.
 
 use crate::point::Point;
 use std::fmt;
 
-/// Three numbers that are no triangular distribution.
+/// Three numbers that do not describe a triangular distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangularError {
-    /// As given.
+    /// The minimum that was given.
     pub min: f64,
-    /// As given.
+    /// The mode that was given.
     pub mode: f64,
-    /// As given.
+    /// The maximum that was given.
     pub max: f64,
 }
 
 impl fmt::Display for TriangularError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { min, mode, max } = self;
+
         write!(
             f,
-            "need 0 <= min <= mode <= max, all finite; got min {min}, mode {mode}, max {max}"
+            "must be finite with 0 <= min <= mode <= max; got min {min}, mode {mode}, max {max}"
         )
     }
 }
 
 impl std::error::Error for TriangularError {}
 
-/// Why a [`Hall`](crate::Hall) cannot become a [`World`](crate::World).
+/// Why a [`World`](crate::World) cannot be built from a [`Hall`](crate::Hall).
 ///
-/// Indices count from 0 in the order of the hall's own lists; places are centers in metres, as given.
+/// Indices count from 0 in the hall's lists. Positions are centers in meters, as given in the hall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum HallError {
-    /// A size, a time or a speed is not a number in the range that makes sense.
+    /// A length, time or speed is NaN or outside its valid range.
     OutOfRange {
-        /// The quantity, as it is called in the hall, with its unit.
+        /// The field of the hall that holds the quantity, with its unit.
         name: &'static str,
-        /// As given.
+        /// The value that was given.
         value: f64,
         /// The smallest value accepted.
         min: f64,
@@ -50,50 +53,50 @@ pub enum HallError {
         /// Side of a body, m.
         body_m: f64,
     },
-    /// More bodies than the index can number.
+    /// More bodies than a world supports.
     TooManyBodies {
-        /// Obstacles, robots and guests together.
+        /// Number of obstacles, robots and guests together.
         count: usize,
-        /// [`BODIES_MAX`](crate::BODIES_MAX).
+        /// The limit, [`BODIES_MAX`](crate::BODIES_MAX).
         max: usize,
     },
-    /// A fixed obstacle does not lie wholly inside the field.
+    /// A fixed obstacle is not entirely inside the field.
     ObstacleOffField {
-        /// Which obstacle.
+        /// Index of the obstacle.
         index: usize,
         /// Its center.
         at: Point,
     },
-    /// A robot does not lie wholly inside the field.
+    /// A robot is not entirely inside the field.
     RobotOffField {
-        /// Which robot.
+        /// Index of the robot.
         index: usize,
         /// Its center.
         at: Point,
     },
     /// A robot overlaps a fixed obstacle.
     RobotOnObstacle {
-        /// Which robot.
+        /// Index of the robot.
         index: usize,
         /// Its center.
         at: Point,
-        /// Which obstacle (the first, if several).
+        /// Index of the obstacle; the first one if there are several.
         obstacle: usize,
     },
-    /// A robot overlaps a robot before it in the list.
+    /// A robot overlaps another one that precedes it in the list.
     RobotOnRobot {
-        /// Which robot.
+        /// Index of the robot.
         index: usize,
         /// Its center.
         at: Point,
-        /// The robot it overlaps (the first, if several).
+        /// Index of the robot it overlaps; the first one if there are several.
         other: usize,
     },
-    /// The guests do not fit between the obstacles and the robots.
+    /// The guests do not fit beside the obstacles and the robots.
     NoRoom {
-        /// How many guests were asked for.
+        /// Number of guests requested.
         count: usize,
-        /// How many fit, set in rows.
+        /// Number of guests that fit when arranged in rows.
         room: usize,
     },
 }
@@ -109,7 +112,7 @@ impl fmt::Display for HallError {
             } => {
                 write!(
                     f,
-                    "{name} is {value:?}; it must be a number from {min:?} to {max:?}"
+                    "{name} is {value:?}; must be a number from {min:?} to {max:?}"
                 )
             }
             Self::FieldTooSmall {
@@ -118,11 +121,14 @@ impl fmt::Display for HallError {
             } => {
                 write!(
                     f,
-                    "a field of {width_m} m by {height_m} m has no room for a body of {body_m} m"
+                    "a field of {width_m} m by {height_m} m is too small for a body of {body_m} m"
                 )
             }
             Self::TooManyBodies { count, max } => {
-                write!(f, "{count} bodies; at most {max} are supported")
+                write!(
+                    f,
+                    "{count} bodies are too many; at most {max} are supported"
+                )
             }
             Self::ObstacleOffField { index, at } => off_field(f, "obstacle", index, at),
             Self::RobotOffField { index, at } => off_field(f, "robot", index, at),
@@ -139,7 +145,7 @@ impl fmt::Display for HallError {
             Self::NoRoom { count, room } => {
                 write!(
                     f,
-                    "{count} guests do not fit: in rows, beside obstacles and robots, there is room for {room}"
+                    "{count} guests do not fit: obstacles and robots leave room for {room}"
                 )
             }
         }
@@ -149,7 +155,7 @@ impl fmt::Display for HallError {
 fn off_field(f: &mut fmt::Formatter<'_>, kind: &str, index: usize, at: Point) -> fmt::Result {
     write!(
         f,
-        "{kind} {index} at {at} m does not lie wholly inside the field"
+        "{kind} {index} at {at} m is not entirely inside the field"
     )
 }
 

@@ -1,20 +1,23 @@
-//! A uniform grid over the field that finds the bodies near a place.
+//! A uniform grid over the field that finds the bodies near a point.
 //!
-//! It exists so that the cost of a tick grows with the number of bodies and not with its square. A cell holds a
-//! chain of body numbers, kept in two flat vectors, so that a move allocates nothing. The order within a chain
-//! depends on who came when; no caller may let it show (each takes a minimum or sorts).
+//! The grid keeps the cost of a tick linear in the number of bodies. Each cell holds a linked list of body
+//! numbers, stored in two flat vectors, so that moving a body does not allocate. The order within a list depends
+//! on the history of moves and must not affect results: callers take a minimum or sort.
 
 use crate::point::Point;
 
-/// No body: the end of a chain.
+/// Marks the end of a list.
 const NONE: u32 = u32::MAX;
 
-/// A cell is as large as a body, so that a body meets only those in its own cell and the eight around it. Cells
-/// are larger only where there would be more of them than this (4 MB; bodies of 2 ft on a field of 600 m) and
-/// more than [`CELLS_PER_BODY`].
+/// Maximum number of cells, 4 MB, unless [`CELLS_PER_BODY`] allows more.
+///
+/// A cell is normally as large as a body, so that a body can only touch bodies in its own cell and the eight
+/// around it. Cells become larger on fields that would exceed this limit, such as a field of 600 m with bodies of
+/// 2 ft.
 const CELLS: u64 = 1 << 20;
 
-/// Keeps the memory linear in the number of bodies; at 16, chance brings two of them into one cell rarely.
+/// Cells allowed for each body, which keeps memory linear in the number of bodies. With 16, two bodies rarely
+/// share a cell.
 const CELLS_PER_BODY: u64 = 16;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -22,18 +25,20 @@ pub(crate) struct Grid {
     columns: usize,
     rows: usize,
     cells_per_m: (f64, f64),
-    /// For each cell, row by row, the first body of its chain.
+    /// For each cell, row by row: the first body in its list.
     heads: Vec<u32>,
-    /// For each body the next one in its cell.
+    /// For each body: the next one in the same cell.
     next: Vec<u32>,
-    /// For each body its cell.
+    /// For each body: its cell.
     cell: Vec<u32>,
 }
 
 impl Grid {
-    /// An empty grid over a field of this size for `bodies` bodies, which will be numbered from 0.
+    /// An empty grid over a field of this size, for `bodies` bodies numbered from 0.
     pub(crate) fn new(size_m: (f64, f64), body_m: f64, bodies: usize) -> Self {
-        let (columns, rows) = shape(size_m, body_m, CELLS.max(CELLS_PER_BODY * bodies as u64));
+        let cells_max = CELLS.max(CELLS_PER_BODY * bodies as u64);
+        let (columns, rows) = shape(size_m, body_m, cells_max);
+
         Self {
             columns,
             rows,
@@ -48,6 +53,7 @@ impl Grid {
     pub(crate) fn push(&mut self, center: Point) {
         let cell = self.cell_of(center);
         let id = self.next.len() as u32;
+
         self.next.push(self.heads[cell]);
         self.cell.push(cell as u32);
         self.heads[cell] = id;
@@ -62,45 +68,55 @@ impl Grid {
         }
     }
 
-    /// Notes that a body is now at `center`.
+    /// Records that a body is now at `center`.
     pub(crate) fn relocate(&mut self, id: usize, center: Point) {
         let cell = self.cell_of(center);
-        if cell as u32 != self.cell[id] {
-            self.unlink(id);
-            self.next[id] = self.heads[cell];
-            self.cell[id] = cell as u32;
-            self.heads[cell] = id as u32;
+        if cell as u32 == self.cell[id] {
+            return;
+        }
+
+        self.unlink(id);
+        self.next[id] = self.heads[cell];
+        self.cell[id] = cell as u32;
+        self.heads[cell] = id as u32;
+    }
+
+    /// Calls `visit` for every body whose center is within `reach_m` of `center` along both axes.
+    ///
+    /// It is also called for some bodies outside that window. The order is unspecified.
+    pub(crate) fn visit_around(&self, center: Point, reach_m: f64, mut visit: impl FnMut(usize)) {
+        // The cells of bodies and of the window's edges come from the same monotone function, rounding
+        // included. A body inside the window is therefore never in a cell outside it.
+        let left = self.column(center.x - reach_m);
+        let right = self.column(center.x + reach_m);
+        let bottom = self.row(center.y - reach_m);
+        let top = self.row(center.y + reach_m);
+
+        for row in bottom..=top {
+            let start = row * self.columns;
+            for &head in &self.heads[start + left..=start + right] {
+                self.visit_list(head, &mut visit);
+            }
         }
     }
 
-    /// Calls `visit` with every body whose center is within `reach_m` of `center` along both axes, and with
-    /// some beyond; in no particular order.
-    pub(crate) fn visit_around(&self, center: Point, reach_m: f64, mut visit: impl FnMut(usize)) {
-        // The same rounding, monotone function numbers the cells of bodies and of the window's edges, so no
-        // body inside the window can be in a cell outside it.
-        let (left, right) = (
-            self.column(center.x - reach_m),
-            self.column(center.x + reach_m),
-        );
-        let (bottom, top) = (self.row(center.y - reach_m), self.row(center.y + reach_m));
-        for row in bottom..=top {
-            for &head in &self.heads[row * self.columns + left..=row * self.columns + right] {
-                let mut id = head;
-                while id != NONE {
-                    visit(id as usize);
-                    id = self.next[id as usize];
-                }
-            }
+    fn visit_list(&self, head: u32, visit: &mut impl FnMut(usize)) {
+        let mut id = head;
+        while id != NONE {
+            visit(id as usize);
+            id = self.next[id as usize];
         }
     }
 
     fn unlink(&mut self, id: usize) {
         let after = self.next[id];
         let head = &mut self.heads[self.cell[id] as usize];
+
         if *head == id as u32 {
             *head = after;
             return;
         }
+
         let mut before = *head as usize;
         while self.next[before] != id as u32 {
             before = self.next[before] as usize;
@@ -112,8 +128,8 @@ impl Grid {
         self.row(center.y) * self.columns + self.column(center.x)
     }
 
-    // A conversion from f64 saturates, so what lies left of the field is in column 0; by way of u32 it takes
-    // fewer instructions.
+    // The cast from f64 saturates, so anything left of the field falls into column 0. Casting to u32 first takes
+    // fewer instructions than casting to usize.
     fn column(&self, x_m: f64) -> usize {
         ((x_m * self.cells_per_m.0) as u32 as usize).min(self.columns - 1)
     }
@@ -123,18 +139,24 @@ impl Grid {
     }
 }
 
-/// Columns and rows of cells at least as large as a body, at most `cells` of them.
-fn shape(size_m: (f64, f64), body_m: f64, cells: u64) -> (usize, usize) {
-    let along = |side_m: f64| ((side_m / body_m) as u64).max(1);
-    let (mut columns, mut rows) = (along(size_m.0), along(size_m.1));
-    while columns * rows > cells {
+/// Columns and rows of a grid of at most `cells_max` cells, each at least as large as a body.
+fn shape(size_m: (f64, f64), body_m: f64, cells_max: u64) -> (usize, usize) {
+    let mut columns = cells_along(size_m.0, body_m);
+    let mut rows = cells_along(size_m.1, body_m);
+
+    while columns * rows > cells_max {
         if columns >= rows {
             columns = columns.div_ceil(2);
         } else {
             rows = rows.div_ceil(2);
         }
     }
+
     (columns as usize, rows as usize)
+}
+
+fn cells_along(side_m: f64, body_m: f64) -> u64 {
+    ((side_m / body_m) as u64).max(1)
 }
 
 #[cfg(test)]
@@ -158,17 +180,20 @@ mod tests {
         ] {
             grid.push(center);
         }
+
         assert_eq!(found(&grid, Point::new(1.0, 1.0), 0.6), [0, 1]);
         assert_eq!(found(&grid, Point::new(-100.0, -100.0), 1.0), [0]);
         assert_eq!(found(&grid, Point::new(5.0, 5.0), f64::INFINITY), [0, 1, 2]);
+
         grid.relocate(1, Point::new(8.5, 9.5));
         assert_eq!(found(&grid, Point::new(9.0, 9.0), 0.6), [1, 2]);
+
         grid.pop();
         assert_eq!(found(&grid, Point::new(9.0, 9.0), 0.6), [1]);
     }
 
     #[test]
-    fn chains_survive_any_order_of_leaving() {
+    fn lists_survive_removal_in_any_order() {
         for order in [
             [0, 1, 2],
             [0, 2, 1],
@@ -178,24 +203,30 @@ mod tests {
             [2, 1, 0],
         ] {
             let mut grid = Grid::new((10.0, 10.0), 1.0, 3);
-            (0..3).for_each(|_| grid.push(Point::new(2.5, 2.5)));
-            for (gone, id) in order.into_iter().enumerate() {
-                assert_eq!(found(&grid, Point::new(2.5, 2.5), 0.1).len(), 3 - gone);
+            for _ in 0..3 {
+                grid.push(Point::new(2.5, 2.5));
+            }
+
+            for (moved, id) in order.into_iter().enumerate() {
+                assert_eq!(found(&grid, Point::new(2.5, 2.5), 0.1).len(), 3 - moved);
                 grid.relocate(id, Point::new(7.5, 7.5));
             }
+
             assert_eq!(found(&grid, Point::new(7.5, 7.5), 0.1), [0, 1, 2]);
         }
     }
 
     #[test]
-    fn memory_is_bounded_whatever_the_field() {
+    fn memory_is_bounded_for_every_field() {
         for size_m in [(1e6, 1e6), (1e6, 1e-3), (1e-3, 1e6), (3.0, 7e5)] {
             let (columns, rows) = shape(size_m, 1e-3, CELLS);
+
             assert!(
                 columns >= 1 && rows >= 1 && (columns * rows) as u64 <= CELLS,
                 "{columns} {rows}"
             );
         }
+
         assert_eq!(shape((50.0, 50.0), 2.0, CELLS), (25, 25));
     }
 }

@@ -1,4 +1,4 @@
-//! How guests move: straight for a while, then anew.
+//! How guests move: in a straight line for a while, then along a new one.
 
 use crate::bodies::{Blocker, Bodies};
 use crate::hall;
@@ -6,20 +6,20 @@ use crate::point::Point;
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
 
-/// What a guest is up to: a direction, a speed and how long it keeps them (seed, "Obstacles").
+/// A guest's course: a direction, a speed, and how long the guest keeps them (paper, "Obstacles").
 ///
-/// A blocked guest keeps its course; the time runs on.
+/// A blocked guest keeps its course, and the duration keeps counting down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Course {
-    /// Counter-clockwise from +x, rad, in [0, 2π).
+    /// Direction of motion, counter-clockwise from +x, rad, in [0, 2π).
     pub direction_rad: f64,
-    /// m/s.
+    /// Speed, m/s.
     pub speed_mps: f64,
-    /// How long the course was to last when it was drawn, s.
+    /// The duration that was drawn, s.
     pub duration_s: f64,
-    /// How many ticks of it are still to come; at 0 the next tick begins with a new course.
+    /// Remaining ticks. At 0, the next tick starts with a new course.
     pub ticks_left: u64,
-    /// The displacement of one tick, m.
+    /// Displacement per tick, m.
     pub step_m: Point,
 }
 
@@ -29,26 +29,33 @@ impl Course {
         let direction_rad = rng.random::<f64>() * TAU;
         let speed_mps = guests.speed_mps.sample(rng);
         let duration_s = guests.duration_s.sample(rng);
-        let (sin, cos) = libm::sincos(direction_rad);
+
         Self {
             direction_rad,
             speed_mps,
             duration_s,
             ticks_left: whole_ticks(duration_s, tick_s),
-            step_m: Point::new(cos, sin) * (speed_mps * tick_s),
+            step_m: displacement(direction_rad, speed_mps * tick_s),
         }
     }
 }
 
-/// The number of ticks after which a duration has passed; one at least, so that every course is walked.
+fn displacement(direction_rad: f64, distance_m: f64) -> Point {
+    let (sin, cos) = libm::sincos(direction_rad);
+
+    Point::new(cos, sin) * distance_m
+}
+
+/// The number of ticks after which a duration has passed; at least one, so that every course moves the guest.
 ///
-/// Counted once instead of subtracting each tick, which would let rounding decide when a course ends. For the
-/// same reason 1.1 s are 11 ticks of 0.1 s, although the quotient is a little more than 11.
+/// Counting whole ticks up front, rather than subtracting `tick_s` from the remaining time, keeps rounding errors
+/// from deciding when a course ends. For the same reason 1.1 s is 11 ticks of 0.1 s, although the floating-point
+/// quotient is slightly more than 11.
 fn whole_ticks(duration_s: f64, tick_s: f64) -> u64 {
     ((duration_s / tick_s - 1e-9).ceil() as u64).max(1)
 }
 
-/// The guests' courses and what became of their last steps, by index.
+/// The guests' courses and the results of their last steps, by index.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Crowd {
     guests: hall::Guests,
@@ -58,11 +65,12 @@ pub(crate) struct Crowd {
 }
 
 impl Crowd {
-    /// Draws every guest's first course, in index order.
+    /// Draws the first course of every guest, in index order.
     pub(crate) fn new(guests: hall::Guests, tick_s: f64, rng: &mut impl Rng) -> Self {
         let courses = (0..guests.count)
             .map(|_| Course::draw(&guests, tick_s, rng))
             .collect();
+
         Self {
             guests,
             tick_s,
@@ -79,14 +87,15 @@ impl Crowd {
         &self.blockers
     }
 
-    /// Every guest's step of one tick, in index order; who has no time left draws a new course first.
+    /// Moves every guest by one step, in index order. A guest whose course is over draws a new one first.
     pub(crate) fn advance(&mut self, bodies: &mut Bodies, rng: &mut impl Rng) {
-        for (index, (course, blocker)) in
-            self.courses.iter_mut().zip(&mut self.blockers).enumerate()
-        {
+        let guests = self.courses.iter_mut().zip(&mut self.blockers);
+
+        for (index, (course, blocker)) in guests.enumerate() {
             if course.ticks_left == 0 {
                 *course = Course::draw(&self.guests, self.tick_s, rng);
             }
+
             course.ticks_left -= 1;
             *blocker = bodies.advance_guest(index, course.step_m).err();
         }
@@ -109,6 +118,7 @@ mod tests {
             (8.0, 1.0, 8),
             (1e300, 1e-6, u64::MAX),
         ];
+
         for (duration_s, tick_s, ticks) in cases {
             assert_eq!(
                 whole_ticks(duration_s, tick_s),

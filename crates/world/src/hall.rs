@@ -1,39 +1,39 @@
-//! The hall as it is described before it becomes a world, and the limits within which its arithmetic holds.
+//! The description from which a world is built, and the limits within which its arithmetic is valid.
 
 use crate::error::HallError;
 use crate::point::Point;
 use crate::triangular::Triangular;
 
-/// How deep two bodies may overlap, or a body stick out of the field, and still count as touching: 1 nm \[chosen
+/// How far two bodies may overlap, or a body extend beyond the field, and still count as touching: 1 nm \[chosen
 /// here\].
 ///
-/// Places arrive from feet, from JSON and from sums of steps; squares that are meant to touch miss by a few
-/// units in the last place, which stay below this for every field up to [`SIDE_MAX_M`]. It does not add up:
-/// each test is against where the bodies are.
+/// Positions are converted from feet, parsed from JSON and summed from steps, so squares that are meant to touch
+/// are off by a few units in the last place. On fields up to [`SIDE_MAX_M`] these errors stay below the tolerance.
+/// The tolerance does not accumulate, because each test uses the bodies' actual positions.
 pub const TOLERANCE_M: f64 = 1e-9;
 
-/// The longest side of a field, 1,000 km: beyond it the spacing of `f64` nears [`TOLERANCE_M`] \[chosen here\].
+/// Maximum side of a field, 1,000 km; beyond that, the spacing of `f64` approaches [`TOLERANCE_M`] \[chosen here\].
 pub const SIDE_MAX_M: f64 = 1e6;
 
-/// The smallest body, 1 mm: a million times [`TOLERANCE_M`] \[chosen here\].
+/// Minimum side of a body, 1 mm, a million times [`TOLERANCE_M`] \[chosen here\].
 pub const BODY_MIN_M: f64 = 1e-3;
 
-/// The most bodies a world may hold, obstacles, robots and guests together \[chosen here\]: at most 2.5 GB.
+/// Maximum number of obstacles, robots and guests together \[chosen here\]. A world of that size takes up to 2.5 GB.
 pub const BODIES_MAX: usize = 1 << 24;
 
-/// The shortest tick, 1 µs \[chosen here\].
+/// Minimum length of a tick, 1 µs \[chosen here\].
 const TICK_MIN_S: f64 = 1e-6;
 
-/// The longest tick, 11 days \[chosen here\].
+/// Maximum length of a tick, 11 days \[chosen here\].
 const TICK_MAX_S: f64 = 1e6;
 
-/// The highest speed limit for robots: across the largest field in a second \[chosen here\].
+/// Maximum speed limit of robots, which crosses the largest field in one second \[chosen here\].
 const SPEED_MAX_MPS: f64 = 1e6;
 
 /// The plane `[0, width] x [0, height]`, on which every body is an axis-aligned square given by its center.
 ///
-/// One size for all bodies is the seed's ("Obstacles": all objects occupy 2 ft by 2 ft); that the size can be
-/// set is chosen here.
+/// In the paper all objects occupy 2 ft by 2 ft ("Obstacles"). Making that size configurable is a choice of this
+/// crate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Field {
     /// Width and height, m; at most [`SIDE_MAX_M`].
@@ -43,12 +43,14 @@ pub struct Field {
 }
 
 impl Field {
-    /// Whether a body with this center lies wholly inside the field, within [`TOLERANCE_M`]. Not so for a
-    /// center that is not finite.
+    /// Whether a body with this center is entirely inside the field, within [`TOLERANCE_M`].
+    ///
+    /// Returns `false` if a coordinate is NaN or infinite.
     #[must_use]
     pub fn contains(&self, center: Point) -> bool {
         let margin_m = self.body_m * 0.5 - TOLERANCE_M;
         let (width_m, height_m) = self.size_m;
+
         margin_m <= center.x
             && center.x <= width_m - margin_m
             && margin_m <= center.y
@@ -59,79 +61,96 @@ impl Field {
     #[must_use]
     pub fn overlap(&self, a: Point, b: Point) -> bool {
         let apart_m = self.body_m - TOLERANCE_M;
+
         (a.x - b.x).abs() < apart_m && (a.y - b.y).abs() < apart_m
     }
 
     /// How many bodies fit side by side along x and along y.
     pub(crate) fn columns_and_rows(&self) -> (u64, u64) {
-        let fit = |side_m: f64| ((side_m + TOLERANCE_M) / self.body_m) as u64;
-        (fit(self.size_m.0), fit(self.size_m.1))
+        let (width_m, height_m) = self.size_m;
+
+        (self.bodies_along(width_m), self.bodies_along(height_m))
+    }
+
+    fn bodies_along(&self, side_m: f64) -> u64 {
+        ((side_m + TOLERANCE_M) / self.body_m) as u64
     }
 
     fn check(&self) -> Result<(), HallError> {
         in_range("field width_m", self.size_m.0, BODY_MIN_M, SIDE_MAX_M)?;
         in_range("field height_m", self.size_m.1, BODY_MIN_M, SIDE_MAX_M)?;
         in_range("body_m", self.body_m, BODY_MIN_M, SIDE_MAX_M)?;
-        if self.columns_and_rows().0 == 0 || self.columns_and_rows().1 == 0 {
+
+        let (columns, rows) = self.columns_and_rows();
+        if columns == 0 || rows == 0 {
             return Err(HallError::FieldTooSmall {
                 size_m: self.size_m,
                 body_m: self.body_m,
             });
         }
+
         Ok(())
     }
 }
 
-/// The moving obstacles: how many and how they move (seed, "Obstacles").
+/// The moving obstacles: their number and how they move (paper, "Obstacles").
 ///
-/// They are placed uniformly at random without overlap, each by trying places until one is free. Where that
-/// jams (it does somewhere between two fifths and three fifths of the floor covered) all are placed anew, on a
-/// random choice among the free places of rows of bodies \[chosen here\].
+/// Guests are placed uniformly at random without overlap, by rejection sampling. Once that fails, which happens
+/// when 40 to 60 % of the floor is covered, all guests are placed again, each in a random free position of a
+/// layout in rows \[chosen here\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guests {
-    /// How many.
+    /// Number of guests.
     pub count: usize,
-    /// Speed of a course, m/s.
+    /// Distribution of a course's speed, m/s.
     pub speed_mps: Triangular,
-    /// Duration of a course, s.
+    /// Distribution of a course's duration, s.
     pub duration_s: Triangular,
 }
 
-/// Everything a [`World`](crate::World) is made from, but for the random stream.
+/// Everything that defines a [`World`](crate::World), apart from its random stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hall {
     /// The field and the size of bodies.
     pub field: Field,
-    /// Centers of the fixed obstacles, m; they may touch and overlap one another, so that larger shapes can be
-    /// built (seed, "Obstacles").
+    /// Centers of the fixed obstacles, m. Obstacles may touch and overlap one another to form larger shapes
+    /// (paper, "Obstacles").
     pub obstacles: Vec<Point>,
     /// The moving obstacles.
     pub guests: Guests,
-    /// Centers of the robots at the start, m, in the caller's order; that order is the order of motion.
+    /// Initial centers of the robots, m. Robots move in the order of this list.
     pub robots: Vec<Point>,
     /// Length of a tick, simulated seconds; from 1e-6 to 1e6.
     pub tick_s: f64,
-    /// The speed limit of robots, m/s; from 0, which means that none may move, to 1e6. It does not bind guests.
+    /// Speed limit of robots, m/s, from 0 (robots cannot move) to 1e6. It does not apply to guests.
     pub max_speed_mps: f64,
 }
 
 impl Hall {
-    /// Checks every number and count that can be judged without placing a body.
+    /// Number of obstacles, robots and guests; `usize::MAX` if it overflows.
+    fn body_count(&self) -> usize {
+        let fixed = self.obstacles.len();
+        let robots = self.robots.len();
+
+        fixed
+            .saturating_add(robots)
+            .saturating_add(self.guests.count)
+    }
+
+    /// Checks every number and count that can be validated without placing a body.
     pub(crate) fn check(&self) -> Result<(), HallError> {
         self.field.check()?;
         in_range("tick_s", self.tick_s, TICK_MIN_S, TICK_MAX_S)?;
         in_range("max_speed_mps", self.max_speed_mps, 0.0, SPEED_MAX_MPS)?;
-        let count = self
-            .obstacles
-            .len()
-            .saturating_add(self.robots.len())
-            .saturating_add(self.guests.count);
+
+        let count = self.body_count();
         if count > BODIES_MAX {
             return Err(HallError::TooManyBodies {
                 count,
                 max: BODIES_MAX,
             });
         }
+
         Ok(())
     }
 }

@@ -1,31 +1,30 @@
-//! The environment of CARS: a bounded field, fixed obstacles, guests who wander, and the robots' bodies.
+//! The environment of CARS: a bounded field, fixed obstacles, wandering guests, and the robots' bodies.
 //!
-//! This crate exists so that the rules of motion and collision stand alone and can be read, tested and trusted
-//! without anything around them: no clock, no network, no files, no threads. What happens is a function of the
-//! [`Hall`], of the random stream given to [`World::new`] and of the proposals given to [`World::advance`];
-//! the same three give the same positions, to the last bit, on every machine.
+//! This crate implements the rules of motion and collision and nothing else. It uses no clock, network, files or
+//! threads. The state of a [`World`] is a function of the [`Hall`], the random stream passed to [`World::new`] and
+//! the proposals passed to [`World::advance`]. The same three inputs give bit-identical positions on every machine.
 //!
-//! The rules are the seed's (CARS, 2002, section "Obstacles"): every body occupies a square of the same size,
-//! guests walk straight for a while and then choose anew, and a body whose proposed location collides is not
-//! advanced. What a robot does about a collision is its own affair, so no robot's reasoning is found here.
+//! The rules are those of the paper (CARS, 2002, section "Obstacles"). Every body occupies a square of the same
+//! size. Guests walk in a straight line for a while, then choose a new one. A body whose proposed location
+//! collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
 //!
 //! # One tick
 //!
-//! Robots in index order, then guests in index order. Each attempts its proposed location against the bodies
-//! *where they are at that moment*: it arrives, or it stays. This is the one order there is; because of it no
-//! two bodies ever overlap and no body leaves the field. Only the proposed location is tested, as in the seed,
-//! not the way to it.
+//! Robots move first, in index order, followed by the guests, in index order. Each body's proposed location is
+//! tested against the *current* positions of all other bodies; the body then either moves there or stays in place.
+//! Because bodies move one at a time in this fixed order, no two bodies ever overlap and no body leaves the field.
+//! As in the paper, only the proposed location is tested, and not the path to it.
 //!
 //! # Random draws
 //!
-//! All draws come from the one stream, and in this order:
+//! All draws come from one stream, in this order:
 //!
-//! 1. at [`World::new`] the guests' places, in index order: x then y for each try; if that jams, one number for
-//!    each guest that chooses among the places left (see [`Guests`]);
-//! 2. at [`World::new`] the guests' first courses, in index order: direction, speed, duration;
-//! 3. in each tick, for every guest whose course is over, in index order: direction, speed, duration.
+//! 1. In [`World::new`], the guests' positions, in index order: x, then y, for each attempt. If rejection sampling
+//!    fails, one more number per guest, which selects one of the remaining free positions (see [`Guests`]).
+//! 2. In [`World::new`], the guests' first courses, in index order: direction, speed, duration.
+//! 3. In each tick, for every guest whose course is over, in index order: direction, speed, duration.
 //!
-//! What robots do never changes how many numbers are drawn.
+//! The behavior of robots never changes how many numbers are drawn.
 //!
 //! # Example
 //!

@@ -1,4 +1,4 @@
-//! The world and its one step.
+//! The world and its step function.
 
 use crate::bodies::{Blocker, Bodies, Near};
 use crate::error::HallError;
@@ -8,28 +8,28 @@ use crate::placing::place;
 use crate::point::Point;
 use rand::Rng;
 
-/// What became of a robot's proposal.
+/// The outcome of a robot's proposal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It is at the location it proposed.
+    /// The robot is at the location it proposed.
     Advanced,
-    /// It proposed nothing and is where it was.
+    /// The robot proposed no location and has not moved.
     Stayed,
-    /// It collided and is where it was (seed, "Obstacles").
+    /// The proposed location collides, so the robot has not moved (paper, "Obstacles").
     Blocked {
-        /// With what.
+        /// What occupies the proposed location.
         by: Blocker,
     },
-    /// It proposed a location farther than its speed limit allows, and is where it was \[chosen here\].
+    /// The proposed location is farther away than the speed limit allows, so the robot has not moved \[chosen here\].
     TooFast,
-    /// It proposed a location that is not a pair of numbers, and is where it was \[chosen here\].
+    /// A coordinate of the proposed location is NaN or infinite, so the robot has not moved \[chosen here\].
     NotFinite,
 }
 
 /// The environment during a run: all bodies, the guests' courses and the guests' random stream.
 ///
-/// `R` is the generator of that stream. A clone is an independent world that goes on alike, given the same
-/// proposals; it serves to save and to restore.
+/// `R` is the generator of that stream. A clone is independent, and evolves identically when given the same
+/// proposals; cloning saves and restores a world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World<R> {
     bodies: Bodies,
@@ -40,46 +40,52 @@ pub struct World<R> {
 }
 
 impl<R: Rng> World<R> {
-    /// Checks the hall, places its bodies and draws the guests' first courses (see the [crate] for the order).
+    /// Validates the hall, places its bodies and draws the guests' first courses.
+    ///
+    /// The [crate] documentation gives the order of the random draws.
     ///
     /// # Errors
     ///
-    /// The first [`HallError`] found: numbers and counts first, then obstacles, then robots, then guests.
+    /// Returns the first [`HallError`] found. Numbers and counts are checked first, then obstacles, robots and
+    /// guests.
     pub fn new(hall: &Hall, mut rng: R) -> Result<Self, HallError> {
         hall.check()?;
+
         let bodies = place(hall, &mut rng)?;
         let crowd = Crowd::new(hall.guests, hall.tick_s, &mut rng);
-        let stride_m = hall.max_speed_mps * hall.tick_s;
+
         Ok(Self {
             bodies,
             crowd,
             tick_s: hall.tick_s,
-            stride_m,
+            stride_m: hall.max_speed_mps * hall.tick_s,
             rng,
         })
     }
 
-    /// One tick: robots in index order attempt the locations they propose, then guests in index order the next
-    /// step of their courses. Returns one verdict for each robot.
+    /// Advances the world by one tick and returns one verdict for each robot.
     ///
-    /// `None` means that a robot does not move. A place may be taken in the tick in which its owner leaves it,
-    /// if the owner comes first in the order.
+    /// Robots attempt to move to their proposed locations in index order; then guests attempt the next step of
+    /// their courses in index order. A proposal of `None` keeps the robot in place. A body can take a location that
+    /// another one leaves in the same tick, provided that the other one moves first.
     ///
     /// # Panics
     ///
-    /// If there is not exactly one proposal for each robot.
+    /// Panics unless there is exactly one proposal for each robot.
     pub fn advance(&mut self, proposals: &[Option<Point>]) -> Vec<Verdict> {
         assert_eq!(
             proposals.len(),
             self.robots().len(),
             "there is one proposal for each robot"
         );
-        let verdicts = proposals
-            .iter()
-            .enumerate()
-            .map(|(index, to)| self.advance_robot(index, *to))
-            .collect();
+
+        let mut verdicts = Vec::with_capacity(proposals.len());
+        for (index, &proposal) in proposals.iter().enumerate() {
+            verdicts.push(self.advance_robot(index, proposal));
+        }
+
         self.crowd.advance(&mut self.bodies, &mut self.rng);
+
         verdicts
     }
 
@@ -90,9 +96,12 @@ impl<R: Rng> World<R> {
         if !to.is_finite() {
             return Verdict::NotFinite;
         }
-        if self.robots()[index].distance_m(to) > self.stride_m + TOLERANCE_M {
+
+        let distance_m = self.robots()[index].distance_m(to);
+        if distance_m > self.stride_m + TOLERANCE_M {
             return Verdict::TooFast;
         }
+
         match self.bodies.advance_robot(index, to) {
             Ok(()) => Verdict::Advanced,
             Err(by) => Verdict::Blocked { by },
@@ -107,13 +116,13 @@ impl<R> World<R> {
         self.bodies.field()
     }
 
-    /// Length of a tick, simulated seconds.
+    /// Length of a tick, in simulated seconds.
     #[must_use]
     pub fn tick_s(&self) -> f64 {
         self.tick_s
     }
 
-    /// How far a robot may go in one tick, m (within [`TOLERANCE_M`]).
+    /// Maximum distance that a robot can move in one tick, m, within [`TOLERANCE_M`].
     #[must_use]
     pub fn stride_m(&self) -> f64 {
         self.stride_m
@@ -143,17 +152,19 @@ impl<R> World<R> {
         self.crowd.courses()
     }
 
-    /// For each guest, what blocked it in the last tick; `None` if it advanced, and before the first tick.
+    /// What blocked each guest in the last tick, by index.
+    ///
+    /// `None` if the guest advanced, or if no tick has run yet.
     #[must_use]
     pub fn guest_blockers(&self) -> &[Option<Blocker>] {
         self.crowd.blockers()
     }
 
-    /// All bodies whose center is at most `range_m` from `point`, in the order of [`Body`](crate::Body): by
-    /// kind, then by index.
+    /// All bodies whose center is at most `range_m` from `point`, in the order of [`Body`](crate::Body): by kind,
+    /// then by index.
     ///
-    /// A body that stands at `point` itself is among them. A `point` that is not finite, or a `range_m` that is
-    /// negative or NaN, finds nothing; an infinite range finds everything.
+    /// The result includes a body centered at `point` itself. It is empty if `point` is not finite or if `range_m`
+    /// is negative or NaN. An infinite range returns every body.
     #[must_use]
     pub fn near(&self, point: Point, range_m: f64) -> Vec<Near> {
         self.bodies.near(point, range_m)

@@ -1,4 +1,4 @@
-//! Where bodies stand at the start.
+//! Initial placement of the bodies.
 
 use crate::bodies::{Bodies, Body};
 use crate::error::HallError;
@@ -6,25 +6,25 @@ use crate::hall::{Field, Hall, TOLERANCE_M};
 use crate::point::Point;
 use rand::{Rng, RngExt};
 
-/// Places tried for one guest before the hall counts as jammed.
+/// Number of attempts to place a guest at random before giving up on rejection sampling.
 ///
-/// A thousand misses mean that about 99.5 % of the floor is out of reach for one more body (with that much
-/// out of reach the chance of so many misses is 1 %); the rows need a fraction of the time from there on.
+/// A thousand misses mean that about 99.5 % of the floor cannot take another body: at that share, the probability
+/// of so many misses is 1 %. Beyond that point, arranging the guests in rows is much faster.
 const TRIES: usize = 1000;
 
-/// All bodies of the hall in their places; the guests' are drawn from `rng`.
+/// Places all bodies of the hall. The guests' positions are drawn from `rng`.
 pub(crate) fn place(hall: &Hall, rng: &mut impl Rng) -> Result<Bodies, HallError> {
-    let guests = hall.guests.count;
-    let mut bodies = Bodies::new(hall.field, hall.obstacles.len(), hall.robots.len(), guests);
+    let mut bodies = Bodies::new(
+        hall.field,
+        hall.obstacles.len(),
+        hall.robots.len(),
+        hall.guests.count,
+    );
+
     place_obstacles(&mut bodies, &hall.obstacles)?;
     place_robots(&mut bodies, &hall.robots)?;
-    let (columns, rows) = hall.field.columns_and_rows();
-    // No layout of squares beats the lattice in an empty field. Beyond that a search is in vain.
-    let is_hopeless = guests as u64 > columns * rows;
-    if is_hopeless || !scatter(&mut bodies, guests, rng) {
-        bodies.remove_guests();
-        line_up(&mut bodies, guests, rng)?;
-    }
+    place_guests(&mut bodies, hall.guests.count, rng)?;
+
     Ok(bodies)
 }
 
@@ -33,54 +33,90 @@ fn place_obstacles(bodies: &mut Bodies, obstacles: &[Point]) -> Result<(), HallE
         if !bodies.field().contains(at) {
             return Err(HallError::ObstacleOffField { index, at });
         }
+
         bodies.push(at);
     }
+
     Ok(())
 }
 
 fn place_robots(bodies: &mut Bodies, robots: &[Point]) -> Result<(), HallError> {
     for (index, &at) in robots.iter().enumerate() {
-        if !bodies.field().contains(at) {
-            return Err(HallError::RobotOffField { index, at });
-        }
-        match bodies.hit(at) {
-            Some(Body::Obstacle(obstacle)) => {
-                return Err(HallError::RobotOnObstacle {
-                    index,
-                    at,
-                    obstacle,
-                });
-            }
-            Some(Body::Robot(other)) => return Err(HallError::RobotOnRobot { index, at, other }),
-            Some(Body::Guest(_)) => unreachable!("guests are placed after the robots"),
-            None => bodies.push(at),
-        }
+        check_robot(bodies, index, at)?;
+        bodies.push(at);
     }
+
     Ok(())
 }
 
-/// Places guests uniformly at random, one after the other, each where it overlaps nobody; false if that jams.
+/// Checks that a robot can be placed at `at`.
+fn check_robot(bodies: &Bodies, index: usize, at: Point) -> Result<(), HallError> {
+    if !bodies.field().contains(at) {
+        return Err(HallError::RobotOffField { index, at });
+    }
+
+    match bodies.hit(at) {
+        None => Ok(()),
+        Some(Body::Obstacle(obstacle)) => Err(HallError::RobotOnObstacle {
+            index,
+            at,
+            obstacle,
+        }),
+        Some(Body::Robot(other)) => Err(HallError::RobotOnRobot { index, at, other }),
+        Some(Body::Guest(_)) => unreachable!("guests are placed after the robots"),
+    }
+}
+
+/// Places the guests at random positions, or in rows if the hall is too crowded for that.
+fn place_guests(bodies: &mut Bodies, count: usize, rng: &mut impl Rng) -> Result<(), HallError> {
+    // No arrangement of squares is denser than a lattice, so do not even try to scatter more guests than the
+    // lattice of an empty field holds.
+    let (columns, rows) = bodies.field().columns_and_rows();
+    let may_fit = count as u64 <= columns * rows;
+
+    if may_fit && scatter(bodies, count, rng) {
+        return Ok(());
+    }
+
+    bodies.remove_guests();
+    line_up(bodies, count, rng)
+}
+
+/// Places guests one by one, uniformly at random, without overlap. Returns `false` if no free position is found
+/// for one of them.
 fn scatter(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> bool {
     for _ in 0..guests {
-        let field = *bodies.field();
-        let free = (0..TRIES)
-            .map(|_| anywhere(&field, rng))
-            .find(|&at| bodies.hit(at).is_none());
-        let Some(at) = free else { return false };
+        let Some(at) = random_free_place(bodies, rng) else {
+            return false;
+        };
         bodies.push(at);
     }
+
     true
 }
 
-fn anywhere(field: &Field, rng: &mut impl Rng) -> Point {
-    let mut along =
-        |side_m: f64| field.body_m * 0.5 + rng.random::<f64>() * (side_m - field.body_m);
-    let x = along(field.size_m.0);
-    let y = along(field.size_m.1);
+fn random_free_place(bodies: &Bodies, rng: &mut impl Rng) -> Option<Point> {
+    for _ in 0..TRIES {
+        let at = random_place(bodies.field(), rng);
+        if bodies.hit(at).is_none() {
+            return Some(at);
+        }
+    }
+
+    None
+}
+
+fn random_place(field: &Field, rng: &mut impl Rng) -> Point {
+    let (width_m, height_m) = field.size_m;
+    let body_m = field.body_m;
+
+    let x = body_m * 0.5 + rng.random::<f64>() * (width_m - body_m);
+    let y = body_m * 0.5 + rng.random::<f64>() * (height_m - body_m);
+
     Point::new(x, y)
 }
 
-/// Gives each guest a random one of the places in rows.
+/// Assigns each guest a random position of the layout in rows.
 fn line_up(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> Result<(), HallError> {
     let mut places = free_places(bodies);
     if places.len() < guests {
@@ -89,41 +125,57 @@ fn line_up(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> Result<(),
             room: places.len(),
         });
     }
+
+    // A partial Fisher-Yates shuffle: each guest draws from the positions that are left.
     for guest in 0..guests {
         let chosen = rng.random_range(guest..places.len());
         places.swap(guest, chosen);
         bodies.push(places[guest]);
     }
+
     Ok(())
 }
 
-/// The places left on the floor, in rows from below, filled from the left.
+/// Free positions on the floor, arranged in rows from the bottom, each row filled from the left.
 ///
-/// In an empty field, and around obstacles that are set on multiples of a body, this is the lattice of
-/// body-sized cells; around anything else a row takes no fewer bodies than the lattice would.
+/// In an empty field, and around obstacles aligned to multiples of a body, the result is the lattice of body-sized
+/// cells. Around other bodies, a row holds at least as many positions as the lattice would.
 ///
-/// Called where the hall jammed or the field is small, so the number of places is in proportion to the bodies.
+/// Only called for crowded halls and small fields, so the number of positions is proportional to the number of
+/// bodies.
 fn free_places(bodies: &Bodies) -> Vec<Point> {
-    let Field {
-        size_m: (width_m, _),
-        body_m,
-    } = *bodies.field();
+    let body_m = bodies.field().body_m;
     let (_, rows) = bodies.field().columns_and_rows();
-    let last_x_m = width_m - body_m * 0.5 + TOLERANCE_M;
+
     let mut places = Vec::new();
     for row in 0..rows {
-        let y = body_m * (row as f64 + 0.5);
-        // Counted from the last obstacle and not summed up, so that rounding cannot cost the last place.
-        let (mut from_x_m, mut steps) = (body_m * 0.5, 0.0);
-        while from_x_m + steps * body_m <= last_x_m {
-            let at = Point::new(from_x_m + steps * body_m, y);
-            if let Some(until_x_m) = bodies.hit_until_x_m(at) {
-                (from_x_m, steps) = (until_x_m, 0.0);
-            } else {
-                places.push(at);
-            }
-            steps += 1.0;
-        }
+        let y_m = body_m * (row as f64 + 0.5);
+        fill_row(bodies, y_m, &mut places);
     }
+
     places
+}
+
+/// Adds the free positions of the row at `y_m`.
+fn fill_row(bodies: &Bodies, y_m: f64, places: &mut Vec<Point>) {
+    let body_m = bodies.field().body_m;
+    let (width_m, _) = bodies.field().size_m;
+    let last_x_m = width_m - body_m * 0.5 + TOLERANCE_M;
+
+    // Multiplying steps since the last obstruction, rather than summing them, keeps rounding errors from losing
+    // the last position.
+    let mut from_x_m = body_m * 0.5;
+    let mut steps = 0.0;
+
+    while from_x_m + steps * body_m <= last_x_m {
+        let at = Point::new(from_x_m + steps * body_m, y_m);
+
+        if let Some(hit_x_m) = bodies.rightmost_hit_x_m(at) {
+            from_x_m = hit_x_m;
+            steps = 0.0;
+        } else {
+            places.push(at);
+        }
+        steps += 1.0;
+    }
 }

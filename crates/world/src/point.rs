@@ -1,37 +1,39 @@
-//! Places and displacements in the plane.
+//! Positions and displacements in the plane.
 
 use std::fmt;
 use std::ops::{Add, Mul, Sub};
 
-/// A place on the field, or a displacement between two; metres, x to the right and y up (REP 103).
+/// A position on the field, or the displacement between two positions.
+///
+/// Coordinates are in meters, with x to the right and y up (REP 103).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
-    /// Metres from the left edge.
+    /// Distance from the left edge, m.
     pub x: f64,
-    /// Metres from the lower edge.
+    /// Distance from the lower edge, m.
     pub y: f64,
 }
 
 impl Point {
-    /// The point (x, y), in metres.
+    /// The point (x, y), in meters.
     #[must_use]
     pub const fn new(x: f64, y: f64) -> Self {
         Self { x, y }
     }
 
-    /// Whether both coordinates are numbers, neither NaN nor infinite.
+    /// Whether neither coordinate is NaN or infinite.
     #[must_use]
     pub fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite()
     }
 
-    /// The square of the distance to the origin, in m². Enough to compare distances, without a root.
+    /// The squared distance to the origin, m². Comparing squared distances avoids the square root.
     #[must_use]
     pub fn length_squared_m2(self) -> f64 {
         self.x * self.x + self.y * self.y
     }
 
-    /// The distance to `other`, in metres.
+    /// The distance to `other`, m.
     #[must_use]
     pub fn distance_m(self, other: Self) -> f64 {
         (other - self).length_squared_m2().sqrt()
@@ -62,7 +64,7 @@ impl Mul<f64> for Point {
     }
 }
 
-/// `(1.5, 2)`, in metres, as error texts name a place.
+/// Formats the point as `(1.5, 2)`, in meters, for error messages.
 impl fmt::Display for Point {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "({}, {})", self.x, self.y)

@@ -1,11 +1,11 @@
-//! The triangular distribution, from which guests take speeds and durations.
+//! The triangular distribution, from which the guests' speeds and durations are drawn.
 
 use crate::error::TriangularError;
 use rand::{Rng, RngExt};
 
-/// A triangular distribution of a quantity that cannot be negative (seed, "Obstacles": speed and duration).
+/// A triangular distribution of a non-negative quantity (paper, "Obstacles": speed and duration).
 ///
-/// The unit is that of the quantity. `min == max` is allowed and means a constant.
+/// Values have the unit of the quantity. `min == max` is allowed and gives a constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangular {
     min: f64,
@@ -18,7 +18,7 @@ impl Triangular {
     ///
     /// # Errors
     ///
-    /// [`TriangularError`] unless all three are finite and `0 <= min <= mode <= max`.
+    /// Returns a [`TriangularError`] unless all three are finite and `0 <= min <= mode <= max`.
     pub fn new(min: f64, mode: f64, max: f64) -> Result<Self, TriangularError> {
         if 0.0 <= min && min <= mode && mode <= max && max.is_finite() {
             Ok(Self { min, mode, max })
@@ -27,7 +27,7 @@ impl Triangular {
         }
     }
 
-    /// The smallest value that is drawn.
+    /// The lower end of the distribution.
     #[must_use]
     pub fn min(&self) -> f64 {
         self.min
@@ -39,28 +39,34 @@ impl Triangular {
         self.mode
     }
 
-    /// The largest value that is drawn.
+    /// The upper end of the distribution.
     #[must_use]
     pub fn max(&self) -> f64 {
         self.max
     }
 
-    /// One value; takes exactly one number from the stream, also for a constant, so that two halls which differ
-    /// in a parameter only still draw alike.
+    /// Draws one value.
+    ///
+    /// Takes exactly one number from the stream, even for a constant, so that halls that differ only in a parameter
+    /// consume the stream in the same way.
     pub(crate) fn sample(&self, rng: &mut impl Rng) -> f64 {
         self.quantile(rng.random())
     }
 
-    /// The value below which a share `p` of all draws lies; `p` from 0 to 1.
+    /// The quantile function: the value below which a fraction `p` of all draws lies, with `p` from 0 to 1.
     #[must_use]
     pub fn quantile(&self, p: f64) -> f64 {
-        let (range, rise) = (self.max - self.min, self.mode - self.min);
+        let range = self.max - self.min;
+        let rise = self.mode - self.min;
+        let fall = self.max - self.mode;
+
         let value = if p * range < rise {
             self.min + (p * range * rise).sqrt()
         } else {
-            self.max - ((range - p * range) * (self.max - self.mode)).sqrt()
+            self.max - ((range - p * range) * fall).sqrt()
         };
-        // Rounding may leave the interval by a bit; what was promised is the interval.
+
+        // Rounding can leave the interval by a few units in the last place.
         value.clamp(self.min, self.max)
     }
 }
@@ -72,7 +78,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     #[test]
-    fn refuses_what_is_not_a_triangle() {
+    fn rejects_parameters_out_of_order() {
         for (min, mode, max) in [
             (-1.0, 0.0, 1.0),
             (0.0, 2.0, 1.0),
@@ -87,35 +93,41 @@ mod tests {
                 "{min} {mode} {max}"
             );
         }
-        let text = Triangular::new(0.5, 0.2, 1.0).unwrap_err().to_string();
+
+        let error = Triangular::new(0.5, 0.2, 1.0).unwrap_err();
         assert_eq!(
-            text,
-            "need 0 <= min <= mode <= max, all finite; got min 0.5, mode 0.2, max 1"
+            error.to_string(),
+            "must be finite with 0 <= min <= mode <= max; got min 0.5, mode 0.2, max 1"
         );
     }
 
     #[test]
-    fn constant_is_constant_and_still_draws_one() {
+    fn a_constant_still_consumes_one_draw() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let mut other = rng.clone();
-        assert_eq!(
-            Triangular::new(0.7, 0.7, 0.7).unwrap().sample(&mut rng),
-            0.7
-        );
+        let constant = Triangular::new(0.7, 0.7, 0.7).unwrap();
+
+        assert_eq!(constant.sample(&mut rng), 0.7);
+
         other.next_u64();
         assert_eq!(rng, other);
     }
 
     #[test]
-    fn mean_is_that_of_the_triangle() {
-        let (min, mode, max) = (0.2, 0.6, 1.6);
+    fn draws_have_the_mean_and_mode_of_the_triangle() {
+        let min = 0.2;
+        let mode = 0.6;
+        let max = 1.6;
         let triangular = Triangular::new(min, mode, max).unwrap();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
+
         let draws: Vec<f64> = (0..100_000).map(|_| triangular.sample(&mut rng)).collect();
         assert!(draws.iter().all(|draw| (min..=max).contains(draw)));
+
+        // The standard error is 0.0009; allow four of them.
         let mean = draws.iter().sum::<f64>() / 1e5;
-        // Standard error is 0.0009; four of them.
         assert!((mean - (min + mode + max) / 3.0).abs() < 0.004, "{mean}");
+
         let below_mode = draws.iter().filter(|&&draw| draw < mode).count() as f64 / 1e5;
         assert!(
             (below_mode - (mode - min) / (max - min)).abs() < 0.006,

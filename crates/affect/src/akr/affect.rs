@@ -1,4 +1,4 @@
-//! Affect, the coarse state above moods and emotions, and the attributes that tell levels apart.
+//! Affect, the coarse state that moods and emotions refine, and the attributes that distinguish the levels.
 
 use crate::scalar::Intensity;
 use serde::{Deserialize, Serialize};
@@ -25,8 +25,8 @@ impl Valence {
 
 /// How long an affective phenomenon lasts [D: S].
 ///
-/// The seed says in one place that moods are shorter than emotions, and in the description of this
-/// attribute that moods last days and emotions minutes. The attribute is what is implemented.
+/// The paper contradicts itself: it calls moods shorter than emotions in one place, and in the description of this
+/// attribute moods last days and emotions minutes. This crate implements the attribute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Duration {
@@ -38,8 +38,10 @@ pub enum Duration {
     Lifetime,
 }
 
-/// What an affective phenomenon is about. That it separates moods from emotions is documented [D: S]; the
-/// values besides global are chosen here \[I\].
+/// What an affective phenomenon is about.
+///
+/// That this attribute separates moods from emotions is documented [D: S]. The values other than `Global` are
+/// chosen here \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Focality {
@@ -51,16 +53,17 @@ pub enum Focality {
     Object,
 }
 
-/// A coarse affective state: two dimensions and no more [D: S].
+/// A coarse affective state with two dimensions [D: S].
 ///
-/// The figure of the taxonomy lists duration and focality here, too [D: F2]; they have values only where a state is a
-/// mood or an emotion, and stand there. Moods and emotions contain one. It is all that the sensory-motor level may see.
+/// Every mood and every emotion contains one, and it is all that the sensory-motor level can see. The figure of the
+/// taxonomy also lists duration and focality here [D: F2]. Those only have values for moods and emotions, which
+/// provide them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Affect {
     /// Pleasant or unpleasant.
     pub valence: Valence,
-    /// How strongly.
+    /// Strength of the state.
     pub intensity: Intensity,
 }
 

@@ -1,9 +1,9 @@
-//! The components by which one emotion differs from another.
+//! The appraisal components that distinguish one emotion from another.
 
 use super::affect::Valence;
 use serde::{Deserialize, Serialize};
 
-/// The face that goes with an emotion [D: S].
+/// The facial expression of an emotion [D: S].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FacialExpression {
@@ -19,13 +19,14 @@ pub enum FacialExpression {
     Angry,
     /// Brows raised and drawn together.
     Fearful,
-    /// None in particular.
+    /// No particular expression.
     Neutral,
 }
 
 impl FacialExpression {
-    /// The valence that this face shows; none for surprise, which may be either [D: S], and for a neutral
-    /// face, which shows nothing \[I\].
+    /// The valence that this expression shows.
+    ///
+    /// `None` for surprise, which may be either [D: S], and for a neutral face, which shows nothing \[I\].
     pub fn valence(self) -> Option<Valence> {
         match self {
             Self::Happy => Some(Valence::Positive),
@@ -35,28 +36,28 @@ impl FacialExpression {
     }
 }
 
-/// Who is responsible for what elicited an emotion [D: S].
+/// The agent responsible for what elicited an emotion [D: S].
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Agency {
-    /// The agent that feels it.
+    /// The agent that feels the emotion.
     #[serde(rename = "self")]
     Oneself,
-    /// Somebody or something else, by name.
+    /// Another agent or a thing, identified by name.
     Other(String),
 }
 
-/// Whether the eliciting event was expected. The dimension is documented [D: S], the values are not \[I\].
+/// Whether the eliciting event was expected. The dimension is documented [D: S], its values are not \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Novelty {
-    /// As expected.
+    /// The event was expected.
     Match,
-    /// Not as expected.
+    /// The event was not expected.
     Mismatch,
 }
 
-/// How far something is given. Values of controllability and modifiability \[I\].
+/// Degree of controllability or modifiability \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Degree {
@@ -70,17 +71,17 @@ pub enum Degree {
     High,
 }
 
-/// Whether the agent is sure of what happens. The dimension is documented [D: S], the values are not \[I\].
+/// Whether the agent is certain of what happens. The dimension is documented [D: S], its values are not \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Certainty {
-    /// Sure.
+    /// The agent is certain.
     Certain,
-    /// Not sure.
+    /// The agent is not certain.
     Uncertain,
 }
 
-/// Whether what happens agrees with a norm or standard. The dimensions are documented [D: S], the values are
+/// Whether what happens agrees with a norm or standard. The dimensions are documented [D: S], their values are
 /// not \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -1,4 +1,4 @@
-//! Emotion: the most differentiated affective state, a set of components.
+//! Emotion: the most specific affective state, described by a set of components.
 
 use super::Refusal;
 use super::affect::{Affect, Duration, Focality, Valence};
@@ -7,53 +7,56 @@ use super::tendency::ActionTendency;
 use crate::scalar::Intensity;
 use serde::{Deserialize, Serialize};
 
-/// What a clause of a causal chain speaks of. That chains speak of beliefs, goals and whether these are
-/// achieved is documented [D: S]; the division into clauses is chosen here \[I\].
+/// The subject of a clause in a causal chain.
+///
+/// That causal chains mention beliefs, goals and whether goals are achieved is documented [D: S]. The division into
+/// clauses is chosen here \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClauseKind {
-    /// What happens or was done.
+    /// Something that happens or was done.
     Event,
-    /// What the agent takes to be so.
+    /// Something that the agent believes.
     Belief,
-    /// What it wants or does not want.
+    /// Something that the agent wants or does not want.
     Goal,
-    /// What it feels and is inclined to do because of that.
+    /// What the agent feels and is inclined to do as a consequence.
     Feeling,
 }
 
-/// How it stands with the goal that an emotion is about \[I\].
+/// Status of the goal that an emotion is about \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GoalStatus {
-    /// It is being reached.
+    /// The goal is being achieved.
     Achieved,
-    /// It will be reached, the agent thinks.
+    /// The agent expects to achieve the goal.
     Expected,
-    /// It may be missed.
+    /// The goal may not be achieved.
     AtRisk,
-    /// It cannot be reached in this way.
+    /// The goal cannot be achieved with the current strategy.
     Blocked,
-    /// It is given up.
+    /// The goal has been given up.
     Lost,
 }
 
-/// What an emotion signals about the course of action: to oneself, and to others, who can see it [D: S].
+/// What an emotion signals about the course of action, to the agent itself and to others who see it [D: S].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Signal {
-    /// Go on in this direction.
+    /// Continue with the current course of action.
     Continue,
-    /// Reach the goal in another way.
+    /// Pursue the goal in another way.
     ChangeCourse,
-    /// Leave the goal.
+    /// Abandon the goal.
     Disengage,
 }
 
 impl GoalStatus {
-    /// That an achieved goal signals to continue, and a lost one to change course or to disengage, is documented
-    /// [D: S]; which of the two a blocked goal signals, and that one at risk still signals to continue, is chosen
-    /// here \[I\].
+    /// The signal that an emotion about a goal of this status sends.
+    ///
+    /// It is documented that an achieved goal signals to continue, and a lost goal to change course or to disengage
+    /// [D: S]. The signals of blocked goals and of goals at risk are chosen here \[I\].
     pub fn signal(self) -> Signal {
         match self {
             Self::Achieved | Self::Expected | Self::AtRisk => Signal::Continue,
@@ -67,27 +70,27 @@ impl GoalStatus {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clause {
-    /// What it speaks of.
+    /// The subject of the clause.
     pub kind: ClauseKind,
-    /// The words.
+    /// The clause in words.
     pub text: String,
 }
 
-/// A causal chain: how the agent accounts for its emotion.
+/// A causal chain: the agent's explanation of its emotion.
 ///
-/// That it can be spoken is documented [D: S], as is the method: short scripts of simple words after
-/// Wierzbicka. The published texts were not readable; those of this crate are its own \[I\].
+/// That the chain can be spoken is documented [D: S], and so is its form: short scripts of simple words, following
+/// Wierzbicka. The published scripts were not readable; those of this crate are newly written \[I\].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Account {
-    /// How it stands with the goal.
+    /// Status of the goal that the chain mentions.
     pub goal: GoalStatus,
-    /// The steps, in order.
+    /// The clauses, in order.
     pub clauses: Vec<Clause>,
 }
 
 impl Account {
-    /// The chain as one sentence for a voice or a panel.
+    /// The chain as one sentence, for speech output or a panel.
     pub fn spoken(&self) -> String {
         let texts: Vec<&str> = self
             .clauses
@@ -95,52 +98,88 @@ impl Account {
             .map(|clause| clause.text.as_str())
             .collect();
         let mut sentence = texts.join("; ");
+
         if let Some(first) = sentence.chars().next() {
             let capital: String = first.to_uppercase().collect();
             sentence.replace_range(..first.len_utf8(), &capital);
             sentence.push('.');
         }
+
         sentence
     }
 }
 
-/// Everything that makes up an emotion, not yet checked.
+/// The components of an emotion, not yet validated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Components {
-    /// What it is called.
+    /// Name of the emotion.
     pub name: String,
-    /// The face that goes with it.
+    /// Facial expression.
     pub facial_expression: FacialExpression,
     /// Pleasant or unpleasant.
     pub valence: Valence,
-    /// How strongly it is felt.
+    /// Strength of the feeling.
     pub intensity: Intensity,
-    /// How long it lasts: minutes.
+    /// How long it lasts; must be [`Duration::Minutes`].
     pub duration: Duration,
-    /// Who is responsible.
+    /// The agent responsible for the eliciting event.
     pub agency: Agency,
-    /// What it is about.
+    /// What the emotion is about; must not be [`Focality::Global`].
     pub focality: Focality,
-    /// Whether the event was expected.
+    /// Whether the eliciting event was expected.
     pub novelty: Novelty,
-    /// How far the agent controls what happens.
+    /// How much control the agent has over what happens.
     pub controllability: Degree,
-    /// How far what happens can be changed at all.
+    /// How much of what happens can be changed at all.
     pub modifiability: Degree,
-    /// Whether the agent is sure of what happens.
+    /// Whether the agent is certain of what happens.
     pub certainty: Certainty,
-    /// Whether it agrees with the norms of others.
+    /// Whether what happens agrees with the norms of others.
     pub external_norms: Compatibility,
-    /// Whether it agrees with the agent's own standards.
+    /// Whether what happens agrees with the agent's own standards.
     pub internal_standards: Compatibility,
-    /// What it inclines the agent to do.
+    /// What the emotion inclines the agent to do.
     pub action_tendency: ActionTendency,
-    /// How the agent accounts for it.
+    /// How the agent explains the emotion.
     pub causal_chain: Account,
 }
 
-/// An emotion with legal components [D: S].
+impl Components {
+    fn check_attributes(&self) -> Result<(), Refusal> {
+        if self.name.is_empty() {
+            return Err(Refusal::EmotionName);
+        }
+
+        let name = self.name.clone();
+        if self.duration != Duration::Minutes {
+            return Err(Refusal::EmotionDuration { name });
+        }
+        if self.focality == Focality::Global {
+            return Err(Refusal::EmotionFocality { name });
+        }
+        if matches!(&self.agency, Agency::Other(agent) if agent.is_empty()) {
+            return Err(Refusal::AgentUnnamed { name });
+        }
+
+        Ok(())
+    }
+
+    fn check_face(&self) -> Result<(), Refusal> {
+        let face = self.facial_expression;
+
+        match face.valence() {
+            Some(shown) if shown != self.valence => Err(Refusal::FaceContradictsValence {
+                name: self.name.clone(),
+                valence: self.valence,
+                face,
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// An emotion whose components are valid together [D: S].
 ///
 /// ```
 /// use affect::akr::{Duration, Emotion};
@@ -150,7 +189,7 @@ pub struct Components {
 /// let mut components = angry.components().clone();
 /// components.duration = Duration::Lifetime;
 /// let refusal = Emotion::new(components).unwrap_err();
-/// assert!(refusal.to_string().starts_with("ANGRY lasts minutes"));
+/// assert!(refusal.to_string().starts_with("ANGRY must last minutes"));
 /// # Ok::<(), affect::SchemaError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -160,29 +199,15 @@ pub struct Emotion {
 }
 
 impl Emotion {
-    /// Checks the components against each other.
+    /// Validates the components against each other.
+    ///
+    /// # Errors
+    ///
+    /// Returns the first [`Refusal`] that applies.
     pub fn new(components: Components) -> Result<Self, Refusal> {
-        let name = || components.name.clone();
-        if components.name.is_empty() {
-            return Err(Refusal::EmotionName);
-        }
-        if components.duration != Duration::Minutes {
-            return Err(Refusal::EmotionDuration { name: name() });
-        }
-        if components.focality == Focality::Global {
-            return Err(Refusal::EmotionFocality { name: name() });
-        }
-        if matches!(&components.agency, Agency::Other(agent) if agent.is_empty()) {
-            return Err(Refusal::AgentUnnamed { name: name() });
-        }
-        let (face, valence) = (components.facial_expression, components.valence);
-        if face.valence().is_some_and(|shown| shown != valence) {
-            return Err(Refusal::FaceContradictsValence {
-                name: name(),
-                valence,
-                face,
-            });
-        }
+        components.check_attributes()?;
+        components.check_face()?;
+
         Ok(Self { components })
     }
 
@@ -191,12 +216,12 @@ impl Emotion {
         &self.components
     }
 
-    /// What it is called.
+    /// Name of the emotion.
     pub fn name(&self) -> &str {
         &self.components.name
     }
 
-    /// Its coarse part.
+    /// Its valence and intensity.
     pub fn affect(&self) -> Affect {
         Affect {
             valence: self.components.valence,

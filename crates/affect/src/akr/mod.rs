@@ -1,11 +1,11 @@
-//! The taxonomy: personality, affect, mood and emotion, told apart by their attributes.
+//! The taxonomy: personality, affect, mood and emotion, distinguished by their attributes.
 //!
-//! Attributes and most of their values are documented [D: S, F2]; the figure that lists the values of
-//! novelty, controllability, modifiability, certainty and the two compatibilities was not readable, and what
-//! stands here for them is marked \[I\] where it is defined.
+//! The attributes and most of their values are documented [D: S, F2]. The figure that lists the values of novelty,
+//! controllability, modifiability, certainty and the two compatibilities was not readable; the values used here are
+//! marked \[I\] where they are defined.
 //!
-//! What the taxonomy excludes cannot be expressed, or is refused with a [`Refusal`] that says why: a mood has
-//! no field for an agency, and a mood read from a file that names one is an error.
+//! Combinations that the taxonomy excludes either cannot be expressed or return a [`Refusal`] with the reason. For
+//! example, [`Mood`] has no agency, and deserializing a mood that specifies one is an error.
 //!
 //! ```
 //! use affect::akr::Mood;
@@ -29,61 +29,63 @@ pub use mood::Mood;
 pub use personality::{Personality, Preference, Strategy, Trait};
 pub use tendency::{ActionTendency, PrimaryTendency, TABLE_1, TABLE_2, TaskTendency};
 
-/// Why something is not a personality, a mood or an emotion.
+/// Why attributes do not form a valid personality, mood or emotion.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// A personality that does not last a lifetime.
     #[error("a personality lasts a lifetime, not {0:?}")]
     PersonalityDuration(Duration),
-    /// A personality that is about something.
+    /// A personality that is about an event or an object.
     #[error("a personality is global, not about an event or object")]
     PersonalityFocality,
     /// A mood that does not last days.
     #[error("a mood lasts days, not {0:?}")]
     MoodDuration(Duration),
-    /// A mood that is about something.
+    /// A mood that is about an event or an object.
     #[error("a mood is global, not about an event or object")]
     MoodFocality,
-    /// A mood for which somebody is responsible.
+    /// A mood for which an agent is responsible.
     #[error("a mood has no agency, since no specific stimulus elicits it")]
     MoodAgency,
     /// An emotion without a name.
-    #[error("an emotion has a name")]
+    #[error("an emotion must have a name")]
     EmotionName,
-    /// An emotion that lasts longer than emotions do.
+    /// An emotion that does not last minutes.
     #[error(
-        "{name} lasts minutes, as every emotion: what lasts days is a mood, what lasts a lifetime a personality"
+        "{name} must last minutes: only moods last days, and only personalities last a lifetime"
     )]
     EmotionDuration {
-        /// The emotion.
+        /// Name of the emotion.
         name: String,
     },
-    /// An emotion about nothing.
-    #[error("{name} is about an event or an object: what is global is a mood or a personality")]
+    /// An emotion that is not about an event or an object.
+    #[error("{name} must be about an event or an object: only moods and personalities are global")]
     EmotionFocality {
-        /// The emotion.
+        /// Name of the emotion.
         name: String,
     },
-    /// A face that contradicts the valence. Only surprise may be either [D: S]; a neutral face says nothing.
-    #[error("{name} is {valence:?}, which a {face:?} face contradicts")]
+    /// A facial expression that contradicts the valence.
+    ///
+    /// Surprise goes with either valence [D: S], and so does a neutral face.
+    #[error("{name} has {valence:?} valence, which contradicts its {face:?} face")]
     FaceContradictsValence {
-        /// The emotion.
+        /// Name of the emotion.
         name: String,
         /// Its valence.
         valence: Valence,
-        /// Its face.
+        /// Its facial expression.
         face: FacialExpression,
     },
-    /// An emotion whose valence may be either, and that is not surprise.
-    #[error("{name} needs a valence of its own: only surprise may be either")]
+    /// An emotion without a definite valence, although only surprise may have either.
+    #[error("{name} must have a valence: only surprise may have either")]
     ValenceOpen {
-        /// The emotion.
+        /// Name of the emotion.
         name: String,
     },
-    /// Another agent is responsible, and has no name.
-    #[error("{name} points to another agent, who must be named")]
+    /// Another agent is responsible but not named.
+    #[error("{name} holds another agent responsible, which must be named")]
     AgentUnnamed {
-        /// The emotion.
+        /// Name of the emotion.
         name: String,
     },
 }

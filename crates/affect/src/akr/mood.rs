@@ -1,4 +1,4 @@
-//! Mood: affect without an object.
+//! Mood: affect that is not about anything in particular.
 
 use super::Refusal;
 use super::affect::{Affect, Duration, Focality, Valence};
@@ -6,8 +6,7 @@ use super::appraisal::Agency;
 use crate::scalar::Intensity;
 use serde::{Deserialize, Serialize};
 
-/// An affective state that lasts days, is about nothing in particular, and for which nobody is responsible
-/// [D: S].
+/// An affective state that lasts days, has no particular object, and for which no agent is responsible [D: S].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "RawMood", into = "RawMood")]
 pub struct Mood {
@@ -15,7 +14,7 @@ pub struct Mood {
 }
 
 impl Mood {
-    /// A mood is an affect and no more.
+    /// Creates a mood, which consists of an affect only.
     pub fn new(affect: Affect) -> Self {
         Self { affect }
     }
@@ -25,19 +24,20 @@ impl Mood {
         self.affect
     }
 
-    /// Days.
+    /// Always [`Duration::Days`].
     pub fn duration(&self) -> Duration {
         Duration::Days
     }
 
-    /// Global.
+    /// Always [`Focality::Global`].
     pub fn focality(&self) -> Focality {
         Focality::Global
     }
 }
 
-/// What a file may say of a mood. Attributes that a mood has not are understood, so that the refusal can say
-/// what is wrong with them.
+/// The serialized form of a mood.
+///
+/// It has the attributes that a mood must not have, so that the error can explain them.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawMood {
@@ -55,6 +55,7 @@ impl TryFrom<RawMood> for Mood {
         if raw.agency.is_some() {
             return Err(Refusal::MoodAgency);
         }
+
         match raw.duration {
             None | Some(Duration::Days) => {}
             Some(other) => return Err(Refusal::MoodDuration(other)),
@@ -63,6 +64,7 @@ impl TryFrom<RawMood> for Mood {
             None | Some(Focality::Global) => {}
             Some(_) => return Err(Refusal::MoodFocality),
         }
+
         Ok(Self::new(Affect {
             valence: raw.valence,
             intensity: raw.intensity,

@@ -1,4 +1,4 @@
-//! Personality: what stays the same for a lifetime.
+//! Personality: the dispositions that last a lifetime.
 
 use super::Refusal;
 use super::affect::{Duration, Focality, Valence};
@@ -6,7 +6,7 @@ use crate::scalar::Caution;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// A lasting disposition. The named ones are documented [D: F2]; the list is open there too.
+/// A lasting disposition. The named ones are documented [D: F2]; the published list is open-ended, too.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Trait {
@@ -26,37 +26,37 @@ pub enum Trait {
     Other(String),
 }
 
-/// How an agent deals with others. The named ones are documented [D: F2, S]; the list is open there too.
+/// How an agent deals with others. The named ones are documented [D: F2, S]; the published list is open-ended, too.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Strategy {
-    /// Does as it is done by.
+    /// Treats others as they treated it.
     TitForTat,
-    /// Takes its advantage.
+    /// Takes advantage of others.
     Cheat,
-    /// Gives everyone their due. The default \[I\].
+    /// Treats others fairly. The default \[I\].
     #[default]
     Fair,
     /// Any other.
     Other(String),
 }
 
-/// What an agent wants of its own affect [D: S].
+/// An agent's preference about its own affect [D: S].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preference {
-    /// Acts so that negative affect does not come.
+    /// Acts to avoid negative affect.
     AvoidNegative,
-    /// Does not like negative affect.
+    /// Dislikes negative affect.
     DislikeNegative,
-    /// Acts so that positive affect comes.
+    /// Acts to experience positive affect.
     SeekPositive,
     /// Likes positive affect.
     LikePositive,
 }
 
 impl Preference {
-    /// The affect that it is about.
+    /// The valence that the preference is about.
     pub fn valence(self) -> Valence {
         match self {
             Self::AvoidNegative | Self::DislikeNegative => Valence::Negative,
@@ -65,10 +65,10 @@ impl Preference {
     }
 }
 
-/// What an agent is like, in every situation and for as long as it lives [D: S, F2].
+/// The lasting character of an agent, the same in every situation [D: S, F2].
 ///
-/// Emotions do not depend on it: any personality can have any emotion [D: S]. It acts on how strongly
-/// they are felt, through [`Caution`].
+/// Any personality can have any emotion [D: S]. Personality affects how strongly emotions are felt, through
+/// [`Caution`].
 ///
 /// ```
 /// use affect::akr::Personality;
@@ -80,13 +80,13 @@ impl Preference {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "RawPersonality", into = "RawPersonality")]
 pub struct Personality {
-    /// How fast feelings rise.
+    /// How fast the intensity of emotions rises.
     pub caution: Caution,
-    /// Other traits.
+    /// Further traits.
     pub traits: BTreeSet<Trait>,
-    /// How it deals with others.
+    /// How the agent deals with others.
     pub strategy: Strategy,
-    /// What it wants of its own affect. Avoid negative and seek positive unless said otherwise [D: S].
+    /// Preferences about its own affect. By default it avoids negative and seeks positive affect [D: S].
     pub preferences: BTreeSet<Preference>,
 }
 
@@ -102,7 +102,7 @@ impl Default for Personality {
 }
 
 impl Personality {
-    /// An otherwise ordinary personality of this caution.
+    /// The default personality with this caution.
     pub fn with_caution(caution: Caution) -> Self {
         Self {
             caution,
@@ -110,18 +110,17 @@ impl Personality {
         }
     }
 
-    /// A lifetime.
+    /// Always [`Duration::Lifetime`].
     pub fn duration(&self) -> Duration {
         Duration::Lifetime
     }
 
-    /// Global.
+    /// Always [`Focality::Global`].
     pub fn focality(&self) -> Focality {
         Focality::Global
     }
 
-    /// Whether it has a preference about affect of this valence: to have the positive, to be spared the
-    /// negative.
+    /// Whether the agent has a preference about affect of this valence.
     pub fn cares_about(&self, valence: Valence) -> bool {
         self.preferences
             .iter()
@@ -129,7 +128,9 @@ impl Personality {
     }
 }
 
-/// What a file may say of a personality; see the like of it for moods.
+/// The serialized form of a personality.
+///
+/// It has the attributes that are fixed for personalities, so that the error can explain other values.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawPersonality {
@@ -156,19 +157,13 @@ impl TryFrom<RawPersonality> for Personality {
             None | Some(Focality::Global) => {}
             Some(_) => return Err(Refusal::PersonalityFocality),
         }
-        let RawPersonality {
-            caution,
-            traits,
-            strategy,
-            preferences,
-            ..
-        } = raw;
-        let preferences = preferences.unwrap_or_else(|| Self::default().preferences);
+
+        let default = Self::default();
         Ok(Self {
-            caution,
-            traits,
-            strategy,
-            preferences,
+            caution: raw.caution,
+            traits: raw.traits,
+            strategy: raw.strategy,
+            preferences: raw.preferences.unwrap_or(default.preferences),
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Action tendencies: the small suite of actions that an emotion makes ready.
+//! Action tendencies: the small set of actions that an emotion prepares.
 
 use crate::label::StandardEmotion;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ pub enum ActionTendency {
     Avoid,
     /// Come nearer (Table 1).
     Approach,
-    /// Fight for control (Table 1). The seed prints "agnostic", taken for a misprint \[I\].
+    /// Fight for control (Table 1). The paper prints "agnostic", assumed to be a misprint \[I\].
     Agonistic,
     /// Push away (Table 1).
     Reject,
@@ -19,21 +19,21 @@ pub enum ActionTendency {
     Prepare,
     /// Rest (Table 1).
     Inactivity,
-    /// Do as one likes (Table 2).
+    /// Act freely (Table 2).
     FreeActivate,
-    /// Go on as usual (Table 2).
+    /// Continue as usual (Table 2).
     ContinueNormalActivity,
-    /// Watch closely how it goes (Table 2).
+    /// Watch progress closely (Table 2).
     MonitorProgressClosely,
-    /// Try something else (Table 2).
+    /// Try another strategy (Table 2).
     ChangeCurrentStrategy,
-    /// Give the goal up. In no table; the seed names it as what the loss of a goal signals [D: S], and this
-    /// crate gives it to DISCOURAGED \[I\].
+    /// Give up the goal. Not in the tables: the paper mentions it as the signal of a lost goal [D: S], and this
+    /// crate assigns it to DISCOURAGED \[I\].
     Disengage,
 }
 
 impl ActionTendency {
-    /// What the tendency is good for, as in Table 1; none for the others.
+    /// The function of the tendency according to Table 1, or `None` if it is not in that table.
     pub fn function(self) -> Option<&'static str> {
         TABLE_1
             .iter()
@@ -41,13 +41,14 @@ impl ActionTendency {
             .map(|row| row.function)
     }
 
-    /// The item of EmotionML's vocabulary `frijda-action-tendencies` that means this [D: W]; none where that
-    /// vocabulary has no such item, so that an export needs one of its own.
+    /// The corresponding item of EmotionML's vocabulary `frijda-action-tendencies` [D: W].
+    ///
+    /// `None` if that vocabulary has no such item, so that an export must define its own.
     pub fn emotionml(self) -> Option<&'static str> {
         TABLE_1.iter().find(|row| row.tendency == self)?.emotionml
     }
 
-    /// The name, as files and logs spell it.
+    /// The name used in files and logs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Avoid => "avoid",
@@ -68,18 +69,19 @@ impl ActionTendency {
 /// A row of Table 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PrimaryTendency {
-    /// What the emotion inclines to.
+    /// The tendency.
     pub tendency: ActionTendency,
-    /// What that is good for.
+    /// The function of the tendency.
     pub function: &'static str,
-    /// The emotion, in words: these are not emotions of the robots.
+    /// The emotion in words; these are not emotions of the robots.
     pub emotion: &'static str,
-    /// Its name in EmotionML's `frijda-action-tendencies`.
+    /// The tendency's name in EmotionML's `frijda-action-tendencies`.
     pub emotionml: Option<&'static str>,
 }
 
-/// Table 1 of the seed [D: S]. EmotionML names are those of its vocabulary [D: W]; that `attending` is
-/// nearest to preparation is a choice \[I\].
+/// Table 1 of the paper [D: S].
+///
+/// The EmotionML names are those of its vocabulary [D: W]. Mapping preparation to `attending` is a choice \[I\].
 pub const TABLE_1: [PrimaryTendency; 6] = {
     use ActionTendency::{Agonistic, Approach, Avoid, Inactivity, Prepare, Reject};
     [
@@ -114,20 +116,20 @@ const fn row_1(
 /// A row of Table 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TaskTendency {
-    /// What the emotion inclines to.
+    /// The tendency.
     pub tendency: ActionTendency,
-    /// What that means for the robot others depend on, the waiter.
+    /// What it means for the waiter, the robot that is supported.
     pub waiter: &'static [&'static str],
-    /// What that means for the robot that supports it, the refiller.
+    /// What it means for the refiller, the robot that supports the waiter.
     pub refiller: &'static [&'static str],
     /// The emotion.
     pub emotion: StandardEmotion,
 }
 
-/// Table 2 of the seed [D: S].
+/// Table 2 of the paper [D: S].
 ///
-/// The seed prints "serve/joke" for HAPPY, which may also mean that the waiter does both; read here, as the
-/// other rows, as waiter/refiller \[I\].
+/// The paper prints "serve/joke" for HAPPY. This could mean that the waiter does both; here it is read as
+/// waiter/refiller, like the other rows \[I\].
 pub const TABLE_2: [TaskTendency; 4] = {
     use ActionTendency::{
         ChangeCurrentStrategy, ContinueNormalActivity, FreeActivate, MonitorProgressClosely,
@@ -176,15 +178,12 @@ mod tests {
 
     #[test]
     fn the_name_is_the_serialized_form() {
-        for row in TABLE_1
-            .iter()
-            .map(|row| row.tendency)
-            .chain(TABLE_2.iter().map(|row| row.tendency))
-        {
-            assert_eq!(
-                serde_json::to_string(&row).unwrap(),
-                format!("\"{}\"", row.name())
-            );
+        let of_table_1 = TABLE_1.iter().map(|row| row.tendency);
+        let of_table_2 = TABLE_2.iter().map(|row| row.tendency);
+
+        for tendency in of_table_1.chain(of_table_2) {
+            let json = serde_json::to_string(&tendency).unwrap();
+            assert_eq!(json, format!("\"{}\"", tendency.name()));
         }
     }
 

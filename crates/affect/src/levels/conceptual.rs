@@ -1,10 +1,10 @@
-//! The deliberative level: choose by the emotion that an action is expected to lead to.
+//! The deliberative level, which chooses actions by the emotions that they are expected to lead to.
 //!
-//! That this level reasons over past and present emotions and projects what an action may lead to is
-//! documented [D: S, Table 3]. So is, in the decision-theoretic companion work, what an emotion does to the
-//! decision itself [D: D1, D2]: a pressed agent drops outcomes of negligible probability and inferior actions,
-//! becomes short-sighted, and has the action tendency of its emotion ready. How much of each is chosen
-//! here \[I\]. Nothing is random: equal values go to the candidate that comes first.
+//! It is documented that this level reasons about past and present emotions and projects the outcomes of actions
+//! [D: S, Table 3]. The decision-theoretic companion papers document how an emotion affects the decision itself
+//! [D: D1, D2]: an agent under pressure ignores outcomes of negligible probability and inferior actions, becomes
+//! short-sighted, and favors the action tendency of its emotion. The extent of each effect is chosen here \[I\].
+//! Decisions are deterministic: of candidates with equal values, the first one is chosen.
 
 use crate::akr::{ActionTendency, Affect, Personality, Valence};
 use crate::label::{EmotionLabel, Feeling};
@@ -15,19 +15,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConceptualParameters {
-    /// Probability below which an agent under full pressure drops an outcome. Default 0.2 \[I\].
+    /// Probability below which an agent under full pressure ignores an outcome. Default 0.2 \[I\].
     pub negligible: f64,
-    /// How far, in seconds, a calm agent looks ahead. Default 60 \[I\].
+    /// Planning horizon of a calm agent, in seconds. Default 60 \[I\].
     pub horizon_s: f64,
-    /// How far, in seconds, an agent under full pressure looks ahead. Default 10 \[I\].
+    /// Planning horizon of an agent under full pressure, in seconds. Default 10 \[I\].
     pub pressed_horizon_s: f64,
-    /// How many actions an agent under full pressure weighs; a calm one weighs all. 0 counts as 1.
+    /// Number of actions that an agent under full pressure evaluates; a calm agent evaluates all. 0 is treated as 1.
     /// Default 2 \[I\].
     pub pressed_actions: u32,
-    /// What the action tendency of a fully felt emotion adds to the value of an action that follows it.
-    /// Default 0.2 \[I\].
+    /// Bonus at full intensity for an action that follows the action tendency of the emotion. Default 0.2 \[I\].
     pub readiness: f64,
-    /// How many experiences an anticipation is worth. Default 3 \[I\].
+    /// Weight of the anticipation, as a number of experiences. Default 3 \[I\].
     pub anticipation_n: f64,
 }
 
@@ -44,34 +43,37 @@ impl Default for ConceptualParameters {
     }
 }
 
-/// What an action may lead to.
+/// A possible outcome of an action.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
-    /// How probable it is, in `[0, 1]`.
+    /// Its probability, in `[0, 1]`.
     pub probability: f64,
-    /// In how many seconds it comes.
+    /// Time until the outcome, in seconds.
     pub after_s: f64,
-    /// What the agent would feel then.
+    /// The affect that the agent expects to feel then.
     pub anticipated: Affect,
 }
 
-/// Why a candidate is none.
+/// Why the outcomes of a candidate are invalid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CandidateError {
     /// A probability outside `[0, 1]`.
-    #[error("a probability lies in [0, 1], not {0}")]
+    #[error("a probability must be in [0, 1], not {0}")]
     Probability(f64),
-    /// Outcomes that exclude each other cannot be more probable together than 1.
-    #[error("the outcomes of an action are more probable than 1 together: {0}")]
+    /// The probabilities of mutually exclusive outcomes add up to more than 1.
+    #[error(
+        "the probabilities of an action's outcomes must not add up to more than 1, but are {0}"
+    )]
     Sum(f64),
-    /// An outcome in the past or at no time.
-    #[error("an outcome comes after 0 or more seconds, not {0}")]
+    /// The time of an outcome is negative or NaN.
+    #[error("the time until an outcome must be 0 s or more, not {0}")]
     Time(f64),
 }
 
-/// An action that could be taken, with its possible outcomes, which exclude each other. What is missing to
-/// probability 1 changes nothing for the agent.
+/// An action that can be chosen, with its mutually exclusive outcomes.
+///
+/// If the probabilities add up to less than 1, the action has no effect with the remaining probability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate<A> {
     action: A,
@@ -80,10 +82,14 @@ pub struct Candidate<A> {
 }
 
 impl<A> Candidate<A> {
-    /// Sums of probabilities such as 0.1 exceed what they mean by less than this.
+    /// Allowance for rounding errors in sums of probabilities such as 0.1.
     const SLACK: f64 = 1e-9;
 
-    /// Checks the outcomes. `tendency` is the action tendency that the action follows, if it follows one.
+    /// Creates a candidate. `tendency` is the action tendency that the action follows, if any.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`CandidateError`] if a probability or a time is invalid.
     pub fn new(
         action: A,
         tendency: Option<ActionTendency>,
@@ -97,10 +103,12 @@ impl<A> Candidate<A> {
                 return Err(CandidateError::Time(outcome.after_s));
             }
         }
+
         let sum: f64 = outcomes.iter().map(|outcome| outcome.probability).sum();
         if sum > 1.0 + Self::SLACK {
             return Err(CandidateError::Sum(sum));
         }
+
         Ok(Self {
             action,
             tendency,
@@ -114,21 +122,34 @@ impl<A> Candidate<A> {
     }
 }
 
-/// What followed an action that was taken under an emotion.
+/// What an agent felt after an action that it took under an emotion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experience<E, A> {
-    /// What was felt when it was taken.
+    /// The emotion when the action was taken.
     pub emotion: E,
     /// The action.
     pub action: A,
-    /// Mean of what was felt afterwards, intensity with the sign of the valence, in `[-1, 1]`.
+    /// Mean of the affect afterwards, as intensity with the sign of the valence, in `[-1, 1]`.
     pub mean: f64,
-    /// How often it was experienced.
+    /// Number of experiences.
     pub times: u32,
 }
 
-/// Past emotions, as experience with actions. It grows with the number of distinct pairs and not with time.
+impl<E: EmotionLabel, A: PartialEq> Experience<E, A> {
+    fn is_of(&self, emotion: E, action: &A) -> bool {
+        self.emotion == emotion && self.action == *action
+    }
+
+    fn add(&mut self, felt: Affect) {
+        self.times = self.times.saturating_add(1);
+        self.mean += (felt.signed() - self.mean) / f64::from(self.times);
+    }
+}
+
+/// Memory of past emotions, as experience with actions.
+///
+/// Its size is bounded by the number of distinct pairs of emotion and action.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Memory<E, A> {
@@ -144,45 +165,46 @@ impl<E, A> Default for Memory<E, A> {
 }
 
 impl<E: EmotionLabel, A: Clone + PartialEq> Memory<E, A> {
-    /// `action`, taken when `emotion` was felt, led to `felt`.
+    /// Records that `action`, taken under `emotion`, led to the affect `felt`.
     pub fn remember(&mut self, emotion: E, action: &A, felt: Affect) {
-        let same = |one: &&mut Experience<E, A>| one.emotion == emotion && one.action == *action;
-        if let Some(experience) = self.experiences.iter_mut().find(same) {
-            experience.times = experience.times.saturating_add(1);
-            experience.mean += (felt.signed() - experience.mean) / f64::from(experience.times);
-        } else {
-            let action = action.clone();
-            self.experiences.push(Experience {
+        let known = self
+            .experiences
+            .iter_mut()
+            .find(|experience| experience.is_of(emotion, action));
+
+        match known {
+            Some(experience) => experience.add(felt),
+            None => self.experiences.push(Experience {
                 emotion,
-                action,
+                action: action.clone(),
                 mean: felt.signed(),
                 times: 1,
-            });
+            }),
         }
     }
 
-    /// What is remembered of an action under an emotion.
+    /// The experience with an action under an emotion, if any.
     pub fn recall(&self, emotion: E, action: &A) -> Option<&Experience<E, A>> {
         self.experiences
             .iter()
-            .find(|one| one.emotion == emotion && one.action == *action)
+            .find(|experience| experience.is_of(emotion, action))
     }
 }
 
-/// What deliberation arrived at.
+/// The result of deliberation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice<A> {
     /// The best action.
     pub action: A,
-    /// Its value, about in `[-1, 1]`.
+    /// Its value, approximately in `[-1, 1]`.
     pub value: f64,
-    /// Every action that was weighed, with its value, in the order of the candidates.
+    /// The actions that were evaluated, with their values, in the order of the candidates.
     pub weighed: Vec<(A, f64)>,
-    /// Actions that a first glance found inferior, and that were not weighed.
+    /// The actions that were dismissed without evaluation because they looked inferior.
     pub dropped: Vec<A>,
 }
 
-/// The level that reasons.
+/// The deliberative level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conceptual {
     parameters: ConceptualParameters,
@@ -191,7 +213,13 @@ pub struct Conceptual {
 }
 
 impl Conceptual {
-    /// A level for an agent of this personality: affect of which it has no preference has no value to it.
+    /// Creates a level for an agent of this personality.
+    ///
+    /// Affect about which the agent has no preference has no value for it.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a parameter is invalid.
     pub fn new(
         parameters: ConceptualParameters,
         personality: &Personality,
@@ -201,6 +229,7 @@ impl Conceptual {
         not_negative("pressed_horizon_s", parameters.pressed_horizon_s)?;
         not_negative("readiness", parameters.readiness)?;
         positive("anticipation_n", parameters.anticipation_n)?;
+
         Ok(Self {
             parameters,
             counts_positive: personality.cares_about(Valence::Positive),
@@ -208,10 +237,10 @@ impl Conceptual {
         })
     }
 
-    /// The best of the candidates for an agent that feels this, or none if there is no candidate.
+    /// Chooses the best candidate for an agent with this feeling. Returns `None` if there are no candidates.
     ///
-    /// Under pressure only the actions that a first glance finds best are weighed: by experience and by the
-    /// action tendency, without projecting where they lead.
+    /// Under pressure, only the most promising candidates are evaluated. They are selected by experience and action
+    /// tendency, without projecting their outcomes.
     pub fn deliberate<E: EmotionLabel, A: Clone + PartialEq>(
         &self,
         feeling: Feeling<E>,
@@ -219,32 +248,32 @@ impl Conceptual {
         candidates: &[Candidate<A>],
         memory: &Memory<E, A>,
     ) -> Option<Choice<A>> {
-        let pressure = pressure(feeling.affect());
-        let readiness = |candidate: &Candidate<A>| {
-            let follows = tendency.is_some() && candidate.tendency == tendency;
-            if follows {
-                self.parameters.readiness * feeling.intensity.value()
-            } else {
-                0.0
-            }
+        let condition = Condition {
+            feeling,
+            tendency,
+            pressure: pressure(feeling.affect()),
         };
-        let glance = |candidate: &Candidate<A>| {
-            let experience = memory.recall(feeling.emotion, &candidate.action);
-            self.temper(0.0, experience) + readiness(candidate)
-        };
-        let glances: Vec<f64> = candidates.iter().map(glance).collect();
-        let kept = best_indices(&glances, self.weighable(candidates.len(), pressure));
-        let (mut weighed, mut dropped) = (Vec::new(), Vec::new());
+
+        let mut glances = Vec::with_capacity(candidates.len());
+        for candidate in candidates {
+            // The first assessment does not project outcomes.
+            glances.push(self.value(candidate, 0.0, &condition, memory));
+        }
+        let count = self.weighable(candidates.len(), condition.pressure);
+        let kept = best_indices(&glances, count);
+
+        let mut weighed = Vec::new();
+        let mut dropped = Vec::new();
         for (index, candidate) in candidates.iter().enumerate() {
             let action = candidate.action.clone();
             if kept.contains(&index) {
-                let experience = memory.recall(feeling.emotion, &action);
-                let value = self.temper(self.prospect(candidate, pressure), experience);
-                weighed.push((action, value + readiness(candidate)));
+                let prospect = self.prospect(candidate, condition.pressure);
+                weighed.push((action, self.value(candidate, prospect, &condition, memory)));
             } else {
                 dropped.push(action);
             }
         }
+
         let (action, value) = first_best(&weighed)?;
         Some(Choice {
             action,
@@ -254,39 +283,67 @@ impl Conceptual {
         })
     }
 
-    /// How many of `count` actions an agent under this pressure weighs: all, down to `pressed_actions`.
+    /// Number of actions, out of `count`, that an agent under this pressure evaluates.
+    ///
+    /// It decreases from `count` for a calm agent to `pressed_actions` under full pressure.
     fn weighable(&self, count: usize, pressure: f64) -> usize {
         let least = (self.parameters.pressed_actions.max(1) as usize).min(count);
-        let spared = ((count - least) as f64 * pressure).floor();
-        // At most `count`, so nothing is cut off.
-        count - spared as usize
+        let dismissed = ((count - least) as f64 * pressure).floor();
+
+        // The cast is exact: the number is whole and at most `count`.
+        count - dismissed as usize
     }
 
-    /// What a candidate promises to an agent under pressure.
+    /// The value of a candidate from which the agent anticipates `anticipated`.
+    fn value<E: EmotionLabel, A: Clone + PartialEq>(
+        &self,
+        candidate: &Candidate<A>,
+        anticipated: f64,
+        condition: &Condition<E>,
+        memory: &Memory<E, A>,
+    ) -> f64 {
+        let experience = memory.recall(condition.feeling.emotion, &candidate.action);
+        let follows = condition.tendency.is_some() && candidate.tendency == condition.tendency;
+        let readiness = if follows {
+            self.parameters.readiness * condition.feeling.intensity.value()
+        } else {
+            0.0
+        };
+
+        self.temper(anticipated, experience) + readiness
+    }
+
+    /// The expected affect after an action, for an agent under this pressure.
     ///
-    /// An outcome that is dropped as negligible leaves its probability to the others; one beyond the horizon
-    /// is not foreseen, and counts as no change.
+    /// The probability of outcomes that are ignored as negligible is distributed over the others. An outcome beyond
+    /// the horizon is not foreseen and contributes nothing.
     fn prospect<A>(&self, candidate: &Candidate<A>, pressure: f64) -> f64 {
-        let ConceptualParameters {
-            negligible,
-            horizon_s,
-            pressed_horizon_s,
-            ..
-        } = self.parameters;
-        let least = negligible * pressure;
-        let horizon_s = horizon_s + (pressed_horizon_s - horizon_s) * pressure;
-        let (mut all, mut kept, mut sum) = (0.0, 0.0, 0.0);
+        let least = self.parameters.negligible * pressure;
+        let horizon_s = self.horizon_s(pressure);
+
+        let mut all = 0.0;
+        let mut kept = 0.0;
+        let mut sum = 0.0;
         for outcome in &candidate.outcomes {
             all += outcome.probability;
             if outcome.probability < least {
                 continue;
             }
+
             kept += outcome.probability;
             if outcome.after_s <= horizon_s {
                 sum += outcome.probability * self.worth(outcome.anticipated);
             }
         }
+
         if kept > 0.0 { sum * all / kept } else { 0.0 }
+    }
+
+    fn horizon_s(&self, pressure: f64) -> f64 {
+        let calm_s = self.parameters.horizon_s;
+        let pressed_s = self.parameters.pressed_horizon_s;
+
+        calm_s + (pressed_s - calm_s) * pressure
     }
 
     fn worth(&self, anticipated: Affect) -> f64 {
@@ -297,22 +354,33 @@ impl Conceptual {
         if counts { anticipated.signed() } else { 0.0 }
     }
 
-    /// Anticipation, corrected by what was experienced.
+    /// The anticipation, corrected by experience.
     fn temper<E, A>(&self, anticipated: f64, experience: Option<&Experience<E, A>>) -> f64 {
         let Some(experience) = experience else {
             return anticipated;
         };
-        let (times, prior_n) = (f64::from(experience.times), self.parameters.anticipation_n);
+
+        let times = f64::from(experience.times);
+        let prior_n = self.parameters.anticipation_n;
         (times * experience.mean + prior_n * anticipated) / (times + prior_n)
     }
 }
 
-/// How much an affect presses an agent: its intensity if it is negative, else not at all \[I\].
+/// The condition in which an agent deliberates.
+struct Condition<E> {
+    feeling: Feeling<E>,
+    /// The action tendency of the emotion, if it has one.
+    tendency: Option<ActionTendency>,
+    /// From 0 (calm) to 1 (full pressure).
+    pressure: f64,
+}
+
+/// How much pressure an affect puts on an agent: its intensity if it is negative, and otherwise 0 \[I\].
 fn pressure(affect: Affect) -> f64 {
     (-affect.signed()).max(0.0)
 }
 
-/// Indices of the `count` greatest values; of equal ones, those that come first.
+/// Indices of the `count` greatest values. Of equal values, the first ones are taken.
 fn best_indices(values: &[f64], count: usize) -> Vec<usize> {
     let mut indices: Vec<usize> = (0..values.len()).collect();
     indices.sort_by(|&one, &other| values[other].total_cmp(&values[one]));
@@ -320,12 +388,15 @@ fn best_indices(values: &[f64], count: usize) -> Vec<usize> {
     indices
 }
 
+/// The action with the greatest value. Of equal values, the first one is taken.
 fn first_best<A: Clone>(weighed: &[(A, f64)]) -> Option<(A, f64)> {
     let mut best: Option<&(A, f64)> = None;
-    for one in weighed {
-        if best.is_none_or(|best| one.1 > best.1) {
-            best = Some(one);
+
+    for candidate in weighed {
+        if best.is_none_or(|best| candidate.1 > best.1) {
+            best = Some(candidate);
         }
     }
+
     best.cloned()
 }

@@ -1,4 +1,4 @@
-//! The multilevel process: three ways in which an emotion acts on behavior.
+//! The multilevel process: three ways in which emotion affects behavior.
 //!
 //! | Level | Sees | Decides | Counterpart in a hybrid architecture |
 //! | --- | --- | --- | --- |
@@ -6,9 +6,9 @@
 //! | [`Schematic`] | the emotion | which behaviors are active | assemblage, script |
 //! | [`Conceptual`] | past emotions, anticipated ones | which behavior is best | deliberative planning |
 //!
-//! The levels, what each may see and the correspondence are documented [D: S, Table 3; T], and so is that
-//! they can be built and tested one by one. So each works alone, and [`MultilevelProcess`] puts them together
-//! with a switch for each. The numbers are chosen here \[I\].
+//! The levels, what each of them sees, and their counterparts are documented [D: S, Table 3; T], and so is that they
+//! can be built and tested one by one. Each level therefore works alone, and [`MultilevelProcess`] combines them with
+//! a switch for each. The numbers are chosen here \[I\].
 
 mod conceptual;
 mod schematic;
@@ -25,15 +25,15 @@ use crate::akr::ActionTendency;
 use crate::label::{EmotionLabel, Feeling};
 use serde::{Deserialize, Serialize};
 
-/// Which levels take part. All by default; an experiment switches off what it wants to see without.
+/// The levels that are enabled, by default all of them. Experiments disable levels to measure their effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Levels {
-    /// Emotion modifies motor output.
+    /// Whether emotion modifies motor output.
     pub sensory_motor: bool,
-    /// Emotion controls which behaviors are active.
+    /// Whether emotion selects the active behaviors.
     pub schematic: bool,
-    /// The robot deliberates about emotions.
+    /// Whether the robot deliberates about emotions.
     pub conceptual: bool,
 }
 
@@ -47,36 +47,36 @@ impl Default for Levels {
     }
 }
 
-/// What the levels together make of a feeling.
+/// The combined effect of the levels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Influence<B> {
-    /// Factor on the motor output; 1 without the sensory-motor level.
+    /// Factor on motor output (dimensionless); 1 without the sensory-motor level.
     pub motor_gain: f64,
-    /// Behaviors that may run; the neutral set without the schematic level.
+    /// The active behaviors; the neutral set without the schematic level.
     pub active: Vec<B>,
-    /// What deliberation chose among them; none without the conceptual level or without a candidate.
+    /// The choice among the active behaviors; `None` without the conceptual level or without candidates.
     pub choice: Option<Choice<B>>,
 }
 
-/// The three levels together.
+/// The combination of the three levels.
 ///
-/// The schematic level says which behaviors may run, the conceptual level chooses among the candidates that
-/// are of that set, and the sensory-motor level modifies whatever runs. A level that is off changes
-/// nothing, so that any of the eight combinations is a robot that works \[I\].
+/// The schematic level selects the active behaviors, the conceptual level chooses among the candidates in that set,
+/// and the sensory-motor level modifies the output of the chosen behavior. A disabled level has no effect, so all
+/// eight combinations give a working robot \[I\].
 #[derive(Debug, Clone, PartialEq)]
 pub struct MultilevelProcess<E, B> {
-    /// The automatic level.
+    /// The level that modifies motor output.
     pub sensory_motor: SensoryMotor,
-    /// The level of prototypes.
+    /// The level that selects the active behaviors.
     pub schematic: Schematic<E, B>,
     /// The deliberative level.
     pub conceptual: Conceptual,
-    /// Which of them take part.
+    /// The levels that are enabled.
     pub levels: Levels,
 }
 
 impl<E: EmotionLabel, B: Clone + PartialEq> MultilevelProcess<E, B> {
-    /// What a feeling does to behavior. `tendency` is the action tendency of the emotion, if it has one.
+    /// The effect of a feeling on behavior. `tendency` is the action tendency of the emotion, if it has one.
     pub fn influence(
         &self,
         feeling: Feeling<E>,
@@ -89,22 +89,26 @@ impl<E: EmotionLabel, B: Clone + PartialEq> MultilevelProcess<E, B> {
         } else {
             1.0
         };
+
         let active = if self.levels.schematic {
             self.schematic.active(feeling.emotion)
         } else {
             self.schematic.neutral()
         };
+
         let choice = if self.levels.conceptual {
             let possible: Vec<Candidate<B>> = candidates
                 .iter()
                 .filter(|candidate| active.contains(candidate.action()))
                 .cloned()
                 .collect();
+
             self.conceptual
                 .deliberate(feeling, tendency, &possible, memory)
         } else {
             None
         };
+
         Influence {
             motor_gain,
             active: active.to_vec(),

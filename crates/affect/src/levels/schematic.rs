@@ -1,14 +1,14 @@
-//! The level of prototypes: an emotion makes a set of behaviors active.
+//! The schematic level, which selects the active behaviors by emotion.
 
 use crate::label::EmotionLabel;
 
-/// Which behaviors each emotion makes active.
+/// The set of active behaviors for each emotion.
 ///
 /// ```
 /// use affect::StandardEmotion::{Frustrated, Happy};
 /// use affect::levels::Schematic;
 /// let level = Schematic::new(vec!["wander", "serve"]).with(Frustrated, vec!["intercept"]);
-/// assert_eq!(level.active(Happy), ["wander", "serve"]); // no prototype of its own
+/// assert_eq!(level.active(Happy), ["wander", "serve"]); // no prototype: the neutral set
 /// assert_eq!(level.active(Frustrated), ["intercept"]);
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct Schematic<E, B> {
 }
 
 impl<E: EmotionLabel, B> Schematic<E, B> {
-    /// No prototype yet: every emotion makes the neutral set active.
+    /// Creates a level without prototypes, in which every emotion activates the neutral set.
     pub fn new(neutral: Vec<B>) -> Self {
         Self {
             neutral,
@@ -26,7 +26,7 @@ impl<E: EmotionLabel, B> Schematic<E, B> {
         }
     }
 
-    /// Adds the prototype of an emotion, or replaces it.
+    /// Adds or replaces the prototype of an emotion.
     #[must_use]
     pub fn with(mut self, emotion: E, behaviors: Vec<B>) -> Self {
         self.prototypes.retain(|(other, _)| *other != emotion);
@@ -34,13 +34,13 @@ impl<E: EmotionLabel, B> Schematic<E, B> {
         self
     }
 
-    /// The behaviors that this emotion makes active.
+    /// The behaviors that are active under this emotion.
     pub fn active(&self, emotion: E) -> &[B] {
         let prototype = self.prototypes.iter().find(|(other, _)| *other == emotion);
         prototype.map_or(&self.neutral, |(_, behaviors)| behaviors)
     }
 
-    /// The behaviors that are active for an emotion without prototype, or when emotion has no say.
+    /// The behaviors that are active under an emotion without a prototype, or when this level is disabled.
     pub fn neutral(&self) -> &[B] {
         &self.neutral
     }

@@ -1,4 +1,4 @@
-//! The automatic level: valence and intensity modify motor output.
+//! The sensory-motor level, in which valence and intensity modify motor output.
 
 use crate::akr::{Affect, Valence};
 use crate::parameters::{ParameterError, not_negative};
@@ -8,14 +8,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensoryMotorParameters {
-    /// Factor on motor output (dimensionless) under full negative affect. Default 1.5 \[I\]; that a concerned
-    /// refiller increases its speed [D: S, Table 2].
+    /// Factor on motor output (dimensionless) under full negative affect. Default 1.5 \[I\].
+    ///
+    /// It is documented that a concerned refiller increases its speed [D: S, Table 2].
     pub negative_gain: f64,
-    /// The same under full positive affect. Default 1 \[I\].
+    /// Factor on motor output (dimensionless) under full positive affect. Default 1 \[I\].
     pub positive_gain: f64,
-    /// Intensity at which the factor departs from 1. Default 0.45 \[I\], where CONCERNED begins.
+    /// Intensity above which the factor differs from 1. Default 0.45 \[I\], the threshold of CONCERNED.
     pub onset: f64,
-    /// Intensity at which it is reached. Default 0.45 \[I\]: the same as the onset, so that it comes at once.
+    /// Intensity from which the full factor applies. Default 0.45 \[I\], the same as the onset, which makes the change a
+    /// step.
     pub full: f64,
 }
 
@@ -30,7 +32,7 @@ impl Default for SensoryMotorParameters {
     }
 }
 
-/// The level that sees an [`Affect`] and nothing else, and gives a factor for motor output.
+/// A level that turns an [`Affect`] into a factor on motor output.
 ///
 /// ```
 /// use affect::akr::{Affect, Valence};
@@ -47,43 +49,48 @@ pub struct SensoryMotor {
 }
 
 impl SensoryMotor {
-    /// Checks the constants.
+    /// Creates a level with these parameters.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a factor or the onset is negative, or unless `onset <= full <= 1`.
     pub fn new(parameters: SensoryMotorParameters) -> Result<Self, ParameterError> {
         not_negative("negative_gain", parameters.negative_gain)?;
         not_negative("positive_gain", parameters.positive_gain)?;
         not_negative("onset", parameters.onset)?;
-        let SensoryMotorParameters { onset, full, .. } = parameters;
-        let ascends = onset <= full && full <= 1.0;
-        if ascends {
-            Ok(Self { parameters })
-        } else {
-            Err(ParameterError::NotAscending {
-                lower: onset,
-                upper: full,
-            })
+
+        let lower = parameters.onset;
+        let upper = parameters.full;
+        let ascends = lower <= upper && upper <= 1.0;
+        if !ascends {
+            return Err(ParameterError::NotAscending { lower, upper });
         }
+
+        Ok(Self { parameters })
     }
 
-    /// The factor: 1 below the onset, the gain of the valence from `full`, and linear in between.
+    /// The factor on motor output (dimensionless).
+    ///
+    /// It is 1 up to the onset, the gain of the valence from `full` on, and linear in between.
     pub fn gain(&self, affect: Affect) -> f64 {
-        let SensoryMotorParameters {
-            negative_gain,
-            positive_gain,
-            onset,
-            full,
-        } = self.parameters;
         let gain = match affect.valence {
-            Valence::Positive => positive_gain,
-            Valence::Negative => negative_gain,
+            Valence::Positive => self.parameters.positive_gain,
+            Valence::Negative => self.parameters.negative_gain,
         };
-        let intensity = affect.intensity.value();
-        let share = if intensity >= full {
+
+        1.0 + (gain - 1.0) * self.share(affect.intensity.value())
+    }
+
+    fn share(&self, intensity: f64) -> f64 {
+        let onset = self.parameters.onset;
+        let full = self.parameters.full;
+
+        if intensity >= full {
             1.0
         } else if intensity <= onset {
             0.0
         } else {
             (intensity - onset) / (full - onset)
-        };
-        1.0 + (gain - 1.0) * share
+        }
     }
 }

@@ -1,7 +1,7 @@
-//! A waiter that calls for a refiller, reduced to what the emotion needs: stock, distance, and one command.
+//! A waiter that calls for a refiller, reduced to the inputs of the emotion: stock, distance, and two commands.
 //!
-//! One tick: the refiller moves, a treat is taken, the state variables are updated, the ESG runs, the BSG
-//! runs. A command given in one tick is obeyed from the next.
+//! In each tick the refiller moves, a treat may be taken, the state variables are updated, and the ESG and the BSG
+//! run. A command takes effect in the next tick.
 
 use affect::StandardEmotion::{self, Concerned, Confident};
 use affect::behavior::{BehaviorGenerator, Row, Then::Stay};
@@ -19,7 +19,7 @@ pub(crate) const DT_S: f64 = 0.5;
 pub(crate) const FT_M: f64 = 0.3048;
 const REACH_M: f64 = 4.0 * FT_M;
 
-/// A change of emotion: when, to what, with how many treats left.
+/// A change of emotion: time in seconds, new emotion, treats left.
 pub(crate) type Change = (f64, StandardEmotion, u32);
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -78,6 +78,7 @@ pub(crate) struct Waiter {
 impl Waiter {
     pub(crate) fn new(parameters: &DynamicsParameters, caution: f64) -> Self {
         let dynamics = Dynamics::standard(parameters, Caution::new(caution).unwrap()).unwrap();
+
         Self {
             tick: 0,
             treats: 30,
@@ -107,10 +108,11 @@ impl Waiter {
         self.distance_m <= REACH_M + 1e-9
     }
 
-    /// One tick, in which a called refiller closes at `closing_mps`.
+    /// Runs one tick. The refiller, once called, approaches at `closing_mps`.
     pub(crate) fn tick(&mut self, closing_mps: f64) {
         self.tick += 1;
         self.update_state_variables(closing_mps);
+
         let measures = Measures {
             need_ratio: self.need_ratio(),
         };
@@ -120,6 +122,7 @@ impl Waiter {
             self.changes
                 .push((self.time_s(), feeling.emotion, self.treats));
         }
+
         self.update_behavior(feeling);
     }
 
@@ -127,8 +130,10 @@ impl Waiter {
         if self.is_called {
             self.distance_m -= closing_mps * DT_S;
         }
+
         let taken = u32::from(self.tick.is_multiple_of(2) && self.treats > 0);
         self.treats -= taken;
+
         self.rate.advance(DT_S, taken);
         self.approach.observe(self.distance_m, self.is_called, DT_S);
         self.bsg.advance(DT_S);
@@ -137,11 +142,9 @@ impl Waiter {
     fn need_ratio(&self) -> f64 {
         let per_second = self.rate.per_second();
         let empty_s = time_to_empty_s(f64::from(self.treats), per_second);
-        need_ratio(
-            self.approach.arrival_s(REACH_M).unwrap(),
-            empty_s,
-            per_second,
-        )
+        let arrival_s = self.approach.arrival_s(REACH_M).unwrap();
+
+        need_ratio(arrival_s, empty_s, per_second)
     }
 
     fn update_behavior(&mut self, feeling: Feeling<StandardEmotion>) {
@@ -150,6 +153,7 @@ impl Waiter {
             is_called: self.is_called,
             is_hurried: self.is_hurried,
         };
+
         for act in self.bsg.update(&context).actions {
             self.is_called = true;
             self.is_hurried |= act == Act::Hurry;
@@ -157,15 +161,17 @@ impl Waiter {
         }
     }
 
-    /// What a save and a restore through text make of the emotion.
+    /// Saves the waiter as text and restores it.
     pub(crate) fn through_text(&mut self) {
         let text = serde_json::to_string(self.esg.state()).unwrap();
         let state: EmotionState<StandardEmotion> = serde_json::from_str(&text).unwrap();
         assert!(self.esg.dynamics().accepts(&state));
         self.esg.restore(state);
+
         let text = serde_json::to_string(&(&self.rate, &self.approach, self.bsg.state())).unwrap();
         let (rate, approach, behavior) = serde_json::from_str(&text).unwrap();
-        (self.rate, self.approach) = (rate, approach);
+        self.rate = rate;
+        self.approach = approach;
         self.bsg.restore(behavior);
     }
 }

@@ -1,4 +1,4 @@
-//! Halls to test with, and what is always true of a world.
+//! Halls for tests, and the invariants of every world.
 
 use proptest::prelude::*;
 use rand::SeedableRng;
@@ -17,7 +17,7 @@ pub(crate) fn triangular(min: f64, mode: f64, max: f64) -> Triangular {
     Triangular::new(min, mode, max).unwrap()
 }
 
-/// The seed's hall: 50 ft by 50 ft, bodies of 2 ft, `count` guests, nothing else.
+/// The hall of the paper: 50 ft by 50 ft, bodies of 2 ft, and `count` guests, without obstacles or robots.
 pub(crate) fn reception(count: usize) -> Hall {
     Hall {
         field: Field {
@@ -36,7 +36,7 @@ pub(crate) fn reception(count: usize) -> Hall {
     }
 }
 
-/// The places of all bodies that must not overlap one another: robots, then guests.
+/// Positions of all bodies that must not overlap one another: robots, then guests.
 pub(crate) fn movers(world: &TestWorld) -> Vec<Point> {
     world
         .robots()
@@ -46,27 +46,37 @@ pub(crate) fn movers(world: &TestWorld) -> Vec<Point> {
         .collect()
 }
 
-/// Whether squares with these centers overlap, in the tests' own words; a nanometre counts as touching.
+/// Whether squares with these centers overlap, implemented independently. Up to 1 nm counts as touching.
 pub(crate) fn overlap(body_m: f64, a: Point, b: Point) -> bool {
     (a.x - b.x).abs().max((a.y - b.y).abs()) < body_m - 1e-9
 }
 
 pub(crate) fn is_inside(field: &Field, at: Point) -> bool {
     let half_m = field.body_m / 2.0;
-    let (left, right) = (at.x - half_m, at.x + half_m);
-    let (bottom, top) = (at.y - half_m, at.y + half_m);
-    // Twice the tolerance leaves room for the rounding of this very test.
-    left >= -2e-9
-        && bottom >= -2e-9
-        && right <= field.size_m.0 + 2e-9
-        && top <= field.size_m.1 + 2e-9
+    let left = at.x - half_m;
+    let right = at.x + half_m;
+    let bottom = at.y - half_m;
+    let top = at.y + half_m;
+
+    // Twice the tolerance, to allow for the rounding errors of this test.
+    let slack_m = 2e-9;
+    let (width_m, height_m) = field.size_m;
+
+    left >= -slack_m
+        && bottom >= -slack_m
+        && right <= width_m + slack_m
+        && top <= height_m + slack_m
 }
 
-/// The two promises of the crate: no body leaves the field, no two overlap (obstacles may among themselves).
+/// Asserts the two invariants of the crate: no body leaves the field, and no two bodies overlap. Only obstacles may
+/// overlap one another.
 pub(crate) fn check_promises(world: &TestWorld) {
-    let (field, movers) = (world.field(), movers(world));
+    let field = world.field();
+    let movers = movers(world);
+
     for (index, &at) in movers.iter().enumerate() {
         assert!(is_inside(field, at), "body {index} at {at} left the field");
+
         let others = movers[..index].iter().chain(world.obstacles());
         let hit = others
             .copied()
@@ -75,18 +85,29 @@ pub(crate) fn check_promises(world: &TestWorld) {
     }
 }
 
-/// Builds a world with the given share of the guests that fit; `hall.guests.count` is set accordingly.
+/// Builds a world filled to the given share of its capacity for guests, and sets `hall.guests.count` accordingly.
 pub(crate) fn crowded(hall: &mut Hall, share: f64, seed: u64) -> TestWorld {
     hall.guests.count = 1_000_000;
     let Err(HallError::NoRoom { room, .. }) = World::new(hall, rng(seed)) else {
         panic!("a million guests fit");
     };
+
     hall.guests.count = (share * room as f64).round() as usize;
     World::new(hall, rng(seed)).unwrap()
 }
 
+/// The center at the given shares of the way across the floor that centers can reach.
+fn place(field: &Field, share: (f64, f64)) -> Point {
+    let Field { size_m, body_m } = *field;
+
+    Point::new(
+        body_m / 2.0 + share.0 * (size_m.0 - body_m),
+        body_m / 2.0 + share.1 * (size_m.1 - body_m),
+    )
+}
+
 prop_compose! {
-    /// A hall of 3 to 14 bodies a side, with obstacles and robots anywhere, and guests of any pace.
+    /// A hall of 3 to 14 bodies per side, with obstacles and robots anywhere, and guests of any speed.
     pub(crate) fn any_hall()(
         body_m in 0.1..2.0,
         sides in (3.0..14.0, 3.0..14.0),
@@ -96,31 +117,39 @@ prop_compose! {
         bodies_a_tick in 0.0..1.5,
         tick_s in 0.01..1.0,
     ) -> Hall {
-        let round = |side: f64| if is_whole { side.round() } else { side };
-        let size_m = (round(sides.0) * body_m, round(sides.1) * body_m);
-        let field = Field { size_m, body_m };
-        let place = |(x, y): (f64, f64)| {
-            Point::new(body_m / 2.0 + x * (size_m.0 - body_m), body_m / 2.0 + y * (size_m.1 - body_m))
+        let (columns, rows) = if is_whole {
+            (f64::round(sides.0), f64::round(sides.1))
+        } else {
+            sides
         };
-        let obstacles: Vec<Point> = obstacles.into_iter().map(place).collect();
+        let field = Field {
+            size_m: (columns * body_m, rows * body_m),
+            body_m,
+        };
+
+        let obstacles: Vec<Point> = obstacles.into_iter().map(|share| place(&field, share)).collect();
         let mut apart: Vec<Point> = Vec::new();
-        for robot in robots.into_iter().map(place) {
-            if !obstacles.iter().chain(&apart).any(|&other| overlap(body_m, robot, other)) {
+        for share in robots {
+            let robot = place(&field, share);
+            let mut others = obstacles.iter().chain(&apart);
+
+            if !others.any(|&other| overlap(body_m, robot, other)) {
                 apart.push(robot);
             }
         }
-        let fastest = bodies_a_tick * body_m / tick_s;
+
+        let fastest_mps = bodies_a_tick * body_m / tick_s;
         Hall {
             field,
             obstacles,
             guests: Guests {
                 count: 0,
-                speed_mps: triangular(0.0, fastest / 2.0, fastest),
+                speed_mps: triangular(0.0, fastest_mps / 2.0, fastest_mps),
                 duration_s: triangular(0.0, 3.0 * tick_s, 30.0 * tick_s),
             },
             robots: apart,
             tick_s,
-            max_speed_mps: fastest,
+            max_speed_mps: fastest_mps,
         }
     }
 }

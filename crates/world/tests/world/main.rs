@@ -1,8 +1,8 @@
-//! The rules of the environment, tested from outside, against an implementation that is as simple as it can be.
+//! Tests of the environment's rules through the public interface, against the simplest possible implementation.
 
 #![expect(
     clippy::unwrap_used,
-    reason = "helpers of tests fail as tests do; clippy.toml excepts only `#[test]`"
+    reason = "test helpers may panic; clippy.toml only exempts `#[test]` functions"
 )]
 
 mod guests;

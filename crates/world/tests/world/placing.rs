@@ -1,4 +1,4 @@
-//! Where bodies stand at the start, and what is said when they cannot.
+//! Initial placement, and the errors for halls that cannot be built.
 
 use crate::halls::{FT, any_hall, check_promises, crowded, reception, rng, triangular};
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use world::{BODIES_MAX, Field, Hall, HallError, Point, World};
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Any number of guests up to what the error promises can be placed, and then nobody overlaps.
+    /// Any number of guests up to the capacity given in the error can be placed, without overlap.
     #[test]
     fn what_fits_is_placed(mut hall in any_hall(), share in 0.0..=1.0, seed in any::<u64>()) {
         for share in [share, 1.0] {
@@ -20,13 +20,16 @@ proptest! {
         }
     }
 
-    /// The room in rows is that of the lattice, less at most four cells for each body in the way.
+    /// The capacity in rows is that of the lattice, minus at most four cells for each obstacle or robot.
     #[test]
-    fn the_room_is_that_of_the_lattice(mut hall in any_hall(), seed in any::<u64>()) {
+    fn the_capacity_is_that_of_the_lattice(mut hall in any_hall(), seed in any::<u64>()) {
         let world = crowded(&mut hall, 1.0, seed);
         let Field { size_m, body_m } = hall.field;
-        let along = |side_m: f64| (side_m / body_m + 1e-6).floor() as usize;
-        let (lattice, in_the_way) = (along(size_m.0) * along(size_m.1), hall.obstacles.len() + hall.robots.len());
+        let columns = (size_m.0 / body_m + 1e-6).floor() as usize;
+        let rows = (size_m.1 / body_m + 1e-6).floor() as usize;
+        let lattice = columns * rows;
+        let in_the_way = hall.obstacles.len() + hall.robots.len();
+
         prop_assert!(world.guests().len() <= lattice);
         prop_assert!(world.guests().len() + 4 * in_the_way >= lattice);
         if in_the_way == 0 {
@@ -36,7 +39,7 @@ proptest! {
 }
 
 #[test]
-fn the_reception_takes_any_number_up_to_the_lattice() {
+fn the_reception_holds_any_number_of_guests_up_to_the_lattice() {
     for count in (0..=625).step_by(25).chain(620..=625) {
         for seed in 0..4 {
             let world = World::new(&reception(count), rng(seed)).unwrap();
@@ -44,9 +47,10 @@ fn the_reception_takes_any_number_up_to_the_lattice() {
             check_promises(&world);
         }
     }
+
     assert_eq!(
         text(&reception(626)),
-        "626 guests do not fit: in rows, beside obstacles and robots, there is room for 625"
+        "626 guests do not fit: obstacles and robots leave room for 625"
     );
 }
 
@@ -56,6 +60,7 @@ fn an_obstacle_on_the_lattice_costs_one_place() {
     hall.obstacles = vec![Point::new(3.0 * FT, 3.0 * FT)];
     hall.robots = vec![Point::new(25.0 * FT, 25.0 * FT)];
     check_promises(&World::new(&hall, rng(1)).unwrap());
+
     hall.guests.count = 624;
     assert_eq!(
         World::new(&hall, rng(1)).unwrap_err(),
@@ -68,7 +73,8 @@ fn an_obstacle_on_the_lattice_costs_one_place() {
 
 #[test]
 fn rows_close_up_behind_bodies_off_the_lattice() {
-    // Robots at 0.9..1.9 and 2.9..3.9 of 5 m: one guest fits between and one beyond; the lattice had one cell.
+    // Robots at 0.9..1.9 and 2.9..3.9 of 5 m: one guest fits between them and one to the right. Only one cell of
+    // the lattice is free.
     let field = Field {
         size_m: (5.0, 1.0),
         body_m: 1.0,
@@ -79,6 +85,7 @@ fn rows_close_up_behind_bodies_off_the_lattice() {
         ..reception(2)
     };
     check_promises(&World::new(&hall, rng(1)).unwrap());
+
     hall.guests.count = 3;
     assert_eq!(
         World::new(&hall, rng(1)).unwrap_err(),
@@ -87,44 +94,66 @@ fn rows_close_up_behind_bodies_off_the_lattice() {
 }
 
 #[test]
-fn a_crowd_below_the_jam_stands_anywhere() {
-    // Scattered uniformly: every sixteenth of the floor gets its share, and no two share a column's x.
+fn a_sparse_crowd_is_scattered_uniformly() {
+    // Every sixteenth of the floor gets its share, and no two guests have the same x.
     let mut sixteenths = [0.0; 16];
     let mut columns = BTreeSet::new();
+
     for seed in 0..200 {
         let world = World::new(&reception(100), rng(seed)).unwrap();
         for at in world.guests() {
-            let part = |along_m: f64| ((along_m - FT) / (48.0 * FT) * 4.0) as usize;
-            sixteenths[part(at.x) * 4 + part(at.y)] += 1.0 / 1250.0;
+            sixteenths[quarter(at.x) * 4 + quarter(at.y)] += 1.0 / 1250.0;
             columns.insert(at.x.to_bits());
         }
     }
+
     assert_eq!(columns.len(), 20_000);
-    // Those at the edges have fewer neighbors and get a little more.
+    // Positions at the edges have fewer neighbors and are slightly more likely.
     assert!(
         sixteenths.iter().all(|share| (0.85..1.2).contains(share)),
         "{sixteenths:?}"
     );
 }
 
+/// The quarter of the reachable floor, from 0 to 3, that a coordinate falls into.
+fn quarter(along_m: f64) -> usize {
+    ((along_m - FT) / (48.0 * FT) * 4.0) as usize
+}
+
 #[test]
-fn a_jammed_crowd_is_a_random_choice_of_the_lattice() {
-    let place = |seed| {
-        World::new(&reception(500), rng(seed))
-            .unwrap()
-            .guests()
-            .to_vec()
-    };
-    let cell = |at: &Point| ((at.x / (2.0 * FT)) as usize, (at.y / (2.0 * FT)) as usize);
+fn a_dense_crowd_is_a_random_choice_of_the_lattice() {
     let mut taken = BTreeSet::new();
-    for seed in 0..10 {
-        let cells: BTreeSet<_> = place(seed).iter().map(cell).collect();
-        assert_eq!(cells.len(), 500, "one in a cell");
-        taken.extend(cells);
+    let mut first = BTreeSet::new();
+
+    for seed in 0..50 {
+        let cells = cells_of_dense_crowd(seed);
+        first.insert(cells[0]);
+
+        if seed < 10 {
+            let distinct = BTreeSet::from_iter(cells);
+            assert_eq!(distinct.len(), 500, "one guest per cell");
+            taken.extend(distinct);
+        }
     }
-    assert_eq!(taken.len(), 625, "no cell is left out");
-    let first: BTreeSet<_> = (0..50).map(|seed| cell(&place(seed)[0])).collect();
-    assert!(first.len() > 40, "guest 0 stands anywhere: {}", first.len());
+
+    assert_eq!(taken.len(), 625, "every cell is used");
+    assert!(
+        first.len() > 40,
+        "guest 0 is not placed at random: {} cells",
+        first.len()
+    );
+}
+
+/// Column and row of each of 500 guests at the reception.
+fn cells_of_dense_crowd(seed: u64) -> Vec<(usize, usize)> {
+    let world = World::new(&reception(500), rng(seed)).unwrap();
+    let cell_m = 2.0 * FT;
+
+    world
+        .guests()
+        .iter()
+        .map(|at| ((at.x / cell_m) as usize, (at.y / cell_m) as usize))
+        .collect()
 }
 
 #[test]
@@ -137,11 +166,15 @@ fn obstacles_may_touch_and_overlap() {
     check_promises(&World::new(&hall, rng(1)).unwrap());
 }
 
+fn at(x: f64, y: f64) -> Point {
+    Point::new(x, y)
+}
+
 fn text(hall: &Hall) -> String {
     World::new(hall, rng(0)).unwrap_err().to_string()
 }
 
-/// The reception of 100, made wrong.
+/// The error for a reception of 100 guests after `change`.
 fn wrong(change: impl FnOnce(&mut Hall)) -> String {
     let mut hall = reception(100);
     change(&mut hall);
@@ -149,16 +182,15 @@ fn wrong(change: impl FnOnce(&mut Hall)) -> String {
 }
 
 #[test]
-fn misplaced_bodies_are_named() {
-    let at = |x, y| Point::new(x, y);
+fn misplaced_bodies_are_reported() {
     for (actual, expected) in [
         (
             wrong(|hall| hall.obstacles = vec![at(5.0, 5.0), at(0.2, 5.0)]),
-            "obstacle 1 at (0.2, 5) m does not lie wholly inside the field",
+            "obstacle 1 at (0.2, 5) m is not entirely inside the field",
         ),
         (
             wrong(|hall| hall.robots = vec![at(5.0, f64::NAN)]),
-            "robot 0 at (5, NaN) m does not lie wholly inside the field",
+            "robot 0 at (5, NaN) m is not entirely inside the field",
         ),
         (
             wrong(|hall| hall.robots = vec![at(5.0, 5.0), at(7.0, 5.0), at(5.5, 5.0)]),
@@ -177,19 +209,19 @@ fn misplaced_bodies_are_named() {
 }
 
 #[test]
-fn numbers_out_of_range_are_named() {
+fn numbers_out_of_range_are_reported() {
     for (actual, expected) in [
         (
             wrong(|hall| hall.field.size_m.0 = f64::NAN),
-            "field width_m is NaN; it must be a number from 0.001 to 1000000.0",
+            "field width_m is NaN; must be a number from 0.001 to 1000000.0",
         ),
         (
             wrong(|hall| hall.field.size_m.1 = 2e6),
-            "field height_m is 2000000.0; it must be a number from 0.001 to 1000000.0",
+            "field height_m is 2000000.0; must be a number from 0.001 to 1000000.0",
         ),
         (
             wrong(|hall| hall.field.body_m = 0.0),
-            "body_m is 0.0; it must be a number from 0.001 to 1000000.0",
+            "body_m is 0.0; must be a number from 0.001 to 1000000.0",
         ),
         (
             wrong(|hall| {
@@ -198,19 +230,19 @@ fn numbers_out_of_range_are_named() {
                     body_m: 2.0,
                 }
             }),
-            "a field of 1 m by 3 m has no room for a body of 2 m",
+            "a field of 1 m by 3 m is too small for a body of 2 m",
         ),
         (
             wrong(|hall| hall.tick_s = -0.1),
-            "tick_s is -0.1; it must be a number from 1e-6 to 1000000.0",
+            "tick_s is -0.1; must be a number from 1e-6 to 1000000.0",
         ),
         (
             wrong(|hall| hall.max_speed_mps = f64::INFINITY),
-            "max_speed_mps is inf; it must be a number from 0.0 to 1000000.0",
+            "max_speed_mps is inf; must be a number from 0.0 to 1000000.0",
         ),
         (
             wrong(|hall| hall.guests.count = usize::MAX),
-            "18446744073709551615 bodies; at most 16777216 are supported",
+            "18446744073709551615 bodies are too many; at most 16777216 are supported",
         ),
     ] {
         assert_eq!(actual, expected);
@@ -218,8 +250,8 @@ fn numbers_out_of_range_are_named() {
 }
 
 #[test]
-fn the_limits_themselves_are_answered() {
-    // The most guests asked for where one fits, the largest field, the smallest body: an answer, soon.
+fn halls_at_the_limits_are_handled() {
+    // The most guests in the smallest field, then the smallest bodies in the largest field, must both finish quickly.
     let mut hall = Hall {
         field: Field {
             size_m: (1.0, 1.0),
@@ -234,6 +266,7 @@ fn the_limits_themselves_are_answered() {
             room: 1
         }
     );
+
     hall.field = Field {
         size_m: (1e6, 1e6),
         body_m: 1e-3,
@@ -241,6 +274,8 @@ fn the_limits_themselves_are_answered() {
     hall.guests.count = 1000;
     hall.guests.speed_mps = triangular(1e6, 1e6, 1e6);
     let mut world = World::new(&hall, rng(0)).unwrap();
-    (0..100).for_each(|_| drop(world.advance(&[])));
+    for _ in 0..100 {
+        world.advance(&[]);
+    }
     check_promises(&world);
 }
