@@ -60,6 +60,7 @@ export class Charts {
     this.renderSelect(names);
     const robots = history.variables.get(this.variable);
     const { clientWidth: width, clientHeight: height } = this.chart;
+
     if (!robots || width === 0 || height === 0) {
       if (!robots) this.forget();
       return;

@@ -47,6 +47,7 @@ export class Connection {
 
     const socket = new WebSocket(url);
     this.socket = socket;
+
     socket.addEventListener("open", () => {
       this.pause_ms = FIRST_PAUSE_MS;
       this.onConnection(true);

@@ -34,6 +34,7 @@ export class Controls {
     this.store = store;
     this.transport = transport;
     this.isStopAsked = false;
+
     document.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -155,6 +156,7 @@ export class Controls {
     const { store } = this;
     let word = "no simulator";
     let tone = "warning";
+
     if (store.mode === "recording") {
       word = "recording";
       tone = "neutral";
@@ -165,7 +167,6 @@ export class Controls {
       word = "connected";
       tone = "good";
     }
-
 
     return html`<span class="connection"><span class="dot ${tone}"></span><span data-testid="connection">${word}</span></span>`;
   }

@@ -51,10 +51,13 @@ export function faultsOf(setup, body_m, tick_s, length) {
 
   const { field_m, guests, seed, duration_s, log_file } = setup;
   const isField = field_m.every((size) => size >= body_m && size <= 1e5);
+
   fault("field_m", !isField, `Each side must be a length of at least ${length(body_m)}, the size of a body.`);
   fault("guests", !isWhole(guests, MOST_GUESTS), "The number of guests must be a whole number, 0 or more.");
+
   if (isField && Number.isFinite(guests)) {
-    const room = Math.floor((field_m[0] * field_m[1]) / (body_m * body_m)) - setup.obstacles.length - Object.keys(setup.robots).length;
+    const places = Math.floor((field_m[0] * field_m[1]) / (body_m * body_m));
+    const room = places - setup.obstacles.length - Object.keys(setup.robots).length;
     fault("guests", guests > room, `There is no room for so many guests: ${Math.max(0, room)} at most.`);
   }
 
@@ -62,8 +65,9 @@ export function faultsOf(setup, body_m, tick_s, length) {
   fault("guest_duration_s", rangeFault(setup.guest_duration_s) !== "", rangeFault(setup.guest_duration_s));
   fault("seed", !isWhole(seed, MOST_SEED), `The seed must be a whole number from 0 to ${MOST_SEED}.`);
   fault("duration_s", !(duration_s >= tick_s), `The run must last at least one tick, ${short(tick_s)} s.`);
-  fault("log_file.name", log_file.enabled && !/^[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}$/.test(log_file.name),
-    "The name may have letters, digits, dots, dashes and underscores, and no folder.");
+
+  const isName = /^[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}$/.test(log_file.name);
+  fault("log_file.name", log_file.enabled && !isName, "The name may have letters, digits, dots, dashes and underscores, and no folder.");
   if (isField) placeFaults(setup, body_m, fault);
 
   return faults;

@@ -34,6 +34,7 @@ export function field({ context, camera, theme }, step_m) {
   const height = height_m * camera.scale;
   context.fillStyle = theme.field;
   context.fillRect(left, top, width, height);
+
   if (step_m * camera.scale >= 6) {
     context.beginPath();
     for (let x = step_m; x < width_m - 1e-9; x += step_m) line(context, camera.x(x), top, camera.x(x), top + height);
@@ -137,6 +138,7 @@ export function trail({ context, camera, theme }, track, from, to, end) {
     const last = from + Math.floor(((to - from) * (piece + 1)) / pieces);
     context.globalAlpha = 0.08 + (0.5 * (piece + 1)) / pieces;
     context.beginPath();
+
     for (let i = first; i <= last && i < to; i += 1) {
       const x = track.x_m[i];
       const y = track.y_m[i];

@@ -29,6 +29,7 @@ export class Gestures {
     this.pointers = new Map();
     this.travel_px = 0;
     this.isEditing = false;
+
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.up(event, true));
@@ -54,6 +55,7 @@ export class Gestures {
     this.pointers.set(event.pointerId, at);
     this.canvas.setPointerCapture(event.pointerId);
     this.travel_px = 0;
+
     if (this.pointers.size > 1) {
       this.endEdit();
     } else if (event.button === 0 && this.client.editor.isActive) {

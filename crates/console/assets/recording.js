@@ -126,7 +126,6 @@ export class Player {
     const record = chunk.ticks.find((one) => one.tick === tick) ?? chunk.ticks.at(-1);
     if (seek !== this.seeks || !record) return;
 
-
     const flights = isPlayed ? chunk.flights.filter((flight) => flight.tick > this.tick && flight.tick <= tick) : [];
     this.tick = record.tick;
     this.store.show(this.frame(header, record, flights));

@@ -62,6 +62,7 @@ export class SetupView {
     if (!this.draft) return new Map();
     const length = (/** @type {number} */ length_m) => this.units.length(length_m, 2);
     const faults = faultsOf(this.draft, this.body_m, this.store.frame?.tick_s ?? 0, length);
+
     for (const [field, reason] of this.refused) {
       if (!faults.has(field)) faults.set(field, reason);
     }
@@ -194,7 +195,6 @@ export class SetupView {
   async save() {
     const answer = await this.request({ do: "setup" });
     if (answer.answer !== "setup") return this.notices.show(answer);
-
 
     const anchor = document.createElement("a");
     anchor.href = URL.createObjectURL(new Blob([answer.scenario], { type: "application/toml" }));

@@ -123,6 +123,7 @@ export class Store {
     const isNew = !last || frame.epoch !== last.epoch || frame.run !== last.run;
     this.frame = frame;
     this.frameAt_ms = performance.now();
+
     if (this.mode === "live") {
       if (isNew || frame.tick < last.tick) this.history.clear();
       this.history.add(frame.time_s, frame.robots);
