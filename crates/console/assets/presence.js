@@ -27,6 +27,6 @@ export function presence({ name, presence, generation }, awaiting) {
 export function because(because) {
   if (because === "not_joined") return "has not joined yet";
   if (because === "gone") return "its process or its link is down";
-  if (because === "silent") return "is there but has not reported";
+  if (because === "silent") return "is connected but has not reported";
   return `waits for ${because.waits_for}`;
 }
