@@ -16,7 +16,7 @@ def shows(page, phase, at_tick=None):
 
 
 def test_step_start_pause_speed_and_init(launch, open_page):
-    run = launch(options=("--speed", "20"))
+    run = launch(options=("--speed", "20", "--duration", "100000 s"))
     page = open_page(run.address)
     shows(page, "ready", 0)
 
