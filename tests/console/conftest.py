@@ -1,4 +1,4 @@
-"""One Chromium for all tests; a launch, and pages that must not complain, for each."""
+"""One Chromium for all tests; launches and pages for each."""
 
 import os
 import pathlib
@@ -24,7 +24,7 @@ def browser():
 
 @pytest.fixture
 def launch(tmp_path):
-    """Starts launches; they end with the test."""
+    """Starts launches and ends them with the test."""
     started = []
 
     def start(**options):
@@ -32,6 +32,7 @@ def launch(tmp_path):
         return started[-1]
 
     yield start
+
     for one in started:
         one.end()
         print(one.processes.logs())
@@ -39,28 +40,35 @@ def launch(tmp_path):
 
 @pytest.fixture
 def open_page(browser):
-    """Opens pages. None of them may print an error, throw one, or ask anything in a dialog."""
-    contexts, complaints = [], []
+    """Opens pages. A test fails if one of them logs an error or warning, throws, or opens a dialog."""
+    contexts = []
+    errors = []
 
-    def complain(message):
+    def on_console(message):
         if message.type in ("error", "warning"):
-            complaints.append(f"console: {message.text} ({message.location})")
+            errors.append(f"console: {message.text} ({message.location})")
+
+    def on_dialog(dialog):
+        errors.append(f"dialog: {dialog.message}")
+        dialog.dismiss()
 
     def open_at(address, width=1440, height=900, scheme="light", **options):
         viewport = {"width": width, "height": height}
         context = browser.new_context(viewport=viewport, color_scheme=scheme, **options)
         contexts.append(context)
+
         page = context.new_page()
-        page.on("console", complain)
-        page.on("pageerror", lambda error: complaints.append(f"thrown: {error}"))
-        page.on("dialog", lambda dialog: (complaints.append(f"dialog: {dialog.message}"), dialog.dismiss()))
+        page.on("console", on_console)
+        page.on("pageerror", lambda error: errors.append(f"thrown: {error}"))
+        page.on("dialog", on_dialog)
         page.goto(address)
         return page
 
     yield open_at
+
     for context in contexts:
         context.close()
-    assert complaints == []
+    assert errors == []
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""A real launch to test the console with: a simulator, robots and a console, each a process of its own."""
+"""A real launch to test the console with: simulator, robots and console, each in its own process."""
 
 import json
 import os
@@ -16,18 +16,19 @@ PATIENCE_S = 20.0
 
 
 def eventually(what, ready, patience_s=PATIENCE_S):
-    """Waits until `ready()` gives something, returns it, and fails if it never does."""
+    """Waits until `ready()` returns a true value, and returns it."""
     end = time.monotonic() + patience_s
+
     while True:
         found = ready()
         if found:
             return found
-        assert time.monotonic() < end, f"waited in vain for {what}"
+        assert time.monotonic() < end, f"no {what} within {patience_s} s"
         time.sleep(0.02)
 
 
 def until(page, expression):
-    """Waits until an expression holds in the page, whose policy lets nobody wait inside it."""
+    """Waits until an expression is true in the page, whose policy forbids Playwright's own `wait_for_function`."""
     return eventually(expression, lambda: page.evaluate(expression))
 
 
@@ -38,7 +39,7 @@ def free_port():
 
 
 class Processes:
-    """Processes that end with the test."""
+    """Processes, each with a log file."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -48,8 +49,10 @@ class Processes:
         log = open(self.folder / f"{name}-{len(self.all)}.log", "wb")
         environment = {**os.environ, **(environment or {})}
         command = [str(BIN / name), *map(str, arguments)]
+
         process = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stderr=log, **options)
         log.close()
+
         self.all.append(process)
         return process
 
@@ -64,10 +67,12 @@ class Processes:
 
 
 def start_console(processes, *arguments, environment=None):
-    """Starts a console and returns its address."""
+    """Starts a console and returns its URL."""
     arguments = ("--bind", "127.0.0.1:0", *arguments)
     process = processes.start("cars-console", *arguments, environment=environment, stdout=subprocess.PIPE)
-    assert select.select([process.stdout], [], [], PATIENCE_S)[0], "the console does not say where it is"
+
+    assert select.select([process.stdout], [], [], PATIENCE_S)[0], "the console prints no URL"
+
     line = process.stdout.readline().decode()
     found = re.fullmatch(r"console: (http://\S+)\n", line)
     assert found, f"{line!r}\n{processes.logs()}"
@@ -84,7 +89,12 @@ class Launch:
         self.run_folder = folder / "runs" / self.RUN
         self.processes = Processes(folder)
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
-        self.environment = {"CARS_RUN": self.RUN, "CARS_CONNECT": self.endpoint, "CARS_LISTEN": self.endpoint}
+        self.environment = {
+            "CARS_RUN": self.RUN,
+            "CARS_CONNECT": self.endpoint,
+            "CARS_LISTEN": self.endpoint,
+        }
+
         self.simulator = self.start("cars-sim", scenario, "--out", folder / "runs", "--paused", *options)
         self.robots = {name: self.start(f"cars-{name.lower()}", "--name", name) for name in robots}
         self.address = start_console(self.processes, environment=self.environment)
@@ -101,8 +111,9 @@ class Launch:
         self.robots[robot] = self.start(f"cars-{robot.lower()}", "--name", robot)
 
     def status(self):
-        """What the simulator itself says; none if it does not answer."""
+        """The simulator's status; `None` if it does not answer."""
         command = [BIN / "cars", "ctl", "status", "--json", "--run", self.RUN, "--connect", self.endpoint]
+
         answer = subprocess.run(command, capture_output=True, timeout=PATIENCE_S, cwd=self.folder)
         return json.loads(answer.stdout) if answer.returncode == 0 else None
 
@@ -111,9 +122,10 @@ class Launch:
         return [json.loads(line) for line in lines if line.endswith("}")]
 
     def put(self, key, message):
-        """Puts a message on a key below the run's, as anybody on the bus can."""
+        """Puts a message on a key of the run, as any zenoh client can."""
         helper = BIN / "examples" / "put"
         command = [helper, self.endpoint, f"cars/{self.RUN}/{key}"]
+
         subprocess.run(command, input=json.dumps(message).encode(), check=True, timeout=PATIENCE_S)
 
     def end(self):

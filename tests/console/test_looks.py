@@ -1,4 +1,4 @@
-"""How it looks and how smoothly it is drawn; the pictures are kept for people to look at."""
+"""Layout, colors and frame rate; the screenshots are kept for people to look at."""
 
 import pytest
 from playwright.sync_api import expect
@@ -6,20 +6,23 @@ from playwright.sync_api import expect
 from lab import until
 
 SIZES = [(1440, 900), (390, 844)]
-# As smooth as the design asks for on a machine of its own; machines differ, so what fails is far below.
-WANTED_FPS, LEAST_FPS = 25, 15
+# The design demands this on an otherwise idle machine.
+WANTED_FPS = 25
+# The limit of the test is lower, because other machines are slower or under load.
+LEAST_FPS = 15
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width, height", SIZES)
 def test_everything_can_be_seen(launch, open_page, screenshots, width, height, scheme):
-    three = {"scenario": "configs/three_robots.toml", "robots": ("Butler", "Leguin", "Vonda")}
-    run = launch(**three, options=("--speed", "20"))
+    robots = ("Butler", "Leguin", "Vonda")
+    run = launch(scenario="configs/three_robots.toml", robots=robots, options=("--speed", "20"))
     page = open_page(run.address, width, height, scheme)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("trails").check()
     page.get_by_test_id("btn-start").click()
     until(page, "window.carsConsole.frame().tick > 40")
+
     name = f"{width}x{height}-{scheme}"
     for tab in ("log", "charts", "setup"):
         if tab == "setup":
@@ -30,21 +33,25 @@ def test_everything_can_be_seen(launch, open_page, screenshots, width, height, s
         page.screenshot(path=screenshots / f"{tab}-{name}.png", full_page=width < 1000)
         too_wide = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
         assert too_wide <= 0, f"{tab} is {too_wide} px wider than the window"
+
     for test_id in ("plan", "phase", "tick", "btn-start", "btn-pause", "btn-step", "btn-init", "btn-stop", "speed"):
         box = page.get_by_test_id(test_id).bounding_box()
-        assert box and box["width"] > 0 and box["x"] >= 0 and box["x"] + box["width"] <= width, f"{test_id}: {box}"
+        assert box and box["width"] > 0, f"{test_id}: {box}"
+        assert box["x"] >= 0 and box["x"] + box["width"] <= width, f"{test_id}: {box}"
+
     page.get_by_test_id("tab-charts").click()
     expect(page.get_by_test_id("bands")).to_be_visible()
     choices = page.get_by_test_id("chart-variable").locator("option").all_inner_texts()
     assert any("treats" in choice for choice in choices), choices
 
 
-def test_what_is_drawn_is_what_the_plan_says(launch, open_page):
+def test_robots_obstacles_and_floor_are_drawn_in_their_colors(launch, open_page):
     """A pixel in the middle of an obstacle is dark, one of a robot reddish, one of the empty floor neither."""
     run = launch(options=("--set", "guests.count=0"))
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.wait_for_timeout(300)
+
     pixel = """([x, y]) => {
         const canvas = document.querySelector('[data-testid=plan]'), box = canvas.getBoundingClientRect();
         const at = window.carsConsole.toClient(x, y), scale = canvas.width / box.width;
@@ -52,8 +59,11 @@ def test_what_is_drawn_is_what_the_plan_says(launch, open_page):
         copy.drawImage(canvas, -(at.x - box.left) * scale, -(at.y - box.top) * scale);
         return [...copy.getImageData(0, 0, 1, 1).data].slice(0, 3);
     }"""
-    obstacle, floor = (page.evaluate(pixel, at) for at in ([0.45, 0.45], [12.3, 11.3]))
+
+    obstacle = page.evaluate(pixel, [0.45, 0.45])
+    floor = page.evaluate(pixel, [12.3, 11.3])
     assert sum(obstacle) < 200 < sum(floor), (obstacle, floor)
+
     red, green, blue = page.evaluate(pixel, [7.62 + 0.22, 7.62])
     assert red > green and red > blue, (red, green, blue)
 
@@ -66,11 +76,13 @@ def test_ten_thousand_guests_move_smoothly(launch, open_page, screenshots):
     page.get_by_test_id("btn-start").click()
     until(page, "window.carsConsole.frame().tick > 10")
     assert len(page.evaluate("window.carsConsole.frame().guests")) == 10_000
+
     rates = []
     for _ in range(5):
         page.wait_for_timeout(1000)
         rates.append(page.evaluate("window.carsConsole.fps()"))
+
     page.screenshot(path=screenshots / "ten-thousand-guests.png")
     rate = sorted(rates)[len(rates) // 2]
-    print(f"10,000 guests: {rate:.0f} pictures/s (median of {rates}), wanted {WANTED_FPS}")
+    print(f"10,000 guests: {rate:.0f} frames/s (median of {rates}), wanted {WANTED_FPS}")
     assert rate >= LEAST_FPS

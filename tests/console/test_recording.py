@@ -1,4 +1,4 @@
-"""A run of the past."""
+"""A recorded run."""
 
 import pytest
 from playwright.sync_api import expect
@@ -16,7 +16,7 @@ def recorded(launch, tmp_path):
 
 
 def move(page, tick):
-    """Moves the scrub bar as a hand does."""
+    """Moves the scrub bar and fires its events."""
     page.get_by_test_id("scrub").evaluate(
         "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true}));"
         " bar.dispatchEvent(new Event('change', {bubbles: true})); }",
@@ -31,19 +31,23 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     assert page.get_by_test_id("scrub").get_attribute("max") == "200"
     assert page.get_by_test_id("btn-start").count() == 0, "there is nothing to control"
     expect(page.get_by_test_id("tab-setup")).to_be_hidden()
+
     move(page, 150)
     expect(page.get_by_test_id("tick")).to_have_text("150")
     expect(page.get_by_test_id("time")).to_contain_text("75.0")
     at_150 = page.evaluate("window.carsConsole.frame()")
-    assert len(at_150["guests"]) == 100 and len(at_150["robots"]) == 2
+    assert len(at_150["guests"]) == 100
+    assert len(at_150["robots"]) == 2
     expect(page.get_by_test_id("panel-Butler")).to_contain_text(at_150["robots"][0]["emotion_state"])
     page.screenshot(path=screenshots / "recording-1440x900-light.png")
+
     move(page, 20)
     expect(page.get_by_test_id("tick")).to_have_text("20")
     assert page.evaluate("window.carsConsole.frame().guests") != at_150["guests"]
     move(page, 150)
     expect(page.get_by_test_id("tick")).to_have_text("150")
     assert page.evaluate("window.carsConsole.frame().guests") == at_150["guests"]
+
     page.get_by_test_id("play").click()
     until(page, "window.carsConsole.frame().tick > 160")
     page.get_by_test_id("play").click()
@@ -51,6 +55,7 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     page.wait_for_timeout(300)
     assert abs(int(page.get_by_test_id("tick").inner_text()) - int(held)) <= 1
     expect(page.get_by_test_id("log")).to_contain_text("initialized, seed 2002")
+
     page.get_by_test_id("speed").select_option("max")
     page.get_by_test_id("play").click()
     expect(page.get_by_test_id("tick")).to_have_text("200")

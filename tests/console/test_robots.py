@@ -1,4 +1,4 @@
-"""What is shown of robots: their panels, that they are there, and that nothing they say does anything."""
+"""Panels and presence of robots, and that no content of a panel is executed."""
 
 import random
 
@@ -14,12 +14,14 @@ def test_three_robots_show_three_panels(launch, open_page):
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-step").click()
+
     seen = []
     for name in THREE["robots"]:
         panel = page.get_by_test_id(f"panel-{name}")
         expect(panel.get_by_test_id("face")).to_be_visible()
         expect(panel.get_by_test_id("presence")).to_have_text("here")
         seen.append(panel.inner_text().replace(name, ""))
+
     assert len(set(seen)) == 3, seen
     butler, leguin, vonda = seen
     assert "served" in butler and "served" not in leguin + vonda
@@ -31,17 +33,21 @@ def test_a_button_of_a_panel_commands_the_robot(launch, open_page):
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-step").click()
+
     page.get_by_test_id("panel-Leguin").get_by_test_id("button-refill").click()
     expect(page.get_by_test_id("message")).to_contain_text("refill")
     page.get_by_test_id("btn-step").click()
     expect(page.get_by_test_id("tick")).to_have_text("2")
     page.get_by_test_id("btn-step").click()
     expect(page.get_by_test_id("panel-Leguin")).to_contain_text("REFILL")
+
     sent = [event for event in run.events() if event["event"] == "command_sent" and event["from"] == "operator"]
     assert [(event["to"], event["command"]) for event in sent] == [("Leguin", "refill")]
     expect(page.get_by_test_id("log")).to_contain_text("-> Leguin: refill")
+
     page.get_by_test_id("log-filter-robot").select_option("Butler")
     expect(page.get_by_test_id("log")).not_to_contain_text("-> Leguin: refill")
+
     page.get_by_test_id("log-filter-robot").select_option("")
     page.get_by_test_id("log-filter-kind").select_option("command")
     expect(page.get_by_test_id("log")).to_contain_text("-> Leguin: refill")
@@ -54,11 +60,13 @@ def test_a_killed_robot_is_shown_as_gone_and_returns(launch, open_page):
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-start").click()
     until(page, "window.carsConsole.frame().tick > 5")
+
     run.kill("Leguin")
     presence = page.get_by_test_id("panel-Leguin").get_by_test_id("presence")
     expect(presence).to_have_text("gone")
     expect(page.get_by_test_id("awaiting")).to_contain_text("Leguin")
     expect(page.get_by_test_id("panel-Butler").get_by_test_id("presence")).not_to_have_text("gone")
+
     held = page.evaluate("window.carsConsole.frame().tick")
     run.restart("Leguin")
     expect(presence).to_have_text("returned")
@@ -74,10 +82,12 @@ def test_a_robot_that_the_run_goes_on_without_is_lost(launch, open_page):
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-start").click()
     until(page, "window.carsConsole.frame().tick > 5")
+
     run.kill("Leguin")
     expect(page.get_by_test_id("panel-Leguin").get_by_test_id("presence")).to_have_text("lost")
     lost_at = page.evaluate("window.carsConsole.frame().tick")
     until(page, f"window.carsConsole.frame().tick > {lost_at + 5}")
+
     run.restart("Leguin")
     expect(page.get_by_test_id("panel-Leguin").get_by_test_id("presence")).to_have_text("returned")
 
@@ -107,7 +117,7 @@ HOSTILE = {
 }
 
 
-def test_nothing_that_a_robot_shows_does_anything(launch, open_page):
+def test_content_of_a_panel_or_line_is_not_executed(launch, open_page):
     run = launch()
     page = open_page(run.address)
     requests = []
@@ -116,24 +126,29 @@ def test_nothing_that_a_robot_shows_does_anything(launch, open_page):
     page.get_by_test_id("btn-step").click()
     panel = page.get_by_test_id("panel-Leguin")
     expect(panel.get_by_test_id("face")).to_be_visible()
+
     run.put("robot/Leguin/panel", HOSTILE)
     expect(panel).to_contain_text("<script>window.hacked=1</script>")
     page.wait_for_timeout(500)
     assert page.locator("#injected").count() == 0
+
     picture = panel.locator("img").first
     expect(picture).to_be_visible()
     picture.hover()
     button = panel.locator("button", has_text="<script>")
     button.click()
     expect(page.get_by_test_id("message")).to_contain_text("javascript:")
+
     line = {"epoch": 1, "tick": 1, "time_s": 0.5, "source": MARKUP, "kind": "say", "text": MARKUP}
     run.put("log", line)
     expect(page.get_by_test_id("log")).to_contain_text("<b id='injected'>")
-    # What is no panel at all changes nothing.
+
+    # Malformed panels, frames and unknown robots are ignored.
     for wrong in ({}, [], {"widgets": [{"widget": "html", "html": MARKUP}]}, {"widgets": [HOSTILE["widgets"][1]] * 100}):
         run.put("robot/Leguin/panel", wrong)
-    run.put("robot/Nobody/panel", HOSTILE)
+    run.put("robot/Unknown/panel", HOSTILE)
     run.put("world", {"tick": 10**9})
+
     page.get_by_test_id("btn-step").click()
     expect(page.get_by_test_id("tick")).to_have_text("2")
     assert page.evaluate("typeof window.hacked") == "undefined"
@@ -150,8 +165,14 @@ FACES = ("happy", "sad", "surprised", "disgusted", "angry", "fearful", "neutral"
 
 
 def odd_widget(chance):
-    """A widget that a console accepts, or nearly."""
-    text, number = lambda: chance.choice(ODD_TEXTS), lambda: chance.choice(ODD_NUMBERS)
+    """A widget with unusual content, sometimes malformed."""
+
+    def text():
+        return chance.choice(ODD_TEXTS)
+
+    def number():
+        return chance.choice(ODD_NUMBERS)
+
     widget = chance.choice(
         (
             {"widget": "text", "label": text(), "text": text()},
@@ -164,37 +185,40 @@ def odd_widget(chance):
             {"widget": "button", "label": text(), "command": text()},
         )
     )
+
     if chance.random() < 0.1:
         widget[chance.choice(list(widget))] = chance.choice((None, [], {}, True, "odd", 3))
     return widget
 
 
-def test_whatever_a_robot_shows_the_page_goes_on(launch, open_page):
+def test_the_page_works_with_any_content_of_a_panel(launch, open_page):
     run = launch()
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-step").click()
     panel = page.get_by_test_id("panel-Leguin")
     expect(panel.get_by_test_id("face")).to_be_visible()
+
     chance = random.Random(2002)
     for number in range(60):
         run.put("robot/Leguin/panel", {"widgets": [odd_widget(chance) for _ in range(chance.randrange(20))]})
         if number % 10 == 9:
             run.put("robot/Leguin/panel", {"widgets": [{"widget": "text", "label": "number", "text": f"shown {number}"}]})
             expect(panel).to_contain_text(f"shown {number}")
+
     assert page.evaluate("typeof window.hacked") == "undefined"
     page.get_by_test_id("btn-step").click()
     expect(page.get_by_test_id("tick")).to_have_text("2")
 
 
-def test_many_lines_do_not_pile_up(launch, open_page):
+def test_the_number_of_log_rows_is_bounded(launch, open_page):
     run = launch(options=("--speed", "max", "--duration", "1000000 s"))
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-start").click()
     until(page, "window.carsConsole.frame().tick > 4000")
     assert page.get_by_test_id("log").locator(".line").count() <= 2000
+
     page.get_by_test_id("btn-pause").click()
     expect(page.get_by_test_id("phase")).to_have_text("paused", ignore_case=True)
-    # What is shown when it stops is the newest, whatever came on the way.
-    eventually("the last picture", lambda: run.status()["tick"] == page.evaluate("window.carsConsole.frame().tick"))
+    eventually("the last frame", lambda: run.status()["tick"] == page.evaluate("window.carsConsole.frame().tick"))

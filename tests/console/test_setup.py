@@ -1,4 +1,4 @@
-"""The set-up screen, on the plan and beside it."""
+"""The set-up, on the plan and in the form."""
 
 import json
 
@@ -33,7 +33,8 @@ def test_obstacles_that_are_clicked_block_a_robot(launch, open_page):
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-step").click()
     set_up_from_paused(page)
-    # Leguin stands at 4 ft, 4 ft, beside the food table: the other ways out are walled up.
+
+    # Leguin is at 4 ft, 4 ft, beside the food table: the walls block all other directions.
     corner = 2 * BODY_M
     walls = [(1, 0), (1, 1), (0, 1), (1, -1), (-1, 1)]
     for right, up in walls:
@@ -41,13 +42,16 @@ def test_obstacles_that_are_clicked_block_a_robot(launch, open_page):
     page.wait_for_timeout(100)
     apply(page, run)
     assert len(page.evaluate("window.carsConsole.frame().obstacles")) == 1 + len(walls)
+
     page.get_by_test_id("btn-step").click()
     page.get_by_test_id("panel-Leguin").get_by_test_id("button-refill").click()
     for _ in range(12):
         page.get_by_test_id("btn-step").click()
     expect(page.get_by_test_id("tick")).to_have_text("13")
+
     blocked = [event for event in run.events() if event["event"] == "blocked" and event["robot"] == "Leguin"]
-    assert blocked and blocked[0]["by"] == "obstacle", run.events()
+    assert blocked, run.events()
+    assert blocked[0]["by"] == "obstacle", run.events()
     expect(page.get_by_test_id("panel-Leguin")).to_contain_text("blocked")
 
 
@@ -57,7 +61,7 @@ def set_up_from_paused(page):
     expect(page.get_by_test_id("setup-guests")).to_be_visible()
 
 
-def test_an_obstacle_that_is_clicked_again_is_gone(launch, open_page):
+def test_a_second_click_removes_an_obstacle(launch, open_page):
     run = launch(options=("--set", "guests.count=0"))
     page = open_page(run.address)
     set_up(page)
@@ -65,8 +69,10 @@ def test_an_obstacle_that_is_clicked_again_is_gone(launch, open_page):
     page.mouse.click(*at(page, 15 * BODY_M, 20 * BODY_M))
     page.mouse.click(*at(page, 10 * BODY_M, 20 * BODY_M))
     apply(page, run)
+
     placed = page.evaluate("window.carsConsole.frame().obstacles")[1:]
-    assert len(placed) == 1 and placed[0] == pytest.approx([15 * BODY_M, 20 * BODY_M], abs=BODY_M / 2)
+    assert len(placed) == 1
+    assert placed[0] == pytest.approx([15 * BODY_M, 20 * BODY_M], abs=BODY_M / 2)
 
 
 def test_a_dragged_robot_starts_there(launch, open_page):
@@ -74,14 +80,17 @@ def test_a_dragged_robot_starts_there(launch, open_page):
     page = open_page(run.address)
     set_up(page)
     before = page.evaluate("window.carsConsole.frame().robots.find(r => r.name === 'Butler').location")
+
     page.mouse.move(*at(page, before["x"], before["y"]))
     page.mouse.down()
     page.mouse.move(*at(page, 6.0, 9.0), steps=5)
     page.mouse.move(*at(page, 3.5, 10.5), steps=5)
     page.mouse.up()
     apply(page, run)
+
     after = page.evaluate("window.carsConsole.frame().robots.find(r => r.name === 'Butler').location")
-    assert (after["x"], after["y"]) == (pytest.approx(3.5, abs=0.1), pytest.approx(10.5, abs=0.1))
+    assert after["x"] == pytest.approx(3.5, abs=0.1)
+    assert after["y"] == pytest.approx(10.5, abs=0.1)
     joined = [event for event in run.events() if event["event"] == "joined" and event["robot"] == "Butler"]
     assert joined[0]["at"] == after
 
@@ -91,6 +100,7 @@ def test_fields_are_applied(launch, open_page):
     page = open_page(run.address)
     page.get_by_test_id("units").select_option("m")
     set_up(page)
+
     for name, value in {
         "guests": "17",
         "seed": "77",
@@ -107,20 +117,26 @@ def test_fields_are_applied(launch, open_page):
     }.items():
         page.get_by_test_id(f"setup-{name}").fill(value)
     apply(page, run)
+
     frame = page.evaluate("window.carsConsole.frame()")
-    assert (len(frame["guests"]), frame["seed"], frame["field_m"]) == (17, 77, [12, 10])
+    assert len(frame["guests"]) == 17
+    assert frame["seed"] == 77
+    assert frame["field_m"] == [12, 10]
     assert frame["duration_s"] == 50
+
     page.get_by_test_id("btn-step").click()
     eventually("the log", lambda: (run.run_folder / "other.log").exists())
     scenario = (run.run_folder / "scenario.toml").read_text()
-    assert "77" in scenario and "other.log" in scenario
+    assert "77" in scenario
+    assert "other.log" in scenario
 
 
 def test_a_refused_set_up_is_explained_beside_the_field(launch, open_page):
     run = launch()
     page = open_page(run.address)
     set_up(page)
-    # The page itself cannot know this one: the simulator refuses it.
+
+    # The page does not check for this: the simulator refuses it.
     page.get_by_test_id("setup-log-name").fill("events.jsonl")
     page.get_by_test_id("setup-apply").click()
     error = page.get_by_test_id("error-log_file.name")
@@ -128,8 +144,10 @@ def test_a_refused_set_up_is_explained_beside_the_field(launch, open_page):
     expect(error).to_be_in_viewport()
     expect(page.get_by_test_id("message")).not_to_be_empty()
     assert run.status()["epoch"] == 1, "nothing has changed"
+
     page.get_by_test_id("setup-log-name").fill("cars.log")
     expect(error).to_be_empty()
+
     for field, name, value in [
         ("guests", "guests", "many"),
         ("guest_speed_mps", "speed-min", "99"),
@@ -143,6 +161,7 @@ def test_a_refused_set_up_is_explained_beside_the_field(launch, open_page):
         expect(page.get_by_test_id(f"error-{field}")).not_to_be_empty()
         page.get_by_test_id(f"setup-{name}").fill(before)
         expect(page.get_by_test_id(f"error-{field}")).to_be_empty()
+
     assert run.status()["epoch"] == 1, "nothing has changed"
     apply(page, run)
 
@@ -151,16 +170,19 @@ def test_a_set_up_is_saved_and_loaded(launch, open_page, tmp_path):
     run = launch(options=("--seed", "11"))
     page = open_page(run.address)
     set_up(page)
+
     with page.expect_download() as download:
         page.get_by_test_id("setup-save").click()
     saved = tmp_path / "saved.toml"
     download.value.save_as(saved)
     assert "seed = 11" in saved.read_text()
+
     changed = tmp_path / "changed.toml"
     changed.write_text(saved.read_text().replace("seed = 11", "seed = 12"))
     page.get_by_test_id("setup-load").set_input_files(changed)
     eventually("the epoch", lambda: run.status()["epoch"] == 2)
     assert run.status()["seed"] == 12
+
     changed.write_text("seed = 13\n[gusts]\ncount = 1\n")
     page.get_by_test_id("setup-load").set_input_files(changed)
     expect(page.get_by_test_id("message")).to_contain_text("gusts")

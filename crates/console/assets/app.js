@@ -1,5 +1,5 @@
 // @ts-check
-// Wires the page: messages go into the store, the store tells the views, people's wishes go to the connection.
+// Wires the page: messages go into the store, the store notifies the views, user actions go to the connection.
 
 import { Bands } from "./bands.js";
 import { Charts } from "./charts.js";
@@ -36,22 +36,39 @@ const box = (/** @type {string} */ id) => element(id, HTMLElement);
 const store = new Store();
 const units = new Units();
 const notices = new Notices(box("notice"));
-const connection = new Connection((message) => store.apply(message), (isOpen) => store.link(isOpen));
-const player = new Player(store, { failed: (reason) => notices.refusal(reason), sought: () => plan.flights.clear() });
+const connection = new Connection(
+  (message) => store.apply(message),
+  (isOpen) => store.setConnected(isOpen),
+);
+const player = new Player(store, {
+  failed: (reason) => notices.refusal(reason),
+  sought: () => plan.flights.clear(),
+});
 
-/** @param {Control} control */
-async function ask(control) {
+/** Sends a request and applies the status in its answer. @param {Control} control */
+async function request(control) {
   const answer = await connection.control(control);
   if (answer.answer === "done") store.applyStatus(answer);
   return answer;
 }
 
 /**
+ * Sends a request and shows its outcome.
  * @param {Control} control
- * @param {string} note
+ * @param {string} note shown if it succeeds
  */
 async function act(control, note = "") {
-  notices.tell(await ask(control), note);
+  notices.show(await request(control), note);
+}
+
+/**
+ * @param {string} to
+ * @param {string} command
+ */
+async function sendCommand(to, command) {
+  const answer = await connection.command(to, command);
+  if (answer.answer === "done") store.applyStatus(answer);
+  notices.show(answer, `${command} goes to ${to} with the next tick.`);
 }
 
 const isRecording = () => store.mode === "recording";
@@ -71,11 +88,11 @@ const controls = new Controls(box("bar"), store, {
 
 const editor = new Editor({
   changed: () => setup.moved(),
-  say: (text) => notices.note(text),
+  note: (text) => notices.note(text),
   body_m: () => setup.body_m,
   hasFault: (field) => setup.faults().has(field),
 });
-const setup = new SetupView(box("panel-setup"), { store, units, editor, notices, ask });
+const setup = new SetupView(box("panel-setup"), { store, units, editor, notices, request });
 const plan = new Plan(element("plan", HTMLCanvasElement), store, units, editor, choose);
 setup.onChange = () => {
   plan.touch();
@@ -83,7 +100,7 @@ setup.onChange = () => {
   box("legend").hidden = editor.draft !== null;
 };
 const panels = new Panels(box("panels"), store, units, {
-  send: (to, command) => act({ do: "command", to, command }, `${command} goes to ${to} with the next tick.`),
+  send: sendCommand,
   choose,
 });
 const log = new LogView(box("panel-log"), store);
@@ -91,13 +108,17 @@ const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, 
 const bands = new Bands(box("bands"), store);
 const voice = new Voice(store);
 
-/** A robot is shown both on the plan and among the panels. @param {string | null} robot */
+/** Marks a robot on the plan and among the panels, or removes its mark. @param {string | null} robot */
 function choose(robot) {
   const chosen = robot === plan.chosen ? null : robot;
-  plan.chosen = panels.chosen = chosen;
+  plan.chosen = chosen;
+  panels.chosen = chosen;
   plan.touch();
   panels.render();
-  if (chosen) document.querySelector(`[data-testid="panel-${CSS.escape(chosen)}"]`)?.scrollIntoView({ block: "nearest" });
+
+  if (!chosen) return;
+  const panel = document.querySelector(`[data-testid="panel-${CSS.escape(chosen)}"]`);
+  panel?.scrollIntoView({ block: "nearest" });
 }
 
 let openTab = "log";
@@ -109,7 +130,7 @@ const tabList = tabs(box("tabs"), (name) => {
   if (name === "charts") [charts, bands].forEach((view) => view.render());
 });
 
-// Views are drawn at most once a picture, and those that are costly to lay out less often.
+// Views are rendered at most once per animation frame, and those with an expensive layout less often.
 const stale = new Set();
 const OFTEN_MS = 60;
 const SELDOM_MS = 200;
@@ -124,17 +145,22 @@ const views = new Map([
 function drawBar() {
   controls.render();
   renderAwaiting(box("awaiting"), store);
+
   if (isRecording()) renderScrub(box("scrub-bar"), player);
-  const isSetUp = !isRecording();
-  box("tab-setup").hidden = !isSetUp;
-  if (!isSetUp && openTab === "setup") tabList.select("log");
+  box("tab-setup").hidden = isRecording();
+  if (isRecording() && openTab === "setup") tabList.select("log");
   box("voice-label").hidden = isRecording();
+
   const isEmpty = store.frame === null && !isRecording() && !(store.isLive && store.status);
   box("empty").hidden = !isEmpty;
-  box("empty-console").hidden = store.isLinked;
-  box("empty-simulator").hidden = !store.isLinked;
+  box("empty-console").hidden = store.isConnected;
+  box("empty-simulator").hidden = !store.isConnected;
+
   box("gone").hidden = isEmpty || isRecording() || store.isLive;
-  box("gone").textContent = store.isLinked ? "The simulator is gone. The last picture stays." : "The console is not reachable. The last picture stays.";
+  box("gone").textContent = store.isConnected
+    ? "The simulator is disconnected. This is its last frame."
+    : "The console is not reachable. This is the last frame.";
+
   document.title = store.run ? `${store.run} · CARS` : "CARS";
 }
 
@@ -160,32 +186,42 @@ function draw(now_ms) {
   }
 }
 
-const stain = (/** @type {string[]} */ ...names) => () => names.forEach((name) => stale.add(name));
-store.on("frame", () => setup.phase());
-store.on("frame", stain("bar", "panels", "log", "charts"));
-store.on("panel", stain("panels"));
-store.on("log", stain("log"));
-store.on("link", stain("bar", "panels", "log"));
-units.listeners.push(stain("panels"));
-// Seconds of waiting pass without any message.
-window.setInterval(() => store.awaiting().length > 0 && stain("bar", "panels")(), 500);
+/** @param {string[]} names of views to render again */
+function markStale(...names) {
+  names.forEach((name) => stale.add(name));
+}
 
-// A picture that is missing is painted when somebody asks how things stand. If it does not come, there is none yet.
-const MOST_QUESTIONS = 8;
-let questions = 0;
-store.on("frame", () => store.isBehind || (questions = 0));
+store.on("frame", () => setup.phase());
+store.on("frame", () => markStale("bar", "panels", "log", "charts"));
+store.on("panel", () => markStale("panels"));
+store.on("log", () => markStale("log"));
+store.on("connection", () => markStale("bar", "panels", "log"));
+units.listeners.push(() => markStale("panels"));
+
+// The time that the clock has been waiting for a robot grows without any message.
 window.setInterval(() => {
-  if (!store.isLive || !store.isBehind || questions >= MOST_QUESTIONS) return;
-  questions += 1;
-  ask({ do: "status" });
+  if (store.awaiting().length > 0) markStale("bar", "panels");
+}, 500);
+
+// The simulator publishes a frame when it answers a status request. If none comes, there is no newer one.
+const MOST_STATUS_REQUESTS = 8;
+let statusRequests = 0;
+store.on("frame", () => {
+  if (!store.isBehind) statusRequests = 0;
+});
+window.setInterval(() => {
+  if (!store.isLive || !store.isBehind || statusRequests >= MOST_STATUS_REQUESTS) return;
+
+  statusRequests += 1;
+  request({ do: "status" });
 }, 250);
 
-// Before the first picture, somebody may still be missing: the status tells.
-store.on("link", () => {
-  if (store.isLive && !store.frame && !store.status) ask({ do: "status" });
+// There is no frame while robots have not joined: the status names them.
+store.on("connection", () => {
+  if (store.isLive && !store.frame && !store.status) request({ do: "status" });
 });
 let isOpened = false;
-store.on("link", () => {
+store.on("connection", () => {
   if (!isRecording() || isOpened) return;
   isOpened = true;
   player.open();
@@ -210,7 +246,7 @@ for (const [id, zoom] of /** @type {const} */ ([["zoom-in", 1.4], ["zoom-out", 1
   });
 }
 
-// For tests: where things are and how smoothly they are drawn.
+// For tests: positions, the frame rate and the newest frame.
 Object.assign(window, {
   carsConsole: {
     toClient: (/** @type {number} */ x_m, /** @type {number} */ y_m) => plan.toClient(x_m, y_m),
@@ -220,6 +256,6 @@ Object.assign(window, {
 });
 
 tabList.select("log");
-stain("bar", "panels", "log")();
+markStale("bar", "panels", "log");
 requestAnimationFrame(draw);
 connection.open();

@@ -1,5 +1,5 @@
 // @ts-check
-// Emotion and behavior of each robot over simulated time, a color for a state.
+// Emotion and behavior of each robot over simulated time, a color per state.
 
 import { GUTTER_PX, MARGIN_PX } from "./charts.js";
 import { colorOf } from "./palette.js";
@@ -12,7 +12,7 @@ import { html, nothing, render, svg } from "./vendor/lit-html.js";
 const BAND_PX = 16;
 const GAP_PX = 3;
 const ROBOT_GAP_PX = 9;
-/** Width of a letter, about. */
+/** Approximate width of a letter. */
 const LETTER_PX = 6.2;
 
 export class Bands {
@@ -31,6 +31,7 @@ export class Bands {
     const [first_s, last_s] = this.store.history.range_s();
     const inner = width - GUTTER_PX - MARGIN_PX;
     if (inner <= 0) return;
+
     const x = (/** @type {number} */ time_s) => GUTTER_PX + (inner * (Math.max(first_s, time_s) - first_s)) / (last_s - first_s);
     const rows = [...states].flatMap(([robot, { emotion, behavior }], i) => {
       const y = i * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
@@ -40,7 +41,9 @@ export class Bands {
         ...behavior.map((span) => block(span, x, y + BAND_PX + GAP_PX, "behavior", robot)),
       ];
     });
+
     const height = states.size * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
+
     render(
       states.size
         ? html`<svg width=${width} height=${height} role="img" aria-label=${this.words()}>${rows}${this.now(x, height)}</svg>`
@@ -50,7 +53,7 @@ export class Bands {
   }
 
   /**
-   * In a recording: where in time the plan is.
+   * In a recording, marks the time that the plan shows.
    * @param {(time_s: number) => number} x
    * @param {number} height
    */
@@ -77,8 +80,10 @@ export class Bands {
  * @param {string} robot
  */
 function block({ state, from_s, to_s }, x, y, kind, robot) {
-  const [left, width] = [x(from_s), Math.max(1, x(to_s) - x(from_s) - 0.5)];
+  const left = x(from_s);
+  const width = Math.max(1, x(to_s) - left - 0.5);
   const isRoomy = width > LETTER_PX * state.length + 8;
+
   return svg`
     <g class="band" data-state=${state}><title>${robot}, ${kind} ${state}, ${seconds(from_s)} to ${seconds(to_s)}</title>
       <rect x=${left} y=${y} width=${width} height=${BAND_PX} rx="2" fill=${colorOf(kind, state)}></rect>

@@ -1,5 +1,5 @@
 // @ts-check
-// Where on the canvas a place of the field is. Field: meters, y up. Canvas: CSS pixels, y down.
+// Maps places of the field (meters, y up) to points of the canvas (CSS pixels, y down).
 
 /** @typedef {{x: number, y: number}} Place */
 
@@ -12,14 +12,14 @@ export class Camera {
     this.field_m = [10, 10];
     this.width_px = 1;
     this.height_px = 1;
-    /** Times the scale at which the whole field is seen. */
+    /** Factor of the scale at which the whole field is visible. */
     this.zoom = 1;
     /** The place in the middle of the canvas, meters. */
     this.center = { x: 5, y: 5 };
   }
 
   /**
-   * Another field or canvas. What is seen stays, unless the field is another one.
+   * Sets the sizes of field and canvas. Another field resets zoom and center.
    * @param {[number, number]} field_m
    * @param {number} width_px
    * @param {number} height_px
@@ -32,7 +32,7 @@ export class Camera {
     if (isOther) this.reset();
   }
 
-  /** The whole field again. */
+  /** Shows the whole field. */
   reset() {
     this.zoom = 1;
     this.center = { x: this.field_m[0] / 2, y: this.field_m[1] / 2 };
@@ -42,7 +42,7 @@ export class Camera {
     return this.zoom === 1;
   }
 
-  /** CSS pixels in a meter. */
+  /** CSS pixels per meter. */
   get scale() {
     const across = (this.width_px - 2 * MARGIN_PX) / this.field_m[0];
     const up = (this.height_px - 2 * MARGIN_PX) / this.field_m[1];
@@ -94,7 +94,7 @@ export class Camera {
   }
 
   /**
-   * Looks at a place, which is always one of the field: nobody gets lost outside.
+   * Moves the center to a place, clamped to the field.
    * @param {number} x_m
    * @param {number} y_m
    */

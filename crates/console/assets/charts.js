@@ -9,9 +9,9 @@ import uPlot from "./vendor/uPlot.esm.js";
 
 /** @typedef {import("./store.js").Store} Store */
 
-/** Room for the numbers on the left; the bands below leave the same. */
+/** Space for the axis labels on the left; the bands have the same. */
 export const GUTTER_PX = 76;
-/** And on the right. */
+/** Space on the right. */
 export const MARGIN_PX = 24;
 
 export class Charts {
@@ -26,9 +26,9 @@ export class Charts {
     this.variable = "";
     /** @type {uPlot | null} */
     this.plot = null;
-    /** What the plot was made for. */
+    /** Variable and robots of the current plot. */
     this.made = "";
-    /** Index of the moment under the pointer. @type {number | null} */
+    /** Index of the sample under the pointer. @type {number | null} */
     this.pointed = null;
     chart.addEventListener("pointermove", () => this.point(this.plot?.cursor.idx ?? null));
     chart.addEventListener("pointerleave", () => this.point(null));
@@ -60,10 +60,12 @@ export class Charts {
     this.renderSelect(names);
     const robots = history.variables.get(this.variable);
     const { clientWidth: width, clientHeight: height } = this.chart;
+
     if (!robots || width === 0 || height === 0) {
       if (!robots) this.forget();
       return;
     }
+
     const made = [this.variable, ...robots.keys()].join("\n");
     if (made !== this.made) {
       this.forget();
@@ -71,28 +73,31 @@ export class Charts {
       this.plot = new uPlot(options(this.variable, [...robots.keys()], width, height), [[0, 1]], this.chart);
       this.chart.setAttribute("role", "img");
     }
+
     const [first_s, last_s] = history.range_s();
     this.plot?.setData([history.times_s, ...robots.values()], false);
     this.plot?.batch(() => {
       this.plot?.setScale("x", { min: first_s, max: last_s });
       this.cursor();
     });
+
     const now = [...robots].map(([robot, values]) => `${robot} ${short(values.at(-1) ?? NaN)}`);
     this.chart.setAttribute("aria-label", `${this.variable} over time; last: ${now.join(", ")}`);
   }
 
-  /** In a recording: where in time the plan is. */
+  /** In a recording, marks the time that the plan shows. */
   cursor() {
     const { frame, mode } = this.store;
     if (mode !== "recording" || !frame || !this.plot) return;
     this.plot.setCursor({ left: this.plot.valToPos(frame.time_s, "x"), top: 10 }, false);
   }
 
-  /** Who has which color, and the value where the reader points, or else the last one. */
+  /** The color of each robot, with its value at the pointer or else the last one. */
   key() {
     const { history, frame, mode } = this.store;
     const shown = mode === "recording" && frame ? history.indexAt(frame.time_s) : history.times_s.length - 1;
     const index = this.pointed ?? shown;
+
     return [...(history.variables.get(this.variable) ?? [])].map(
       ([robot, values]) => html`<li>${dot(colorOf("robot", robot))}${robot} <b>${short(values[index] ?? NaN, 3)}</b></li>`,
     );
@@ -104,7 +109,9 @@ export class Charts {
       this.variable = /** @type {HTMLSelectElement} */ (event.target).value;
       this.render();
     };
+
     const robots = (/** @type {string} */ name) => [...(this.store.history.variables.get(name)?.keys() ?? [])].join(", ");
+
     render(
       html`
         <label class="field inline"><span>Variable</span>
@@ -119,7 +126,7 @@ export class Charts {
 }
 
 /**
- * A small circle in a color that is only known to scripts.
+ * A small filled circle.
  * @param {string} color
  */
 function dot(color) {
@@ -127,19 +134,24 @@ function dot(color) {
 }
 
 /**
- * What to begin with: the variable that changes most often tells most.
+ * The variable that changes most often, which is shown first.
  * @param {import("./history.js").History} history
  */
 function liveliest(history) {
   let most = -1;
   let found;
+
   for (const [name, robots] of history.variables) {
     for (const values of robots.values()) {
       const changes = values.reduce((/** @type {number} */ sum, value, i) => sum + (i > 0 && value !== values[i - 1] ? 1 : 0), 0);
       const rank = changes + robots.size / 10;
-      if (rank > most) [most, found] = [rank, name];
+      if (rank > most) {
+        most = rank;
+        found = name;
+      }
     }
   }
+
   return found;
 }
 
@@ -153,6 +165,7 @@ function liveliest(history) {
 function options(variable, robots, width, height) {
   const theme = readTheme();
   const axis = { stroke: theme.muted, grid: { stroke: theme.grid, width: 1 }, ticks: { show: false }, font: `11px ${theme.font}` };
+
   return {
     width,
     height,

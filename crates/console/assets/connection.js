@@ -1,5 +1,5 @@
 // @ts-check
-// The WebSocket to the console server: comes back by itself, and gives every control its answer.
+// The WebSocket to the console server: reconnects by itself and resolves every request with its answer.
 
 /** @typedef {import("./types/messages.js").Control} Control */
 /** @typedef {import("./types/messages.js").ControlAnswer} ControlAnswer */
@@ -17,7 +17,7 @@
  *   | {type: "answer", id: number, answer?: ControlAnswer, error?: string}} ServerMessage
  */
 
-/** What is for everybody. @typedef {Exclude<ServerMessage, {type: "answer"}>} Broadcast */
+/** Messages that do not answer a request. @typedef {Exclude<ServerMessage, {type: "answer"}>} Broadcast */
 /** @typedef {{resolve: (answer: ControlAnswer) => void, timer: number}} Pending */
 
 const FIRST_PAUSE_MS = 500;
@@ -27,11 +27,11 @@ const ANSWER_TIMEOUT_MS = 15000;
 export class Connection {
   /**
    * @param {(message: Broadcast) => void} onMessage
-   * @param {(isOpen: boolean) => void} onLink
+   * @param {(isOpen: boolean) => void} onConnection
    */
-  constructor(onMessage, onLink) {
+  constructor(onMessage, onConnection) {
     this.onMessage = onMessage;
-    this.onLink = onLink;
+    this.onConnection = onConnection;
     /** @type {WebSocket | null} */
     this.socket = null;
     /** @type {Map<number, Pending>} */
@@ -40,36 +40,60 @@ export class Connection {
     this.pause_ms = FIRST_PAUSE_MS;
   }
 
-  /** Opens the connection, and again whenever it is lost. */
+  /** Connects, and reconnects whenever the connection is lost. */
   open() {
     const url = new URL(`ws${location.search}`, location.href);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+
     const socket = new WebSocket(url);
     this.socket = socket;
+
     socket.addEventListener("open", () => {
       this.pause_ms = FIRST_PAUSE_MS;
-      this.onLink(true);
+      this.onConnection(true);
     });
+
     socket.addEventListener("message", (event) => this.receive(String(event.data)));
     socket.addEventListener("close", () => this.closed());
   }
 
   /**
-   * Asks the simulator for something. What cannot be asked is refused like what the simulator refuses, so that there is
-   * one way to show it.
+   * Sends a request to the simulator.
    * @param {Control} control
-   * @returns {Promise<ControlAnswer>}
    */
   control(control) {
+    return this.send({ type: "control", control });
+  }
+
+  /**
+   * Sends a command to a robot.
+   * @param {string} to
+   * @param {string} command
+   */
+  command(to, command) {
+    return this.send({ type: "command", to, command });
+  }
+
+  /**
+   * Resolves with the answer. Failures of the connection look like refusals of the simulator, so that there is one way to
+   * show both.
+   * @param {{type: "control", control: Control} | {type: "command", to: string, command: string}} message
+   * @returns {Promise<ControlAnswer>}
+   */
+  send(message) {
     const socket = this.socket;
     if (!socket || socket.readyState !== WebSocket.OPEN) {
-      return Promise.resolve(refused("The console server is not reachable; the page tries again by itself."));
+      return Promise.resolve(refused("The console server is not reachable; the page reconnects by itself."));
     }
+
     const id = ++this.lastId;
+
     return new Promise((resolve) => {
-      const late = () => this.settle(id, refused("No answer from the simulator in 15 seconds."));
-      this.pending.set(id, { resolve, timer: window.setTimeout(late, ANSWER_TIMEOUT_MS) });
-      socket.send(JSON.stringify({ type: "control", id, control }));
+      const timer = window.setTimeout(() => {
+        this.settle(id, refused("No answer from the simulator in 15 seconds."));
+      }, ANSWER_TIMEOUT_MS);
+      this.pending.set(id, { resolve, timer });
+      socket.send(JSON.stringify({ ...message, id }));
     });
   }
 
@@ -97,8 +121,12 @@ export class Connection {
   }
 
   closed() {
-    this.onLink(false);
-    for (const id of [...this.pending.keys()]) this.settle(id, refused("The connection was lost before an answer came."));
+    this.onConnection(false);
+
+    for (const id of [...this.pending.keys()]) {
+      this.settle(id, refused("The connection was lost before an answer arrived."));
+    }
+
     window.setTimeout(() => this.open(), this.pause_ms);
     this.pause_ms = Math.min(this.pause_ms * 2, LONGEST_PAUSE_MS);
   }

@@ -1,5 +1,5 @@
 // @ts-check
-// The bar on top: what the simulator is doing, the buttons of a CD player, and how the page shows things.
+// The bar on top: phase and time, buttons as on a CD player, and the speed.
 
 import { ICONS } from "./icons.js";
 import { because } from "./presence.js";
@@ -11,15 +11,15 @@ import { html, nothing, render } from "./vendor/lit-html.js";
 /** @typedef {{name: string, label: string, hint: string, act: () => void}} Button */
 
 const SPEEDS = ["0.5", "1", "2", "5", "10", "20", "max"];
-/** Of a recording the phases are the player's. @type {Record<string, string>} */
+/** Words for the phases of a recording. @type {Record<string, string>} */
 const PLAYING = { running: "playing", ended: "at the end" };
 
 /**
- * What the buttons do; a recording has a player behind them instead of a simulator.
+ * What the buttons control: the simulator or the player of a recording.
  * @typedef {object} Transport
  * @property {(control: Control) => void} control
  * @property {(factor: number | null) => void} speed
- * @property {() => void} toggle start or pause, whichever makes sense
+ * @property {() => void} toggle start or pause
  * @property {() => void} step
  */
 
@@ -34,16 +34,19 @@ export class Controls {
     this.store = store;
     this.transport = transport;
     this.isStopAsked = false;
+
     document.addEventListener("keydown", (event) => this.key(event));
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
     if (event.key === "Escape" && this.isStopAsked) return this.askStop(false);
+
     const { target } = event;
     const isTyping = target instanceof HTMLElement && target.closest("input:not([type=range]), select, textarea") !== null;
     const isPressing = target instanceof HTMLElement && target.closest("button, summary, label") !== null;
     if (isTyping || event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+
     if (event.key === " " && !isPressing) {
       event.preventDefault();
       this.transport.toggle();
@@ -65,6 +68,7 @@ export class Controls {
     const phase = store.phase ?? "–";
     const word = store.mode === "recording" ? (PLAYING[phase] ?? phase) : phase;
     const frame = store.frame;
+
     render(
       html`
         <div class="brand"><h1>CARS</h1><span class="run" title="the run">${store.run}</span></div>
@@ -82,7 +86,7 @@ export class Controls {
             ${this.speeds().map((name) => html`<option value=${name} ?selected=${name === this.speed()}>${name === "max" ? "max" : `${name}×`}</option>`)}
           </select>
         </label>
-        ${this.linkChip()}
+        ${this.connectionState()}
       `,
       this.place,
     );
@@ -93,7 +97,7 @@ export class Controls {
     return speed === undefined ? "1" : speed === null ? "max" : String(speed);
   }
 
-  /** A launch may have asked for a speed that is none of ours. */
+  /** A launch may have set a speed that is not in the list. */
   speeds() {
     const speed = this.speed();
     return SPEEDS.includes(speed) ? SPEEDS : [...SPEEDS, speed];
@@ -116,7 +120,9 @@ export class Controls {
       { name: "step", label: "Step", hint: "one tick (.)", act: () => control({ do: "step", n: 1 }) },
       { name: "stop", label: "Stop", hint: "end the run for good", act: () => this.askStop(!this.isStopAsked) },
     ];
+
     const next = phase === "running" ? "pause" : phase === "ended" ? "init" : "start";
+
     return html`
       <div class="transport" role="group" aria-label="Simulation">
         ${buttons.map(
@@ -135,6 +141,7 @@ export class Controls {
       this.askStop(false);
       this.transport.control({ do: "stop" });
     };
+
     return html`
       <div class="question" role="alertdialog" aria-label="Stop">
         <p>End this run for good? The simulator and its robots end; what was recorded stays.</p>
@@ -145,19 +152,28 @@ export class Controls {
       </div>`;
   }
 
-  linkChip() {
+  connectionState() {
     const { store } = this;
-    const [word, tone] =
-      !store.isLinked && store.mode !== "recording" ? ["console not reachable", "bad"]
-      : store.mode === "recording" ? ["recording", "neutral"]
-      : store.isSimulatorPresent ? ["connected", "good"]
-      : ["no simulator", "warning"];
-    return html`<span class="link"><span class="dot ${tone}"></span><span data-testid="connection">${word}</span></span>`;
+    let word = "no simulator";
+    let tone = "warning";
+
+    if (store.mode === "recording") {
+      word = "recording";
+      tone = "neutral";
+    } else if (!store.isConnected) {
+      word = "console not reachable";
+      tone = "bad";
+    } else if (store.isSimulatorPresent) {
+      word = "connected";
+      tone = "good";
+    }
+
+    return html`<span class="connection"><span class="dot ${tone}"></span><span data-testid="connection">${word}</span></span>`;
   }
 }
 
 /**
- * For whom the clock waits, since when and why.
+ * The robots that the clock waits for, since when and why.
  * @param {HTMLElement} place
  * @param {Store} store
  */
@@ -168,11 +184,12 @@ export function renderAwaiting(place, store) {
     ({ name, since_s, because: why }) =>
       html`<li><b>${name}</b> (${because(why)}) for <span class="since">${since_s.toFixed(0)} s</span></li>`,
   );
+
   render(awaiting.length ? html`<span>The clock has been waiting for</span><ul>${who}</ul>` : nothing, place);
 }
 
 /**
- * A button that was clicked does not keep the focus, or the space bar would click it again instead of pausing.
+ * Removes the focus from a button that was clicked, so that the space bar does not click it again instead of pausing.
  * @param {MouseEvent} event
  * @param {() => void} act
  */

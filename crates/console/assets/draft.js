@@ -1,5 +1,5 @@
 // @ts-check
-// A set-up that is being made: what would be wrong with it, before the simulator is asked.
+// Checks of an edited set-up that need no simulator.
 
 import { short } from "./units.js";
 
@@ -10,7 +10,7 @@ import { short } from "./units.js";
 
 export const MOST_SEED = Number.MAX_SAFE_INTEGER;
 const MOST_GUESTS = 4294967295;
-/** Two bodies that touch do not overlap, also after rounding. */
+/** Tolerance for rounding: bodies that touch do not overlap. */
 const SLACK_M = 1e-9;
 
 /**
@@ -24,7 +24,7 @@ export function overlaps(a, b, body_m) {
 }
 
 /**
- * Whether a body there is within the field.
+ * Whether a body at this place is within the field.
  * @param {Place} place
  * @param {[number, number]} field_m
  * @param {number} body_m
@@ -35,11 +35,11 @@ export function isWithin(place, field_m, body_m) {
 }
 
 /**
- * All that can be told to be wrong without the simulator.
+ * What is wrong with a set-up, as far as the page can check it.
  * @param {Setup} setup
  * @param {number} body_m
  * @param {number} tick_s
- * @param {(length_m: number) => string} length for people
+ * @param {(length_m: number) => string} length formats a length
  * @returns {Faults}
  */
 export function faultsOf(setup, body_m, tick_s, length) {
@@ -48,21 +48,28 @@ export function faultsOf(setup, body_m, tick_s, length) {
   const fault = (/** @type {string} */ field, /** @type {boolean} */ isWrong, /** @type {string} */ reason) => {
     if (isWrong && !faults.has(field)) faults.set(field, reason);
   };
+
   const { field_m, guests, seed, duration_s, log_file } = setup;
   const isField = field_m.every((size) => size >= body_m && size <= 1e5);
+
   fault("field_m", !isField, `Each side must be a length of at least ${length(body_m)}, the size of a body.`);
   fault("guests", !isWhole(guests, MOST_GUESTS), "The number of guests must be a whole number, 0 or more.");
+
   if (isField && Number.isFinite(guests)) {
-    const room = Math.floor((field_m[0] * field_m[1]) / (body_m * body_m)) - setup.obstacles.length - Object.keys(setup.robots).length;
-    fault("guests", guests > room, `There is no room for so many: ${Math.max(0, room)} at the very most.`);
+    const places = Math.floor((field_m[0] * field_m[1]) / (body_m * body_m));
+    const room = places - setup.obstacles.length - Object.keys(setup.robots).length;
+    fault("guests", guests > room, `There is no room for so many guests: ${Math.max(0, room)} at most.`);
   }
+
   fault("guest_speed_mps", rangeFault(setup.guest_speed_mps) !== "", rangeFault(setup.guest_speed_mps));
   fault("guest_duration_s", rangeFault(setup.guest_duration_s) !== "", rangeFault(setup.guest_duration_s));
   fault("seed", !isWhole(seed, MOST_SEED), `The seed must be a whole number from 0 to ${MOST_SEED}.`);
   fault("duration_s", !(duration_s >= tick_s), `The run must last at least one tick, ${short(tick_s)} s.`);
-  fault("log_file.name", log_file.enabled && !/^[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}$/.test(log_file.name),
-    "The name may have letters, digits, dots, dashes and underscores, and no folder.");
+
+  const isName = /^[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}$/.test(log_file.name);
+  fault("log_file.name", log_file.enabled && !isName, "The name may have letters, digits, dots, dashes and underscores, and no folder.");
   if (isField) placeFaults(setup, body_m, fault);
+
   return faults;
 }
 
@@ -74,7 +81,7 @@ export function faultsOf(setup, body_m, tick_s, length) {
 function placeFaults(setup, body_m, fault) {
   const { field_m, obstacles } = setup;
   const outside = obstacles.filter((place) => !isWithin(place, field_m, body_m)).length;
-  fault("obstacles", outside > 0, `${outside} of them would reach out of the field: remove them or enlarge the field.`);
+  fault("obstacles", outside > 0, `${outside} of them would extend beyond the field: remove them or enlarge the field.`);
   const robots = Object.entries(setup.robots);
   robots.forEach(([name, place], i) => {
     const field = `robots.${name}`;

@@ -1,5 +1,5 @@
 // @ts-check
-// How things look on the plan. Every function draws one kind of thing and keeps nothing.
+// Draws the plan. Every function draws one kind of object and keeps no state.
 
 import { barrier, cross, envelope, line, nose, ring, text } from "./shapes.js";
 
@@ -13,12 +13,12 @@ import { barrier, cross, envelope, line, nose, ring, text } from "./shapes.js";
 const FULL_TURN = 2 * Math.PI;
 /** Smallest radius at which the letters in a robot can be read. */
 const SMALLEST_ROBOT_PX = 9;
-/** Below this radius a guest is a dot, and a square dot is as good as a round one and cheaper. */
+/** Guests with a smaller radius are drawn as squares, which are faster than circles. */
 const SMALLEST_ROUND_PX = 1.7;
-/** With more guests than this, two crossed bars stand for a circle: twice as fast, and at this size no eye can tell. */
+/** More small guests than this are drawn as two crossed bars: twice as fast as circles, and hardly different. */
 const MANY_GUESTS = 2000;
 const LARGEST_CROSS_PX = 5;
-/** Circles in one path: one path for all is slow, and so is one for each. */
+/** Circles per path: one path for all is slow, and so is one for each. */
 const CIRCLES_IN_PATH = 60;
 
 /**
@@ -28,10 +28,13 @@ const CIRCLES_IN_PATH = 60;
  */
 export function field({ context, camera, theme }, step_m) {
   const [width_m, height_m] = camera.field_m;
-  const [left, top] = [camera.x(0), camera.y(height_m)];
-  const [width, height] = [width_m * camera.scale, height_m * camera.scale];
+  const left = camera.x(0);
+  const top = camera.y(height_m);
+  const width = width_m * camera.scale;
+  const height = height_m * camera.scale;
   context.fillStyle = theme.field;
   context.fillRect(left, top, width, height);
+
   if (step_m * camera.scale >= 6) {
     context.beginPath();
     for (let x = step_m; x < width_m - 1e-9; x += step_m) line(context, camera.x(x), top, camera.x(x), top + height);
@@ -40,6 +43,7 @@ export function field({ context, camera, theme }, step_m) {
     context.lineWidth = 1;
     context.stroke();
   }
+
   context.strokeStyle = theme.edge;
   context.lineWidth = 1.5;
   context.strokeRect(left, top, width, height);
@@ -55,8 +59,10 @@ export function obstacles({ context, camera, theme }, centers, body_m) {
   context.fillStyle = theme.obstacle;
   context.strokeStyle = theme.obstacleEdge;
   context.lineWidth = 1;
+
   for (const [x_m, y_m] of centers) {
-    const [x, y] = [camera.x(x_m) - side / 2, camera.y(y_m) - side / 2];
+    const x = camera.x(x_m) - side / 2;
+    const y = camera.y(y_m) - side / 2;
     if (isOutside(camera, x + side / 2, y + side / 2, side)) continue;
     context.fillRect(x, y, side, side);
     if (side > 4) context.strokeRect(x + 0.5, y + 0.5, side - 1, side - 1);
@@ -71,13 +77,16 @@ export function obstacles({ context, camera, theme }, centers, body_m) {
 export function guests({ context, camera, theme }, places_m, body_m) {
   const radius = (body_m * camera.scale) / 2;
   const { scale, width_px, height_px } = camera;
-  const [left, bottom] = [camera.x(0), camera.y(0)];
+  const left = camera.x(0);
+  const bottom = camera.y(0);
   const seen = [];
+
   for (let i = 0; i < places_m.length; i += 2) {
     const x = left + places_m[i] * scale;
     const y = bottom - places_m[i + 1] * scale;
     if (x > -radius && y > -radius && x < width_px + radius && y < height_px + radius) seen.push(x, y);
   }
+
   context.fillStyle = theme.guest;
   if (radius < SMALLEST_ROUND_PX) squares(context, seen, Math.max(0.75, radius));
   else if (seen.length / 2 > MANY_GUESTS && radius < LARGEST_CROSS_PX) crosses(context, seen, radius);
@@ -120,25 +129,30 @@ function circles(context, at, radius) {
 export function trail({ context, camera, theme }, track, from, to, end) {
   context.strokeStyle = theme.robot;
   context.lineWidth = 2;
-  context.lineJoin = context.lineCap = "round";
+  context.lineJoin = "round";
+  context.lineCap = "round";
   const pieces = 8;
+
   for (let piece = 0; piece < pieces; piece += 1) {
     const first = from + Math.floor(((to - from) * piece) / pieces);
     const last = from + Math.floor(((to - from) * (piece + 1)) / pieces);
     context.globalAlpha = 0.08 + (0.5 * (piece + 1)) / pieces;
     context.beginPath();
+
     for (let i = first; i <= last && i < to; i += 1) {
-      const [x, y] = [track.x_m[i], track.y_m[i]];
+      const x = track.x_m[i];
+      const y = track.y_m[i];
       if (x !== null && y !== null) context.lineTo(camera.x(x), camera.y(y));
     }
     if (piece === pieces - 1) context.lineTo(camera.x(end.x), camera.y(end.y));
     context.stroke();
   }
+
   context.globalAlpha = 1;
 }
 
 /**
- * A red circle with the first two letters of the name; what is out of the ordinary is drawn around it.
+ * A red circle with the first two letters of the name, and marks around it.
  * @param {Pen} pen
  * @param {Pick<RobotFrame, "name" | "blocked" | "presence" | "direction_rad" | "speed_mps">} robot
  * @param {Place} place
@@ -146,9 +160,11 @@ export function trail({ context, camera, theme }, track, from, to, end) {
  * @param {{isLate: boolean, isChosen: boolean}} marks
  */
 export function robot({ context, camera, theme }, robot, place, body_m, { isLate, isChosen }) {
-  const [x, y] = [camera.x(place.x), camera.y(place.y)];
+  const x = camera.x(place.x);
+  const y = camera.y(place.y);
   const radius = Math.max(SMALLEST_ROBOT_PX, (body_m * camera.scale) / 2);
   if (isOutside(camera, x, y, 3 * radius)) return;
+
   const isHere = robot.presence === "here";
   if (isChosen) ring(context, x, y, radius + 6, theme.accent, 2);
   if (isLate && isHere) ring(context, x, y, radius + 4, theme.warning, 2.5, [4, 4]);
@@ -168,14 +184,17 @@ export function robot({ context, camera, theme }, robot, place, body_m, { isLate
 }
 
 /**
- * A link that is cut: dashed and struck through.
+ * A dashed line with a cross between two robots that are cut off from each other.
  * @param {Pen} pen
  * @param {Place} from
  * @param {Place} to
  * @param {string} label
  */
 export function cut({ context, camera, theme }, from, to, label) {
-  const [x1, y1, x2, y2] = [camera.x(from.x), camera.y(from.y), camera.x(to.x), camera.y(to.y)];
+  const x1 = camera.x(from.x);
+  const y1 = camera.y(from.y);
+  const x2 = camera.x(to.x);
+  const y2 = camera.y(to.y);
   context.strokeStyle = theme.bad;
   context.lineWidth = 1.75;
   context.setLineDash([7, 6]);
@@ -183,7 +202,9 @@ export function cut({ context, camera, theme }, from, to, label) {
   line(context, x1, y1, x2, y2);
   context.stroke();
   context.setLineDash([]);
-  const [x, y] = [(x1 + x2) / 2, (y1 + y2) / 2];
+
+  const x = (x1 + x2) / 2;
+  const y = (y1 + y2) / 2;
   context.fillStyle = theme.field;
   context.beginPath();
   context.arc(x, y, 9, 0, FULL_TURN);
@@ -194,17 +215,21 @@ export function cut({ context, camera, theme }, from, to, label) {
 }
 
 /**
- * A command in the air.
+ * A command on its way.
  * @param {Pen} pen
  * @param {import("./flights.js").Airborne} flight
  * @param {Place} from
  * @param {Place} to
  */
 export function flight({ context, camera, theme }, flight, from, to) {
-  const [x1, y1, x2, y2] = [camera.x(from.x), camera.y(from.y), camera.x(to.x), camera.y(to.y)];
+  const x1 = camera.x(from.x);
+  const y1 = camera.y(from.y);
+  const x2 = camera.x(to.x);
+  const y2 = camera.y(to.y);
   const isLost = flight.fate === "dropped" || flight.fate === "missing";
   const eased = flight.progress * flight.progress * (3 - 2 * flight.progress);
-  const [x, y] = [x1 + (x2 - x1) * eased, y1 + (y2 - y1) * eased + 60 * flight.fallen * flight.fallen];
+  const x = x1 + (x2 - x1) * eased;
+  const y = y1 + (y2 - y1) * eased + 60 * flight.fallen * flight.fallen;
   const color = isLost && flight.fallen > 0 ? theme.bad : theme.accent;
   context.globalAlpha = Math.max(0, 1 - Math.max(flight.fallen, flight.landed));
   context.strokeStyle = color;
@@ -223,13 +248,16 @@ export function flight({ context, camera, theme }, flight, from, to) {
 }
 
 /**
- * How long a stretch of the field is.
+ * A scale bar.
  * @param {Pen} pen
  * @param {number} length_m
  * @param {string} label
  */
 export function scaleBar({ context, camera, theme }, length_m, label) {
-  const [x, y, width] = [14, camera.height_px - 14, length_m * camera.scale];
+  const x = 14;
+  const y = camera.height_px - 14;
+  const width = length_m * camera.scale;
+
   context.strokeStyle = theme.muted;
   context.lineWidth = 1.5;
   context.beginPath();

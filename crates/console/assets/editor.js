@@ -8,12 +8,12 @@ import { isWithin, overlaps } from "./draft.js";
 /** @typedef {{x: number, y: number}} Place */
 /** What a drag does. @typedef {{kind: "build", start: Place, at: Place} | {kind: "clear"} | {kind: "robot", name: string}} Drag */
 
-/** A robot is taken by its body, or this much beside it. */
+/** A drag that begins this far from a robot's body still moves the robot. */
 const GRIP_M = 0.15;
 const MOST_OBSTACLES = 5000;
 
 export class Editor {
-  /** @param {{changed: () => void, say: (text: string) => void, body_m: () => number, hasFault: (field: string) => boolean}} client */
+  /** @param {{changed: () => void, note: (text: string) => void, body_m: () => number, hasFault: (field: string) => boolean}} client */
   constructor(client) {
     this.client = client;
     /** Shown on the plan while not null. @type {Setup | null} */
@@ -37,6 +37,7 @@ export class Editor {
   down(place) {
     const { draft } = this;
     if (!draft) return false;
+
     const name = this.robotAt(place);
     if (name) {
       this.drag = { kind: "robot", name };
@@ -46,9 +47,11 @@ export class Editor {
       const start = this.snap(place);
       this.drag = { kind: "build", start, at: start };
       const reason = this.place(start);
-      if (reason) this.client.say(reason);
+      if (reason) this.client.note(reason);
     }
+
     this.client.changed();
+
     return true;
   }
 
@@ -56,6 +59,7 @@ export class Editor {
   move(place) {
     const { draft, drag } = this;
     if (!draft || !drag) return;
+
     if (drag.kind === "robot") draft.robots[drag.name] = this.inside(place);
     else if (drag.kind === "clear") this.remove(place);
     else this.wall(drag, place);
@@ -67,7 +71,7 @@ export class Editor {
   }
 
   /**
-   * Obstacles side by side, on whole bodies from where the drag began.
+   * Places obstacles side by side, at whole bodies from the start of the drag.
    * @param {Extract<Drag, {kind: "build"}>} drag
    * @param {Place} place
    */
@@ -77,34 +81,39 @@ export class Editor {
     const [fromX, fromY] = cell(drag.at);
     const [toX, toY] = cell(place);
     const steps = Math.min(1000, Math.max(Math.abs(toX - fromX), Math.abs(toY - fromY)));
+
     for (let i = 1; i <= steps; i += 1) {
       const x = fromX + Math.round(((toX - fromX) * i) / steps);
       const y = fromY + Math.round(((toY - fromY) * i) / steps);
       this.place({ x: exact(drag.start.x + x * body_m), y: exact(drag.start.y + y * body_m) });
     }
+
     drag.at = place;
   }
 
   /**
-   * Puts an obstacle there if there is room.
+   * Places an obstacle if there is room.
    * @param {Place} place
-   * @returns {string} why not, empty if it stands
+   * @returns {string} why there is no room; empty if it was placed
    */
   place(place) {
     const { draft } = this;
     const body_m = this.client.body_m();
     if (!draft) return "";
     if (!isWithin(place, draft.field_m, body_m)) return "An obstacle must be wholly within the field.";
+
     const robot = Object.entries(draft.robots).find(([, at]) => overlaps(at, place, body_m));
     if (robot) return `There is no room: ${robot[0]} stands there.`;
     if (draft.obstacles.some((at) => overlaps(at, place, body_m))) return "There is no room: an obstacle is too near.";
-    if (draft.obstacles.length >= MOST_OBSTACLES) return `More than ${MOST_OBSTACLES} obstacles are for a scenario file.`;
+    if (draft.obstacles.length >= MOST_OBSTACLES) return `More than ${MOST_OBSTACLES} obstacles can only be set in a scenario file.`;
+
     draft.obstacles.push(place);
+
     return "";
   }
 
   /**
-   * Takes away the obstacle there.
+   * Removes the obstacle at a place.
    * @param {Place} place
    */
   remove(place) {
@@ -123,7 +132,7 @@ export class Editor {
   }
 
   /**
-   * Obstacles snap to half bodies, so that walls close; the field's edge is as good a place.
+   * Snaps to half bodies, so that walls have no gaps, and to the field's edge.
    * @param {Place} place
    */
   snap(place) {
@@ -145,7 +154,7 @@ export class Editor {
 }
 
 /**
- * Tenths of a millimeter: fine enough for anybody, and a number that can be read.
+ * Rounds to a tenth of a millimeter, which keeps the numbers of a saved scenario short.
  * @param {number} value_m
  */
 function exact(value_m) {

@@ -1,5 +1,5 @@
 // @ts-check
-// Facial expressions, drawn from a few measures that go from neutral to the full expression with its intensity.
+// Facial expressions: measures are interpolated between neutral and the full expression by its intensity.
 
 import { svg } from "./vendor/lit-html.js";
 
@@ -33,7 +33,7 @@ const FACES = {
   fearful: { browInner: -9, browOuter: -1, eye: 8.5, lid: 0, corners: -4, upper: -4, lower: 5, width: 16, nose: 0 },
 };
 
-/** Even a weak expression is more than none. */
+/** Part of the full expression at intensity 0, so that a weak expression is visible. */
 const WEAKEST = 0.4;
 
 /**
@@ -48,6 +48,7 @@ export function drawFace(face, intensity) {
       Object.entries(NEUTRAL).map(([key, value]) => [key, value + part * (full[/** @type {keyof Measures} */ (key)] - value)]),
     )
   );
+
   return svg`
     <circle class="skin" cx="50" cy="50" r="45"></circle>
     <path class="brow" d=${brow(m, 33, 1)}></path><path class="brow" d=${brow(m, 67, -1)}></path>
@@ -81,6 +82,8 @@ function lid(m, x) {
 /** @param {Measures} m */
 function mouth(m) {
   const y = 70 - m.corners / 2;
-  const [left, right] = [50 - m.width, 50 + m.width];
+  const left = 50 - m.width;
+  const right = 50 + m.width;
+
   return `M${left} ${y}Q50 ${y + m.upper} ${right} ${y}Q50 ${y + m.lower} ${left} ${y}Z`;
 }

@@ -1,30 +1,30 @@
 // @ts-check
-// Commands in the air. A frame tells at once that one was sent and what became of it; the eye needs a moment longer.
+// Animates commands. A frame may state the sending and the fate of a command at once; the animation takes longer.
 
 /** @typedef {import("./types/messages.js").Flight} Flight */
 /** @typedef {import("./types/messages.js").Fate} Fate */
 
 /**
- * A command as it is seen.
+ * A command as it is drawn.
  * @typedef {object} Airborne
  * @property {string} from
  * @property {string} to
- * @property {string} text what it says, empty if its sending was not seen
- * @property {Fate} fate what is known of it
+ * @property {string} text of the command, empty if the frame with its sending was skipped
+ * @property {Fate} fate the latest one that a frame stated
  * @property {number} progress 0 at the sender, 1 at the target
- * @property {number} fallen 0 while it flies, 1 when a lost one is out of sight
- * @property {number} landed 0 while it flies, 1 when the mark at the target is out of sight
+ * @property {number} fallen 0 while it flies, 1 when a lost one is no longer visible
+ * @property {number} landed 0 while it flies, 1 when the mark at the target is no longer visible
  */
 
 const FLIGHT_MS = 900;
 const FALL_MS = 900;
 const LANDING_MS = 500;
-/** Where a lost one falls. */
+/** Progress at which a lost command falls. */
 const HALF_WAY = 0.5;
-/** Where one stays whose fate is not decided yet. */
+/** Progress at which a command stays while its fate is not decided. */
 const BEFORE_TARGET = 0.85;
 const MOST_AIRBORNE = 64;
-/** One that the frames never speak of again. */
+/** A command whose fate no frame states is removed after this time. */
 const FORGOTTEN_MS = 60000;
 
 export class Flights {
@@ -37,7 +37,7 @@ export class Flights {
     this.airborne.clear();
   }
 
-  /** @param {Flight[]} flights in the order in which things happened */
+  /** @param {Flight[]} flights in order of time */
   push(flights) {
     for (const { from, to, seq, command, fate } of flights) {
       const key = JSON.stringify([from, to, seq]);
@@ -50,6 +50,7 @@ export class Flights {
       const text = command ?? "";
       this.airborne.set(key, { from, to, text, fate, progress: 0, fallen: 0, landed: 0, age_ms: 0 });
     }
+
     for (const key of this.airborne.keys()) {
       if (this.airborne.size <= MOST_AIRBORNE) break;
       this.airborne.delete(key);
@@ -65,7 +66,7 @@ export class Flights {
     }
   }
 
-  /** Whether something in the air changes with time. */
+  /** Whether any command has to be drawn again. */
   get isMoving() {
     return [...this.airborne.values()].some((flight) => flight.fate !== "sent" || flight.progress < BEFORE_TARGET);
   }

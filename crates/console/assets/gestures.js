@@ -1,12 +1,12 @@
 // @ts-check
-// Pointer, wheel and keys on the plan: zoom and pan, and what an editor wants of them.
+// Pointer, wheel and keys on the plan: zoom, pan, and drags for the editor.
 
 /** @typedef {import("./camera.js").Camera} Camera */
 /** @typedef {{x: number, y: number}} Place */
 
 /**
- * Takes a drag for itself when `down` says so.
- * @typedef {object} Editor
+ * Handles a drag if `down` returns true.
+ * @typedef {object} DragHandler
  * @property {boolean} isActive
  * @property {(place: Place) => boolean} down
  * @property {(place: Place) => void} move
@@ -19,16 +19,17 @@ export class Gestures {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {Camera} camera
-   * @param {{changed: () => void, clicked: (place: Place) => void, editor: Editor}} client
+   * @param {{changed: () => void, clicked: (place: Place) => void, editor: DragHandler}} client
    */
   constructor(canvas, camera, client) {
     this.canvas = canvas;
     this.camera = camera;
     this.client = client;
-    /** Fingers and buttons that are down. @type {Map<number, {x: number, y: number}>} */
+    /** Pointers that are down. @type {Map<number, {x: number, y: number}>} */
     this.pointers = new Map();
     this.travel_px = 0;
     this.isEditing = false;
+
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.up(event, true));
@@ -37,7 +38,7 @@ export class Gestures {
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
-  /** One finger scrolls the page while there is nothing to pan or to edit. */
+  /** One finger scrolls the page while the whole field is visible and not edited. */
   touch() {
     this.canvas.style.touchAction = this.camera.isWhole && !this.client.editor.isActive ? "pan-y" : "none";
   }
@@ -54,6 +55,7 @@ export class Gestures {
     this.pointers.set(event.pointerId, at);
     this.canvas.setPointerCapture(event.pointerId);
     this.travel_px = 0;
+
     if (this.pointers.size > 1) {
       this.endEdit();
     } else if (event.button === 0 && this.client.editor.isActive) {
@@ -65,6 +67,7 @@ export class Gestures {
   move(event) {
     const before = this.pointers.get(event.pointerId);
     if (!before) return;
+
     const at = this.at(event);
     if (this.isEditing) {
       this.client.editor.move(this.camera.place(at.x, at.y));
@@ -73,6 +76,7 @@ export class Gestures {
     } else {
       this.camera.panBy(at.x - before.x, at.y - before.y);
     }
+
     this.travel_px += Math.hypot(at.x - before.x, at.y - before.y);
     this.pointers.set(event.pointerId, at);
     this.client.changed();
@@ -86,6 +90,7 @@ export class Gestures {
   pinch(id, before, at) {
     const other = [...this.pointers].find(([key]) => key !== id)?.[1];
     if (!other) return;
+
     const spread = (/** @type {Place} */ p) => Math.max(1, Math.hypot(p.x - other.x, p.y - other.y));
     this.camera.zoomBy(spread(at) / spread(before), (at.x + other.x) / 2, (at.y + other.y) / 2);
     this.camera.panBy((at.x - before.x) / 2, (at.y - before.y) / 2);
@@ -130,8 +135,10 @@ export class Gestures {
       ArrowUp: () => this.camera.panBy(0, 40),
       ArrowDown: () => this.camera.panBy(0, -40),
     };
+
     const act = keys[event.key];
     if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+
     event.preventDefault();
     event.stopPropagation();
     act();

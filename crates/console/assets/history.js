@@ -1,16 +1,16 @@
 // @ts-check
-// What charts, bands and trails are drawn from: the robots over simulated time, in bounded memory.
+// The robots over simulated time, in bounded memory: the data of charts, bands and trails.
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 
-/** A stretch of time in one state. @typedef {{state: string, from_s: number, to_s: number}} Span */
+/** A period of time in one state. @typedef {{state: string, from_s: number, to_s: number}} Span */
 /** Places at the times of the history. @typedef {{x_m: (number | null)[], y_m: (number | null)[]}} Track */
 
-/** Samples kept; with more, every second one goes, so that the whole run stays in view. */
+/** Most samples; beyond, every second one is dropped, so that the whole run stays visible. */
 const MOST_SAMPLES = 6000;
 const MOST_SPANS = 1000;
-/** Variables kept, over all robots: a robot that invents names must not eat the browser's memory. */
+/** Most variables of all robots: a robot can publish any number of names. */
 const MOST_VARIABLES = 256;
 
 export class History {
@@ -32,14 +32,16 @@ export class History {
   }
 
   /**
-   * Adds a moment; one that is not later than the last is known already.
+   * Adds a sample; one that is not later than the last is ignored.
    * @param {number} time_s
    * @param {Pick<RobotFrame, "name" | "location" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
    */
   add(time_s, robots) {
     const last_s = this.times_s.at(-1) ?? -Infinity;
     if (time_s <= last_s) return;
+
     this.times_s.push(time_s);
+
     for (const robot of robots) {
       this.place(robot);
       this.note(robot, time_s);
@@ -47,6 +49,7 @@ export class History {
         if (typeof value === "number") this.series(variable, robot.name)?.push(value);
       }
     }
+
     this.align();
     if (this.times_s.length > MOST_SAMPLES) this.thin();
   }
@@ -62,7 +65,7 @@ export class History {
   /**
    * @param {string} variable
    * @param {string} robot
-   * @returns {(number | null)[] | undefined} none if there are too many
+   * @returns {(number | null)[] | undefined} undefined if there are too many variables
    */
   series(variable, robot) {
     const robots = this.variables.get(variable) ?? new Map();
@@ -72,10 +75,11 @@ export class History {
       values = this.unknown();
       this.variables.set(variable, robots.set(robot, values));
     }
+
     return values;
   }
 
-  /** Nothing was known so far. @returns {(number | null)[]} */
+  /** Gaps for all earlier samples. @returns {(number | null)[]} */
   unknown() {
     return new Array(this.times_s.length - 1).fill(null);
   }
@@ -91,10 +95,12 @@ export class History {
     extend(states.behavior, behavior_state, time_s);
   }
 
-  /** Who said nothing at the last moment has a gap there. */
+  /** A series without a value in the last sample gets a gap there. */
   align() {
     const length = this.times_s.length;
-    for (const values of this.all()) if (values.length < length) values.push(null);
+    for (const values of this.all()) {
+      if (values.length < length) values.push(null);
+    }
   }
 
   thin() {
@@ -105,31 +111,33 @@ export class History {
     }
   }
 
-  /** Every list that goes along with the times. @returns {(number | null)[][]} */
+  /** Every list that is parallel to the times. @returns {(number | null)[][]} */
   all() {
     const series = [...this.variables.values()].flatMap((robots) => [...robots.values()]);
     const tracks = [...this.tracks.values()].flatMap((track) => [track.x_m, track.y_m]);
     return [...series, ...tracks];
   }
 
-  /** The time that is known, at least a second. @returns {[number, number]} */
+  /** First and last time, at least a second apart. @returns {[number, number]} */
   range_s() {
     const first_s = this.times_s[0] ?? 0;
     return [first_s, Math.max(first_s + 1, this.times_s.at(-1) ?? 0)];
   }
 
   /**
-   * Index of the last moment that is not later.
+   * Index of the last sample that is not later.
    * @param {number} time_s
    */
   indexAt(time_s) {
     let low = 0;
     let high = this.times_s.length;
+
     while (low < high) {
       const middle = (low + high) >> 1;
       if (this.times_s[middle] <= time_s) low = middle + 1;
       else high = middle;
     }
+
     return low - 1;
   }
 }

@@ -1,5 +1,5 @@
 // @ts-check
-// The signs of a CD player, and a few more.
+// Icons of the buttons.
 
 import { html } from "./vendor/lit-html.js";
 

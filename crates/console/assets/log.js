@@ -1,17 +1,17 @@
 // @ts-check
-// The scrolling log: the lines of the log file, filtered, following the newest unless the reader looks back.
+// The log: the lines of the log file, filtered. It scrolls to the newest line unless the reader has scrolled up.
 
 import { html, render } from "./vendor/lit-html.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 
-/** Rows in the page. */
+/** Most rows in the page. */
 const MOST_ROWS = 2000;
-/** Rows that a reader who looks back is left with before the log stops growing under their eyes. */
+/** Most rows while the reader has scrolled up; then no rows are removed. */
 const MOST_ROWS_READING = 4000;
 const NEAR_END_PX = 12;
-/** Every kind there is, which the type check holds. @type {Record<import("./types/messages.js").LogKind, true>} */
+/** Every kind; the type check keeps the list complete. @type {Record<import("./types/messages.js").LogKind, true>} */
 const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, late: true };
 const KINDS = Object.keys(ALL_KINDS);
 
@@ -24,13 +24,13 @@ export class LogView {
     this.store = store;
     this.robot = "";
     this.kind = "";
-    /** How many of the lines that ever came are in the page or were passed over. */
+    /** Number of lines so far that are in the page or were filtered out. */
     this.seen = 0;
-    /** In a recording nothing is shown that has not happened yet. */
+    /** Last tick that is shown; in a recording, the tick that is played. */
     this.until = Infinity;
     this.isFollowing = true;
     this.waiting = 0;
-    /** Where the reader was last. */
+    /** The last scroll position. */
     this.top_px = 0;
     this.bar = document.createElement("div");
     this.bar.className = "log-bar";
@@ -44,30 +44,32 @@ export class LogView {
     place.append(this.bar, this.rows);
   }
 
-  /** Only who scrolls up stops following: rows may also grow by themselves, when they are laid out. */
+  /** Only scrolling up stops following: rows may also grow when they are laid out. */
   scrolled() {
     const { scrollTop, clientHeight, scrollHeight } = this.rows;
     const isAtEnd = scrollHeight - scrollTop - clientHeight < NEAR_END_PX;
     const isUp = scrollTop < this.top_px - 1;
     this.top_px = scrollTop;
     if (isAtEnd && !this.isFollowing && this.waiting > 0) return this.rebuild();
+
     if (isAtEnd) this.isFollowing = true;
     else if (isUp) this.isFollowing = false;
     this.renderBar();
   }
 
-  /** Twice, because rows that come into view get their true height then. */
+  /** Scrolls twice, because rows get their final height when they come into view. */
   toEnd() {
     const go = () => {
       if (!this.isFollowing) return;
       this.rows.scrollTop = this.rows.scrollHeight;
       this.top_px = this.rows.scrollTop;
     };
+
     go();
     requestAnimationFrame(go);
   }
 
-  /** Everything anew: another filter, another time. */
+  /** Renders all rows again, after a change of filter or time. */
   rebuild() {
     this.rows.replaceChildren();
     this.seen = this.store.logCount - this.store.log.length;
@@ -79,6 +81,7 @@ export class LogView {
   render() {
     const { store } = this;
     if (store.logCount < this.seen) return this.rebuild();
+
     const first = store.logCount - store.log.length;
     const fresh = store.log.slice(Math.max(0, this.seen - first)).filter((line) => this.isShown(line));
     this.seen = store.logCount;
@@ -87,7 +90,7 @@ export class LogView {
   }
 
   /**
-   * In a recording: shows the lines up to this tick.
+   * Shows the lines up to this tick of a recording.
    * @param {number} tick
    */
   showUntil(tick) {
@@ -95,6 +98,7 @@ export class LogView {
     const from = this.until;
     this.until = tick;
     if (!isForward) return this.rebuild();
+
     this.append(this.store.log.filter((line) => line.tick > from && this.isShown(line)));
     this.renderBar();
   }
@@ -114,12 +118,14 @@ export class LogView {
     this.waiting += this.isFollowing ? 0 : lines.length;
     rows.append(...kept.map(row));
     if (!this.isFollowing) return;
+
     const tooMany = rows.childElementCount - MOST_ROWS;
+
     for (let i = 0; i < tooMany; i += 1) rows.firstElementChild?.remove();
     this.toEnd();
   }
 
-  /** The tab is shown again: a hidden element does not scroll. */
+  /** To be called when the tab is shown again: a hidden element does not scroll. */
   shown() {
     this.toEnd();
   }
@@ -130,21 +136,23 @@ export class LogView {
       this[key] = /** @type {HTMLSelectElement} */ (event.target).value;
       this.rebuild();
     };
+
     const missed = this.store.logMissed;
+
     render(
       html`
         <label class="field inline"><span>From</span>
           <select data-testid="log-filter-robot" @change=${choose("robot")}>
-            <option value="">everybody</option>
+            <option value="">all</option>
             ${["simulator", ...robots].map((name) => html`<option value=${name}>${name}</option>`)}
           </select></label>
         <label class="field inline"><span>Kind</span>
           <select data-testid="log-filter-kind" @change=${choose("kind")}>
-            <option value="">everything</option>
+            <option value="">all</option>
             ${KINDS.map((kind) => html`<option value=${kind}>${kind}</option>`)}
           </select></label>
         <span class="spacer"></span>
-        <span class="muted" ?hidden=${missed === 0} title="this browser was too slow for them; the log file has them">
+        <span class="muted" ?hidden=${missed === 0} title="this browser was too slow for them; they are in the log file">
           ${missed} lines not shown</span>
         <button type="button" class="jump" ?hidden=${this.isFollowing} data-testid="log-follow" @click=${() => this.rebuild()}>
           ↓ ${this.waiting > 0 ? `${this.waiting} new` : "newest"}</button>`,
@@ -167,10 +175,12 @@ function row(line) {
     span.textContent = text;
     return span;
   };
+
   element.append(
     part("time", `${line.time_s.toFixed(1).padStart(9)} s  `),
     part("source", `${line.source.padEnd(12)} `),
     part("text", line.text),
   );
+
   return element;
 }

@@ -1,29 +1,29 @@
 // @ts-check
-// Smooth motion between frames: everybody glides from where they are seen to where the newest frame has them.
+// Smooth motion between frames: robots and guests glide from where they are drawn to their places in the newest frame.
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {{x: number, y: number}} Place */
 
 const SHORTEST_MS = 30;
 const LONGEST_MS = 1000;
-/** Without a pace, ticks come as they come; longer than this would look like lag. */
+/** Longest glide of a run without a set speed, where a longer one would look like lag. */
 const LONGEST_UNPACED_MS = 150;
-/** A leap over more ticks than this is shown as a leap. */
+/** With more ticks between two frames there is no glide. */
 const MOST_TICKS = 200;
 
 export class Motion {
   constructor() {
     /** @type {WorldFrame | null} */
     this.to = null;
-    /** Where the guests were seen when the frame came, x and y in turn, meters. */
+    /** Where the guests were drawn when the frame arrived: x and y in turn, meters. */
     this.from_m = new Float64Array(0);
-    /** Where they are seen now. */
+    /** Where they are drawn now. */
     this.now_m = new Float64Array(0);
     /** @type {Map<string, Place>} */
     this.robotsFrom = new Map();
     /** @type {Map<string, Place>} */
     this.robotsNow = new Map();
-    this.cameAt_ms = 0;
+    this.arrivedAt_ms = 0;
     this.length_ms = SHORTEST_MS;
     this.isMoving = false;
   }
@@ -37,29 +37,32 @@ export class Motion {
     this.to = frame;
     const leap = last?.epoch === frame.epoch ? frame.tick - last.tick : Infinity;
     if (leap === 0) return;
+
     const isGlide = leap > 0 && leap <= MOST_TICKS && last?.guests.length === frame.guests.length;
     this.from_m = isGlide ? this.now_m.slice() : flat(frame.guests);
     this.robotsFrom = isGlide ? new Map(this.robotsNow) : new Map();
     if (this.now_m.length !== this.from_m.length) this.now_m = this.from_m.slice();
-    this.length_ms = isGlide ? length_ms(frame, leap, now_ms - this.cameAt_ms) : 0;
-    this.cameAt_ms = now_ms;
+    this.length_ms = isGlide ? length_ms(frame, leap, now_ms - this.arrivedAt_ms) : 0;
+    this.arrivedAt_ms = now_ms;
     this.isMoving = true;
   }
 
   /**
-   * Brings everybody to where they are seen at a moment.
+   * Moves robots and guests to where they are drawn at a time.
    * @param {number} now_ms
    */
   advance(now_ms) {
     const frame = this.to;
     if (!frame || !this.isMoving) return;
-    const part = this.length_ms > 0 ? Math.min(1, (now_ms - this.cameAt_ms) / this.length_ms) : 1;
+
+    const part = this.length_ms > 0 ? Math.min(1, (now_ms - this.arrivedAt_ms) / this.length_ms) : 1;
     this.isMoving = part < 1;
     const { from_m, now_m } = this;
     frame.guests.forEach((guest, i) => {
       now_m[2 * i] = from_m[2 * i] + (guest[0] - from_m[2 * i]) * part;
       now_m[2 * i + 1] = from_m[2 * i + 1] + (guest[1] - from_m[2 * i + 1]) * part;
     });
+
     this.robotsNow = new Map(
       frame.robots.map(({ name, location }) => {
         const from = this.robotsFrom.get(name) ?? location;
@@ -71,7 +74,7 @@ export class Motion {
 }
 
 /**
- * How long to glide: about until the next frame comes.
+ * Duration of a glide: about until the next frame arrives.
  * @param {WorldFrame} frame
  * @param {number} ticks that passed
  * @param {number} measured_ms since the last frame
@@ -88,5 +91,6 @@ function flat(places) {
     all[2 * i] = x;
     all[2 * i + 1] = y;
   });
+
   return all;
 }

@@ -1,5 +1,5 @@
 // @ts-check
-// What the simulator refused and why, and short notes of what was done.
+// Refusals with their reasons, and short confirmations.
 
 import { html, nothing, render } from "./vendor/lit-html.js";
 
@@ -17,13 +17,13 @@ export class Notices {
     this.set("", false);
   }
 
-  /** Something was done; it goes by itself. @param {string} text */
+  /** Confirms an action; disappears by itself. @param {string} text */
   note(text) {
     this.set(text, false);
     this.timer = window.setTimeout(() => this.clear(), NOTE_MS);
   }
 
-  /** Something was not done; it stays until the reader does something else. @param {string} text */
+  /** Shows why an action was refused; stays until the next action. @param {string} text */
   refusal(text) {
     this.set(text, true);
   }
@@ -33,11 +33,11 @@ export class Notices {
   }
 
   /**
-   * Shows a refusal with its reason; an answer that something was done takes an old refusal away.
+   * Shows a refusal with its reason; any other answer removes an old refusal.
    * @param {ControlAnswer} answer
    * @param {string} note
    */
-  tell(answer, note = "") {
+  show(answer, note = "") {
     if (answer.answer === "refused") this.refusal(answer.explanation);
     else if (note) this.note(note);
     else this.clear();
@@ -50,10 +50,12 @@ export class Notices {
   set(text, isRefusal) {
     clearTimeout(this.timer);
     const close = html`<button type="button" class="close" aria-label="Dismiss" @click=${() => this.clear()}>×</button>`;
+
     render(
       html`<span data-testid="message" role="status">${text}</span>${text ? close : nothing}`,
       this.place,
     );
+
     this.place.className = text ? `notice${isRefusal ? " refusal" : ""}` : "notice empty";
   }
 }

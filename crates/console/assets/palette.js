@@ -1,5 +1,5 @@
 // @ts-check
-// Colors for states and curves whose names are the robots' own: the same name has the same color while the page is open.
+// Colors for names that the robots choose: the same name has the same color while the page is open.
 
 /**
  * Told apart by most eyes, in light and in dark (after the schemes of Tol, 2021, made calmer). Robots tend to begin with a
@@ -23,7 +23,9 @@ export function colorOf(kind, name) {
   const key = `${kind} ${name}`;
   const known = given.get(key);
   if (known) return known;
+
   const color = COLORS[kind][count[kind]++ % COLORS[kind].length];
   given.set(key, color);
+
   return color;
 }

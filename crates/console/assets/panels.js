@@ -1,5 +1,5 @@
 // @ts-check
-// A panel for each robot, side by side. The page knows no robot: it draws the widgets that it is given.
+// A panel for each robot. The page has no knowledge of particular robots: it renders the widgets that they publish.
 
 import { presence } from "./presence.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
@@ -32,8 +32,8 @@ export class Panels {
     const robots = this.store.frame?.robots ?? [];
     const awaiting = this.store.awaiting();
     this.place.classList.toggle("many", robots.length > 3);
-    const nobody = html`<p class="panels-empty">Each robot shows here what it feels, does and knows.</p>`;
-    render(robots.length ? robots.map((robot) => this.panel(robot, awaiting)) : nobody, this.place);
+    const placeholder = html`<p class="panels-empty">Each robot's emotion, behavior and state appear here.</p>`;
+    render(robots.length ? robots.map((robot) => this.panel(robot, awaiting)) : placeholder, this.place);
   }
 
   /**
@@ -47,6 +47,7 @@ export class Panels {
     const widgets = Array.isArray(all) ? all.slice(0, MOST_WIDGETS) : [];
     const [buttons, others] = split(widgets);
     const send = (/** @type {string} */ command) => this.actions.send(name, command);
+
     return html`
       <section class="panel ${word} ${name === this.chosen ? "chosen" : ""}" data-testid="panel-${name}" aria-label=${name}>
         <header>
@@ -67,7 +68,7 @@ export class Panels {
 }
 
 /**
- * Buttons stand in one row below the rest.
+ * Separates the buttons, which are rendered in one row below the rest.
  * @param {Panel["widgets"]} widgets
  */
 function split(widgets) {
@@ -76,7 +77,7 @@ function split(widgets) {
 }
 
 /**
- * Of a robot that shows nothing of its own, and in recordings, which hold no panels: what it publishes.
+ * The panel of a robot without one, and of all robots in a recording: its published state.
  * @param {RobotFrame} robot
  * @returns {Panel}
  */

@@ -1,5 +1,5 @@
 // @ts-check
-// The plan view: the field from above, at the display's own rate.
+// The plan view: the field from above, at the display's frame rate.
 
 import { Camera } from "./camera.js";
 import * as draw from "./draw.js";
@@ -12,13 +12,13 @@ import { onThemeChange, readTheme } from "./theme.js";
 /** @typedef {import("./units.js").Units} Units */
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {{x: number, y: number}} Place */
-/** What is being set up, shown instead of the run.
- * @typedef {import("./gestures.js").Editor & {draft: import("./types/messages.js").Setup | null,
+/** The editor of the set-up; its draft is shown instead of the run.
+ * @typedef {import("./gestures.js").DragHandler & {draft: import("./types/messages.js").Setup | null,
  *   isAsApplied: boolean, faulty: (robot: string) => boolean}} PlanEditor */
 
-/** Moments of a trail. */
+/** Samples in a trail. */
 const TRAIL_SAMPLES = 240;
-/** Over these the rate of drawing is taken. */
+/** The window of the frame rate. */
 const RATE_WINDOW_MS = 1000;
 
 export class Plan {
@@ -32,6 +32,7 @@ export class Plan {
   constructor(canvas, store, units, editor, onChoose) {
     const context = canvas.getContext("2d", { alpha: false });
     if (!context) throw new Error("this browser draws no canvas");
+
     this.canvas = canvas;
     this.store = store;
     this.units = units;
@@ -48,21 +49,26 @@ export class Plan {
     /** @type {number[]} */
     this.drawnAt_ms = [];
     this.lastDraw_ms = performance.now();
-    const clicked = (/** @type {Place} */ place) => onChoose(this.robotAt(place));
-    this.gestures = new Gestures(canvas, this.camera, { changed: () => this.touch(), clicked, editor });
+    this.gestures = new Gestures(canvas, this.camera, {
+      changed: () => this.touch(),
+      clicked: (place) => onChoose(this.robotAt(place)),
+      editor,
+    });
+
     store.on("frame", () => this.push());
     store.on("epoch", () => this.flights.clear());
     onThemeChange(() => {
       this.pen.theme = readTheme();
       this.touch();
     });
+
     units.listeners.push(() => this.touch());
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
     requestAnimationFrame((now_ms) => this.loop(now_ms));
   }
 
-  /** Something changed that the next picture must show. */
+  /** Paint again in the next animation frame. */
   touch() {
     this.isStale = true;
   }
@@ -85,7 +91,7 @@ export class Plan {
     this.paint(performance.now());
   }
 
-  /** The camera looks at the field that is shown. */
+  /** Fits the camera to the field that is shown. */
   aim() {
     const field_m = this.editor.draft?.field_m ?? this.motion.to?.field_m;
     const isField = field_m && field_m[0] > 0 && field_m[1] > 0;
@@ -101,7 +107,7 @@ export class Plan {
     this.lastDraw_ms = performance.now();
   }
 
-  /** Pictures in the last second; a picture that needs no drawing counts as drawn. */
+  /** Animation frames in the last second, including those that needed no painting. */
   fps() {
     return this.drawnAt_ms.length;
   }
@@ -131,21 +137,27 @@ export class Plan {
     draw.guests(pen, motion.now_m, frame.body_m);
     draw.obstacles(pen, frame.obstacles, frame.body_m);
     if (this.hasTrails) this.paintTrails(frame);
-    for (const { from, to, label } of links(frame.cuts ?? [])) {
-      const [a, b] = [motion.robotsNow.get(from), motion.robotsNow.get(to)];
+
+    for (const { from, to, label } of cutPairs(frame.cuts ?? [])) {
+      const a = motion.robotsNow.get(from);
+      const b = motion.robotsNow.get(to);
       if (a && b) draw.cut(pen, a, b, label);
     }
+
     const late = new Set(this.store.awaiting().map((awaited) => awaited.name));
+
     for (const robot of frame.robots) {
       const marks = { isLate: late.has(robot.name), isChosen: robot.name === this.chosen };
       draw.robot(pen, robot, motion.robotsNow.get(robot.name) ?? robot.location, frame.body_m, marks);
     }
+
     for (const flight of this.flights.airborne.values()) {
-      // Who sends and is not on the field (a person at a console) stands above it.
+      // A sender that is not on the field, such as the operator, is drawn above it.
       const outside = { x: frame.field_m[0] / 2, y: frame.field_m[1] };
       const to = motion.robotsNow.get(flight.to);
       if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to);
     }
+
     this.paintScale();
   }
 
@@ -153,6 +165,7 @@ export class Plan {
   paintTrails(frame) {
     const { history } = this.store;
     const end = history.indexAt(frame.time_s);
+
     for (const robot of frame.robots) {
       const track = history.tracks.get(robot.name);
       const place = this.motion.robotsNow.get(robot.name);
@@ -164,13 +177,15 @@ export class Plan {
   paintDraft(draft) {
     const body_m = this.motion.to?.body_m ?? 0.6096;
     draw.field(this.pen, this.step_m());
-    // Guests are placed by the simulator: nobody knows yet where those of a changed set-up will be.
+    // The simulator places the guests: those of a changed set-up have no places yet.
     if (this.editor.isAsApplied && this.motion.to?.tick === 0) draw.guests(this.pen, this.motion.now_m, body_m);
     draw.obstacles(this.pen, draft.obstacles.map(({ x, y }) => [x, y]), body_m);
+
     for (const [name, place] of Object.entries(draft.robots)) {
       const robot = { name, blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
       draw.robot(this.pen, robot, place, body_m, { isLate: this.editor.faulty(name), isChosen: name === this.chosen });
     }
+
     this.paintScale();
   }
 
@@ -182,7 +197,7 @@ export class Plan {
     draw.scaleBar(this.pen, length * unit_m, `${Number(length.toPrecision(1))} ${unit}`);
   }
 
-  /** Distance of the grid's lines. */
+  /** Distance between grid lines. */
   step_m() {
     const { unit, unit_m } = this.units;
     const steps = unit === "ft" ? [5, 10, 50, 100, 500] : [1, 5, 10, 50, 100];
@@ -200,7 +215,7 @@ export class Plan {
   }
 
   /**
-   * Where a place of the field is in the window.
+   * The point of the window at a place of the field.
    * @param {number} x_m
    * @param {number} y_m
    */
@@ -212,20 +227,22 @@ export class Plan {
 }
 
 /**
- * Links that are cut, each once; a label where not everything is cut both ways.
+ * Pairs of robots that are cut off from each other, each once, with a label unless everything is cut both ways.
  * @param {import("./types/messages.js").Cut[]} cuts
  */
-function links(cuts) {
+function cutPairs(cuts) {
   /** @type {Map<string, {from: string, to: string, ways: number, kinds: Set<string>}>} */
   const found = new Map();
+
   for (const { from, to, commands, queries } of cuts) {
     const key = JSON.stringify([from, to].sort());
-    const link = found.get(key) ?? { from, to, ways: 0, kinds: new Set() };
-    link.ways += 1;
-    if (commands) link.kinds.add("commands");
-    if (queries) link.kinds.add("queries");
-    found.set(key, link);
+    const pair = found.get(key) ?? { from, to, ways: 0, kinds: new Set() };
+    pair.ways += 1;
+    if (commands) pair.kinds.add("commands");
+    if (queries) pair.kinds.add("queries");
+    found.set(key, pair);
   }
+
   return [...found.values()].map(({ from, to, ways, kinds }) => {
     const what = kinds.size === 1 ? [...kinds][0] : "";
     const way = ways === 1 ? `${from} → ${to}` : "";

@@ -1,5 +1,5 @@
 // @ts-check
-// Whether a robot is there, in words.
+// The presence of a robot in words.
 
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./types/messages.js").Awaited} Awaited */
@@ -16,6 +16,7 @@ export function presence({ name, presence, generation }, awaiting) {
   if (presence === "gone") return { word: "gone", since, detail: "its process or its link is down", tone: "bad" };
   if (awaited) return { word: "late", since, detail: because(awaited.because), tone: "warning" };
   if (generation > 1) return { word: "returned", since: "", detail: `this is its process number ${generation}`, tone: "neutral" };
+
   return { word: "here", since: "", detail: "", tone: "good" };
 }
 
@@ -26,6 +27,6 @@ export function presence({ name, presence, generation }, awaiting) {
 export function because(because) {
   if (because === "not_joined") return "has not joined yet";
   if (because === "gone") return "its process or its link is down";
-  if (because === "silent") return "is there but has not reported";
+  if (because === "silent") return "is connected but has not reported";
   return `waits for ${because.waits_for}`;
 }

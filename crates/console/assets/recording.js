@@ -1,5 +1,5 @@
 // @ts-check
-// A recorded run: fetched in pieces, played through the same store as a live one.
+// A recorded run: fetched in chunks, played through the same store as a live one.
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./types/messages.js").RecordingHeader} RecordingHeader */
@@ -7,15 +7,15 @@
 /** @typedef {import("./types/messages.js").Flight} Flight */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
-/** @typedef {{ticks: RecordedTick[], flights: Flight[], log: LogRecord[]}} Piece */
+/** @typedef {{ticks: RecordedTick[], flights: Flight[], log: LogRecord[]}} Chunk */
 
-/** Ticks in a piece. */
-const PIECE = 128;
-/** Numbers kept of guests' places; the pieces used longest ago go first. */
+/** Ticks in a chunk. */
+const CHUNK = 128;
+/** Most numbers of guests' places that are kept; the least recently used chunks are dropped first. */
 const MOST_NUMBERS = 12_000_000;
-/** No more pictures a second than eyes can use. */
+/** Least time between two frames. */
 const FRAME_MS = 33;
-/** As fast as it goes, for a recording. */
+/** The factor of playback at speed "max". */
 const FASTEST = 200;
 
 export class Player {
@@ -28,17 +28,17 @@ export class Player {
     this.client = client;
     /** @type {(RecordingHeader & {ticks: number}) | null} */
     this.header = null;
-    /** By number; those used last come last. @type {Map<number, Promise<Piece>>} */
-    this.pieces = new Map();
+    /** By number, in order of their last use. @type {Map<number, Promise<Chunk>>} */
+    this.chunks = new Map();
     this.numbers = 0;
-    /** Where the playing is, in ticks; between two of them while it plays. */
+    /** Position of playback, in ticks, with a fraction. */
     this.position = 0;
     this.tick = -1;
     this.isPlaying = false;
     /** @type {number | null} */
     this.factor = 5;
     this.seeks = 0;
-    this.wasAt_ms = 0;
+    this.playedAt_ms = 0;
   }
 
   get last() {
@@ -55,11 +55,12 @@ export class Player {
     }
   }
 
-  /** Charts and the log want the whole run: every piece once, in order. */
+  /** Reads the whole run once, in order, for charts and log. */
   async readAll() {
     if (!this.header) return;
-    for (let number = 0; number * PIECE <= this.last; number += 1) {
-      const { ticks, log } = await this.piece(number);
+
+    for (let number = 0; number * CHUNK <= this.last; number += 1) {
+      const { ticks, log } = await this.chunk(number);
       for (const { tick, robots } of ticks) this.store.history.add(tick * this.header.tick_s, robots);
       this.store.addLines(log);
       this.store.emit("frame");
@@ -68,39 +69,42 @@ export class Player {
 
   /**
    * @param {number} number
-   * @returns {Promise<Piece>}
+   * @returns {Promise<Chunk>}
    */
-  piece(number) {
-    const known = this.pieces.get(number);
+  chunk(number) {
+    const known = this.chunks.get(number);
     if (known) {
-      this.pieces.delete(number);
-      this.pieces.set(number, known);
+      this.chunks.delete(number);
+      this.chunks.set(number, known);
       return known;
     }
-    const query = new URLSearchParams({ from: String(number * PIECE), count: String(PIECE) });
-    const fetched = get("recording/ticks", query).then((/** @type {Piece} */ piece) => {
-      this.numbers += numbersIn(piece);
+
+    const query = new URLSearchParams({ from: String(number * CHUNK), count: String(CHUNK) });
+    const fetched = get("recording/ticks", query).then((/** @type {Chunk} */ chunk) => {
+      this.numbers += numbersIn(chunk);
       this.makeRoom(number);
-      return piece;
+      return chunk;
     });
-    this.pieces.set(number, fetched);
-    // What could not be had may be asked for again.
-    fetched.catch(() => this.pieces.delete(number));
+
+    this.chunks.set(number, fetched);
+    // A failed request may be repeated.
+    fetched.catch(() => this.chunks.delete(number));
+
     return fetched;
   }
 
   /** @param {number} kept */
   async makeRoom(kept) {
-    for (const [number, piece] of this.pieces) {
+    for (const [number, chunk] of this.chunks) {
       if (this.numbers <= MOST_NUMBERS) return;
       if (number === kept) continue;
-      this.pieces.delete(number);
-      this.numbers -= numbersIn(await piece);
+      this.chunks.delete(number);
+      this.numbers -= numbersIn(await chunk);
     }
   }
 
   /**
-   * Shows a tick; a newer wish overtakes an older one that is still being fetched.
+   * Shows a tick, unless another one is requested while its chunk is fetched.
    * @param {number} tick
    */
   async seek(tick) {
@@ -111,16 +115,18 @@ export class Player {
 
   /**
    * @param {number} tick
-   * @param {boolean} isPlayed whether what happened on the way is shown
+   * @param {boolean} isPlayed whether the commands since the tick before are shown
    */
   async show(tick, isPlayed) {
     const header = this.header;
     if (!header) return;
-    const wish = ++this.seeks;
-    const piece = await this.piece(Math.floor(tick / PIECE));
-    const record = piece.ticks.find((one) => one.tick === tick) ?? piece.ticks.at(-1);
-    if (wish !== this.seeks || !record) return;
-    const flights = isPlayed ? piece.flights.filter((flight) => flight.tick > this.tick && flight.tick <= tick) : [];
+
+    const seek = ++this.seeks;
+    const chunk = await this.chunk(Math.floor(tick / CHUNK));
+    const record = chunk.ticks.find((one) => one.tick === tick) ?? chunk.ticks.at(-1);
+    if (seek !== this.seeks || !record) return;
+
+    const flights = isPlayed ? chunk.flights.filter((flight) => flight.tick > this.tick && flight.tick <= tick) : [];
     this.tick = record.tick;
     this.store.show(this.frame(header, record, flights));
   }
@@ -135,7 +141,11 @@ export class Player {
     const { guests_mm } = record;
     /** @type {[number, number][]} */
     const guests = [];
-    for (let i = 0; i + 1 < guests_mm.length; i += 2) guests.push([guests_mm[i] / 1000, guests_mm[i + 1] / 1000]);
+
+    for (let i = 0; i + 1 < guests_mm.length; i += 2) {
+      guests.push([guests_mm[i] / 1000, guests_mm[i + 1] / 1000]);
+    }
+
     return {
       ...header,
       tick: record.tick,
@@ -160,7 +170,7 @@ export class Player {
     if (this.isPlaying) return this.pause();
     if (this.position >= this.last) this.position = 0;
     this.isPlaying = true;
-    this.wasAt_ms = performance.now();
+    this.playedAt_ms = performance.now();
     this.play();
   }
 
@@ -178,8 +188,8 @@ export class Player {
   async play() {
     while (this.isPlaying && this.header) {
       const now_ms = performance.now();
-      const passed_s = Math.min(0.5, (now_ms - this.wasAt_ms) / 1000);
-      this.wasAt_ms = now_ms;
+      const passed_s = Math.min(0.5, (now_ms - this.playedAt_ms) / 1000);
+      this.playedAt_ms = now_ms;
       this.position = Math.min(this.last, this.position + (passed_s * (this.factor ?? FASTEST)) / this.header.tick_s);
       const tick = Math.floor(this.position);
       if (tick >= this.last) this.isPlaying = false;
@@ -194,9 +204,9 @@ export class Player {
   }
 }
 
-/** @param {Piece} piece */
-function numbersIn(piece) {
-  return piece.ticks.reduce((sum, tick) => sum + tick.guests_mm.length, 0);
+/** @param {Chunk} chunk */
+function numbersIn(chunk) {
+  return chunk.ticks.reduce((sum, tick) => sum + tick.guests_mm.length, 0);
 }
 
 /**

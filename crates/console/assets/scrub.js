@@ -15,6 +15,7 @@ export function renderScrub(place, player) {
     player.isPlaying = false;
     player.seek(tick);
   };
+
   const time_s = player.tick * (player.header?.tick_s ?? 0);
   const bar = html`
     <button type="button" class="primary" data-testid="play" aria-pressed=${player.isPlaying} @click=${() => player.toggle()}>
@@ -23,5 +24,6 @@ export function renderScrub(place, player) {
     <input type="range" data-testid="scrub" aria-label="Tick" aria-valuetext="tick ${player.tick}, ${time_s.toFixed(1)} s"
       min="0" max=${player.last} step="1" .value=${String(Math.max(0, player.tick))} @input=${seek} />
     <span class="count">${time_s.toFixed(1)} / ${(player.last * (player.header?.tick_s ?? 0)).toFixed(1)} s</span>`;
+
   render(player.header ? bar : nothing, place);
 }

@@ -1,10 +1,27 @@
 // @ts-check
-// How the set-up form looks.
+// Renders the set-up form.
 
 import { html, nothing } from "./vendor/lit-html.js";
 
-/** @typedef {import("./setup.js").SetupView} SetupView */
-/** @typedef {import("./setup.js").Kind} Kind */
+/** How a number is typed: as it is, or in the chosen unit of length. @typedef {"plain" | "length"} Kind */
+
+/**
+ * What the form shows and calls.
+ * @typedef {object} SetupView
+ * @property {Setup | null} draft
+ * @property {boolean} isChanged
+ * @property {{isLive: boolean}} store
+ * @property {{unit: string}} units
+ * @property {(name: string, value: number, kind: Kind) => string} text
+ * @property {(name: string, text: string, kind: Kind) => number} number
+ * @property {(field: string, change: (draft: Setup) => void) => void} edit
+ * @property {() => void} apply
+ * @property {() => void} refresh
+ * @property {() => void} drawSeed
+ * @property {() => void} save
+ * @property {(file: File) => Promise<void>} load
+ */
+
 /** @typedef {import("./types/messages.js").Setup} Setup */
 /** @typedef {import("./types/messages.js").Range} Range */
 /** @typedef {Map<string, string>} Faults */
@@ -16,14 +33,16 @@ import { html, nothing } from "./vendor/lit-html.js";
 export function form(view, faults) {
   const { draft } = view;
   if (!draft) {
-    const why = view.store.isLive ? "Asking the simulator …" : "A run is set up here as soon as a simulator is there.";
+    const why = view.store.isLive ? "Loading the set-up …" : "The set-up appears here when a simulator is connected.";
     return html`<p class="muted">${why}</p>`;
   }
+
   const unit = view.units.unit;
   const submit = (/** @type {Event} */ event) => {
     event.preventDefault();
     view.apply();
   };
+
   return html`
     <form class="setup" novalidate autocomplete="off" @submit=${submit}>
       <div class="setup-fields">
@@ -40,7 +59,7 @@ export function form(view, faults) {
           number(view, "run-duration", "simulated seconds", draft.duration_s, "plain", (d, v) => (d.duration_s = v), "duration_s"),
         ])}
         ${group("Seed", "seed", faults, [
-          number(view, "seed", "where all chance comes from", draft.seed, "plain", (d, v) => (d.seed = v), "seed"),
+          number(view, "seed", "of all random numbers", draft.seed, "plain", (d, v) => (d.seed = v), "seed"),
           html`<button type="button" data-testid="setup-seed-draw" @click=${() => view.drawSeed()}>Draw</button>`,
         ])}
         ${log(view, draft, faults)} ${obstacles(view, draft, faults)} ${robots(view, draft, faults, unit)}
@@ -79,6 +98,7 @@ function number(view, name, label, value, kind, set, field) {
     const typed = view.number(name, /** @type {HTMLInputElement} */ (event.target).value, kind);
     view.edit(field, (draft) => set(draft, typed));
   };
+
   return html`
     <label class="field"><span>${label}</span>
       <input type="text" inputmode="decimal" data-testid="setup-${name}" aria-describedby="error-${field}"
@@ -108,6 +128,7 @@ function log(view, draft, faults) {
     view.edit("log_file.name", (d) => (d.log_file.enabled = /** @type {HTMLInputElement} */ (event.target).checked));
   const rename = (/** @type {Event} */ event) =>
     view.edit("log_file.name", (d) => (d.log_file.name = /** @type {HTMLInputElement} */ (event.target).value));
+
   return group("Log file", "log_file.name", faults, [
     html`<label class="check"><input type="checkbox" data-testid="setup-log" .checked=${draft.log_file.enabled} @change=${toggle} />
       <span>write it</span></label>`,
@@ -149,7 +170,7 @@ function robots(view, draft, faults, unit) {
 }
 
 /**
- * A refusal of a field that this form does not have is not to be lost.
+ * Reasons of fields that the form does not have.
  * @param {Faults} faults
  * @param {Setup} draft
  */
@@ -171,11 +192,12 @@ function actions(view, faults) {
     if (file) await view.load(file);
     input.value = "";
   };
+
   return html`
     <div class="setup-actions">
       <button type="submit" class="primary" data-testid="setup-apply">Apply and init</button>
       <button type="button" data-testid="setup-revert" ?disabled=${!view.isChanged} @click=${() => view.refresh()}>Undo changes</button>
-      <span class="told">${faults.size > 0 ? html`<span class="fault">${faults.size === 1 ? "1 thing" : `${faults.size} things`} to put right</span>`
+      <span class="form-state">${faults.size > 0 ? html`<span class="fault">${faults.size === 1 ? "1 thing" : `${faults.size} things`} to correct</span>`
         : view.isChanged ? html`<span class="muted">changed, not applied</span>` : nothing}</span>
       <label class="button">Load …<input type="file" accept=".toml,text/plain" class="hidden-file" data-testid="setup-load" @change=${load} /></label>
       <button type="button" data-testid="setup-save" @click=${() => view.save()}>Save</button>

@@ -1,5 +1,5 @@
 // @ts-check
-// The set-up form: what a person can change before the next epoch.
+// The set-up: what a person can change before the next epoch.
 
 import { faultsOf } from "./draft.js";
 import { form } from "./setup-form.js";
@@ -14,7 +14,7 @@ import { render } from "./vendor/lit-html.js";
 /** @typedef {import("./editor.js").Editor} Editor */
 /** @typedef {import("./notices.js").Notices} Notices */
 
-/** How numbers are typed: as they are, or in the reader's unit of length. @typedef {"plain" | "length"} Kind */
+/** @typedef {import("./setup-form.js").Kind} Kind */
 
 const LARGEST_FILE = 1 << 20;
 const SEED_BITS = 2 ** 32;
@@ -22,30 +22,31 @@ const SEED_BITS = 2 ** 32;
 export class SetupView {
   /**
    * @param {HTMLElement} place
-   * @param {{store: Store, units: Units, editor: Editor, notices: Notices, ask: (control: Control) => Promise<ControlAnswer>}} parts
+   * @param {{store: Store, units: Units, editor: Editor, notices: Notices, request: (control: Control) => Promise<ControlAnswer>}} parts
    */
-  constructor(place, { store, units, editor, notices, ask }) {
+  constructor(place, { store, units, editor, notices, request }) {
     this.place = place;
     this.store = store;
     this.units = units;
     this.editor = editor;
     this.notices = notices;
-    this.ask = ask;
-    /** What the run is set up with now. @type {Setup | null} */
+    this.request = request;
+    /** The set-up of the run. @type {Setup | null} */
     this.applied = null;
-    /** What is being made of it. @type {Setup | null} */
+    /** The set-up as it is edited. @type {Setup | null} */
     this.draft = null;
-    /** What stands in a field while it is typed, by name. @type {Map<string, string>} */
+    /** The text of a field that was edited, by name. @type {Map<string, string>} */
     this.typed = new Map();
-    /** What the simulator refused. @type {Map<string, string>} */
+    /** Reasons of the simulator's refusal, by field. @type {Map<string, string>} */
     this.refused = new Map();
     this.isOpen = false;
     units.listeners.push(() => {
       this.typed.clear();
       this.render();
     });
+
     store.on("epoch", () => this.fetch());
-    store.on("link", () => this.fetch());
+    store.on("connection", () => this.fetch());
   }
 
   get body_m() {
@@ -56,12 +57,15 @@ export class SetupView {
     return this.draft !== null && JSON.stringify(this.draft) !== JSON.stringify(this.applied);
   }
 
-  /** What is wrong, by field. */
+  /** Reasons by field. */
   faults() {
     if (!this.draft) return new Map();
     const length = (/** @type {number} */ length_m) => this.units.length(length_m, 2);
     const faults = faultsOf(this.draft, this.body_m, this.store.frame?.tick_s ?? 0, length);
-    for (const [field, reason] of this.refused) if (!faults.has(field)) faults.set(field, reason);
+
+    for (const [field, reason] of this.refused) {
+      if (!faults.has(field)) faults.set(field, reason);
+    }
     return faults;
   }
 
@@ -72,17 +76,17 @@ export class SetupView {
     this.changed();
   }
 
-  /** Asks what the run is set up with, unless the reader is in the middle of changing it. */
+  /** Requests the set-up of the run, unless there are unapplied changes. */
   async fetch() {
     if (!this.isOpen || !this.store.isLive || this.isChanged) return this.changed();
     await this.refresh();
   }
 
-  /** What was changed here is applied or dropped: begins from what the run is set up with. */
+  /** Replaces the draft with the set-up of the run. */
   async refresh() {
-    const answer = await this.ask({ do: "setup" });
+    const answer = await this.request({ do: "setup" });
     if (answer.answer === "setup") this.take(answer.setup);
-    else if (answer.answer === "refused") this.notices.tell(answer);
+    else if (answer.answer === "refused") this.notices.show(answer);
   }
 
   /** @param {Setup} setup */
@@ -94,7 +98,7 @@ export class SetupView {
     this.changed();
   }
 
-  /** Shows the draft in the form, and on the plan unless the run is to be seen there. */
+  /** Shows the draft in the form, and on the plan unless the clock runs. */
   changed() {
     const isEdited = this.isOpen && this.store.mode === "live" && this.store.phase !== "running";
     this.editor.draft = isEdited ? this.draft : null;
@@ -103,19 +107,21 @@ export class SetupView {
     this.onChange();
   }
 
-  /** The run began or came to a halt. */
+  /** To be called when the phase may have changed. */
   phase() {
     const isRunning = this.store.phase === "running";
     if (this.isOpen && isRunning === (this.editor.draft !== null)) this.changed();
   }
 
-  /** Something was moved on the plan: its fields show where to. */
+  /** To be called when the draft was edited on the plan. */
   moved() {
-    for (const name of this.typed.keys()) if (name.startsWith("robot-")) this.typed.delete(name);
+    for (const name of this.typed.keys()) {
+      if (name.startsWith("robot-")) this.typed.delete(name);
+    }
     this.changed();
   }
 
-  /** Set by the page: the plan shows the draft. */
+  /** Called after every change; set by the page. */
   onChange() {}
 
   render() {
@@ -123,7 +129,7 @@ export class SetupView {
   }
 
   /**
-   * A field as it is shown.
+   * The text of a field.
    * @param {string} name
    * @param {number} value
    * @param {Kind} kind
@@ -135,7 +141,7 @@ export class SetupView {
   }
 
   /**
-   * What was typed; nonsense becomes NaN, which the checks explain.
+   * Parses the text of a field; NaN if it is not a number, which the checks report.
    * @param {string} name
    * @param {string} text
    * @param {Kind} kind
@@ -148,7 +154,7 @@ export class SetupView {
   }
 
   /**
-   * @param {string} field whose old refusal does not hold any longer
+   * @param {string} field whose refusal is cleared
    * @param {(draft: Setup) => void} change
    */
   edit(field, change) {
@@ -161,19 +167,22 @@ export class SetupView {
   async apply() {
     const { draft } = this;
     if (!draft) return;
+
     this.refused.clear();
     const faults = this.faults();
     if (faults.size > 0) {
       this.notices.refusal(`Not applied: ${[...faults.values()][0]}`);
       return this.showFirstFault();
     }
-    const answer = await this.ask({ do: "init", setup: draft });
+
+    const answer = await this.request({ do: "init", setup: draft });
     if (answer.answer === "refused") {
       this.refused = new Map((answer.fields ?? []).map(({ field, reason }) => [field, reason]));
-      this.notices.tell(answer);
+      this.notices.show(answer);
       this.changed();
       return this.showFirstFault();
     }
+
     this.notices.note("Applied: the next epoch is ready at tick 0.");
     await this.refresh();
   }
@@ -184,20 +193,21 @@ export class SetupView {
   }
 
   async save() {
-    const answer = await this.ask({ do: "setup" });
-    if (answer.answer !== "setup") return this.notices.tell(answer);
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([answer.scenario], { type: "application/toml" }));
-    link.download = `${this.store.run || "scenario"}.toml`;
-    link.click();
-    URL.revokeObjectURL(link.href);
-    this.notices.note(this.isChanged ? "Saved as applied; what is changed here is not applied yet." : "Saved.");
+    const answer = await this.request({ do: "setup" });
+    if (answer.answer !== "setup") return this.notices.show(answer);
+
+    const anchor = document.createElement("a");
+    anchor.href = URL.createObjectURL(new Blob([answer.scenario], { type: "application/toml" }));
+    anchor.download = `${this.store.run || "scenario"}.toml`;
+    anchor.click();
+    URL.revokeObjectURL(anchor.href);
+    this.notices.note(this.isChanged ? "Saved without the changes that are not applied." : "Saved.");
   }
 
   /** @param {File} file */
   async load(file) {
     if (file.size > LARGEST_FILE) return this.notices.refusal(`${file.name} is larger than a scenario can be (1 MiB).`);
-    const answer = await this.ask({ do: "load", scenario: await file.text() });
+    const answer = await this.request({ do: "load", scenario: await file.text() });
     if (answer.answer === "refused") return this.notices.refusal(`${file.name}: ${answer.explanation}`);
     this.notices.note(`${file.name} is loaded: the next epoch is ready at tick 0.`);
     await this.refresh();

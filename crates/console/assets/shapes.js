@@ -1,5 +1,5 @@
 // @ts-check
-// Small signs on a canvas, in CSS pixels.
+// Small symbols on a canvas, in CSS pixels.
 
 /** @typedef {import("./theme.js").Theme} Theme */
 
@@ -52,7 +52,7 @@ export function cross(context, x, y, size, color) {
   context.stroke();
 }
 
-/** Where it is heading. @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
+/** The direction of motion. @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
 export function nose(context, x, y, radius, angle_rad, color) {
   const at = (/** @type {number} */ turn, /** @type {number} */ distance) =>
     /** @type {const} */ ([x + Math.cos(angle_rad + turn) * distance, y - Math.sin(angle_rad + turn) * distance]);
@@ -64,7 +64,7 @@ export function nose(context, x, y, radius, angle_rad, color) {
   context.fill();
 }
 
-/** Something is in its way. @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
+/** A robot that is blocked. @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
 export function barrier(context, x, y, radius, angle_rad, color) {
   context.beginPath();
   context.arc(x, y, radius + 4, -angle_rad - 0.8, -angle_rad + 0.8);

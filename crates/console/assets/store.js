@@ -1,5 +1,5 @@
 // @ts-check
-// All that the page knows. Messages change it here and nowhere else; views listen and read.
+// The state of the page. Only this module changes it; views subscribe to topics and read.
 
 import { History } from "./history.js";
 
@@ -8,13 +8,13 @@ import { History } from "./history.js";
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 /** @typedef {import("./types/messages.js").Status} Status */
 /** @typedef {import("./connection.js").Broadcast} Broadcast */
-/** What listeners can hear of. @typedef {"link" | "frame" | "panel" | "log" | "epoch"} Topic */
+/** What listeners subscribe to. @typedef {"connection" | "frame" | "panel" | "log" | "epoch"} Topic */
 
-/** Lines kept for reading back and filtering. */
+/** Most log lines that are kept for scrolling back and filtering. */
 const MOST_LINES = 10000;
-/** Panels kept; robots come from the roster, so this only bounds nonsense. */
+/** Most panels; a bound on names that are not in the roster. */
 const MOST_PANELS = 512;
-/** From here on the simulator itself calls a robot late. */
+/** Time without a report after which the simulator, too, calls a robot late. */
 const LATE_S = 0.5;
 
 export class Store {
@@ -23,21 +23,21 @@ export class Store {
     this.mode = null;
     this.run = "";
     this.version = "";
-    this.isLinked = false;
+    this.isConnected = false;
     this.isSimulatorPresent = false;
     /** @type {WorldFrame | null} */
     this.frame = null;
-    /** Wall clock when the frame came, milliseconds. */
+    /** When the frame arrived, in the time of `performance.now()`. */
     this.frameAt_ms = 0;
-    /** Of a simulator that has shown no picture yet. @type {Status | null} */
+    /** The newest status that answered a request. @type {Status | null} */
     this.status = null;
     /** @type {Map<string, Panel>} */
     this.panels = new Map();
     /** @type {LogRecord[]} */
     this.log = [];
-    /** Lines that were ever added; tells a view what is new. */
+    /** Number of lines so far, including those no longer kept. */
     this.logCount = 0;
-    /** Lines that this browser missed. */
+    /** Number of lines that the server dropped because this browser was too slow. */
     this.logMissed = 0;
     this.history = new History();
     /** @type {Map<Topic, (() => void)[]>} */
@@ -57,10 +57,10 @@ export class Store {
     this.listeners.get(topic)?.forEach((listener) => listener());
   }
 
-  /** @param {boolean} isLinked */
-  link(isLinked) {
-    this.isLinked = isLinked;
-    this.emit("link");
+  /** @param {boolean} isConnected */
+  setConnected(isConnected) {
+    this.isConnected = isConnected;
+    this.emit("connection");
   }
 
   /** @param {Broadcast} message */
@@ -72,7 +72,7 @@ export class Store {
       case "simulator":
         this.isSimulatorPresent = message.present;
         if (!message.present) this.status = null;
-        this.emit("link");
+        this.emit("connection");
         break;
       case "frame":
         this.show(message.frame);
@@ -91,7 +91,7 @@ export class Store {
   }
 
   /**
-   * After hello the server sends the last lines again.
+   * A new connection: the server sends the last lines of the log again.
    * @param {"live" | "recording"} mode
    * @param {string} run
    * @param {string} version
@@ -104,7 +104,7 @@ export class Store {
     this.log = [];
     this.logCount = 0;
     this.logMissed = 0;
-    this.emit("link");
+    this.emit("connection");
     this.emit("log");
   }
 
@@ -115,7 +115,7 @@ export class Store {
   }
 
   /**
-   * The newest picture. Whatever belongs to another epoch is no longer of interest.
+   * Replaces the frame. A new epoch clears the history.
    * @param {WorldFrame} frame
    */
   show(frame) {
@@ -123,16 +123,18 @@ export class Store {
     const isNew = !last || frame.epoch !== last.epoch || frame.run !== last.run;
     this.frame = frame;
     this.frameAt_ms = performance.now();
+
     if (this.mode === "live") {
       if (isNew || frame.tick < last.tick) this.history.clear();
       this.history.add(frame.time_s, frame.robots);
     }
+
     if (isNew) this.emit("epoch");
     this.emit("frame");
   }
 
   /**
-   * An answer of the simulator tells of its phase before the next picture does.
+   * Applies the status of an answer, which arrives before the next frame.
    * @param {Status} status
    */
   applyStatus(status) {
@@ -142,6 +144,7 @@ export class Store {
       this.frame = { ...frame, phase: status.phase, speed: status.speed, awaiting: status.awaiting, flights: [] };
       this.frameAt_ms = performance.now();
     }
+
     this.emit("frame");
   }
 
@@ -154,15 +157,17 @@ export class Store {
   }
 
   /**
-   * Whether something told of a later moment than the picture shows: the simulator paints so many pictures a second and
-   * no more, so the last one before it comes to a halt may be missing.
+   * Whether the status or the log is newer than the frame. The simulator limits its frames per second, so the last one
+   * before a pause may be missing.
    */
   get isBehind() {
     const { frame } = this;
     if (!frame) return false;
-    const told = [this.status, this.log.at(-1)].filter((one) => !!one);
-    const isNextEpoch = told.some(({ epoch }) => epoch > frame.epoch);
-    const isLaterTick = told.some(({ epoch, tick }) => epoch === frame.epoch && tick > frame.tick);
+
+    const newest = [this.status, this.log.at(-1)].filter((one) => !!one);
+    const isNextEpoch = newest.some(({ epoch }) => epoch > frame.epoch);
+    const isLaterTick = newest.some(({ epoch, tick }) => epoch === frame.epoch && tick > frame.tick);
+
     return isNextEpoch || (isLaterTick && frame.phase !== "running");
   }
 
@@ -170,14 +175,14 @@ export class Store {
     return this.frame?.phase ?? this.status?.phase ?? null;
   }
 
-  /** Whether there is somebody to control. */
+  /** Whether requests reach a simulator. */
   get isLive() {
-    return this.mode === "live" && this.isLinked && this.isSimulatorPresent;
+    return this.mode === "live" && this.isConnected && this.isSimulatorPresent;
   }
 
   /**
-   * For whom the clock waits, with seconds of wall clock as of now. In the middle of any tick it waits a little for
-   * everybody; that is nothing to tell.
+   * The robots that the clock waits for, with seconds of wall clock as of now. In every tick the clock waits a short time
+   * for each robot; only late ones are listed.
    * @returns {import("./types/messages.js").Awaited[]}
    */
   awaiting() {

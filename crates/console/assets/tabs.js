@@ -1,5 +1,5 @@
 // @ts-check
-// Tabs as assistive technology expects them: arrow keys move, one panel is shown.
+// Accessible tabs: arrow keys move, one panel is shown.
 
 /**
  * @param {HTMLElement} list with elements of role `tab` that control panels by `aria-controls`
@@ -17,6 +17,7 @@ export function tabs(list, onSelect) {
     }
     onSelect(chosen.dataset.tab ?? "");
   };
+
   for (const tab of all) tab.addEventListener("click", () => select(tab));
   list.addEventListener("keydown", (event) => {
     const turn = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
@@ -28,5 +29,6 @@ export function tabs(list, onSelect) {
     next.focus();
     select(next);
   });
+
   return { select: (/** @type {string} */ name) => all.filter((tab) => tab.dataset.tab === name).forEach(select) };
 }

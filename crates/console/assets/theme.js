@@ -1,5 +1,5 @@
 // @ts-check
-// The colors of the style sheet, for what is drawn on canvases; they follow the reader's light or dark mode.
+// The colors of the style sheet for canvases; they follow light and dark mode.
 
 /** @typedef {Record<"field" | "outside" | "grid" | "edge" | "obstacle" | "obstacleEdge" | "guest" | "robot" | "robotText"
  *   | "absent" | "absentFill" | "accent" | "warning" | "bad" | "muted" | "text" | "font", string>} Theme */

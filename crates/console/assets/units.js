@@ -1,5 +1,5 @@
 // @ts-check
-// Feet or meters: what is shown and typed. Everything inside the page is in SI units.
+// Feet or meters for display and input. All values inside the page are in SI units.
 
 /** @typedef {"m" | "ft"} Unit */
 
@@ -7,7 +7,7 @@
 const FOOT_M = 0.3048;
 
 /**
- * A number for people: no more digits than say something, and none that are zero at the end.
+ * Formats a number without trailing zeros.
  * @param {number} value
  * @param {number} digits most digits after the point
  * @returns {string}
@@ -20,7 +20,7 @@ export function short(value, digits = 2) {
 }
 
 /**
- * Simulated time for people.
+ * Formats simulated time.
  * @param {number} time_s
  * @returns {string}
  */
@@ -28,7 +28,7 @@ export function seconds(time_s) {
   return `${time_s.toFixed(1)} s`;
 }
 
-/** The unit that the reader chose, kept by the browser where it may. */
+/** The chosen unit, kept in the browser's local storage if that is allowed. */
 export class Units {
   constructor() {
     /** @type {Unit} */
@@ -43,8 +43,9 @@ export class Units {
     try {
       localStorage.setItem("cars-units", unit);
     } catch {
-      // A browser that keeps nothing still shows the unit until the page is closed.
+      // Without local storage the choice lasts until the page is closed.
     }
+
     this.listeners.forEach((listener) => listener());
   }
 

@@ -1,5 +1,5 @@
 // @ts-check
-// Speaks why a robot feels as it does, when that changes, with the browser's own voice. Off until the reader asks.
+// Speaks the reason for a robot's emotion when it changes, with the browser's speech synthesis. Off by default.
 
 /** @typedef {import("./store.js").Store} Store */
 
@@ -12,11 +12,11 @@ export class Voice {
   constructor(store) {
     this.store = store;
     this.isOn = false;
-    /** What each robot said last. @type {Map<string, string>} */
-    this.said = new Map();
-    /** What waits to be spoken, the newest of each robot. @type {Map<string, string>} */
+    /** The last text of each robot. @type {Map<string, string>} */
+    this.last = new Map();
+    /** The newest text of each robot that is not spoken yet. @type {Map<string, string>} */
     this.waiting = new Map();
-    store.on("panel", () => this.listen());
+    store.on("panel", () => this.update());
   }
 
   get isPossible() {
@@ -26,27 +26,30 @@ export class Voice {
   /** @param {boolean} isOn */
   turn(isOn) {
     this.isOn = isOn && this.isPossible;
-    this.said.clear();
+    this.last.clear();
     this.waiting.clear();
     if (this.isPossible) speechSynthesis.cancel();
-    if (this.isOn) this.listen();
+    if (this.isOn) this.update();
   }
 
-  listen() {
+  update() {
     if (!this.isOn) return;
+
     for (const [robot, panel] of this.store.panels) {
       const why = (panel.widgets ?? []).find((widget) => widget?.widget === "text" && widget.label === LABEL);
-      if (why?.widget !== "text" || this.said.get(robot) === why.text) continue;
-      this.said.set(robot, why.text);
+      if (why?.widget !== "text" || this.last.get(robot) === why.text) continue;
+      this.last.set(robot, why.text);
       this.waiting.set(robot, why.text);
     }
+
     this.speak();
   }
 
-  /** One at a time, so that nobody talks over another and old news is passed over. */
+  /** Speaks one text at a time; older texts of the same robot are skipped. */
   speak() {
     const [next] = this.waiting;
     if (!this.isOn || !next || speechSynthesis.speaking || speechSynthesis.pending) return;
+
     const [robot, text] = next;
     this.waiting.delete(robot);
     const words = new SpeechSynthesisUtterance(`${robot}: ${text.slice(0, LONGEST)}`);

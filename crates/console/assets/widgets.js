@@ -1,5 +1,5 @@
 // @ts-check
-// The widgets of a robot's panel. What a robot sends is data: text stays text, and a picture is an image.
+// The widgets of a robot's panel. Everything that a robot sends is untrusted: text is rendered as text, SVG as an image.
 
 import { drawFace } from "./face.js";
 import { short } from "./units.js";
@@ -10,11 +10,11 @@ import { html, nothing, svg } from "./vendor/lit-html.js";
 /** @typedef {(command: string) => void} Send */
 
 const TONES = ["good", "neutral", "warning", "bad"];
-/** Of a table; more would not be read anyway. */
+/** Limits of a table. */
 const MOST_ROWS = 60;
 const MOST_CELLS = 12;
 const MOST_POINTS = 1000;
-/** Characters of a picture. */
+/** Characters. */
 const LARGEST_SVG = 500_000;
 
 /**
@@ -62,6 +62,7 @@ function bar({ label, value, min, max }) {
   const part = max > min ? (value / 2 - min / 2) / (max / 2 - min / 2) : 0;
   const width = Number.isFinite(part) ? 100 * Math.min(1, Math.max(0, part)) : 0;
   const of = min === 0 && max !== 1 ? html`<span class="of"> / ${short(max)}</span>` : nothing;
+
   return html`
     <div class="widget gauge">
       <div class="row"><span class="label">${label}</span><span class="number">${short(value)}${of}</span></div>
@@ -74,12 +75,14 @@ function bar({ label, value, min, max }) {
 /** @param {Extract<Widget, {widget: "sparkline"}>} widget */
 function sparkline({ label, values }) {
   const points = (Array.isArray(values) ? values : []).filter(Number.isFinite).slice(-MOST_POINTS);
-  const [low, high] = [Math.min(...points), Math.max(...points)];
-  // Halves, because the distance of two large numbers may be larger than any number.
+  const low = Math.min(...points);
+  const high = Math.max(...points);
+  // Halves, because the difference of two large numbers may overflow.
   const range = high / 2 - low / 2 || 1;
   const at = (/** @type {number} */ value, /** @type {number} */ i) =>
     `${((100 * i) / Math.max(1, points.length - 1)).toFixed(2)},${(22 - 20 * ((value / 2 - low / 2) / range)).toFixed(2)}`;
   const last = points.at(-1);
+
   return html`
     <div class="widget spark">
       <div class="row"><span class="label">${label}</span><span class="number">${last === undefined ? "–" : short(last)}</span></div>
@@ -93,6 +96,7 @@ function sparkline({ label, values }) {
 function table(rows) {
   const cells = (/** @type {string[]} */ row) => (Array.isArray(row) ? row : []).slice(0, MOST_CELLS);
   const isPairs = rows.every((row) => row?.length === 2);
+
   return html`
     <div class="widget table"><table class=${isPairs ? "pairs" : ""}><tbody>
       ${rows.slice(0, MOST_ROWS).map((row) => html`<tr>${cells(row).map((cell) => html`<td>${cell}</td>`)}</tr>`)}
@@ -101,15 +105,16 @@ function table(rows) {
 }
 
 /**
- * An image runs no script and loads nothing.
+ * An SVG in an `img` element runs no script and loads nothing.
  * @param {string} document
  */
 function imageOf(document) {
   if (typeof document !== "string" || document.length > LARGEST_SVG) return "data:,";
+
   try {
     return `data:image/svg+xml;charset=utf-8,${encodeURIComponent(document)}`;
   } catch {
-    // Half a surrogate pair: no picture.
+    // A lone surrogate cannot be encoded.
     return "data:,";
   }
 }

@@ -1,4 +1,4 @@
-// The vendored files are those of the packages that `package.json` pins, but for the comment that names a source map.
+// Checks that the vendored files are those of the packages that `package.json` pins, except for the source map comment.
 
 import { readFileSync } from "node:fs";
 

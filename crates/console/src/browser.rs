@@ -1,99 +1,119 @@
-//! One browser: a WebSocket, served at the pace at which it is read.
+//! One browser: a WebSocket, served at the pace at which the browser reads.
 //!
-//! A socket takes in megabytes before it says that nobody reads, which would be minutes of old pictures. So every
-//! portion of news ends with a ping, and there is another portion only when the browser has answered all but the last
-//! few. That is what makes the newest picture win all the way, and a stuck browser cost nothing.
+//! The socket's buffers hold megabytes, which is minutes of outdated frames for a browser that stops reading. Therefore
+//! every batch of new messages ends with a ping, and the next batch is sent only if all but the last few pings have been
+//! answered. So a slow browser always gets the newest frame, and a stalled one needs no memory here.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Bytes;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
-use protocol::Message as _;
-use protocol::messages::{Control, ControlAnswer};
+use protocol::messages::ControlAnswer;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
-use crate::board::Cursor;
+use crate::app::{App, Ending, MAX_BROWSERS, Mode};
+use crate::feed::Cursor;
 use crate::live::{Live, Viewer};
-use crate::page::{FromPage, Numbered, ToPage};
-use crate::server::{App, MAX_BROWSERS, Mode, told_to_leave};
+use crate::page::{PageMessage, RequestId, ServerMessage};
 
-/// Largest message of a page, bytes: a whole scenario, and what is around it.
+/// Largest message of a page, bytes: a scenario of 1 MiB, and the JSON around it.
 pub(crate) const MAX_BYTES: usize = (1 << 20) + 1024;
-/// Largest message that brings no scenario or set-up, bytes.
+/// Largest message without a scenario or set-up, bytes.
 const MAX_PLAIN_BYTES: usize = 64 << 10;
-/// A browser that has said nothing for this long, not even that it is there, is let go; and so is one that does not
-/// take what it is sent.
-const PATIENCE: Duration = Duration::from_secs(30);
-/// It is asked this often whether it is there.
+/// A browser is disconnected if it sends nothing, not even a pong, or accepts no message for this long.
+const STALL_TIMEOUT: Duration = Duration::from_secs(30);
+/// Time without a ping after which one is sent.
 const PING_INTERVAL: Duration = Duration::from_secs(5);
-/// How long a browser may take to say goodbye.
-const GOODBYE: Duration = Duration::from_secs(1);
-/// Portions of news that may be on their way to a browser.
-const MAX_UNSEEN: u64 = 3;
-/// Between two portions: eyes see no more.
-const NEWS_INTERVAL: Duration = Duration::from_millis(20);
-/// Between two requests: hands do no more.
+/// How long to wait for a browser's close frame.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Batches that may be sent before the browser answers the ping of the first one.
+const MAX_UNACKNOWLEDGED: u64 = 3;
+/// Least time between two batches: 50 frames per second.
+const BATCH_INTERVAL: Duration = Duration::from_millis(20);
+/// Least time between two requests of one browser.
 const REQUEST_INTERVAL: Duration = Duration::from_millis(10);
 /// Requests of one browser that may wait for the simulator's answer.
 const MAX_REQUESTS: usize = 8;
 
-/// Serves a browser until it leaves, is stuck, or the console ends.
+/// Serves a browser until it disconnects, stalls, or the console ends.
 pub(crate) async fn serve(mut socket: WebSocket, app: Arc<App>) {
-    let Some(_place) = app.place() else {
-        let why = format!("{MAX_BROWSERS} browsers watch already; close one of them");
-        return say_goodbye(&mut socket, close_code::AGAIN, &why).await;
+    let Some(_permit) = app.admit_browser() else {
+        let reason = format!("{MAX_BROWSERS} browsers are connected already; close one of them");
+        close(&mut socket, close_code::AGAIN, &reason).await;
+        return;
     };
+
     let mut browser = Browser::new(socket, app);
-    match browser.converse().await {
-        Farewell::Gone => {}
-        Farewell::Stuck => {
-            tracing::info!("a browser has taken nothing for {PATIENCE:?} and is let go")
+    match browser.run().await {
+        Disconnect::Left => {}
+        Disconnect::Stalled => {
+            tracing::info!("disconnected a browser that was stalled for {STALL_TIMEOUT:?}");
         }
-        Farewell::Dismissed(code, why) => say_goodbye(&mut browser.socket, code, &why).await,
+        Disconnect::Closed { code, reason } => close(&mut browser.socket, code, &reason).await,
     }
 }
 
-/// How a conversation ends.
-enum Farewell {
-    /// It has left.
-    Gone,
-    /// It does not read.
-    Stuck,
-    /// It is told to leave: WebSocket close code, and why.
-    Dismissed(u16, String),
+/// Why a browser is no longer served.
+enum Disconnect {
+    /// It closed the connection.
+    Left,
+    /// It did not read or send anything for [`STALL_TIMEOUT`].
+    Stalled,
+    /// The server closes the connection.
+    Closed {
+        /// WebSocket close code.
+        code: u16,
+        /// For the close frame.
+        reason: String,
+    },
 }
 
+impl Disconnect {
+    fn closed(code: u16, reason: impl Into<String>) -> Self {
+        Self::Closed {
+            code,
+            reason: reason.into(),
+        }
+    }
+}
+
+/// A connected browser.
 struct Browser {
     socket: WebSocket,
     app: Arc<App>,
-    ending: watch::Receiver<bool>,
-    /// What it sees of a run in progress.
-    sight: Option<Sight>,
-    answers: (mpsc::Sender<Utf8Bytes>, mpsc::Receiver<Utf8Bytes>),
+    ending: Ending,
+    /// `None` while a recording is shown.
+    view: Option<LiveView>,
+    answer_sender: mpsc::Sender<Utf8Bytes>,
+    answers: mpsc::Receiver<Utf8Bytes>,
     requests: Arc<Semaphore>,
-    /// Portions of news sent, and of those the last that it has answered.
-    portions: (u64, u64),
-    heard: Instant,
-    next_news: Instant,
+    /// Number of the last batch that was sent, from 1.
+    batches_sent: u64,
+    /// Number of the last batch whose ping was answered.
+    batches_acknowledged: u64,
+    last_received: Instant,
+    next_batch: Instant,
     next_request: Instant,
     next_ping: Instant,
 }
 
-/// What a browser sees of a run in progress.
-struct Sight {
+/// A browser's view of a run in progress.
+struct LiveView {
     live: Arc<Live>,
     cursor: Cursor,
     changes: watch::Receiver<()>,
-    /// As long as it is there, pictures are painted.
+    /// Keeps the subscription to frames and panels declared.
     _viewer: Viewer,
 }
 
-impl Sight {
+impl LiveView {
     fn new(live: &Arc<Live>) -> Self {
-        let mut changes = live.board().changes();
+        let mut changes = live.feed().changes();
         changes.mark_changed();
+
         Self {
             live: live.clone(),
             cursor: Cursor::default(),
@@ -102,12 +122,13 @@ impl Sight {
         }
     }
 
-    /// Waits until there may be something new to see.
-    async fn news(sight: &mut Option<Self>, from: Instant) {
-        sleep_until(from).await;
-        match sight {
-            // It cannot fail: the other end is in `live`.
-            Some(sight) => drop(sight.changes.changed().await),
+    /// Waits until the feed has changed, and at least until `earliest`. Never returns without a view.
+    async fn changed(view: &mut Option<Self>, earliest: Instant) {
+        sleep_until(earliest).await;
+
+        match view {
+            // It cannot fail: `live` owns the sender.
+            Some(view) => drop(view.changes.changed().await),
             None => std::future::pending().await,
         }
     }
@@ -116,236 +137,261 @@ impl Sight {
 impl Browser {
     fn new(socket: WebSocket, app: Arc<App>) -> Self {
         let now = Instant::now();
-        let sight = match &app.mode {
-            Mode::Live(live) => Some(Sight::new(live)),
+        let view = match &app.mode {
+            Mode::Live(live) => Some(LiveView::new(live)),
             Mode::Recording(_) => None,
         };
+        let (answer_sender, answers) = mpsc::channel(MAX_REQUESTS);
+
         Self {
             socket,
             ending: app.ending(),
             app,
-            sight,
-            answers: mpsc::channel(MAX_REQUESTS),
+            view,
+            answer_sender,
+            answers,
             requests: Arc::new(Semaphore::new(MAX_REQUESTS)),
-            portions: (0, 0),
-            heard: now,
-            next_news: now,
+            batches_sent: 0,
+            batches_acknowledged: 0,
+            last_received: now,
+            next_batch: now,
             next_request: now,
             next_ping: now + PING_INTERVAL,
         }
     }
 
-    async fn converse(&mut self) -> Farewell {
-        let outcome = match self.greet().await {
-            Ok(()) => self.serve().await,
-            Err(farewell) => Err(farewell),
-        };
-        match outcome {
+    async fn run(&mut self) -> Disconnect {
+        match self.serve().await {
             Ok(never) => match never {},
-            Err(farewell) => farewell,
+            Err(disconnect) => disconnect,
         }
     }
 
-    async fn greet(&mut self) -> Result<(), Farewell> {
-        let (mode, run) = match &self.app.mode {
-            Mode::Live(live) => ("live", live.run()),
-            Mode::Recording(recording) => ("recording", recording.run()),
-        };
-        let hello = ToPage::Hello {
-            mode,
-            run,
-            version: env!("CARGO_PKG_VERSION"),
-        }
-        .text();
-        self.send(Message::Text(hello)).await
-    }
+    async fn serve(&mut self) -> Result<Infallible, Disconnect> {
+        self.send_hello().await?;
 
-    async fn serve(&mut self) -> Result<std::convert::Infallible, Farewell> {
         loop {
-            let may_see_more = self.portions.0 - self.portions.1 < MAX_UNSEEN;
+            let unacknowledged = self.batches_sent - self.batches_acknowledged;
             tokio::select! {
                 message = receive(&mut self.socket, self.next_request) => self.on_message(message).await?,
-                Some(answer) = self.answers.1.recv() => self.send(Message::Text(answer)).await?,
-                () = Sight::news(&mut self.sight, self.next_news), if may_see_more => self.send_news().await?,
-                () = sleep_until(self.next_ping) => self.look_after().await?,
-                () = told_to_leave(&mut self.ending) => {
-                    return Err(Farewell::Dismissed(close_code::AWAY, "the console ends".to_owned()));
+                Some(answer) = self.answers.recv() => self.send_text(answer).await?,
+                () = LiveView::changed(&mut self.view, self.next_batch),
+                    if unacknowledged < MAX_UNACKNOWLEDGED => self.send_batch().await?,
+                () = sleep_until(self.next_ping) => self.check_liveness().await?,
+                () = self.ending.reached() => {
+                    return Err(Disconnect::closed(close_code::AWAY, "the console ends"));
                 }
             }
         }
     }
 
-    async fn send(&mut self, message: Message) -> Result<(), Farewell> {
-        match timeout(PATIENCE, self.socket.send(message)).await {
+    async fn send_hello(&mut self) -> Result<(), Disconnect> {
+        let (mode, run) = match &self.app.mode {
+            Mode::Live(live) => ("live", live.run()),
+            Mode::Recording(recording) => ("recording", recording.run()),
+        };
+        let hello = ServerMessage::Hello {
+            mode,
+            run,
+            version: env!("CARGO_PKG_VERSION"),
+        };
+
+        let text = hello.text();
+        self.send_text(text).await
+    }
+
+    async fn send_text(&mut self, text: Utf8Bytes) -> Result<(), Disconnect> {
+        self.send(Message::Text(text)).await
+    }
+
+    async fn send(&mut self, message: Message) -> Result<(), Disconnect> {
+        match timeout(STALL_TIMEOUT, self.socket.send(message)).await {
             Ok(Ok(())) => Ok(()),
-            Ok(Err(_)) => Err(Farewell::Gone),
-            Err(_) => Err(Farewell::Stuck),
+            Ok(Err(_)) => Err(Disconnect::Left),
+            Err(_) => Err(Disconnect::Stalled),
         }
     }
 
-    async fn send_news(&mut self) -> Result<(), Farewell> {
-        let Some(sight) = &mut self.sight else {
+    async fn send_batch(&mut self) -> Result<(), Disconnect> {
+        let Some(view) = &mut self.view else {
             return Ok(());
         };
-        let news = sight.live.board().news(&mut sight.cursor);
-        if news.is_empty() {
+        let batch = view.live.feed().take_new(&mut view.cursor);
+        if batch.is_empty() {
             return Ok(());
         }
-        // There may be more than fits into one portion.
-        sight.changes.mark_changed();
-        for text in news {
-            self.send(Message::Text(text)).await?;
+
+        // One batch has a limited number of log lines: there may be more.
+        view.changes.mark_changed();
+        for text in batch {
+            self.send_text(text).await?;
         }
-        self.portions.0 += 1;
-        self.next_news = Instant::now() + NEWS_INTERVAL;
+
+        self.batches_sent += 1;
+        self.next_batch = Instant::now() + BATCH_INTERVAL;
         self.ping().await
     }
 
-    async fn ping(&mut self) -> Result<(), Farewell> {
+    /// Sends a ping; its pong acknowledges all batches so far.
+    async fn ping(&mut self) -> Result<(), Disconnect> {
         self.next_ping = Instant::now() + PING_INTERVAL;
-        self.send(Message::Ping(Bytes::copy_from_slice(
-            &self.portions.0.to_be_bytes(),
-        )))
-        .await
+        let payload = Bytes::copy_from_slice(&self.batches_sent.to_be_bytes());
+        self.send(Message::Ping(payload)).await
     }
 
-    /// Nothing was sent for a while: is it still there?
-    async fn look_after(&mut self) -> Result<(), Farewell> {
-        if self.heard.elapsed() > PATIENCE {
-            Err(Farewell::Stuck)
-        } else {
-            self.ping().await
+    async fn check_liveness(&mut self) -> Result<(), Disconnect> {
+        if self.last_received.elapsed() > STALL_TIMEOUT {
+            return Err(Disconnect::Stalled);
         }
+        self.ping().await
     }
 
     async fn on_message(
         &mut self,
         message: Option<Result<Message, axum::Error>>,
-    ) -> Result<(), Farewell> {
-        self.heard = Instant::now();
+    ) -> Result<(), Disconnect> {
+        self.last_received = Instant::now();
+
         match message {
             Some(Ok(Message::Text(text))) => {
-                self.next_request = self.heard + REQUEST_INTERVAL;
+                self.next_request = self.last_received + REQUEST_INTERVAL;
                 self.on_text(&text).await
             }
-            Some(Ok(Message::Pong(number))) => {
-                let number = number.as_ref().try_into().map_or(0, u64::from_be_bytes);
-                self.portions.1 = self.portions.1.max(number.min(self.portions.0));
+            Some(Ok(Message::Pong(payload))) => {
+                self.on_pong(&payload);
                 Ok(())
             }
-            Some(Ok(Message::Ping(_))) => Ok(()), // It has been answered.
-            Some(Ok(Message::Binary(_))) => Err(Farewell::Dismissed(
+            // axum has answered it.
+            Some(Ok(Message::Ping(_))) => Ok(()),
+            Some(Ok(Message::Binary(_))) => Err(Disconnect::closed(
                 close_code::UNSUPPORTED,
-                "messages are text here".to_owned(),
+                "binary messages are not supported",
             )),
-            Some(Err(error)) => Err(Farewell::Dismissed(close_code::POLICY, error.to_string())),
-            Some(Ok(Message::Close(_))) | None => Err(Farewell::Gone),
+            Some(Ok(Message::Close(_))) | None => Err(Disconnect::Left),
+            Some(Err(error)) => Err(Disconnect::closed(close_code::POLICY, error.to_string())),
         }
     }
 
-    async fn on_text(&mut self, text: &str) -> Result<(), Farewell> {
-        let (id, control) = match serde_json::from_str(text) {
-            Ok(FromPage::Control { id, control }) => (id, control),
+    fn on_pong(&mut self, payload: &[u8]) {
+        let batch = payload.try_into().map_or(0, u64::from_be_bytes);
+        let batch = batch.min(self.batches_sent);
+        self.batches_acknowledged = self.batches_acknowledged.max(batch);
+    }
+
+    async fn on_text(&mut self, text: &str) -> Result<(), Disconnect> {
+        let message: PageMessage = match serde_json::from_str(text) {
+            Ok(message) => message,
             Err(error) => {
-                let id = serde_json::from_str::<Numbered>(text)
-                    .unwrap_or_default()
-                    .id;
+                let id = id_of_malformed(text);
                 return self
                     .decline(id, format!("malformed request: {error}"))
                     .await;
             }
         };
-        if text.len() > MAX_PLAIN_BYTES
-            && !matches!(control, Control::Load { .. } | Control::Init { .. })
-        {
-            let why = format!(
-                "{} bytes, more than the {MAX_PLAIN_BYTES} allowed",
-                text.len()
-            );
-            return Err(Farewell::Dismissed(close_code::SIZE, why));
+        if text.len() > MAX_PLAIN_BYTES && !message.carries_scenario() {
+            return Err(too_large(text.len()));
         }
-        if let Err((field, reason)) = control.check() {
-            return self
-                .decline(Some(id), format!("malformed request: {field}: {reason}"))
-                .await;
-        }
-        let Some(sight) = &self.sight else {
-            return self
-                .decline(
-                    Some(id),
-                    "this is a recording: it can be played, not changed".to_owned(),
-                )
-                .await;
-        };
-        match (
-            self.requests.clone().try_acquire_owned(),
-            self.app.request(),
-        ) {
-            (Ok(own), Some(all)) => {
-                tokio::spawn(request(
-                    sight.live.clone(),
-                    id,
-                    control,
-                    self.answers.0.clone(),
-                    (own, all),
-                ));
-                Ok(())
-            }
-            _ => {
-                self.decline(
-                    Some(id),
-                    "too many requests wait for an answer already".to_owned(),
-                )
-                .await
-            }
+
+        let id = message.id();
+        match self.start_request(message) {
+            Ok(()) => Ok(()),
+            Err(reason) => self.decline(Some(id), reason.to_owned()).await,
         }
     }
 
-    async fn decline(&mut self, id: Option<u64>, why: String) -> Result<(), Farewell> {
-        self.send(Message::Text(ToPage::answer(id, Err(why)).text()))
-            .await
+    /// Starts a request to the simulator; `answers` receives its outcome.
+    fn start_request(&self, message: PageMessage) -> Result<(), &'static str> {
+        let view = self
+            .view
+            .as_ref()
+            .ok_or("this is a recording: it can be played, not changed")?;
+        let permits = self
+            .request_permits()
+            .ok_or("too many requests wait for an answer already")?;
+
+        let live = view.live.clone();
+        let answers = self.answer_sender.clone();
+        tokio::spawn(request(live, message, answers, permits));
+        Ok(())
+    }
+
+    /// `None` if this browser, or all browsers together, have too many requests that wait for an answer.
+    fn request_permits(&self) -> Option<[OwnedSemaphorePermit; 2]> {
+        let own = self.requests.clone().try_acquire_owned().ok()?;
+        let shared = self.app.admit_request()?;
+        Some([own, shared])
+    }
+
+    async fn decline(&mut self, id: Option<u64>, reason: String) -> Result<(), Disconnect> {
+        let text = ServerMessage::answer(id, Err(reason)).text();
+        self.send_text(text).await
     }
 }
 
-/// The next message, but none before `from`.
-async fn receive(socket: &mut WebSocket, from: Instant) -> Option<Result<Message, axum::Error>> {
-    sleep_until(from).await;
+fn id_of_malformed(text: &str) -> Option<u64> {
+    let request: RequestId = serde_json::from_str(text).unwrap_or_default();
+    request.id
+}
+
+fn too_large(len: usize) -> Disconnect {
+    let reason = format!("{len} bytes, more than the {MAX_PLAIN_BYTES} allowed");
+    Disconnect::closed(close_code::SIZE, reason)
+}
+
+/// The next message, but not before `earliest`.
+async fn receive(
+    socket: &mut WebSocket,
+    earliest: Instant,
+) -> Option<Result<Message, axum::Error>> {
+    sleep_until(earliest).await;
     socket.recv().await
 }
 
-/// Asks the simulator. `_places` are free again when its answer is on the way.
+/// Sends a request to the simulator and passes on its answer. `_permits` are released afterwards.
 async fn request(
     live: Arc<Live>,
-    id: u64,
-    control: Control,
+    message: PageMessage,
     answers: mpsc::Sender<Utf8Bytes>,
-    _places: (OwnedSemaphorePermit, OwnedSemaphorePermit),
+    _permits: [OwnedSemaphorePermit; 2],
 ) {
-    let asked = tokio::task::spawn_blocking(move || live.control(&control)).await;
-    let outcome: Result<ControlAnswer, String> =
-        asked.unwrap_or_else(|error| Err(error.to_string()));
-    if answers
-        .send(ToPage::answer(Some(id), outcome).text())
+    let id = message.id();
+    let outcome = tokio::task::spawn_blocking(move || execute(&live, &message))
         .await
-        .is_err()
-    {
-        tracing::debug!("a browser left before its answer came");
+        .unwrap_or_else(|error| Err(error.to_string()));
+
+    let text = ServerMessage::answer(Some(id), outcome).text();
+    if answers.send(text).await.is_err() {
+        tracing::debug!("a browser disconnected before its answer arrived");
     }
 }
 
-async fn say_goodbye(socket: &mut WebSocket, code: u16, why: &str) {
+/// Blocks until the simulator has answered.
+fn execute(live: &Live, message: &PageMessage) -> Result<ControlAnswer, String> {
+    match message {
+        PageMessage::Control { control, .. } => live.control(control),
+        PageMessage::Command { to, command, .. } => live.send_command(to, command),
+    }
+}
+
+/// Sends a close frame and waits for the browser's.
+async fn close(socket: &mut WebSocket, code: u16, reason: &str) {
     // A control frame has room for 125 bytes, two of them for the code.
-    let reason: String = why.chars().filter(char::is_ascii).take(120).collect();
-    let goodbye = Message::Close(Some(CloseFrame {
+    let reason: String = reason.chars().filter(char::is_ascii).take(120).collect();
+    let frame = CloseFrame {
         code,
         reason: reason.into(),
-    }));
-    let both = async {
-        socket.send(goodbye).await?;
-        while socket.recv().await.transpose()?.is_some() {}
-        Ok::<(), axum::Error>(())
     };
-    if !matches!(timeout(GOODBYE, both).await, Ok(Ok(()))) {
-        tracing::debug!("a browser left without a goodbye");
+
+    if !matches!(
+        timeout(CLOSE_TIMEOUT, exchange_close(socket, frame)).await,
+        Ok(Ok(()))
+    ) {
+        tracing::debug!("a browser disconnected without a close frame");
     }
+}
+
+async fn exchange_close(socket: &mut WebSocket, frame: CloseFrame) -> Result<(), axum::Error> {
+    socket.send(Message::Close(Some(frame))).await?;
+    while socket.recv().await.transpose()?.is_some() {}
+    Ok(())
 }

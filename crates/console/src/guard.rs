@@ -1,7 +1,8 @@
-//! Who may come in. A web page of somebody else's must not reach a run through the browser of a person who has the
-//! console open: neither by a name that suddenly means this machine (DNS rebinding) nor by a WebSocket across origins.
+//! Decides which HTTP requests are answered. Other web pages must not reach a run through the browser of a person who has
+//! the console open, neither through a host name that resolves to this machine (DNS rebinding) nor through a WebSocket
+//! across origins.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use axum::http::header::{
     CONTENT_SECURITY_POLICY, HOST, HeaderMap, HeaderName, HeaderValue, ORIGIN, REFERRER_POLICY,
@@ -9,12 +10,12 @@ use axum::http::header::{
 };
 use subtle::ConstantTimeEq;
 
-/// Nothing but what comes with the page runs in it or is loaded by it.
+/// The page runs and loads only what this server serves.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
                       connect-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
 
-/// What every answer says about itself.
+/// Headers of every response.
 pub(crate) const HEADERS: [(HeaderName, HeaderValue); 5] = [
     (CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
     (X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
@@ -29,65 +30,60 @@ pub(crate) const HEADERS: [(HeaderName, HeaderValue); 5] = [
     ),
 ];
 
-/// Bytes of chance in a token.
+/// Random bytes in a token.
 const TOKEN_BYTES: usize = 24;
 
-/// Decides about requests.
+/// Decides which requests are answered.
 #[derive(Debug)]
 pub(crate) struct Guard {
     address: SocketAddr,
-    /// What whoever comes from another machine must know; none where nobody can.
+    /// What a request must contain; `None` if the console serves loopback only.
     token: Option<String>,
 }
 
 impl Guard {
-    /// A guard of what is served at `address`; a new token where that is not loopback.
+    /// A guard for what is served at `address`, with a new token if that is not loopback.
     pub(crate) fn new(address: SocketAddr) -> Result<Self, getrandom::Error> {
         let token = if address.ip().is_loopback() {
             None
         } else {
-            Some(draw_token()?)
+            Some(new_token()?)
         };
         Ok(Self { address, token })
     }
 
-    /// Where people find it.
+    /// The URL of the page, with the token if one is needed.
     pub(crate) fn url(&self) -> String {
         let mut address = self.address;
         if address.ip().is_unspecified() {
-            let loopback: (IpAddr, IpAddr) =
-                ([127, 0, 0, 1].into(), [0, 0, 0, 0, 0, 0, 0, 1].into());
-            address.set_ip(if address.is_ipv4() {
-                loopback.0
-            } else {
-                loopback.1
-            });
+            address.set_ip(loopback_like(address.ip()));
         }
+
         match &self.token {
             Some(token) => format!("http://{address}/?token={token}"),
             None => format!("http://{address}/"),
         }
     }
 
-    /// Why a request is refused; `None` if it may pass.
+    /// Why a request is refused; `None` if it is admitted.
     pub(crate) fn refuse(
         &self,
         headers: &HeaderMap,
         path: &str,
         query: Option<&str>,
     ) -> Option<String> {
-        let Some(host) = only(headers, &HOST).filter(|host| self.is_own(host)) else {
+        let Some(host) = single(headers, &HOST).filter(|host| self.is_own(host)) else {
             return Some(format!(
                 "This console is at {}: a request must name that address, or localhost, with its port.\n",
                 self.address
             ));
         };
-        let is_foreign = |origin: &str| !origin.eq_ignore_ascii_case(&format!("http://{host}"));
-        if headers.contains_key(ORIGIN) && only(headers, &ORIGIN).is_none_or(is_foreign) {
+        if is_from_other_page(headers, host) {
             return Some("A page from elsewhere may not use this console.\n".to_owned());
         }
-        // The page's parts are no secret; what it shows and does is.
-        if path.starts_with("/assets/") || self.knows_token(query) {
+
+        // The files of the page are public; only what the page shows and does is protected.
+        if path.starts_with("/assets/") || self.has_token(query) {
             return None;
         }
         Some(
@@ -96,30 +92,25 @@ impl Guard {
         )
     }
 
-    /// Whether a `Host` means this console. A literal address cannot be made to mean another machine, a name can.
     fn is_own(&self, host: &str) -> bool {
-        let (name, port) = match host
-            .rsplit_once(':')
-            .filter(|(_, port)| !port.ends_with(']'))
-        {
-            Some((name, port)) => (name, port.parse().ok()),
-            None => (host, Some(80)),
-        };
-        let ip = name
-            .strip_prefix('[')
-            .and_then(|rest| rest.strip_suffix(']'))
-            .unwrap_or(name);
-        let is_ours = |ip: IpAddr| {
-            ip == self.address.ip() || self.address.ip().is_unspecified() || is_usual_loopback(ip)
-        };
-        port == Some(self.address.port())
-            && (name.eq_ignore_ascii_case("localhost") || ip.parse().is_ok_and(is_ours))
+        let host = Host::parse(host);
+        if host.port != Some(self.address.port()) {
+            return false;
+        }
+
+        host.name.eq_ignore_ascii_case("localhost")
+            || host.name.parse().is_ok_and(|ip| self.is_own_ip(ip))
     }
 
-    fn knows_token(&self, query: Option<&str>) -> bool {
+    fn is_own_ip(&self, ip: IpAddr) -> bool {
+        ip == self.address.ip() || self.address.ip().is_unspecified() || is_usual_loopback(ip)
+    }
+
+    fn has_token(&self, query: Option<&str>) -> bool {
         let Some(token) = &self.token else {
             return true;
         };
+
         let mut parameters = query.unwrap_or_default().split('&');
         let given = parameters
             .find_map(|parameter| parameter.strip_prefix("token="))
@@ -128,26 +119,86 @@ impl Guard {
     }
 }
 
-fn is_usual_loopback(ip: IpAddr) -> bool {
-    ip == IpAddr::from([127, 0, 0, 1]) || ip == IpAddr::from([0, 0, 0, 0, 0, 0, 0, 1])
+/// The value of a `Host` header.
+struct Host<'a> {
+    /// A name or an IP address, without brackets.
+    name: &'a str,
+    /// `None` if it is not a port number.
+    port: Option<u16>,
 }
 
-/// The value of a header that is there once.
-fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
+impl<'a> Host<'a> {
+    fn parse(text: &'a str) -> Self {
+        // The colons in `[::1]` are not followed by a port.
+        let with_port = text
+            .rsplit_once(':')
+            .filter(|(_, port)| !port.ends_with(']'));
+
+        match with_port {
+            Some((name, port)) => Self {
+                name: without_brackets(name),
+                port: port.parse().ok(),
+            },
+            None => Self {
+                name: without_brackets(text),
+                port: Some(80),
+            },
+        }
+    }
+}
+
+/// `[::1]` is written in brackets in a URL.
+fn without_brackets(name: &str) -> &str {
+    name.strip_prefix('[')
+        .and_then(|rest| rest.strip_suffix(']'))
+        .unwrap_or(name)
+}
+
+/// Whether a browser sent the request for a page that `host` did not serve. Other programs send no `Origin`.
+fn is_from_other_page(headers: &HeaderMap, host: &str) -> bool {
+    if !headers.contains_key(ORIGIN) {
+        return false;
+    }
+
+    let own_origin = format!("http://{host}");
+    single(headers, &ORIGIN).is_none_or(|origin| !origin.eq_ignore_ascii_case(&own_origin))
+}
+
+/// The loopback address of the same IP version.
+fn loopback_like(ip: IpAddr) -> IpAddr {
+    if ip.is_ipv4() {
+        Ipv4Addr::LOCALHOST.into()
+    } else {
+        Ipv6Addr::LOCALHOST.into()
+    }
+}
+
+fn is_usual_loopback(ip: IpAddr) -> bool {
+    ip == Ipv4Addr::LOCALHOST || ip == Ipv6Addr::LOCALHOST
+}
+
+/// The value of a header that occurs exactly once.
+fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let first = values.next()?.to_str().ok()?;
+
     values.next().is_none().then_some(first)
 }
 
-fn draw_token() -> Result<String, getrandom::Error> {
+fn new_token() -> Result<String, getrandom::Error> {
     let mut bytes = [0; TOKEN_BYTES];
     getrandom::fill(&mut bytes)?;
+
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn guard(address: &str) -> Guard {
+        Guard::new(address.parse().unwrap()).unwrap()
+    }
 
     fn headers(host: &str, origin: Option<&str>) -> HeaderMap {
         let mut headers = HeaderMap::new();
@@ -158,20 +209,28 @@ mod tests {
         headers
     }
 
-    fn passes(guard: &Guard, host: &str, origin: Option<&str>) -> bool {
-        guard.refuse(&headers(host, origin), "/", None).is_none()
+    fn admits(guard: &Guard, host: &str, path: &str, query: &str) -> bool {
+        guard
+            .refuse(&headers(host, None), path, Some(query))
+            .is_none()
+    }
+
+    fn admits_origin(guard: &Guard, origin: &str) -> bool {
+        let headers = headers("localhost:7007", Some(origin));
+        guard.refuse(&headers, "/", None).is_none()
     }
 
     #[test]
     fn only_the_own_address_with_its_port_is_served() {
-        let guard = Guard::new("127.0.0.1:7007".parse().unwrap()).unwrap();
+        let guard = guard("127.0.0.1:7007");
+
         for own in [
             "127.0.0.1:7007",
             "localhost:7007",
             "LOCALHOST:7007",
             "[::1]:7007",
         ] {
-            assert!(passes(&guard, own, None), "{own} was refused");
+            assert!(admits(&guard, own, "/", ""), "{own} was refused");
         }
         for foreign in [
             "evil.example:7007",
@@ -186,22 +245,25 @@ mod tests {
             "",
             ":7007",
         ] {
-            assert!(!passes(&guard, foreign, None), "{foreign} was served");
+            assert!(!admits(&guard, foreign, "/", ""), "{foreign} was served");
         }
+    }
+
+    #[test]
+    fn a_request_needs_exactly_one_host() {
+        let guard = guard("127.0.0.1:7007");
         let mut twice = headers("localhost:7007", None);
         twice.append(HOST, "evil.example".parse().unwrap());
+
         assert!(guard.refuse(&twice, "/", None).is_some());
         assert!(guard.refuse(&HeaderMap::new(), "/", None).is_some());
     }
 
     #[test]
     fn a_page_from_elsewhere_is_refused() {
-        let guard = Guard::new("127.0.0.1:7007".parse().unwrap()).unwrap();
-        assert!(passes(
-            &guard,
-            "localhost:7007",
-            Some("http://localhost:7007")
-        ));
+        let guard = guard("127.0.0.1:7007");
+
+        assert!(admits_origin(&guard, "http://localhost:7007"));
         for foreign in [
             "http://evil.example",
             "null",
@@ -209,31 +271,28 @@ mod tests {
             "https://localhost:7007",
             "",
         ] {
-            assert!(
-                !passes(&guard, "localhost:7007", Some(foreign)),
-                "{foreign} was served"
-            );
+            assert!(!admits_origin(&guard, foreign), "{foreign} was served");
         }
     }
 
     #[test]
-    fn an_open_console_wants_its_token_and_an_address_in_figures() {
-        let guard = Guard::new("0.0.0.0:7007".parse().unwrap()).unwrap();
+    fn an_open_console_requires_its_token_and_an_ip_address() {
+        let guard = guard("0.0.0.0:7007");
         let token = guard.token.clone().unwrap();
+        let right = format!("token={token}");
         assert_eq!(token.len(), 2 * TOKEN_BYTES);
         assert_eq!(guard.url(), format!("http://127.0.0.1:7007/?token={token}"));
-        let ask = |host, path, query: &str| {
-            guard
-                .refuse(&headers(host, None), path, Some(query))
-                .is_none()
-        };
-        assert!(ask("10.0.0.1:7007", "/ws", &format!("token={token}")));
-        assert!(ask(
-            "10.0.0.1:7007",
+
+        let host = "10.0.0.1:7007";
+        assert!(admits(&guard, host, "/ws", &right));
+        assert!(admits(
+            &guard,
+            host,
             "/recording/ticks",
-            &format!("from=1&token={token}")
+            &format!("from=1&{right}")
         ));
-        assert!(ask("10.0.0.1:7007", "/assets/app.js", ""));
+        assert!(admits(&guard, host, "/assets/app.js", ""));
+
         for wrong in [
             "",
             "token=",
@@ -241,15 +300,13 @@ mod tests {
             &format!("token={token}0"),
             &format!("token={}", &token[1..]),
         ] {
-            assert!(!ask("10.0.0.1:7007", "/", wrong), "{wrong} was let in");
+            assert!(!admits(&guard, host, "/", wrong), "{wrong} was admitted");
         }
-        assert!(!ask("evil.example:7007", "/", &format!("token={token}")));
-        assert_ne!(
-            token,
-            Guard::new("0.0.0.0:7007".parse().unwrap())
-                .unwrap()
-                .token
-                .unwrap()
-        );
+        assert!(!admits(&guard, "evil.example:7007", "/", &right));
+    }
+
+    #[test]
+    fn every_token_is_new() {
+        assert_ne!(guard("0.0.0.0:7007").token, guard("0.0.0.0:7007").token);
     }
 }

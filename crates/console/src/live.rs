@@ -1,48 +1,57 @@
-//! The bus side of live mode: what comes from the run goes onto the [`Board`], what people ask for goes to the simulator.
+//! The connection to a run in progress: what it publishes goes into the [`Feed`], requests go to the simulator.
 //!
-//! Two threads of its own. The *keeper* reaches the simulator and sees to it that pictures and panels are asked for
-//! exactly while somebody watches: the others paint only for those who subscribe. The *reader* decodes. The
-//! middleware's thread only hands over: a link that is read slowly would slow the simulator down.
+//! Two threads. The *session* thread connects to the simulator and declares the subscribers: frames and panels exactly
+//! while a browser is connected, because robots and simulator publish them only if there is a subscriber. The *decoder*
+//! thread decodes samples. zenoh's thread only enqueues them: a link that is read slowly would slow the simulator down.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Role};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer};
-use protocol::{RobotName, RunName, decode, encode};
+use protocol::{Message, RobotName, RunName, decode, encode};
 
-use crate::board::Board;
+use crate::feed::Feed;
 
-/// How long one attempt to reach the simulator lasts; there is always another one.
-const ATTEMPT: Duration = Duration::from_secs(1);
-/// Between two attempts.
-const ATTEMPT_AGAIN: Duration = Duration::from_millis(200);
-/// The simulator answers at once.
-const PATIENCE: Duration = Duration::from_secs(5);
-/// A step takes as long as its ticks take; who asked for more than this sees how it goes on.
-const STEP_PATIENCE: Duration = Duration::from_secs(600);
-/// A picture that was asked for and has not come is asked for again after this long, and twice that, and so on.
-const ASK_AGAIN: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(5));
-/// Messages, and bytes of them, that may wait to be decoded; what comes then is lost, for the run does not wait.
-const QUEUE: (usize, usize) = (1024, 16 << 20);
+/// How long one attempt to connect to the simulator lasts; attempts are repeated until one succeeds.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
+/// Pause between two attempts.
+const CONNECT_RETRY: Duration = Duration::from_millis(200);
+/// How long to wait for a reply of the simulator, which replies to everything but `step` at once.
+const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long to wait for the reply to `step`, which comes when its ticks are complete.
+const STEP_TIMEOUT: Duration = Duration::from_secs(600);
+/// How long to wait for a requested frame before it is requested again; doubled each time.
+const FRAME_RETRY: Duration = Duration::from_millis(100);
+/// Upper bound of the doubled [`FRAME_RETRY`].
+const MAX_FRAME_RETRY: Duration = Duration::from_secs(5);
+/// Samples that may wait to be decoded; further ones are dropped, because the run must not wait for the console.
+const MAX_QUEUED_SAMPLES: usize = 1024;
+/// Bytes of samples that may wait to be decoded.
+const MAX_QUEUED_BYTES: usize = 16 << 20;
 
-/// A message that is not decoded yet.
-enum Raw {
+/// A received message, not decoded yet.
+enum Sample {
     World(Vec<u8>),
     Log(Vec<u8>),
-    /// Of the robot in the key.
-    Panel(String, Vec<u8>),
+    Panel {
+        /// As the key names it.
+        robot: String,
+        payload: Vec<u8>,
+    },
 }
 
-impl Raw {
-    fn bytes(&self) -> &[u8] {
-        let (Self::World(bytes) | Self::Log(bytes) | Self::Panel(_, bytes)) = self;
-        bytes
+impl Sample {
+    fn payload(&self) -> &[u8] {
+        match self {
+            Self::World(payload) | Self::Log(payload) | Self::Panel { payload, .. } => payload,
+        }
     }
 }
 
@@ -51,42 +60,48 @@ pub(crate) struct Live {
     run: RunName,
     connect: String,
     keys: Keys,
-    board: Board,
+    feed: Feed,
+    /// Set when the simulator has been reached.
     bus: OnceLock<Bus>,
-    /// What the keeper is to see to.
-    wanted: Mutex<Wanted>,
-    /// The keeper has something to see to.
-    wake: Condvar,
-    raw: SyncSender<Raw>,
-    /// Bytes that wait to be decoded.
-    waiting_bytes: AtomicUsize,
-    /// Lines of the log that were lost since the last one that was not.
+    demand: Mutex<Demand>,
+    /// Notified when `demand` or `feed` has changed in a way that the session thread may wait for.
+    changed: Condvar,
+    queue: SyncSender<Sample>,
+    queued_bytes: AtomicUsize,
+    /// Lines of the log that were dropped since the last one that was not.
     lost_lines: AtomicU64,
-    /// Messages that changed nothing.
+    /// Samples that were ignored.
     ignored: AtomicU64,
 }
 
+/// What the session thread has to provide.
 #[derive(Default)]
-struct Wanted {
+struct Demand {
     viewers: usize,
     is_over: bool,
 }
 
-/// Somebody who watches, until dropped.
+impl Demand {
+    fn has_viewers(&self) -> bool {
+        self.viewers > 0 && !self.is_over
+    }
+}
+
+/// Keeps the subscribers to frames and panels declared until it is dropped.
 pub(crate) struct Viewer(Arc<Live>);
 
 impl Drop for Viewer {
     fn drop(&mut self) {
         self.0.lock().viewers -= 1;
-        self.0.nudge();
+        self.0.notify();
     }
 }
 
 impl Live {
-    /// Begins to look for the simulator of `run`; it need not be there yet.
+    /// Begins to connect to the simulator of `run`, which may start later.
     ///
     /// # Errors
-    /// Why it cannot begin.
+    /// The configuration file cannot be read, or a thread cannot be started.
     pub(crate) fn start(
         run: RunName,
         connect: String,
@@ -95,30 +110,32 @@ impl Live {
         if let Some(file) = &config {
             std::fs::metadata(file).map_err(|error| format!("{}: {error}", file.display()))?;
         }
-        let (raw, received) = sync_channel(QUEUE.0);
-        let live = Arc::new(Self {
+
+        let (queue, samples) = sync_channel(MAX_QUEUED_SAMPLES);
+        let live = Arc::new(Self::new(run, connect, queue));
+
+        let decoder = live.clone();
+        spawn("decoder", move || decoder.decode_all(&samples))?;
+        let session = live.clone();
+        spawn("session", move || session.run_session(config.as_deref()))?;
+
+        Ok(live)
+    }
+
+    fn new(run: RunName, connect: String, queue: SyncSender<Sample>) -> Self {
+        Self {
             keys: Keys::new(&run),
             run,
             connect,
-            board: Board::new(),
+            feed: Feed::new(),
             bus: OnceLock::new(),
-            wanted: Mutex::default(),
-            wake: Condvar::new(),
-            raw,
-            waiting_bytes: AtomicUsize::new(0),
+            demand: Mutex::default(),
+            changed: Condvar::new(),
+            queue,
+            queued_bytes: AtomicUsize::new(0),
             lost_lines: AtomicU64::new(0),
             ignored: AtomicU64::new(0),
-        });
-        let (reader, keeper) = (live.clone(), live.clone());
-        let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
-            let thread = std::thread::Builder::new()
-                .name(name.to_owned())
-                .spawn(work);
-            thread.map_err(|error| format!("cannot start a thread: {error}"))
-        };
-        spawn("reader", Box::new(move || reader.read(&received)))?;
-        spawn("keeper", Box::new(move || keeper.keep(config.as_ref())))?;
-        Ok(live)
+        }
     }
 
     /// Name of the run.
@@ -126,267 +143,343 @@ impl Live {
         self.run.as_str()
     }
 
-    /// What there is to see.
-    pub(crate) fn board(&self) -> &Board {
-        &self.board
+    /// What the run shows.
+    pub(crate) fn feed(&self) -> &Feed {
+        &self.feed
     }
 
-    /// Somebody watches.
+    /// Registers a viewer.
     pub(crate) fn viewer(self: &Arc<Self>) -> Viewer {
         self.lock().viewers += 1;
-        self.nudge();
+        self.notify();
         Viewer(self.clone())
     }
 
-    /// Takes leave of the run.
+    /// Ends the session thread and closes the session.
     pub(crate) fn end(&self) {
         self.lock().is_over = true;
-        self.nudge();
+        self.notify();
+
         if let Some(bus) = self.bus.get() {
             bus.close();
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Wanted> {
-        self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Demand> {
+        self.demand.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Something has changed that the keeper may be waiting for. Under its lock, or it might just have looked.
-    fn nudge(&self) {
-        let _wanted = self.lock();
-        self.wake.notify_all();
-    }
-
-    /// Asks the simulator for something and waits for its answer.
-    ///
-    /// # Errors
-    /// Why there is none.
-    pub(crate) fn control(&self, control: &Control) -> Result<ControlAnswer, String> {
-        let patience = if matches!(control, Control::Step { .. }) {
-            STEP_PATIENCE
-        } else {
-            PATIENCE
-        };
-        self.ask(control, patience)
-    }
-
-    fn ask(&self, control: &Control, patience: Duration) -> Result<ControlAnswer, String> {
-        let nobody = || {
-            format!(
-                "no simulator of run {} answers at {}: it is not started yet, or it has ended",
-                self.run, self.connect
-            )
-        };
-        let bus = self.bus.get().ok_or_else(nobody)?;
-        let (key, asked) = (self.keys.control(), Instant::now());
-        let answer = bus.get_within(&key, "", Some(encode(control)), patience);
-        let answer =
-            answer
-                .map_err(|error| error.to_string())?
-                .ok_or_else(|| match asked.elapsed() {
-                    elapsed if elapsed < patience => nobody(),
-                    elapsed => {
-                        format!(
-                            "no answer for {:.0} s; the simulator may still be at it",
-                            elapsed.as_secs_f64()
-                        )
-                    }
-                })?;
-        decode(&key, "simulator", &answer.result?).map_err(|error| error.to_string())
-    }
-
-    /// A message that changes nothing: counted, and said once in a while.
-    fn ignore(&self, why: &str) {
-        let count = self.ignored.fetch_add(1, Ordering::Relaxed) + 1;
-        if count.is_power_of_two() {
-            tracing::warn!(count, "ignored a message: {why}");
-        }
+    /// Wakes the session thread. The lock is held so that the notification cannot fall between its check of a condition
+    /// and its wait.
+    fn notify(&self) {
+        let _demand = self.lock();
+        self.changed.notify_all();
     }
 }
 
-/// The reader, and what feeds it.
+/// Requests to the simulator.
 impl Live {
-    /// Hands over what came. Never waits.
-    fn receive(&self, raw: Raw) {
-        let (len, is_line) = (raw.bytes().len(), matches!(raw, Raw::Log(_)));
-        let is_too_long = len > MAX_MESSAGE_BYTES;
-        let is_full = self.waiting_bytes.fetch_add(len, Ordering::Relaxed) + len > QUEUE.1;
-        if !is_too_long && !is_full && self.raw.try_send(raw).is_ok() {
-            return;
+    /// Sends a request to the simulator and waits for its answer.
+    ///
+    /// # Errors
+    /// The request is malformed, or there is no answer.
+    pub(crate) fn control(&self, control: &Control) -> Result<ControlAnswer, String> {
+        let timeout = if matches!(control, Control::Step { .. }) {
+            STEP_TIMEOUT
+        } else {
+            REPLY_TIMEOUT
+        };
+        self.query(control, timeout)
+    }
+
+    /// Sends a person's command to a robot and waits for the simulator's answer.
+    ///
+    /// # Errors
+    /// The command is too long, or there is no answer.
+    pub(crate) fn send_command(
+        &self,
+        to: &RobotName,
+        command: &str,
+    ) -> Result<ControlAnswer, String> {
+        let request = Control::Command {
+            to: to.clone(),
+            command: command.to_owned(),
+        };
+        self.query(&request, REPLY_TIMEOUT)
+    }
+
+    fn query(&self, control: &Control, timeout: Duration) -> Result<ControlAnswer, String> {
+        control
+            .check()
+            .map_err(|(field, reason)| format!("malformed request: {field}: {reason}"))?;
+        let bus = self.bus.get().ok_or_else(|| self.no_simulator())?;
+        let key = self.keys.control();
+
+        let sent_at = Instant::now();
+        let reply = bus
+            .get_within(&key, "", Some(encode(control)), timeout)
+            .map_err(|error| error.to_string())?
+            .ok_or_else(|| self.no_reply(sent_at.elapsed(), timeout))?;
+
+        decode(&key, "simulator", &reply.result?).map_err(|error| error.to_string())
+    }
+
+    fn no_simulator(&self) -> String {
+        format!(
+            "no simulator of run {} answers at {}: it is not started yet, or it has ended",
+            self.run, self.connect
+        )
+    }
+
+    fn no_reply(&self, elapsed: Duration, timeout: Duration) -> String {
+        // A query that ends early has found no queryable.
+        if elapsed < timeout {
+            return self.no_simulator();
         }
-        self.waiting_bytes.fetch_sub(len, Ordering::Relaxed);
-        self.lost_lines
-            .fetch_add(u64::from(is_line), Ordering::Relaxed);
-        if is_too_long {
+        format!(
+            "no answer within {:.0} s; the simulator may still be working on it",
+            elapsed.as_secs_f64()
+        )
+    }
+}
+
+/// The decoder thread, and the queue in front of it.
+impl Live {
+    /// Enqueues a sample, or drops it if there is no room. Never waits.
+    fn enqueue(&self, sample: Sample) {
+        let is_line = matches!(sample, Sample::Log(_));
+        if !self.try_enqueue(sample) && is_line {
+            self.lost_lines.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn try_enqueue(&self, sample: Sample) -> bool {
+        let len = sample.payload().len();
+        if len > MAX_MESSAGE_BYTES {
             self.ignore(&format!(
                 "{len} bytes, more than the {MAX_MESSAGE_BYTES} allowed"
             ));
+            return false;
         }
+
+        let queued_bytes = self.queued_bytes.fetch_add(len, Ordering::Relaxed) + len;
+        if queued_bytes <= MAX_QUEUED_BYTES && self.queue.try_send(sample).is_ok() {
+            return true;
+        }
+
+        self.queued_bytes.fetch_sub(len, Ordering::Relaxed);
+        false
     }
 
-    fn read(&self, received: &Receiver<Raw>) {
-        // It ends with the process: the other end of the queue is in `self`.
-        while let Ok(raw) = received.recv() {
-            let outcome = match &raw {
-                Raw::World(bytes) => self.read_world(bytes),
-                Raw::Log(bytes) => self.read_line(bytes),
-                Raw::Panel(robot, bytes) => self.read_panel(robot, bytes),
-            };
-            self.waiting_bytes
-                .fetch_sub(raw.bytes().len(), Ordering::Relaxed);
-            if let Err(why) = outcome {
-                self.ignore(&why);
+    /// Decodes samples until the process ends: `self` owns the sender of the queue.
+    fn decode_all(&self, samples: &Receiver<Sample>) {
+        for sample in samples {
+            let outcome = self.decode(&sample);
+            self.queued_bytes
+                .fetch_sub(sample.payload().len(), Ordering::Relaxed);
+
+            if let Err(reason) = outcome {
+                self.ignore(&reason);
             }
         }
     }
 
-    fn read_world(&self, bytes: &[u8]) -> Result<(), String> {
-        let frame =
-            decode(&self.keys.world(), "simulator", bytes).map_err(|error| error.to_string())?;
-        self.board.show(frame);
-        self.nudge();
+    fn decode(&self, sample: &Sample) -> Result<(), String> {
+        match sample {
+            Sample::World(payload) => self.decode_frame(payload),
+            Sample::Log(payload) => self.decode_line(payload),
+            Sample::Panel { robot, payload } => self.decode_panel(robot, payload),
+        }
+    }
+
+    fn decode_frame(&self, payload: &[u8]) -> Result<(), String> {
+        let frame = decode_from(&self.keys.world(), "simulator", payload)?;
+
+        self.feed.put_frame(frame);
+        // The session thread may wait for a frame that it requested.
+        self.notify();
         Ok(())
     }
 
-    fn read_line(&self, bytes: &[u8]) -> Result<(), String> {
-        let line =
-            decode(&self.keys.log(), "simulator", bytes).map_err(|error| error.to_string())?;
-        self.board
-            .log(line, self.lost_lines.swap(0, Ordering::Relaxed));
+    fn decode_line(&self, payload: &[u8]) -> Result<(), String> {
+        let line = decode_from(&self.keys.log(), "simulator", payload)?;
+
+        let lost = self.lost_lines.swap(0, Ordering::Relaxed);
+        self.feed.add_line(line, lost);
         Ok(())
     }
 
-    fn read_panel(&self, robot: &str, bytes: &[u8]) -> Result<(), String> {
+    fn decode_panel(&self, robot: &str, payload: &[u8]) -> Result<(), String> {
         let name = RobotName::new(robot).map_err(|error| error.to_string())?;
-        let panel =
-            decode(&self.keys.panel(&name), robot, bytes).map_err(|error| error.to_string())?;
-        self.board.paint(&name, &panel)
+        let panel = decode_from(&self.keys.panel(&name), robot, payload)?;
+
+        self.feed.put_panel(&name, &panel)
+    }
+
+    /// Counts an ignored sample; logs the 1st, 2nd, 4th, 8th and so on.
+    fn ignore(&self, reason: &str) {
+        let count = self.ignored.fetch_add(1, Ordering::Relaxed) + 1;
+        if count.is_power_of_two() {
+            tracing::warn!(count, "ignored a message: {reason}");
+        }
     }
 }
 
-/// The keeper.
+/// The session thread.
 impl Live {
-    fn keep(self: Arc<Self>, config: Option<&PathBuf>) {
-        let Some(bus) = self.reach(config) else {
+    fn run_session(self: Arc<Self>, config: Option<&Path>) {
+        let Some(bus) = self.connect(config) else {
             return;
         };
-        match self.listen(&bus) {
-            // Held to the end of the process.
-            Ok(_declared) => self.follow_viewers(&bus),
-            Err(error) => tracing::error!("{error}"),
+
+        let outcome = self
+            .subscribe_always(&bus)
+            .and_then(|_declared| self.follow_viewers(&bus));
+        if let Err(error) = outcome {
+            tracing::error!("{error}");
         }
     }
 
-    /// Tries until the simulator is reached; `None` if it is all over before.
-    fn reach(&self, config: Option<&PathBuf>) -> Option<Bus> {
+    /// Repeats attempts until the simulator is reached; `None` if the console ends before.
+    fn connect(&self, config: Option<&Path>) -> Option<Bus> {
         let role = Role::Client {
             connect: self.connect.clone(),
-            patience: ATTEMPT,
+            patience: CONNECT_TIMEOUT,
         };
+        let config = config.map(Path::to_owned);
         let mut attempts: u64 = 0;
+
         loop {
-            match Bus::open(&role, config) {
+            let error = match Bus::open(&role, config.as_ref()) {
                 Ok(bus) => return Some(self.bus.get_or_init(|| bus).clone()),
-                Err(error) => {
-                    attempts += 1;
-                    if attempts.is_power_of_two() {
-                        tracing::warn!(attempts, "{error}");
-                    }
-                }
+                Err(error) => error,
+            };
+            attempts += 1;
+            if attempts.is_power_of_two() {
+                tracing::warn!(attempts, "{error}");
             }
-            let wait = self.wake.wait_timeout(self.lock(), ATTEMPT_AGAIN);
-            if wait.unwrap_or_else(PoisonError::into_inner).0.is_over {
+
+            if self.pause(CONNECT_RETRY) {
                 return None;
             }
         }
     }
 
-    /// What is listened to always: whether the simulator is there, and the log, so that who opens the console sees
-    /// what happened before. Lines are few; see `tests/tests/console.rs` for what they cost.
-    fn listen(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
-        let (alive, log) = (self.clone(), self.clone());
-        Ok([
-            bus.liveliness(&self.keys.alive_sim(), move |_, is_there| {
-                alive.board.set_present(is_there);
-                alive.nudge();
-            })?,
-            bus.subscribe(&self.keys.log(), move |_, bytes| {
-                log.receive(Raw::Log(bytes.to_vec()))
-            })?,
-        ])
+    /// Waits for `duration`, or less if there is a notification; returns whether the console ends.
+    fn pause(&self, duration: Duration) -> bool {
+        let waited = self.changed.wait_timeout(self.lock(), duration);
+        let (demand, _timed_out) = waited.unwrap_or_else(PoisonError::into_inner);
+        demand.is_over
     }
 
-    /// What is listened to while somebody watches.
-    fn watch(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
-        let (world, panels) = (self.clone(), self.clone());
-        Ok([
-            bus.subscribe(&self.keys.world(), move |_, bytes| {
-                world.receive(Raw::World(bytes.to_vec()))
-            })?,
-            bus.subscribe(&panels_of(&self.run), move |key, bytes| {
-                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
-                panels.receive(Raw::Panel(robot, bytes.to_vec()));
-            })?,
-        ])
+    /// Subscribes to the simulator's liveliness token and to the log, so that a new browser gets the lines before it
+    /// connected. Lines are few; `tests/tests/console.rs` measures what they cost.
+    fn subscribe_always(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
+        let live = self.clone();
+        let token = bus.liveliness(&self.keys.alive_sim(), move |_, is_present| {
+            live.feed.set_present(is_present);
+            live.notify();
+        })?;
+
+        let live = self.clone();
+        let log = bus.subscribe(&self.keys.log(), move |_, payload| {
+            live.enqueue(Sample::Log(payload.to_vec()));
+        })?;
+
+        Ok([token, log])
     }
 
-    fn follow_viewers(self: &Arc<Self>, bus: &Bus) {
+    /// Subscribes to what is published only for subscribers.
+    fn subscribe_for_viewers(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
+        let live = self.clone();
+        let world = bus.subscribe(&self.keys.world(), move |_, payload| {
+            live.enqueue(Sample::World(payload.to_vec()));
+        })?;
+
+        let live = self.clone();
+        let panels = bus.subscribe(&panels_of(&self.run), move |key, payload| {
+            live.enqueue(Sample::Panel {
+                robot: Keys::robot_of(key).unwrap_or_default().to_owned(),
+                payload: payload.to_vec(),
+            });
+        })?;
+
+        Ok([world, panels])
+    }
+
+    /// Keeps the subscribers declared while there are viewers, until the console ends.
+    fn follow_viewers(self: &Arc<Self>, bus: &Bus) -> Result<(), BusError> {
         loop {
-            if !self.wait(|wanted| wanted.viewers > 0) {
-                return;
-            }
-            match self.watch(bus) {
-                Ok(_declared) => self.follow_simulator(),
-                Err(error) => {
-                    tracing::error!("{error}");
-                    return;
-                }
-            }
+            self.wait(Demand::has_viewers);
             if self.lock().is_over {
+                return Ok(());
+            }
+
+            let _declared = self.subscribe_for_viewers(bus)?;
+            self.follow_simulator();
+        }
+    }
+
+    /// Requests a frame whenever the simulator appears; returns when there are no viewers.
+    fn follow_simulator(&self) {
+        loop {
+            self.wait(|demand| !demand.has_viewers() || self.feed.is_present());
+            if !self.lock().has_viewers() {
                 return;
             }
+
+            self.request_frame();
+            self.wait(|demand| !demand.has_viewers() || !self.feed.is_present());
         }
     }
 
-    /// Returns when nobody watches any more. A simulator that has nothing to do paints nothing: whenever one appears,
-    /// it is asked how things stand, for then it shows it, too.
-    fn follow_simulator(&self) {
-        let is_wanted = |wanted: &Wanted| wanted.viewers > 0 && !wanted.is_over;
-        while self.wait(|wanted| !is_wanted(wanted) || self.board.is_present())
-            && is_wanted(&self.lock())
-        {
-            self.ask_for_picture(is_wanted);
-            self.wait(|wanted| !is_wanted(wanted) || !self.board.is_present());
-        }
-    }
+    /// Queries the status until a frame arrives. A simulator whose clock is held publishes no frames by itself, but it
+    /// publishes one when it replies to a query.
+    fn request_frame(&self) {
+        let frames_before = self.feed.frame_count();
+        let mut retry = FRAME_RETRY;
 
-    fn ask_for_picture(&self, is_wanted: impl Fn(&Wanted) -> bool) {
-        let (seen, mut patience) = (self.board.pictures(), ASK_AGAIN.0);
-        let is_settled = |wanted: &Wanted| {
-            !is_wanted(wanted) || !self.board.is_present() || self.board.pictures() > seen
-        };
-        while !is_settled(&self.lock()) {
-            if let Err(error) = self.ask(&Control::Status, PATIENCE) {
-                tracing::debug!("asked for a picture: {error}");
+        while self.lacks_frame(&self.lock(), frames_before) {
+            if let Err(error) = self.query(&Control::Status, REPLY_TIMEOUT) {
+                tracing::debug!("requested a frame: {error}");
             }
-            let timed = self
-                .wake
-                .wait_timeout_while(self.lock(), patience, |wanted| !is_settled(wanted));
-            drop(timed);
-            patience = (2 * patience).min(ASK_AGAIN.1);
+
+            let waited = self
+                .changed
+                .wait_timeout_while(self.lock(), retry, |demand| {
+                    self.lacks_frame(demand, frames_before)
+                });
+            drop(waited);
+            retry = (2 * retry).min(MAX_FRAME_RETRY);
         }
     }
 
-    /// Waits until `is_met`; `false` if it is all over.
-    fn wait(&self, is_met: impl Fn(&Wanted) -> bool) -> bool {
-        let wait = self
-            .wake
-            .wait_while(self.lock(), |wanted| !wanted.is_over && !is_met(wanted));
-        !wait.unwrap_or_else(PoisonError::into_inner).is_over
+    fn lacks_frame(&self, demand: &Demand, frames_before: u64) -> bool {
+        demand.has_viewers() && self.feed.is_present() && self.feed.frame_count() == frames_before
+    }
+
+    /// Waits until `is_met` or until the console ends.
+    fn wait(&self, is_met: impl Fn(&Demand) -> bool) {
+        let waited = self
+            .changed
+            .wait_while(self.lock(), |demand| !demand.is_over && !is_met(demand));
+        drop(waited);
     }
 }
 
-/// The panels of all robots of a run.
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<(), String> {
+    thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(work)
+        .map(drop)
+        .map_err(|error| format!("cannot start a thread: {error}"))
+}
+
+fn decode_from<M: Message>(key: &str, sender: &str, payload: &[u8]) -> Result<M, String> {
+    decode(key, sender, payload).map_err(|error| error.to_string())
+}
+
+/// The key expression of all robots' panels.
 fn panels_of(run: &RunName) -> String {
     format!("cars/{run}/robot/*/panel")
 }

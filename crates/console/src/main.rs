@@ -1,19 +1,22 @@
-//! `cars-console`: shows a run, or a recording of one, in a browser, and has its buttons.
+//! `cars-console`: shows a run, or a recording of one, in a browser, and sends the simulator what people request there.
 //!
-//! It watches from the outside: what it is shown, it passes on; what is asked of it, it hands to the simulator, which
-//! decides. Whether it is there, and who looks at it, makes no difference to a run.
+//! The console is an observer. It forwards what the run publishes to browsers and forwards requests to the simulator,
+//! which decides. A run is the same with or without it.
 
-mod board;
+mod app;
 mod browser;
+mod feed;
 mod guard;
 mod live;
 mod page;
 mod recording;
 mod server;
+mod tick_file;
 
+use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -21,17 +24,22 @@ use bus::DEFAULT_ENDPOINT;
 use clap::Parser;
 use protocol::RunName;
 use tokio::net::TcpListener;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::runtime::Runtime;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 
+use app::{App, Mode};
 use guard::Guard;
 use live::Live;
 use recording::Recording;
-use server::{App, Mode};
 
-/// Where the console is unless told otherwise.
+/// The address to serve at without `--bind`.
 const DEFAULT_BIND: &str = "127.0.0.1:7007";
-/// How long the browsers get to say goodbye.
-const GOODBYE: Duration = Duration::from_secs(2);
+/// The address to serve at if the default port is in use: any free port.
+const FALLBACK_BIND: &str = "127.0.0.1:0";
+/// How long browsers have to close their connections when the console ends.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long to wait for threads that are blocked on a reply of the simulator.
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// The web console of the Cooperative Affective Robot Simulator.
 #[derive(Debug, Parser)]
@@ -43,11 +51,11 @@ struct Args {
     /// Where its simulator listens.
     #[arg(long, env = "CARS_CONNECT", default_value = DEFAULT_ENDPOINT, value_name = "ENDPOINT")]
     connect: String,
-    /// A configuration file of the middleware instead of the built-in settings.
+    /// A zenoh configuration file to use instead of the built-in settings.
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
-    /// Address and port to serve at; port 0 takes a free one. Without it 127.0.0.1:7007, or a free port if that one is
-    /// taken. Everything but loopback opens the run to the network, to those who have the token in the address printed.
+    /// Address and port to serve at; port 0 takes a free one. The default is 127.0.0.1:7007, or a free port if that one
+    /// is in use. Any address but loopback opens the run to the network, to everyone with the token in the printed URL.
     #[arg(long, env = "CARS_CONSOLE_BIND", value_name = "ADDRESS:PORT")]
     bind: Option<SocketAddr>,
     /// Show the recording in this run's folder, or this recording, instead of a run in progress.
@@ -61,14 +69,8 @@ struct Args {
 fn main() -> ExitCode {
     bus::runtime::use_one_thread();
     let args = Args::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .with_target(false)
-        .init();
+    init_tracing();
+
     match run(args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -78,102 +80,136 @@ fn main() -> ExitCode {
     }
 }
 
+fn init_tracing() {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| "warn,zenoh=error".into());
+
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .init();
+}
+
 fn run(args: Args) -> Result<(), String> {
     let mode = match args.recording {
-        Some(path) => Mode::Recording(Recording::open(&path).map_err(|error| error.to_string())?),
+        Some(path) => open_recording(&path)?,
         None => Mode::Live(Live::start(args.run, args.connect, args.zenoh_config)?),
     };
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()
-        .map_err(|error| format!("cannot start: {error}"))?;
+    let runtime = build_runtime()?;
+
     let outcome = runtime.block_on(serve(args.bind, mode, args.open));
-    // Whoever still waits for an answer of the simulator waits in vain.
-    runtime.shutdown_timeout(Duration::from_millis(200));
+
+    // Requests that still wait for the simulator get no answer any more.
+    runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
     outcome
 }
 
-/// Serves until it is told to end.
+fn open_recording(path: &std::path::Path) -> Result<Mode, String> {
+    Recording::open(path)
+        .map(Mode::Recording)
+        .map_err(|error| error.to_string())
+}
+
+fn build_runtime() -> Result<Runtime, String> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| format!("cannot start: {error}"))
+}
+
+/// Serves until the process receives SIGTERM or SIGINT.
 async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), String> {
     let listener = listen(bind).await?;
     let address = listener
         .local_addr()
         .map_err(|error| format!("cannot serve: {error}"))?;
-    let guard = Guard::new(address).map_err(|error| format!("cannot draw a token: {error}"))?;
+    let guard = Guard::new(address).map_err(|error| format!("cannot create a token: {error}"))?;
     let url = guard.url();
     let app = Arc::new(App::new(guard, mode));
-    let mut ended = (
-        termination(SignalKind::terminate())?,
-        termination(SignalKind::interrupt())?,
-    );
-    if !address.ip().is_loopback() {
-        eprintln!(
-            "the console is open to the network at {address}; whoever has the token controls the run"
-        );
-    }
-    println!("console: {url}");
+    let mut terminate = handle(SignalKind::terminate())?;
+    let mut interrupt = handle(SignalKind::interrupt())?;
+
+    announce(address, &url);
     if opens {
         open_browser(&url);
     }
+
     let serving = tokio::spawn(server::serve(listener, app.clone()));
     tokio::select! {
-        _ = ended.0.recv() => {}
-        _ = ended.1.recv() => {}
+        _ = terminate.recv() => {}
+        _ = interrupt.recv() => {}
     }
+
     app.end();
-    if tokio::time::timeout(GOODBYE, serving).await.is_err() {
-        tracing::debug!("a browser did not say goodbye");
+    if tokio::time::timeout(CLOSE_TIMEOUT, serving).await.is_err() {
+        tracing::debug!("a browser did not close its connection in time");
     }
     app.close();
     Ok(())
 }
 
-/// Opens the page with what the system, or the variable `BROWSER`, opens pages with. Without one the address is printed all
-/// the same.
+fn announce(address: SocketAddr, url: &str) {
+    if !address.ip().is_loopback() {
+        eprintln!(
+            "the console is open to the network at {address}; anyone with the token controls the run"
+        );
+    }
+    println!("console: {url}");
+}
+
+/// Opens the page with the program in `BROWSER`, or else with the system's opener. A failure is only reported: the URL
+/// has been printed.
 fn open_browser(url: &str) {
-    let system = if cfg!(target_os = "macos") {
+    let opener = if cfg!(target_os = "macos") {
         "open"
     } else {
         "xdg-open"
     };
-    let program = std::env::var("BROWSER").unwrap_or_else(|_| system.to_owned());
-    let quiet = std::process::Stdio::null;
-    let started = std::process::Command::new(&program)
+    let program = std::env::var("BROWSER").unwrap_or_else(|_| opener.to_owned());
+
+    let started = Command::new(&program)
         .arg(url)
-        .stdout(quiet())
-        .stderr(quiet())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
         .spawn();
+
     if let Err(error) = started {
         eprintln!("{program} cannot be started ({error}): open the address above yourself");
     }
 }
 
-fn termination(kind: SignalKind) -> Result<tokio::signal::unix::Signal, String> {
+fn handle(kind: SignalKind) -> Result<Signal, String> {
     signal(kind).map_err(|error| format!("cannot listen for signals: {error}"))
 }
 
-/// An address that was asked for is that one or none; the default gives way.
-async fn listen(bind: Option<SocketAddr>) -> Result<TcpListener, String> {
-    let failed = |at: &str, error: std::io::Error| {
-        format!(
-            "cannot serve at {at}: {error}; choose another address with --bind, port 0 takes a free one"
-        )
-    };
-    if let Some(address) = bind {
+/// Binds the requested address or fails; the default address falls back to a free port.
+async fn listen(requested: Option<SocketAddr>) -> Result<TcpListener, String> {
+    if let Some(address) = requested {
         return TcpListener::bind(address)
             .await
-            .map_err(|error| failed(&address.to_string(), error));
+            .map_err(|error| bind_error(&address.to_string(), &error));
     }
+
     match TcpListener::bind(DEFAULT_BIND).await {
-        Err(error) if error.kind() == std::io::ErrorKind::AddrInUse => {
-            eprintln!(
-                "{DEFAULT_BIND} is taken, perhaps by another console; this one takes a free port"
-            );
-            TcpListener::bind("127.0.0.1:0")
-                .await
-                .map_err(|error| failed("127.0.0.1:0", error))
-        }
-        outcome => outcome.map_err(|error| failed(DEFAULT_BIND, error)),
+        Ok(listener) => Ok(listener),
+        Err(error) if error.kind() == ErrorKind::AddrInUse => listen_on_free_port().await,
+        Err(error) => Err(bind_error(DEFAULT_BIND, &error)),
     }
+}
+
+async fn listen_on_free_port() -> Result<TcpListener, String> {
+    eprintln!("{DEFAULT_BIND} is in use, perhaps by another console; this one takes a free port");
+
+    TcpListener::bind(FALLBACK_BIND)
+        .await
+        .map_err(|error| bind_error(FALLBACK_BIND, &error))
+}
+
+fn bind_error(address: &str, error: &std::io::Error) -> String {
+    format!(
+        "cannot serve at {address}: {error}; choose another address with --bind, port 0 takes a free one"
+    )
 }

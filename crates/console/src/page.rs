@@ -1,4 +1,4 @@
-//! What the page is told and what it says: one JSON object for each message of the WebSocket.
+//! The messages between server and page: one JSON object in each text message of the WebSocket.
 
 use axum::extract::ws::Utf8Bytes;
 use protocol::RobotName;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Server to page.
 #[derive(Debug, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-pub(crate) enum ToPage<'a> {
+pub(crate) enum ServerMessage<'a> {
     /// The first message.
     Hello {
         /// `live` or `recording`.
@@ -18,45 +18,45 @@ pub(crate) enum ToPage<'a> {
         /// Version of the console.
         version: &'static str,
     },
-    /// Whether the simulator is there.
+    /// Whether the simulator is connected.
     Simulator {
-        /// Whether it is.
+        /// Whether its liveliness token is declared.
         present: bool,
     },
-    /// The field.
+    /// The newest frame.
     Frame {
-        /// The newest there is.
+        /// The frame, with the flights of the frames that this browser skipped.
         frame: &'a WorldFrame,
     },
-    /// What a robot displays.
+    /// The newest panel of a robot.
     Panel {
-        /// Which robot.
+        /// The robot that published it.
         robot: &'a RobotName,
-        /// The newest there is.
+        /// Its widgets.
         panel: &'a Panel,
     },
     /// Lines of the log, in order.
     Log {
         /// The lines.
         lines: &'a [LogRecord],
-        /// How many this browser missed before them.
+        /// How many lines before them this browser missed.
         dropped: u64,
     },
-    /// What came of a request.
+    /// The outcome of a request: either `answer` or `error` is present.
     Answer {
-        /// The page's number for it; none where it could not be read.
+        /// The number that the page gave the request; `None` if the request has no readable number.
         id: Option<u64>,
-        /// What the simulator says.
+        /// The simulator's answer.
         #[serde(skip_serializing_if = "Option::is_none")]
         answer: Option<ControlAnswer>,
-        /// Why there is no answer.
+        /// Why the request has no answer.
         #[serde(skip_serializing_if = "Option::is_none")]
         error: Option<String>,
     },
 }
 
-impl ToPage<'_> {
-    /// The answer to request `id`.
+impl ServerMessage<'_> {
+    /// The outcome of request `id`.
     pub(crate) fn answer(id: Option<u64>, outcome: Result<ControlAnswer, String>) -> Self {
         match outcome {
             Ok(answer) => Self::Answer {
@@ -72,9 +72,9 @@ impl ToPage<'_> {
         }
     }
 
-    /// The message as it is sent.
+    /// The message as JSON text.
     pub(crate) fn text(&self) -> Utf8Bytes {
-        // Numbers, strings, lists and maps with string keys: there is no value of theirs that JSON cannot write.
+        // Serialization fails only for maps with keys that are not strings, and there are none in these types.
         let text = serde_json::to_string(self)
             .unwrap_or_else(|error| unreachable!("a message is always JSON: {error}"));
         text.into()
@@ -84,19 +84,48 @@ impl ToPage<'_> {
 /// Page to server.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-pub(crate) enum FromPage {
+pub(crate) enum PageMessage {
     /// A request to the simulator.
     Control {
-        /// The page's number for it; the answer carries it, too.
+        /// Number of the request; the answer carries it, too.
         id: u64,
         /// The request.
         control: Control,
     },
+    /// A command of a person to a robot.
+    Command {
+        /// Number of the request; the answer carries it, too.
+        id: u64,
+        /// The robot.
+        to: RobotName,
+        /// The text of the command.
+        command: String,
+    },
 }
 
-/// What can be made out of a message that cannot be understood.
+impl PageMessage {
+    /// The number that the page gave the request.
+    pub(crate) fn id(&self) -> u64 {
+        match self {
+            Self::Control { id, .. } | Self::Command { id, .. } => *id,
+        }
+    }
+
+    /// Whether the message carries a scenario or a set-up, which may be long.
+    pub(crate) fn carries_scenario(&self) -> bool {
+        matches!(
+            self,
+            Self::Control {
+                control: Control::Load { .. } | Control::Init { .. },
+                ..
+            }
+        )
+    }
+}
+
+/// The number of a request that is malformed otherwise.
 #[derive(Debug, Default, Deserialize)]
-pub(crate) struct Numbered {
-    /// The page's number for it.
+pub(crate) struct RequestId {
+    /// `None` if the message has none.
     pub(crate) id: Option<u64>,
 }

@@ -1,5 +1,7 @@
-//! The HTTP side: what can be asked for, by whom, and for how long.
+//! The HTTP side: routes, connections and their limits.
 
+use std::fmt::Display;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,97 +16,28 @@ use axum::routing::get;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use protocol::Tick;
 use rust_embed::Embed;
 use serde::Deserialize;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
+use crate::app::{App, Ending, Mode};
 use crate::browser;
-use crate::guard::{Guard, HEADERS};
-use crate::live::Live;
-use crate::recording::{MAX_TICKS, Recording};
+use crate::guard::HEADERS;
+use crate::recording::MAX_TICKS;
 
-/// Most browsers at a time.
-pub(crate) const MAX_BROWSERS: usize = 32;
-/// Most connections at a time; a browser uses one for its WebSocket and up to six for everything else.
+/// Most connections at a time; a browser uses one for its WebSocket and up to six for HTTP requests.
 const MAX_CONNECTIONS: usize = 256;
-/// Most requests, of all browsers, that may wait for the simulator's answer; each holds a thread.
-const MAX_REQUESTS: usize = 64;
-/// Most answers that are read from a recording at a time.
-const MAX_READS: usize = 2;
-/// A client that has said nothing for this long, or does not come to the end of its request, is let go.
+/// A connection is closed if a request's header does not arrive completely within this time.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(20);
+/// Pause after a failed accept.
+const ACCEPT_RETRY: Duration = Duration::from_millis(100);
 
-/// The page.
+/// The files of the page.
 #[derive(Embed)]
 #[folder = "assets/"]
 struct Assets;
-
-/// What is shown.
-pub(crate) enum Mode {
-    /// A run in progress, or one that is still to come.
-    Live(Arc<Live>),
-    /// A run of the past.
-    Recording(Recording),
-}
-
-/// The console.
-pub(crate) struct App {
-    guard: Guard,
-    /// What is shown.
-    pub(crate) mode: Mode,
-    browsers: Arc<Semaphore>,
-    requests: Arc<Semaphore>,
-    reads: Semaphore,
-    ending: watch::Sender<bool>,
-}
-
-impl App {
-    /// A console that shows `mode` to those whom `guard` lets in.
-    pub(crate) fn new(guard: Guard, mode: Mode) -> Self {
-        Self {
-            guard,
-            mode,
-            browsers: Arc::new(Semaphore::new(MAX_BROWSERS)),
-            requests: Arc::new(Semaphore::new(MAX_REQUESTS)),
-            reads: Semaphore::new(MAX_READS),
-            ending: watch::Sender::new(false),
-        }
-    }
-
-    /// Tells everybody to leave.
-    pub(crate) fn end(&self) {
-        self.ending.send_replace(true);
-    }
-
-    /// Turns `true` when everybody is told to leave.
-    pub(crate) fn ending(&self) -> watch::Receiver<bool> {
-        self.ending.subscribe()
-    }
-
-    /// Takes leave of the run.
-    pub(crate) fn close(&self) {
-        if let Mode::Live(live) = &self.mode {
-            live.end();
-        }
-    }
-
-    /// A place for a request; none if all are taken.
-    pub(crate) fn request(&self) -> Option<OwnedSemaphorePermit> {
-        self.requests.clone().try_acquire_owned().ok()
-    }
-
-    /// A place for a browser; none if all are taken.
-    pub(crate) fn place(&self) -> Option<OwnedSemaphorePermit> {
-        self.browsers.clone().try_acquire_owned().ok()
-    }
-}
-
-/// Waits until everybody is told to leave.
-pub(crate) async fn told_to_leave(ending: &mut watch::Receiver<bool>) {
-    // Also when the console itself is gone, which is the only way in which this fails.
-    let _is_ending = ending.wait_for(|is_ending| *is_ending).await;
-}
 
 fn routes(app: Arc<App>) -> Router {
     Router::new()
@@ -121,81 +54,86 @@ fn routes(app: Arc<App>) -> Router {
         .with_state(app)
 }
 
-/// Serves until it is told to end, and until everybody has left.
+/// Serves until the console ends and all clients are disconnected.
 pub(crate) async fn serve(listener: TcpListener, app: Arc<App>) {
-    let (routes, connections) = (
-        routes(app.clone()),
-        Arc::new(Semaphore::new(MAX_CONNECTIONS)),
-    );
+    let routes = routes(app.clone());
+    let connections = Arc::new(Semaphore::new(MAX_CONNECTIONS));
     let mut ending = app.ending();
-    loop {
-        // A semaphore that nobody closes: who comes when all places are taken waits at the door.
-        let Ok(place) = connections.clone().acquire_owned().await else {
-            break;
-        };
+
+    // The semaphore is never closed. At the limit, new clients wait in the listener's backlog.
+    while let Ok(permit) = connections.clone().acquire_owned().await {
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
-            () = told_to_leave(&mut ending) => break,
+            () = ending.reached() => break,
         };
+
         match accepted {
             Ok((stream, _)) => {
-                tokio::spawn(converse(stream, routes.clone(), app.ending(), place));
+                tokio::spawn(serve_connection(
+                    stream,
+                    routes.clone(),
+                    app.ending(),
+                    permit,
+                ));
             }
             Err(error) => {
-                // No file handles left, for example: it passes when somebody leaves.
+                // Too many open files, for example: a connection that closes makes room.
                 tracing::warn!("a connection failed: {error}");
-                tokio::time::sleep(Duration::from_millis(100)).await;
+                tokio::time::sleep(ACCEPT_RETRY).await;
             }
         }
     }
+
     drop(listener);
-    let _everybody = connections.acquire_many(MAX_CONNECTIONS as u32).await;
-    // WebSockets are no longer their connections' business.
-    let _browsers = app.browsers.acquire_many(MAX_BROWSERS as u32).await;
+    let _all = connections.acquire_many(MAX_CONNECTIONS as u32).await;
+    // An upgraded WebSocket has given back its connection's permit, so browsers are waited for separately.
+    app.browsers_left().await;
 }
 
-/// One connection, until it ends; a request that has been read is answered.
-async fn converse(
+/// Serves one connection until it closes; a request that has been read is answered.
+async fn serve_connection(
     stream: TcpStream,
     routes: Router,
-    mut ending: watch::Receiver<bool>,
-    _place: OwnedSemaphorePermit,
+    mut ending: Ending,
+    _permit: OwnedSemaphorePermit,
 ) {
     if let Err(error) = stream.set_nodelay(true) {
-        tracing::debug!("a connection is gone already: {error}");
+        tracing::debug!("a connection is closed already: {error}");
     }
+
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(REQUEST_TIMEOUT)
         .serve_connection(TokioIo::new(stream), TowerToHyperService::new(routes))
         .with_upgrades();
-    let mut connection = std::pin::pin!(connection);
+    let mut connection = pin!(connection);
+
     let outcome = tokio::select! {
         outcome = connection.as_mut() => outcome,
-        () = told_to_leave(&mut ending) => {
+        () = ending.reached() => {
             connection.as_mut().graceful_shutdown();
             connection.await
         }
     };
+
     if let Err(error) = outcome {
         tracing::debug!("a connection ended: {error}");
     }
 }
 
-/// Nothing is answered that the guard has not seen, and nothing without the headers that protect the page.
+/// Every request passes the guard, and every response carries the headers that protect the page.
 async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let refused = app.guard.refuse(
-        request.headers(),
-        request.uri().path(),
-        request.uri().query(),
-    );
-    let mut response = match refused {
-        Some(why) => (StatusCode::FORBIDDEN, why).into_response(),
+    let uri = request.uri();
+    let refusal = app.guard.refuse(request.headers(), uri.path(), uri.query());
+
+    let mut response = match refusal {
+        Some(reason) => (StatusCode::FORBIDDEN, reason).into_response(),
         None => next.run(request).await,
     };
-    response.headers_mut().extend(HEADERS);
-    response
-        .headers_mut()
+
+    let headers = response.headers_mut();
+    headers.extend(HEADERS);
+    headers
         .entry(CACHE_CONTROL)
         .or_insert(HeaderValue::from_static("no-store"));
     response
@@ -209,7 +147,9 @@ fn asset(path: &str) -> Response {
 }
 
 fn content_type(path: &str) -> &'static str {
-    match path.rsplit_once('.').map_or("", |(_, extension)| extension) {
+    let extension = path.rsplit_once('.').map_or("", |(_, extension)| extension);
+
+    match extension {
         "html" => "text/html; charset=utf-8",
         "js" | "mjs" => "text/javascript; charset=utf-8",
         "css" => "text/css; charset=utf-8",
@@ -222,7 +162,7 @@ fn content_type(path: &str) -> &'static str {
 }
 
 fn not_found() -> Response {
-    (StatusCode::NOT_FOUND, "There is nothing here.\n").into_response()
+    (StatusCode::NOT_FOUND, "Not found.\n").into_response()
 }
 
 async fn socket(State(app): State<Arc<App>>, upgrade: WebSocketUpgrade) -> Response {
@@ -239,48 +179,57 @@ async fn recording(State(app): State<Arc<App>>) -> Response {
     }
 }
 
-/// Which ticks are asked for.
+/// A range of ticks, as the query string of a request states it.
 #[derive(Deserialize)]
-struct Wanted {
-    from: u64,
+struct TickRange {
+    from: Tick,
     count: u64,
 }
 
 async fn ticks(
     State(app): State<Arc<App>>,
-    wanted: Result<Query<Wanted>, QueryRejection>,
+    query: Result<Query<TickRange>, QueryRejection>,
 ) -> Response {
-    let Query(Wanted { from, count }) = match wanted {
-        Ok(wanted) if wanted.count <= MAX_TICKS => wanted,
-        _ => {
-            let why = format!("Ask for ?from=TICK&count=N with N up to {MAX_TICKS}.\n");
-            return (StatusCode::BAD_REQUEST, why).into_response();
-        }
+    let range = match query {
+        Ok(Query(range)) if range.count <= MAX_TICKS => range,
+        _ => return bad_range(),
     };
     if matches!(app.mode, Mode::Live(_)) {
         return not_found();
     }
-    let Ok(_turn) = app.reads.acquire().await else {
+    let Some(_permit) = app.admit_read().await else {
         return not_found();
     };
+
     let reader = app.clone();
-    let range = tokio::task::spawn_blocking(move || match &reader.mode {
-        Mode::Recording(recording) => recording.range(from, count).map(|range| json(&range)),
-        Mode::Live(_) => Ok(not_found()),
-    });
-    let failed = |error: &dyn std::fmt::Display| {
-        (StatusCode::INTERNAL_SERVER_ERROR, format!("{error}\n")).into_response()
+    let read = tokio::task::spawn_blocking(move || read_ticks(&reader, &range));
+    read.await.unwrap_or_else(|error| internal_error(&error))
+}
+
+/// Reads from the recording's files; blocks.
+fn read_ticks(app: &App, range: &TickRange) -> Response {
+    let Mode::Recording(recording) = &app.mode else {
+        return not_found();
     };
-    match range.await {
-        Ok(Ok(response)) => response,
-        Ok(Err(error)) => failed(&error),
-        Err(error) => failed(&error),
+
+    match recording.range(range.from, range.count) {
+        Ok(range) => json(&range),
+        Err(error) => internal_error(&error),
     }
+}
+
+fn bad_range() -> Response {
+    let reason = format!("Request ?from=TICK&count=N with N up to {MAX_TICKS}.\n");
+    (StatusCode::BAD_REQUEST, reason).into_response()
 }
 
 fn json(value: &impl serde::Serialize) -> Response {
     match serde_json::to_vec(value) {
         Ok(text) => ([(CONTENT_TYPE, "application/json")], text).into_response(),
-        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, format!("{error}\n")).into_response(),
+        Err(error) => internal_error(&error),
     }
+}
+
+fn internal_error(error: &dyn Display) -> Response {
+    (StatusCode::INTERNAL_SERVER_ERROR, format!("{error}\n")).into_response()
 }

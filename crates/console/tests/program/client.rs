@@ -1,11 +1,11 @@
-//! A console to test, and what a browser does to it.
+//! Starts a console and connects to it as a browser does.
 
 #![expect(
     clippy::unwrap_used,
     reason = "a test that cannot set up its subject fails"
 )]
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -17,7 +17,7 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
-/// Longest that anything here may take.
+/// How long to wait for anything before a test fails.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// The program under test.
@@ -31,26 +31,30 @@ pub(crate) fn program(args: &[&str]) -> Command {
     ] {
         command.env_remove(variable);
     }
+
     command
         .args(args)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
+
     command
 }
 
-/// Runs the program to its end, which must be a failure, and returns what it says.
+/// Runs the program, which must fail, and returns its error output.
 pub(crate) fn fails(args: &[&str]) -> String {
     let output = program(args).output().unwrap();
+
     assert_eq!(output.status.code(), Some(1));
     assert_eq!(String::from_utf8_lossy(&output.stdout), "");
+
     String::from_utf8(output.stderr).unwrap()
 }
 
-/// A console that runs, until dropped.
+/// A running console; dropping it kills it.
 pub(crate) struct Console {
     child: Child,
-    /// The one line that it printed.
+    /// The line that it printed on its standard output.
     pub(crate) line: String,
     pub(crate) port: u16,
     /// `?token=…`, or nothing.
@@ -58,42 +62,43 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// Starts one; `args` say what it shows.
+    /// Starts a console with these arguments and waits until it has printed its URL.
     pub(crate) fn start(args: &[&str]) -> Self {
         let mut child = program(args).spawn().unwrap();
+        let stdout = child.stdout.as_mut().unwrap();
         let mut line = String::new();
-        BufReader::new(child.stdout.as_mut().unwrap())
-            .read_line(&mut line)
-            .unwrap();
+        BufReader::new(stdout).read_line(&mut line).unwrap();
+
         let url = line
             .trim()
             .strip_prefix("console: http://")
             .unwrap_or_else(|| panic!("{line:?}"));
         let (address, token) = url.split_once('/').unwrap();
         let address: SocketAddr = address.parse().unwrap();
-        let (port, token) = (address.port(), token.to_owned());
+        let token = token.to_owned();
+
         Self {
             child,
             line,
-            port,
+            port: address.port(),
             token,
         }
     }
 
-    /// One that waits for a simulator that never comes.
+    /// Starts a console that connects to a port without a simulator.
     pub(crate) fn live() -> Self {
-        // Nobody listens at port 1 of this machine.
+        // No process listens at port 1.
         Self::start(&[
             "--bind",
             "127.0.0.1:0",
             "--connect",
             "tcp/127.0.0.1:1",
             "--run",
-            "nobody",
+            "absent",
         ])
     }
 
-    /// Where it expects to be called.
+    /// The `Host` that it accepts.
     pub(crate) fn host(&self) -> String {
         format!("127.0.0.1:{}", self.port)
     }
@@ -104,35 +109,41 @@ impl Console {
         stream
     }
 
-    /// Asks for a path as a browser would.
-    pub(crate) fn get(&self, path: &str) -> Answer {
+    /// Requests a path as a browser does.
+    pub(crate) fn get(&self, path: &str) -> Response {
         self.get_with(path, &[("Host", &self.host())])
     }
 
-    /// Asks for a path with exactly these headers.
-    pub(crate) fn get_with(&self, path: &str, headers: &[(&str, &str)]) -> Answer {
-        let mut stream = self.connect();
+    /// Requests a path with exactly these headers.
+    pub(crate) fn get_with(&self, path: &str, headers: &[(&str, &str)]) -> Response {
         let headers: String = headers
             .iter()
             .map(|(name, value)| format!("{name}: {value}\r\n"))
             .collect();
+
+        let mut stream = self.connect();
         write!(
             stream,
             "GET {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n"
         )
         .unwrap();
+
         let mut text = Vec::new();
         stream.read_to_end(&mut text).unwrap();
-        Answer::parse(&String::from_utf8_lossy(&text))
+        Response::parse(&String::from_utf8_lossy(&text))
     }
 
     /// A WebSocket as the page opens it.
     pub(crate) fn page(&self) -> Page {
-        self.page_of(Some(&format!("http://{}", self.host())))
+        let origin = format!("http://{}", self.host());
+        self.page_of(Some(&origin))
             .unwrap_or_else(|status| panic!("{status}"))
     }
 
-    /// A WebSocket as a page of `origin` opens it; `Err` is the HTTP status of a refusal.
+    /// A WebSocket as a page of `origin` opens it.
+    ///
+    /// # Errors
+    /// The HTTP status of a refusal.
     pub(crate) fn page_of(&self, origin: Option<&str>) -> Result<Page, u16> {
         let url = format!("ws://{}/ws{}", self.host(), self.token);
         let mut request = url.into_client_request().unwrap();
@@ -141,6 +152,7 @@ impl Console {
                 .headers_mut()
                 .insert("Origin", HeaderValue::from_str(origin).unwrap());
         }
+
         match tungstenite::client(request, self.connect()) {
             Ok((socket, _)) => Ok(Page { socket }),
             Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(response))) => {
@@ -150,36 +162,30 @@ impl Console {
         }
     }
 
-    /// Tells it to end.
+    /// Sends SIGTERM.
     pub(crate) fn terminate(&self) {
-        kill(
-            Pid::from_raw(self.child.id().try_into().unwrap()),
-            Signal::SIGTERM,
-        )
-        .unwrap();
+        let pid = Pid::from_raw(self.child.id().try_into().unwrap());
+        kill(pid, Signal::SIGTERM).unwrap();
     }
 
-    /// Waits for its end.
+    /// Waits until the process has ended.
     pub(crate) fn wait(&mut self) -> ExitStatus {
-        let begun = Instant::now();
+        let started = Instant::now();
+
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return status;
             }
-            assert!(begun.elapsed() < PATIENCE, "it does not end");
+            assert!(started.elapsed() < PATIENCE, "the console does not end");
             std::thread::sleep(Duration::from_millis(5));
         }
     }
 
-    /// What it printed besides, after its end.
+    /// The error output of a console that has ended.
     pub(crate) fn errors(&mut self) -> String {
+        let mut stderr = self.child.stderr.take().unwrap();
         let mut text = String::new();
-        self.child
-            .stderr
-            .take()
-            .unwrap()
-            .read_to_string(&mut text)
-            .unwrap();
+        stderr.read_to_string(&mut text).unwrap();
         text
     }
 }
@@ -191,34 +197,32 @@ impl Drop for Console {
     }
 }
 
-/// What came back.
+/// An HTTP response.
 #[derive(Debug)]
-pub(crate) struct Answer {
+pub(crate) struct Response {
     pub(crate) status: u16,
-    pub(crate) headers: Vec<(String, String)>,
+    /// Names are in lower case.
+    headers: Vec<(String, String)>,
     pub(crate) body: String,
 }
 
-impl Answer {
+impl Response {
     fn parse(text: &str) -> Self {
         let (head, body) = text
             .split_once("\r\n\r\n")
             .unwrap_or_else(|| panic!("no HTTP: {text:?}"));
         let mut lines = head.lines();
-        let status = lines
-            .next()
-            .unwrap()
-            .split(' ')
-            .nth(1)
-            .unwrap()
-            .parse()
-            .unwrap();
-        let headers = lines.map(|line| line.split_once(": ").unwrap());
-        let headers = headers
-            .map(|(name, value)| (name.to_ascii_lowercase(), value.to_owned()))
-            .collect();
+        let status_line = lines.next().unwrap();
+        let status = status_line.split(' ').nth(1).unwrap();
+
+        let mut headers = Vec::new();
+        for line in lines {
+            let (name, value) = line.split_once(": ").unwrap();
+            headers.push((name.to_ascii_lowercase(), value.to_owned()));
+        }
+
         Self {
-            status,
+            status: status.parse().unwrap(),
             headers,
             body: body.to_owned(),
         }
@@ -232,12 +236,9 @@ impl Answer {
     }
 
     pub(crate) fn json(&self) -> Value {
-        assert_eq!(
-            (self.status, self.header("content-type")),
-            (200, "application/json"),
-            "{}",
-            self.body
-        );
+        assert_eq!(self.status, 200, "{}", self.body);
+        assert_eq!(self.header("content-type"), "application/json");
+
         serde_json::from_str(&self.body).unwrap()
     }
 }
@@ -247,34 +248,38 @@ pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
 }
 
-/// What came over it.
+/// What a page receives.
 #[derive(Debug)]
-pub(crate) enum Heard {
-    Said(Value),
-    /// Closed, with code and reason.
-    Closed(u16, String),
-    /// The connection is gone.
-    Gone,
+pub(crate) enum Received {
+    Message(Value),
+    /// A close frame.
+    Closed {
+        code: u16,
+        reason: String,
+    },
+    /// The end of the connection, without a close frame.
+    Disconnected,
 }
 
 impl Page {
-    /// What comes next. Pings are answered on the way.
-    pub(crate) fn hear(&mut self) -> Heard {
+    /// Waits for a message or for the end of the connection. Pings are answered on the way.
+    pub(crate) fn receive(&mut self) -> Received {
         loop {
             match self.socket.read() {
                 Ok(Message::Text(text)) => {
-                    return Heard::Said(serde_json::from_str(&text).unwrap());
+                    return Received::Message(serde_json::from_str(&text).unwrap());
                 }
                 Ok(Message::Close(Some(frame))) => {
-                    return Heard::Closed(frame.code.into(), frame.reason.to_string());
+                    return Received::Closed {
+                        code: frame.code.into(),
+                        reason: frame.reason.to_string(),
+                    };
                 }
                 Ok(_) => {}
-                Err(tungstenite::Error::Io(error))
-                    if error.kind() == std::io::ErrorKind::WouldBlock =>
-                {
-                    panic!("nothing for {PATIENCE:?}")
+                Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::WouldBlock => {
+                    panic!("received nothing for {PATIENCE:?}")
                 }
-                Err(_) => return Heard::Gone,
+                Err(_) => return Received::Disconnected,
             }
         }
     }
@@ -282,31 +287,31 @@ impl Page {
     /// The next message of this type.
     pub(crate) fn until(&mut self, kind: &str) -> Value {
         loop {
-            match self.hear() {
-                Heard::Said(value) if value["type"] == kind => return value,
-                Heard::Said(_) => {}
+            match self.receive() {
+                Received::Message(value) if value["type"] == kind => return value,
+                Received::Message(_) => {}
                 other => panic!("waited for {kind}: {other:?}"),
             }
         }
     }
 
-    /// Reads on until it is closed; `None` if it just ends.
-    pub(crate) fn farewell(&mut self) -> Option<(u16, String)> {
+    /// Reads to the end of the connection: code and reason of the close frame, or `None` without one.
+    pub(crate) fn until_closed(&mut self) -> Option<(u16, String)> {
         loop {
-            match self.hear() {
-                Heard::Said(_) => {}
-                Heard::Closed(code, reason) => return Some((code, reason)),
-                Heard::Gone => return None,
+            match self.receive() {
+                Received::Message(_) => {}
+                Received::Closed { code, reason } => return Some((code, reason)),
+                Received::Disconnected => return None,
             }
         }
     }
 
-    pub(crate) fn say(&mut self, text: &str) {
+    pub(crate) fn send_text(&mut self, text: &str) {
         self.send(Message::text(text));
     }
 
     pub(crate) fn send(&mut self, message: Message) {
-        // A console that does not want it may have closed before all of it was sent.
+        // The console may refuse a message, and then it may close before all of it is sent.
         let _ = self.socket.send(message);
     }
 }

@@ -1,4 +1,4 @@
-//! Who is let in, and what they get.
+//! Which requests are admitted, and what they get.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -8,6 +8,7 @@ use crate::client::{Console, fails};
 #[test]
 fn a_request_for_another_host_is_refused() {
     let console = Console::live();
+
     for path in ["/", "/ws", "/assets/app.js", "/recording"] {
         for host in [
             "evil.example",
@@ -19,28 +20,30 @@ fn a_request_for_another_host_is_refused() {
             assert_eq!(answer.status, 403, "{path} of {host:?}");
             assert!(answer.body.contains(&console.host()), "{}", answer.body);
         }
-        assert_eq!(
-            console.get_with(path, &[]).status,
-            403,
-            "{path} without a host"
-        );
+
+        let without_host = console.get_with(path, &[]);
+        assert_eq!(without_host.status, 403, "{path} without a host");
     }
+}
+
+#[test]
+fn a_request_for_the_own_address_is_served() {
+    let console = Console::live();
+
     for host in [
         console.host(),
         format!("localhost:{}", console.port),
         format!("[::1]:{}", console.port),
     ] {
-        assert_eq!(
-            console.get_with("/nothing", &[("Host", &host)]).status,
-            404,
-            "{host}"
-        );
+        let answer = console.get_with("/nothing", &[("Host", &host)]);
+        assert_eq!(answer.status, 404, "{host}");
     }
 }
 
 #[test]
 fn a_page_from_elsewhere_gets_no_socket() {
     let console = Console::live();
+
     for origin in [
         "http://evil.example",
         "null",
@@ -50,13 +53,10 @@ fn a_page_from_elsewhere_gets_no_socket() {
         assert_eq!(console.page_of(Some(origin)).err(), Some(403), "{origin}");
     }
     assert_eq!(console.page().until("hello")["mode"], "live");
-    // A program that is no browser names no origin.
-    assert_eq!(
-        console
-            .page_of(None)
-            .map(|mut page| page.until("hello")["run"].clone()),
-        Ok("nobody".into())
-    );
+
+    // Programs other than browsers send no origin.
+    let mut program = console.page_of(None).expect("is admitted");
+    assert_eq!(program.until("hello")["run"], "absent");
 }
 
 #[test]
@@ -71,6 +71,7 @@ fn every_answer_forbids_what_the_page_does_not_need() {
         console.get("/ws"),
         console.get_with("/", &foreign),
     ];
+
     for answer in answers {
         assert_eq!(
             answer.header("content-security-policy"),
@@ -85,7 +86,7 @@ fn every_answer_forbids_what_the_page_does_not_need() {
 }
 
 #[test]
-fn an_open_console_wants_its_token() {
+fn an_open_console_requires_its_token() {
     let console = Console::start(&["--bind", "0.0.0.0:0", "--connect", "tcp/127.0.0.1:1"]);
     let token = console
         .token
@@ -95,61 +96,57 @@ fn an_open_console_wants_its_token() {
         token.len() >= 32 && token.bytes().all(|byte| byte.is_ascii_hexdigit()),
         "{token}"
     );
+
     for path in ["/", "/ws", "/recording", "/recording/ticks?from=0&count=1"] {
         for query in ["", "token=", "token=0", "token=0000", &token[1..]] {
-            let glue = if path.contains('?') { '&' } else { '?' };
-            let answer = console.get(&format!("{path}{glue}{query}"));
+            let separator = if path.contains('?') { '&' } else { '?' };
+            let answer = console.get(&format!("{path}{separator}{query}"));
             assert_eq!(answer.status, 403, "{path} with {query:?}");
             assert!(answer.body.contains("?token="), "{}", answer.body);
         }
     }
-    assert_ne!(console.get(&format!("/{}", console.token)).status, 403);
-    assert_eq!(
-        console.get("/assets/nothing").status,
-        404,
-        "the page's parts are no secret"
-    );
+
+    let with_token = console.get(&format!("/{}", console.token));
+    assert_ne!(with_token.status, 403);
+    let asset = console.get("/assets/nothing");
+    assert_eq!(asset.status, 404, "the files of the page are public");
     assert_eq!(console.page().until("hello")["mode"], "live");
-    assert_ne!(
-        Console::start(&["--bind", "0.0.0.0:0"]).token,
-        console.token,
-        "a new one every time"
-    );
+
+    let other = Console::start(&["--bind", "0.0.0.0:0"]);
+    assert_ne!(other.token, console.token, "every console has a new token");
 }
 
 #[test]
 fn the_page_is_served_with_all_its_parts() {
     let console = Console::live();
     let page = console.get("/");
-    assert_eq!(
-        (page.status, page.header("content-type")),
-        (200, "text/html; charset=utf-8")
-    );
+    assert_eq!(page.status, 200);
+    assert_eq!(page.header("content-type"), "text/html; charset=utf-8");
+
     let parts: Vec<&str> = page
         .body
         .split('"')
         .filter(|text| text.starts_with("assets/"))
         .collect();
     assert!(parts.len() > 2, "{parts:?}");
+
     for part in parts {
         let answer = console.get(&format!("/{part}"));
         let expected = match part.rsplit('.').next() {
             Some("js") => "text/javascript; charset=utf-8",
             Some("css") => "text/css; charset=utf-8",
             Some("svg") => "image/svg+xml",
-            _ => panic!("what is {part}?"),
+            _ => panic!("{part} has an unknown extension"),
         };
-        assert_eq!(
-            (answer.status, answer.header("content-type")),
-            (200, expected),
-            "{part}"
-        );
+        assert_eq!(answer.status, 200, "{part}");
+        assert_eq!(answer.header("content-type"), expected, "{part}");
     }
 }
 
 #[test]
 fn nothing_but_the_page_can_be_read() {
     let console = Console::live();
+
     for path in [
         "/assets/../src/main.rs",
         "/assets/../../Cargo.toml",
@@ -163,24 +160,23 @@ fn nothing_but_the_page_can_be_read() {
         "/assets/..\\Cargo.toml",
     ] {
         let answer = console.get(path);
-        assert_eq!(
-            (answer.status, answer.body.as_str()),
-            (404, "There is nothing here.\n"),
-            "{path}"
-        );
+        assert_eq!(answer.status, 404, "{path}");
+        assert_eq!(answer.body, "Not found.\n", "{path}");
     }
+
     let answer = console.get("/recording");
     assert_eq!(
         answer.status, 404,
-        "a run in progress is no recording: {}",
+        "a run in progress has no recording: {}",
         answer.body
     );
 }
 
 #[test]
-fn requests_that_are_no_requests_do_no_harm() {
+fn malformed_http_does_no_harm() {
     let console = Console::live();
     let long = format!("GET /{} HTTP/1.1\r\n\r\n", "x".repeat(1 << 20));
+
     for junk in [
         "\r\n\r\n\r\n",
         "\0\0\0\0\r\n\r\n",
@@ -189,29 +185,31 @@ fn requests_that_are_no_requests_do_no_harm() {
         &long,
     ] {
         let mut stream = console.connect();
-        // It may be shut before all is written.
+        // The console may close the connection before all is written.
         let _ = stream.write_all(junk.as_bytes());
         let _ = stream.shutdown(std::net::Shutdown::Write);
+
         let mut answer = Vec::new();
         let _ = stream.read_to_end(&mut answer);
         assert!(!answer.starts_with(b"HTTP/1.1 200"), "{junk:?}");
     }
+
     assert_eq!(console.get("/nothing").status, 404, "it still serves");
 }
 
 #[test]
-fn a_taken_default_port_gives_way_and_a_wanted_one_does_not() {
-    // Whoever has it: what matters is that it is taken.
-    let taken = TcpListener::bind("127.0.0.1:7007");
+fn a_default_port_in_use_is_replaced_and_a_requested_one_is_not() {
+    // If this fails, another process uses the port, and that will do.
+    let listener = TcpListener::bind("127.0.0.1:7007");
+
     let mut console = Console::start(&["--connect", "tcp/127.0.0.1:1"]);
     assert_ne!(console.port, 7007);
     console.terminate();
     assert!(console.wait().success());
-    assert!(console.errors().contains("127.0.0.1:7007 is taken"));
+    assert!(console.errors().contains("127.0.0.1:7007 is in use"));
+
     let text = fails(&["--bind", "127.0.0.1:7007"]);
-    assert!(
-        text.contains("cannot serve at 127.0.0.1:7007") && text.contains("--bind"),
-        "{text}"
-    );
-    drop(taken);
+    assert!(text.contains("cannot serve at 127.0.0.1:7007"), "{text}");
+    assert!(text.contains("--bind"), "{text}");
+    drop(listener);
 }

@@ -7,37 +7,49 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
+use serde_json::Value;
 use tungstenite::Message;
 
-use crate::client::{Console, Page};
+use crate::client::{Console, Page, Received};
 
 fn control(id: u64, control: &str) -> String {
     format!(r#"{{"type":"control","id":{id},"control":{control}}}"#)
 }
 
+fn command(id: u64, text: &str) -> String {
+    format!(r#"{{"type":"command","id":{id},"to":"Butler","command":"{text}"}}"#)
+}
+
+fn error(answer: &Value) -> &str {
+    answer["error"]
+        .as_str()
+        .unwrap_or_else(|| panic!("no error: {answer}"))
+}
+
 #[test]
-fn without_a_simulator_it_says_so() {
+fn without_a_simulator_requests_are_answered_with_an_error() {
     let console = Console::live();
     let mut page = console.page();
     let hello = page.until("hello");
-    assert_eq!(
-        (&hello["run"], &hello["version"]),
-        (&"nobody".into(), &env!("CARGO_PKG_VERSION").into())
-    );
+    assert_eq!(hello["run"], "absent");
+    assert_eq!(hello["version"], env!("CARGO_PKG_VERSION"));
     assert_eq!(page.until("simulator")["present"], false);
-    page.say(&control(7, r#"{"do":"start"}"#));
+
+    page.send_text(&control(7, r#"{"do":"start"}"#));
+
     let answer = page.until("answer");
-    let error = answer["error"].as_str().unwrap();
+    assert_eq!(answer["id"], 7);
     assert!(
-        answer["id"] == 7 && error.contains("no simulator of run nobody answers"),
-        "{error}"
+        error(&answer).contains("no simulator of run absent answers"),
+        "{answer}"
     );
 }
 
 #[test]
-fn what_cannot_be_understood_is_answered_with_the_reason() {
+fn malformed_requests_are_answered_with_the_reason() {
     let console = Console::live();
     let mut page = console.page();
+
     for (text, id, reason) in [
         (
             r#"{"type":"control","id":1,"control":{"do":"dance"}}"#,
@@ -56,6 +68,11 @@ fn what_cannot_be_understood_is_answered_with_the_reason() {
         ),
         (r#"{"type":"dance","id":4}"#, Some(4), "unknown variant"),
         (
+            r#"{"type":"command","id":5,"command":"refill"}"#,
+            Some(5),
+            "missing field `to`",
+        ),
+        (
             r#"{"type":"control","id":-5,"control":{"do":"start"}}"#,
             None,
             "invalid value",
@@ -64,128 +81,117 @@ fn what_cannot_be_understood_is_answered_with_the_reason() {
         ("", None, "EOF"),
         ("[[[[", None, "malformed"),
     ] {
-        page.say(text);
+        page.send_text(text);
         let answer = page.until("answer");
         assert_eq!(answer["id"].as_u64(), id, "{answer}");
-        assert!(
-            answer["error"].as_str().unwrap().contains(reason),
-            "{answer}"
-        );
+        assert!(error(&answer).contains(reason), "{answer}");
     }
-    let long = format!(
-        r#"{{"do":"command","to":"Butler","command":"{}"}}"#,
-        "x".repeat(5000)
-    );
-    page.say(&control(6, &long));
+
+    page.send_text(&command(6, &"x".repeat(5000)));
     let answer = page.until("answer");
-    assert!(
-        answer["error"]
-            .as_str()
-            .unwrap()
-            .contains("command: 5000 bytes"),
-        "{answer}"
-    );
+    assert!(error(&answer).contains("command: 5000 bytes"), "{answer}");
 }
 
-/// Requests that are understood.
+/// Well-formed requests.
 const GOOD: &[&str] = &[
     r#"{"type":"control","id":1,"control":{"do":"start"}}"#,
     r#"{"type":"control","id":2,"control":{"do":"step","n":3}}"#,
     r#"{"type":"control","id":3,"control":{"do":"speed","factor":2.5}}"#,
-    r#"{"type":"control","id":4,"control":{"do":"command","to":"Butler","command":"refill"}}"#,
+    r#"{"type":"command","id":4,"to":"Butler","command":"refill"}"#,
     r#"{"type":"control","id":5,"control":{"do":"late","robot":"A","on_late":"continue","deadline_s":0.5}}"#,
     r#"{"type":"control","id":6,"control":{"do":"init","seed":5,"setup":{"guests":3,"field_m":[15,15]}}}"#,
     r#"{"type":"control","id":7,"control":{"do":"load","scenario":"seed = 1"}}"#,
 ];
 
-/// A good request with a few characters replaced, or anything.
-fn saying() -> impl Strategy<Value = String> {
-    let slip = (any::<Index>(), prop_oneof!["[0-9{}\\[\\]\",:.e-]", "\\PC"]);
-    let damaged = (
-        prop::sample::select(GOOD),
-        prop::collection::vec(slip, 0..4),
-    )
-        .prop_map(|(good, slips)| {
-            let mut characters: Vec<String> = good.chars().map(String::from).collect();
-            for (at, with) in slips {
-                *at.get_mut(&mut characters) = with;
-            }
-            characters.concat()
-        });
-    prop_oneof![4 => damaged, 1 => "\\PC{0,200}", 1 => any::<f64>().prop_map(|number| number.to_string())]
+/// A well-formed request with up to three characters replaced, or any text.
+fn any_message() -> impl Strategy<Value = String> {
+    let replacement = (any::<Index>(), prop_oneof!["[0-9{}\\[\\]\",:.e-]", "\\PC"]);
+    let replacements = prop::collection::vec(replacement, 0..4);
+    let damaged = (prop::sample::select(GOOD), replacements).prop_map(damage);
+    let number = any::<f64>().prop_map(|number| number.to_string());
+
+    prop_oneof![4 => damaged, 1 => "\\PC{0,200}", 1 => number]
+}
+
+fn damage((good, replacements): (&str, Vec<(Index, String)>)) -> String {
+    let mut characters: Vec<String> = good.chars().map(String::from).collect();
+    for (at, with) in replacements {
+        *at.get_mut(&mut characters) = with;
+    }
+    characters.concat()
 }
 
 #[test]
-fn whatever_is_said_is_answered() {
+fn every_message_is_answered() {
     let console = Console::live();
     let mut page = console.page();
-    let (mut runner, strategy) = (TestRunner::default(), saying());
+    let mut runner = TestRunner::default();
+    let strategy = any_message();
+
     for _ in 0..400 {
         let text = strategy.new_tree(&mut runner).unwrap().current();
-        page.say(&text);
+        page.send_text(&text);
+
         let answer = page.until("answer");
-        assert!(
-            answer["error"].as_str().is_some_and(|why| !why.is_empty()),
-            "{text}: {answer}"
-        );
+        assert!(!error(&answer).is_empty(), "{text}: {answer}");
     }
 }
 
-#[test]
-fn what_is_too_long_ends_the_conversation() {
-    let console = Console::live();
-    let scenario = |bytes| {
-        control(
-            1,
-            &format!(r#"{{"do":"load","scenario":"{}"}}"#, "x".repeat(bytes)),
-        )
-    };
-    let mut page = console.page();
-    page.say(&scenario(1 << 20));
-    assert!(
-        page.until("answer")["error"]
-            .as_str()
-            .unwrap()
-            .contains("no simulator"),
-        "a scenario may be long"
-    );
-    page.say(&scenario(2 << 20));
-    assert_ne!(page.farewell().map(|(code, _)| code), Some(1000));
-
-    let mut page = console.page();
-    let long = format!(
-        r#"{{"do":"command","to":"Butler","command":"{}"}}"#,
-        "x".repeat(70_000)
-    );
-    page.say(&control(1, &long));
-    let (code, reason) = page.farewell().unwrap();
-    assert!(code == 1009 && reason.contains("65536"), "{code} {reason}");
-
-    let mut page = console.page();
-    page.send(Message::binary(vec![1, 2, 3]));
-    assert_eq!(page.farewell().unwrap().0, 1003);
-    assert_eq!(
-        console.page().until("hello")["mode"],
-        "live",
-        "others are served"
-    );
+fn load(scenario_bytes: usize) -> String {
+    let scenario = "x".repeat(scenario_bytes);
+    control(1, &format!(r#"{{"do":"load","scenario":"{scenario}"}}"#))
 }
 
 #[test]
-fn a_page_may_not_have_any_number_of_requests() {
+fn a_scenario_may_have_a_megabyte_and_no_more() {
     let console = Console::live();
     let mut page = console.page();
-    let begun = Instant::now();
+
+    page.send_text(&load(1 << 20));
+    let answer = page.until("answer");
+    assert!(error(&answer).contains("no simulator"), "{answer}");
+
+    page.send_text(&load(2 << 20));
+    let code = page.until_closed().map(|(code, _)| code);
+    assert_ne!(code, Some(1000));
+}
+
+#[test]
+fn a_message_that_is_too_long_or_binary_closes_the_connection() {
+    let console = Console::live();
+
+    let mut page = console.page();
+    page.send_text(&command(1, &"x".repeat(70_000)));
+    let (code, reason) = page.until_closed().unwrap();
+    assert_eq!(code, 1009, "{reason}");
+    assert!(reason.contains("65536"), "{reason}");
+
+    let mut page = console.page();
+    page.send(Message::binary(vec![1, 2, 3]));
+    let (code, reason) = page.until_closed().unwrap();
+    assert_eq!(code, 1003, "{reason}");
+
+    let mode = console.page().until("hello")["mode"].clone();
+    assert_eq!(mode, "live", "other browsers are still served");
+}
+
+#[test]
+fn requests_of_one_page_are_limited() {
+    let console = Console::live();
+    let mut page = console.page();
+    let started = Instant::now();
+
     for id in 0..100 {
-        page.say(&control(id, r#"{"do":"status"}"#));
+        page.send_text(&control(id, r#"{"do":"status"}"#));
     }
     for _ in 0..100 {
         page.until("answer");
     }
+
+    let elapsed = started.elapsed();
     assert!(
-        begun.elapsed() > Duration::from_millis(900),
-        "100 requests in {:?}",
-        begun.elapsed()
+        elapsed > Duration::from_millis(900),
+        "100 requests in {elapsed:?}"
     );
 }
 
@@ -196,62 +202,75 @@ fn the_33rd_browser_is_refused_with_the_reason() {
     for page in &mut pages {
         page.until("hello");
     }
-    let (code, reason) = console.page().farewell().unwrap();
+
+    let (code, reason) = console.page().until_closed().unwrap();
+    assert_eq!(code, 1013, "{reason}");
     assert!(
-        code == 1013 && reason.contains("32 browsers watch already"),
-        "{code} {reason}"
+        reason.contains("32 browsers are connected already"),
+        "{reason}"
     );
+
+    // There is room again when the console has noticed that one is disconnected.
     pages.pop();
-    // Its place is free as soon as the console has noticed that it left.
-    let begun = Instant::now();
-    while !matches!(console.page().hear(), crate::client::Heard::Said(_)) {
+    let started = Instant::now();
+    while !matches!(console.page().receive(), Received::Message(_)) {
         assert!(
-            begun.elapsed() < Duration::from_secs(5),
-            "its place is not free again"
+            started.elapsed() < Duration::from_secs(5),
+            "there is no room for another browser"
         );
     }
 }
 
 #[test]
-fn it_ends_when_told_to_and_says_goodbye() {
+fn a_console_that_ends_closes_its_connections() {
     let mut console = Console::live();
     let mut page = console.page();
     page.until("simulator");
+
     console.terminate();
-    let (code, reason) = page.farewell().unwrap();
-    assert_eq!((code, reason.as_str()), (1001, "the console ends"));
+
+    let (code, reason) = page.until_closed().unwrap();
+    assert_eq!(code, 1001);
+    assert_eq!(reason, "the console ends");
     drop(page);
     assert!(console.wait().success());
 }
 
 #[test]
-fn somebody_who_never_says_goodbye_cannot_keep_it() {
+fn clients_that_do_not_close_their_connections_cannot_keep_the_console_running() {
     let mut console = Console::live();
-    let (_silent, _stuck) = (console.connect(), console.page());
+    let _silent = console.connect();
+    let _stalled = console.page();
+
     console.terminate();
+
     assert!(console.wait().success());
 }
 
 #[test]
-fn a_stuck_browser_and_a_request_that_never_ends_are_let_go() {
+fn a_stalled_browser_and_an_incomplete_request_are_disconnected() {
     let console = Console::live();
-    let (stuck, mut silent, mut page) = (console.page(), console.connect(), console.page());
+    let mut stalled = console.page();
+    let mut silent = console.connect();
+    let mut page = console.page();
+    let started = Instant::now();
+
     silent
         .set_read_timeout(Some(Duration::from_secs(40)))
         .unwrap();
-    let begun = Instant::now();
     silent.read_to_end(&mut Vec::new()).unwrap();
-    let let_go = begun.elapsed();
-    assert!(
-        let_go > Duration::from_secs(15) && let_go < Duration::from_secs(30),
-        "after {let_go:?}"
-    );
-    page.say(&control(1, r#"{"do":"status"}"#));
+    let elapsed = started.elapsed();
+    assert!(elapsed > Duration::from_secs(15), "after {elapsed:?}");
+    assert!(elapsed < Duration::from_secs(30), "after {elapsed:?}");
+
+    page.send_text(&control(1, r#"{"do":"status"}"#));
     page.until("answer");
-    // 30 s, and up to 5 s until it is looked after.
-    std::thread::sleep(Duration::from_secs(38).saturating_sub(begun.elapsed()));
-    let mut stuck = stuck;
-    assert_eq!(stuck.farewell(), None, "it was let go without a word");
-    page.say(&control(2, r#"{"do":"status"}"#));
-    assert_eq!(page.until("answer")["id"], 2, "who answers stays");
+
+    // The limit is 30 s, and it is checked every 5 s.
+    let limit = Duration::from_secs(38);
+    std::thread::sleep(limit.saturating_sub(started.elapsed()));
+    assert_eq!(stalled.until_closed(), None, "there is no close frame");
+    page.send_text(&control(2, r#"{"do":"status"}"#));
+    let answer = page.until("answer");
+    assert_eq!(answer["id"], 2, "a browser that answers stays connected");
 }

@@ -1,0 +1,98 @@
+//! The state that all connections share: what is shown, how many clients may use it, and whether the console ends.
+
+use std::sync::Arc;
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
+
+use crate::guard::Guard;
+use crate::live::Live;
+use crate::recording::Recording;
+
+/// Most browsers at a time.
+pub(crate) const MAX_BROWSERS: usize = 32;
+/// Most requests, of all browsers, that may wait for the simulator's answer; each occupies a thread.
+const MAX_REQUESTS: usize = 64;
+/// Most ranges that are read from a recording at a time.
+const MAX_READS: usize = 2;
+
+/// What is shown.
+pub(crate) enum Mode {
+    /// A run in progress, or one that has not started yet.
+    Live(Arc<Live>),
+    /// A recorded run.
+    Recording(Recording),
+}
+
+/// The state that all connections share.
+pub(crate) struct App {
+    /// Decides which requests are answered.
+    pub(crate) guard: Guard,
+    /// What is shown.
+    pub(crate) mode: Mode,
+    browsers: Arc<Semaphore>,
+    requests: Arc<Semaphore>,
+    reads: Semaphore,
+    ending: watch::Sender<bool>,
+}
+
+impl App {
+    /// A console that shows `mode` to clients that `guard` admits.
+    pub(crate) fn new(guard: Guard, mode: Mode) -> Self {
+        Self {
+            guard,
+            mode,
+            browsers: Arc::new(Semaphore::new(MAX_BROWSERS)),
+            requests: Arc::new(Semaphore::new(MAX_REQUESTS)),
+            reads: Semaphore::new(MAX_READS),
+            ending: watch::Sender::new(false),
+        }
+    }
+
+    /// Asks all connections to close.
+    pub(crate) fn end(&self) {
+        self.ending.send_replace(true);
+    }
+
+    /// Resolves when [`App::end`] has been called.
+    pub(crate) fn ending(&self) -> Ending {
+        Ending(self.ending.subscribe())
+    }
+
+    /// Closes the session with the run.
+    pub(crate) fn close(&self) {
+        if let Mode::Live(live) = &self.mode {
+            live.end();
+        }
+    }
+
+    /// A permit for one browser; `None` if [`MAX_BROWSERS`] are connected.
+    pub(crate) fn admit_browser(&self) -> Option<OwnedSemaphorePermit> {
+        self.browsers.clone().try_acquire_owned().ok()
+    }
+
+    /// A permit for one request to the simulator; `None` if too many wait for an answer.
+    pub(crate) fn admit_request(&self) -> Option<OwnedSemaphorePermit> {
+        self.requests.clone().try_acquire_owned().ok()
+    }
+
+    /// Waits for a permit to read from the recording. `None` never happens: the semaphore is not closed.
+    pub(crate) async fn admit_read(&self) -> Option<SemaphorePermit<'_>> {
+        self.reads.acquire().await.ok()
+    }
+
+    /// Waits until no browser is connected.
+    pub(crate) async fn browsers_left(&self) {
+        let _all = self.browsers.acquire_many(MAX_BROWSERS as u32).await;
+    }
+}
+
+/// Whether the console ends.
+pub(crate) struct Ending(watch::Receiver<bool>);
+
+impl Ending {
+    /// Waits until the console ends.
+    pub(crate) async fn reached(&mut self) {
+        // The only error is that the sender was dropped, and then the console has ended, too.
+        let _is_ending = self.0.wait_for(|is_ending| *is_ending).await;
+    }
+}

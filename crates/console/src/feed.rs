@@ -1,0 +1,508 @@
+//! What a run shows now. The live connection writes it; every browser reads it at its own pace.
+//!
+//! A browser has a [`Cursor`] and no queue: when it is ready, it takes what is new since its last batch. Frames and panels
+//! replace their predecessors, so the newest wins. The last lines of the log are kept, and a browser that is too slow for
+//! some is told how many it missed. So memory is bounded however slowly a browser reads.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use axum::extract::ws::Utf8Bytes;
+use protocol::RobotName;
+use protocol::messages::{Flight, LogRecord, MAX_FLIGHTS, Panel, WorldFrame};
+use tokio::sync::watch;
+
+use crate::page::ServerMessage;
+
+/// Lines of the log that are kept for browsers that connect later or read slowly.
+pub(crate) const MAX_LINES: usize = 2000;
+/// Most lines in one message.
+const MAX_LINES_PER_MESSAGE: usize = 500;
+/// Most bytes of panels, of all robots together: the number of robots and the size of a panel are not ours to choose.
+const MAX_PANEL_BYTES: usize = 32 << 20;
+
+/// What a run shows now.
+pub(crate) struct Feed {
+    state: Mutex<State>,
+    /// Notified of every change of `state`.
+    changed: watch::Sender<()>,
+}
+
+#[derive(Default)]
+struct State {
+    /// Whether the simulator's liveliness token is declared.
+    is_present: bool,
+    frame: Option<EncodedFrame>,
+    /// Number of the newest frame, from 1.
+    frame_count: u64,
+    /// The fates of commands, numbered like the frames that reported them.
+    flights: VecDeque<Numbered<Flight>>,
+    panels: BTreeMap<RobotName, Numbered<Utf8Bytes>>,
+    /// Number of the newest panel, counted over all robots, from 1.
+    panel_count: u64,
+    lines: VecDeque<Numbered<LogRecord>>,
+    /// Number of the next line; a gap in the numbers is lines that were lost.
+    next_line: u64,
+}
+
+struct Numbered<T> {
+    number: u64,
+    value: T,
+}
+
+/// A frame, and the message for browsers that have seen the frame before.
+#[derive(Clone)]
+struct EncodedFrame {
+    frame: Arc<WorldFrame>,
+    text: Utf8Bytes,
+}
+
+/// How far a browser has read.
+#[derive(Debug, Default)]
+pub(crate) struct Cursor {
+    is_present: Option<bool>,
+    frame: u64,
+    panel: u64,
+    /// `None` before the first line.
+    next_line: Option<u64>,
+}
+
+impl Feed {
+    /// A feed without a simulator.
+    pub(crate) fn new() -> Self {
+        Self {
+            state: Mutex::default(),
+            changed: watch::Sender::new(()),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+        let outcome = change(&mut self.lock());
+        self.changed.send_replace(());
+        outcome
+    }
+
+    /// Notifies of changes.
+    pub(crate) fn changes(&self) -> watch::Receiver<()> {
+        self.changed.subscribe()
+    }
+
+    /// The simulator's liveliness token was declared or undeclared.
+    pub(crate) fn set_present(&self, is_present: bool) {
+        self.change(|state| state.is_present = is_present);
+    }
+
+    /// Whether the simulator's liveliness token is declared.
+    pub(crate) fn is_present(&self) -> bool {
+        self.lock().is_present
+    }
+
+    /// Number of frames so far.
+    pub(crate) fn frame_count(&self) -> u64 {
+        self.lock().frame_count
+    }
+
+    /// Replaces the frame. Panels of robots that are not in it are removed.
+    pub(crate) fn put_frame(&self, frame: WorldFrame) {
+        let text = ServerMessage::Frame { frame: &frame }.text();
+        let encoded = EncodedFrame {
+            frame: Arc::new(frame),
+            text,
+        };
+
+        self.change(|state| state.put_frame(encoded));
+    }
+
+    /// Replaces a robot's panel.
+    ///
+    /// # Errors
+    /// All panels together would exceed [`MAX_PANEL_BYTES`].
+    pub(crate) fn put_panel(&self, robot: &RobotName, panel: &Panel) -> Result<(), String> {
+        let text = ServerMessage::Panel { robot, panel }.text();
+
+        self.change(|state| state.put_panel(robot, text))
+    }
+
+    /// Adds a line of the log; `lost` lines before it could not be kept.
+    pub(crate) fn add_line(&self, line: LogRecord, lost: u64) {
+        self.change(|state| state.add_line(line, lost));
+    }
+
+    /// The messages that are new since `cursor`, which moves on; empty if nothing is new.
+    pub(crate) fn take_new(&self, cursor: &mut Cursor) -> Vec<Utf8Bytes> {
+        let mut messages = Vec::new();
+
+        let state = self.lock();
+        messages.extend(state.new_presence(cursor));
+        messages.extend(state.new_panels(cursor));
+        let lines = state.new_lines(cursor);
+        let frame = state.new_frame(cursor);
+        drop(state);
+
+        // These are encoded for this browser alone, and therefore without the lock.
+        messages.extend(lines.map(|lines| lines.message()));
+        messages.extend(frame.map(|frame| frame.message()));
+        messages
+    }
+}
+
+impl State {
+    fn put_frame(&mut self, encoded: EncodedFrame) {
+        let frame = &encoded.frame;
+        let previous = self.frame.as_ref().map(|previous| &previous.frame);
+        if previous.is_some_and(|previous| previous.epoch != frame.epoch) {
+            self.flights.clear();
+        }
+
+        self.frame_count += 1;
+        let number = self.frame_count;
+        let flights = frame.flights.iter().cloned();
+        self.flights
+            .extend(flights.map(|value| Numbered { number, value }));
+        let surplus = self.flights.len().saturating_sub(MAX_FLIGHTS);
+        self.flights.drain(..surplus);
+
+        self.panels
+            .retain(|name, _| frame.robots.iter().any(|robot| robot.name == *name));
+        self.frame = Some(encoded);
+    }
+
+    fn put_panel(&mut self, robot: &RobotName, text: Utf8Bytes) -> Result<(), String> {
+        if self.panel_bytes_without(robot) + text.len() > MAX_PANEL_BYTES {
+            return Err(format!(
+                "panels are larger than the {MAX_PANEL_BYTES} bytes allowed together"
+            ));
+        }
+
+        self.panel_count += 1;
+        let panel = Numbered {
+            number: self.panel_count,
+            value: text,
+        };
+        self.panels.insert(robot.clone(), panel);
+        Ok(())
+    }
+
+    fn panel_bytes_without(&self, robot: &RobotName) -> usize {
+        self.panels
+            .iter()
+            .filter(|(name, _)| *name != robot)
+            .map(|(_, panel)| panel.value.len())
+            .sum()
+    }
+
+    fn add_line(&mut self, line: LogRecord, lost: u64) {
+        let number = self.next_line + lost;
+        self.next_line = number + 1;
+
+        if self.lines.len() == MAX_LINES {
+            self.lines.pop_front();
+        }
+        self.lines.push_back(Numbered {
+            number,
+            value: line,
+        });
+    }
+
+    fn new_presence(&self, cursor: &mut Cursor) -> Option<Utf8Bytes> {
+        if cursor.is_present == Some(self.is_present) {
+            return None;
+        }
+        cursor.is_present = Some(self.is_present);
+
+        let message = ServerMessage::Simulator {
+            present: self.is_present,
+        };
+        Some(message.text())
+    }
+
+    fn new_panels(&self, cursor: &mut Cursor) -> Vec<Utf8Bytes> {
+        let seen = cursor.panel;
+        cursor.panel = self.panel_count;
+
+        self.panels
+            .values()
+            .filter(|panel| panel.number > seen)
+            .map(|panel| panel.value.clone())
+            .collect()
+    }
+
+    /// The newest frame, with the flights of the frames that the browser skipped.
+    fn new_frame(&self, cursor: &mut Cursor) -> Option<NewFrame> {
+        let encoded = self.frame.as_ref()?;
+        let seen = cursor.frame;
+        if seen == self.frame_count {
+            return None;
+        }
+        cursor.frame = self.frame_count;
+
+        // A browser that has just connected gets the flights of the newest frame only.
+        let has_skipped = seen != 0 && seen + 1 < self.frame_count;
+        let flights = self
+            .flights
+            .iter()
+            .filter(|flight| has_skipped && flight.number > seen)
+            .map(|flight| flight.value.clone())
+            .collect();
+        Some(NewFrame {
+            encoded: encoded.clone(),
+            flights,
+        })
+    }
+
+    fn new_lines(&self, cursor: &mut Cursor) -> Option<NewLines> {
+        let oldest = self
+            .lines
+            .front()
+            .map_or(self.next_line, |line| line.number);
+        let wanted = cursor.next_line.unwrap_or(oldest);
+
+        let from = self.lines.partition_point(|line| line.number < wanted);
+        let to = self.lines.len().min(from + MAX_LINES_PER_MESSAGE);
+        let new = self.lines.range(from..to);
+        let next = new.clone().next_back()?.number + 1;
+        cursor.next_line = Some(next);
+
+        let lines: Vec<LogRecord> = new.map(|line| line.value.clone()).collect();
+        let dropped = next - wanted - lines.len() as u64;
+        Some(NewLines { lines, dropped })
+    }
+}
+
+/// A frame that is new for a browser.
+struct NewFrame {
+    encoded: EncodedFrame,
+    /// Flights of the skipped frames and of this one; empty if none were skipped.
+    flights: Vec<Flight>,
+}
+
+impl NewFrame {
+    fn message(self) -> Utf8Bytes {
+        let frame = self.encoded.frame;
+        if self.flights.len() <= frame.flights.len() {
+            return self.encoded.text;
+        }
+
+        let frame = WorldFrame {
+            flights: self.flights,
+            ..(*frame).clone()
+        };
+        ServerMessage::Frame { frame: &frame }.text()
+    }
+}
+
+/// Lines that are new for a browser.
+struct NewLines {
+    lines: Vec<LogRecord>,
+    /// How many lines before them the browser missed.
+    dropped: u64,
+}
+
+impl NewLines {
+    fn message(&self) -> Utf8Bytes {
+        let message = ServerMessage::Log {
+            lines: &self.lines,
+            dropped: self.dropped,
+        };
+        message.text()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::messages::{Fate, LogKind, Phase, Widget};
+    use serde_json::Value;
+
+    use super::*;
+
+    fn robot(name: &str) -> RobotName {
+        RobotName::new(name).unwrap()
+    }
+
+    fn frame(tick: u64) -> WorldFrame {
+        let flight = Flight {
+            tick,
+            from: robot("A"),
+            to: robot("B"),
+            seq: tick,
+            command: "x".to_owned(),
+            fate: Fate::Sent,
+        };
+
+        WorldFrame {
+            run: protocol::RunName::new("r").unwrap(),
+            epoch: 1,
+            tick,
+            time_s: tick as f64,
+            duration_s: 100.0,
+            tick_s: 1.0,
+            seed: 1,
+            speed: None,
+            phase: Phase::Running,
+            awaiting: Vec::new(),
+            field_m: [10.0, 10.0],
+            body_m: 1.0,
+            robots: Vec::new(),
+            guests: vec![[1.0, 2.0]],
+            obstacles: Vec::new(),
+            flights: vec![flight],
+            cuts: Vec::new(),
+        }
+    }
+
+    fn line(tick: u64) -> LogRecord {
+        LogRecord {
+            epoch: 1,
+            tick,
+            time_s: 0.0,
+            source: "simulator".to_owned(),
+            kind: LogKind::Run,
+            text: format!("line {tick}"),
+        }
+    }
+
+    fn panel(bytes: usize) -> Panel {
+        let picture = Widget::Svg {
+            label: String::new(),
+            svg: "x".repeat(bytes),
+        };
+        Panel {
+            widgets: vec![picture],
+        }
+    }
+
+    fn take_new(feed: &Feed, cursor: &mut Cursor) -> Vec<Value> {
+        feed.take_new(cursor)
+            .iter()
+            .map(|text| serde_json::from_str(text).unwrap())
+            .collect()
+    }
+
+    fn types(messages: &[Value]) -> Vec<&str> {
+        messages
+            .iter()
+            .map(|message| message["type"].as_str().unwrap())
+            .collect()
+    }
+
+    fn flights(message: &Value) -> &[Value] {
+        message["frame"]["flights"].as_array().unwrap()
+    }
+
+    #[test]
+    fn every_browser_gets_what_is_new_and_nothing_twice() {
+        let feed = Feed::new();
+        let mut cursor = Cursor::default();
+        assert_eq!(take_new(&feed, &mut cursor)[0]["present"], false);
+        assert!(take_new(&feed, &mut cursor).is_empty());
+
+        feed.set_present(true);
+        feed.put_frame(frame(1));
+        feed.add_line(line(1), 0);
+
+        let new = take_new(&feed, &mut cursor);
+        assert_eq!(types(&new), ["simulator", "log", "frame"]);
+        assert!(take_new(&feed, &mut cursor).is_empty());
+        let new_for_another = take_new(&feed, &mut Cursor::default());
+        assert_eq!(types(&new_for_another), ["simulator", "log", "frame"]);
+    }
+
+    #[test]
+    fn a_slow_browser_gets_the_newest_frame_with_the_flights_of_all() {
+        let feed = Feed::new();
+        let mut cursor = Cursor::default();
+        feed.put_frame(frame(1));
+        assert_eq!(take_new(&feed, &mut cursor)[1]["frame"]["tick"], 1);
+
+        for tick in 2..=400 {
+            feed.put_frame(frame(tick));
+        }
+
+        let new = take_new(&feed, &mut cursor);
+        assert_eq!(types(&new), ["frame"]);
+        assert_eq!(new[0]["frame"]["tick"], 400);
+        let shown = flights(&new[0]);
+        assert_eq!(shown.len(), MAX_FLIGHTS);
+        assert_eq!(shown[0]["tick"], 145);
+        assert_eq!(shown[MAX_FLIGHTS - 1]["tick"], 400);
+
+        feed.put_frame(frame(401));
+        let next = take_new(&feed, &mut cursor);
+        assert_eq!(flights(&next[0]).len(), 1);
+    }
+
+    #[test]
+    fn flights_of_an_earlier_epoch_are_dropped() {
+        let feed = Feed::new();
+        let mut cursor = Cursor::default();
+        feed.put_frame(frame(401));
+        take_new(&feed, &mut cursor);
+
+        feed.put_frame(frame(402));
+        feed.put_frame(WorldFrame {
+            epoch: 2,
+            ..frame(0)
+        });
+
+        let new = take_new(&feed, &mut cursor);
+        assert_eq!(flights(&new[0]).len(), 1);
+    }
+
+    #[test]
+    fn missed_lines_are_counted() {
+        let feed = Feed::new();
+        let mut cursor = Cursor::default();
+        feed.add_line(line(0), 0);
+        assert_eq!(take_new(&feed, &mut cursor)[1]["dropped"], 0);
+
+        for tick in 1..=2100 {
+            feed.add_line(line(tick), 0);
+        }
+        let mut ticks = Vec::new();
+        let mut dropped = Vec::new();
+        while let Some(log) = take_new(&feed, &mut cursor).pop() {
+            dropped.push(log["dropped"].as_u64().unwrap());
+            for line in log["lines"].as_array().unwrap() {
+                ticks.push(line["tick"].as_u64().unwrap());
+            }
+        }
+        assert_eq!(ticks, (101..=2100).collect::<Vec<_>>());
+        assert_eq!(dropped, [100, 0, 0, 0]);
+
+        feed.add_line(line(2101), 7);
+        let log = &take_new(&feed, &mut cursor)[0];
+        assert_eq!(log["dropped"], 7, "lost before they reached the feed");
+
+        let late = take_new(&feed, &mut Cursor::default()).pop().unwrap();
+        assert_eq!(late["dropped"], 0, "a new browser has missed nothing");
+    }
+
+    #[test]
+    fn a_panel_replaces_its_predecessor_and_is_removed_with_its_robot() {
+        let feed = Feed::new();
+        feed.put_panel(&robot("A"), &panel(1)).unwrap();
+        feed.put_panel(&robot("A"), &panel(2)).unwrap();
+
+        let new = take_new(&feed, &mut Cursor::default());
+        assert_eq!(new[1]["panel"]["widgets"][0]["svg"], "xx");
+
+        feed.put_frame(frame(1));
+        let new = take_new(&feed, &mut Cursor::default());
+        assert_eq!(types(&new), ["simulator", "frame"]);
+    }
+
+    #[test]
+    fn panels_are_bounded_together() {
+        let feed = Feed::new();
+        let refused = (0..100).find(|i| {
+            let name = robot(&format!("r{i}"));
+            feed.put_panel(&name, &panel(1 << 20)).is_err()
+        });
+        let accepted = refused.expect("there is a limit");
+        assert!((25..40).contains(&accepted), "{accepted}");
+    }
+}
