@@ -104,7 +104,6 @@ fn commands(robot: &RobotSummary) -> String {
     lines.push(format!("{} received", robot.received));
     for (count, what) in [
         (robot.dropped, "lost on the way"),
-        (robot.missing, "missing"),
     ] {
         if count > 0 {
             lines.push(format!("{count} {what}"));

@@ -3,12 +3,13 @@
 
 use std::sync::Arc;
 
+use lockstep::Sent;
 use protocol::messages::{
-    MAX_ENTRIES, MAX_TEXT_BYTES, News, Percept, Performative, Point, PublicState, SensedRobot,
-    StateVariables, Welcome,
+    CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, News, Performative, Point, PublicState, SensedBody,
+    SensedRobot, StateVariables, Welcome,
 };
 use protocol::random::Stream;
-use protocol::{RobotName, Seq, Tick};
+use protocol::{RobotName, Tick};
 
 use crate::error::BadParameters;
 use crate::seat::{Network, Undelivered};
@@ -50,17 +51,11 @@ pub struct Cars<'a> {
     pub(crate) commands: &'a [ReceivedCommand],
     pub(crate) news: &'a News,
     pub(crate) random: &'a mut Stream,
-    pub(crate) outbox: &'a mut Outbox,
+    pub(crate) senses_bodies: bool,
+    pub(crate) outbox: &'a mut Vec<Sent<CommandText>>,
     pub(crate) log: &'a mut Vec<String>,
     pub(crate) gave_up: &'a mut Option<String>,
     pub(crate) network: &'a mut dyn Network,
-}
-
-/// Commands that a robot sent in this tick, and the next free number.
-#[derive(Debug, Default)]
-pub(crate) struct Outbox {
-    pub(crate) last_seq: Seq,
-    pub(crate) sent: Vec<protocol::messages::SentCommand>,
 }
 
 impl<'a> Cars<'a> {
@@ -146,14 +141,19 @@ impl<'a> Cars<'a> {
         &self.news.sensed
     }
 
-    /// All bodies within sensing range now: obstacles, guests, robots. Costs a round trip to the simulator.
+    /// All bodies within sensing range now: obstacles, guests, robots.
     ///
-    /// # Errors
-    /// [`CallError::Interrupted`] if the epoch is over.
-    pub fn percept(&mut self) -> Result<Percept, CallError> {
-        self.network
-            .percept(&self.welcome.name, self.welcome.epoch, self.tick)
-            .map_err(|_| CallError::Interrupted)
+    /// # Panics
+    /// If the robot does not ask for them by [`Robot::senses_bodies`](crate::Robot::senses_bodies).
+    #[must_use]
+    pub fn bodies(&self) -> &'a [SensedBody] {
+        assert!(
+            self.senses_bodies,
+            "{} uses bodies() and its senses_bodies() is false",
+            self.welcome.name
+        );
+
+        &self.news.bodies
     }
 
     /// Writes a line to the log of the run. Long lines are truncated, and lines beyond the limit of a tick are dropped.
@@ -189,28 +189,15 @@ impl<'a> Cars<'a> {
         &mut self,
         to: &str,
         command: impl Into<String>,
-    ) -> Result<Seq, CallError> {
+    ) -> Result<(), CallError> {
         let to = self.known(to)?;
-        let command = command.into();
-        self.outbox.last_seq += 1;
-        let seq = self.outbox.last_seq;
-
-        let message = protocol::messages::Command {
-            epoch: self.welcome.epoch,
-            tick: self.tick,
-            seq,
+        let command = CommandText {
             performative: Performative::Achieve,
-            command: command.clone(),
+            command: command.into(),
         };
-        self.network.send(&self.welcome.name, &to, &message);
 
-        self.outbox.sent.push(protocol::messages::SentCommand {
-            to,
-            seq,
-            performative: Performative::Achieve,
-            command,
-        });
-        Ok(seq)
+        self.outbox.push(Sent { to, command });
+        Ok(())
     }
 
     /// Where another robot stood at the last tick, meters (`getRobotLocation`).
@@ -278,7 +265,7 @@ impl<'a> Cars<'a> {
             return Err(CallError::Unreachable(of));
         }
         self.network
-            .state_of(&of, self.welcome.epoch, self.tick - 1)
+            .state_of(&of)
             .map_err(|undelivered| match undelivered {
                 Undelivered::Lost => CallError::Unreachable(of),
                 Undelivered::Interrupted => CallError::Interrupted,

@@ -28,6 +28,11 @@ pub trait Robot {
     /// the process that takes over. By default the robot starts afresh.
     fn resume(&mut self, _cars: &mut Cars<'_>, _last: &StateVariables) {}
 
+    /// Whether the robot perceives all bodies around it ([`Cars::bodies`]): its news are larger then.
+    fn senses_bodies(&self) -> bool {
+        false
+    }
+
     /// What the console shows of the robot (the paper's `paintComponent`). By default nothing.
     fn panel(&self) -> Panel {
         Panel::default()

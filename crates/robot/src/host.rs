@@ -1,24 +1,35 @@
-//! The lock-step loop over the bus, for one robot or several in a process. They share one session: what several robots
-//! say in a tick leaves in one batch.
+//! The robots' side of the bus, for one robot or several in a process: a loop that translates between the bus and the
+//! lock-step ([`lockstep::Participant`]). Robots of one process share a session.
+//!
+//! What arrives is fed to the participants where it arrives, on the middleware's thread: so a query is answered at once,
+//! also while a robot computes. What the participants want done is carried out by the host's own thread, which also runs the
+//! robots.
+
+mod network;
+mod shared;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Role};
+use lockstep::{Action, Admission, Begin, Leave, Patience, StateQuery, Turn};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
-    Clock, End, JoinAnswer, JoinRequest, PublicState, Refusal, Report, Welcome,
+    Clock, Command, End, JoinAnswer, JoinRequest, News, PublicState, Refusal, Waiting, Welcome,
 };
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
-use crate::cri::{Robot, RobotError};
-use crate::link::{Event, Link};
-use crate::seat::Seat;
+use crate::cri::Robot;
+use crate::error::RobotError;
+use crate::seat::{Done, Seat};
+use network::HostNetwork;
+use shared::{HostAction, HostAnswer, Shared};
+
+/// A panel is for eyes: it is put no more often than this.
+const PANEL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// How to reach a run.
 #[derive(Debug, Clone)]
@@ -27,9 +38,9 @@ pub struct HostOptions {
     pub run: RunName,
     /// Endpoint of its simulator or router.
     pub connect: String,
-    /// How long to try to reach it and to be let in.
+    /// How long to try to reach it and to join.
     pub patience: Duration,
-    /// How long to wait for it once it is gone: it ended, or the link to it is cut, which look the same from here.
+    /// How long to wait for a simulator that is gone: it has ended, or the link to it is cut, which look the same from here.
     pub gone_patience: Duration,
     /// A configuration file of the middleware instead of the built-in settings.
     pub zenoh_config: Option<PathBuf>,
@@ -41,17 +52,17 @@ pub enum HostError {
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The simulator did not let a robot in.
+    /// The simulator refused a robot.
     #[error("{name} may not join: {explanation}")]
     Refused {
-        /// Who.
+        /// The robot.
         name: RobotName,
         /// Why, for programs.
         reason: Refusal,
         /// Why, for people.
         explanation: String,
     },
-    /// The simulator said something that cannot be understood.
+    /// An answer of the simulator cannot be understood.
     #[error(transparent)]
     Malformed(#[from] Malformed),
     /// A robot refuses its parameters, or gave up.
@@ -60,10 +71,8 @@ pub enum HostError {
     /// The process wants to leave ([`Stopper::stop`]).
     #[error("stopped from within this process")]
     Stopped,
-    /// Nobody executes the run.
-    #[error(
-        "no simulator of run {run} answers at {connect}; is it running, and is the run's name right?"
-    )]
+    /// No simulator executes the run.
+    #[error("no simulator of run {run} answers at {connect}; is it running, and is the run's name right?")]
     NoSimulator {
         /// The run.
         run: RunName,
@@ -83,51 +92,50 @@ pub struct Host {
     options: HostOptions,
     bus: Bus,
     keys: Keys,
-    link: Link,
+    shared: Arc<Shared>,
     members: BTreeMap<RobotName, Member>,
     declared: Vec<Declared>,
+    /// Subscriptions to other robots' states, by subscriber and robot.
+    followed: BTreeMap<(RobotName, RobotName), Declared>,
 }
 
-/// Lets another thread end [`Host::run`]: for a signal, or when what a robot needs is gone.
+/// Ends [`Host::run`] from another thread: for a signal, or when what a robot needs is gone.
 #[derive(Debug, Clone)]
 pub struct Stopper {
-    is_stopped: Arc<AtomicBool>,
-    queue: SyncSender<Event>,
+    shared: Arc<Shared>,
 }
 
 impl Stopper {
-    /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Questions that the
-    /// tick still asks are interrupted.
+    /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Queries that the
+    /// tick still makes are interrupted.
     pub fn stop(&self) {
-        self.is_stopped.store(true, Ordering::SeqCst);
-        // Wakes a loop that waits; one whose queue is full does not.
-        let _woken = self.queue.try_send(Event::Stop);
+        self.shared
+            .each(|participant, actions| participant.stop(actions));
     }
 }
 
 /// One robot of the process.
 struct Member {
-    seat: Seat,
-    /// Whether the clock that names it has come, and it takes part.
-    is_seated: bool,
+    /// The robot, until its first welcome seats it.
+    robot: Option<Box<dyn Robot>>,
+    seat: Option<Seat>,
+    /// The welcome of the epoch that it joined last, until its first tick.
+    welcome: Option<Welcome>,
+    /// Whether it perceives all bodies around it.
+    senses_bodies: bool,
+    explanation: String,
     report: Publisher,
     state: Publisher,
     panel: Publisher,
     painted: Option<Instant>,
-    /// The last report, for the case that it got lost.
-    last: Option<(Clock, Vec<u8>)>,
+    token: Option<Declared>,
 }
 
-/// A panel is for eyes: no more often than this.
-const PANEL_INTERVAL: Duration = Duration::from_millis(50);
-/// Between two attempts to join.
-const JOIN_AGAIN: Duration = Duration::from_millis(100);
-
 impl Host {
-    /// Connects, joins with every robot, and shows that they are ready.
+    /// Connects.
     ///
     /// # Errors
-    /// [`HostError`] says what is in the way: nobody there, refused and why, or the bus itself.
+    /// [`HostError::Bus`] if the run cannot be reached.
     pub fn connect(
         robots: Vec<(RobotName, Box<dyn Robot>)>,
         options: HostOptions,
@@ -143,144 +151,115 @@ impl Host {
     /// The same over a bus that is open already.
     ///
     /// # Errors
-    /// [`HostError`], as for [`Host::connect`].
+    /// [`HostError::Bus`] if something cannot be declared.
     pub fn join_over(
         bus: Bus,
         robots: Vec<(RobotName, Box<dyn Robot>)>,
         options: HostOptions,
     ) -> Result<Self, HostError> {
         let keys = Keys::new(&options.run);
-        let link = Link::new(bus.clone(), keys.clone(), options.gone_patience);
+        let patience = Patience {
+            join: options.patience,
+            gone: options.gone_patience,
+        };
+        let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
+        let shared = Arc::new(Shared::new(&names, patience));
+        let mut members = BTreeMap::new();
+        for (name, robot) in robots {
+            let member = Member {
+                senses_bodies: robot.senses_bodies(),
+                robot: Some(robot),
+                seat: None,
+                welcome: None,
+                explanation: String::new(),
+                report: bus.publisher(&keys.report(&name))?,
+                state: bus.publisher(&keys.query(&name, STATE))?,
+                panel: bus.observer_publisher(&keys.panel(&name))?,
+                painted: None,
+                token: None,
+            };
+            members.insert(name, member);
+        }
+
         let mut host = Self {
             options,
             bus,
             keys,
-            link,
-            members: BTreeMap::new(),
+            shared,
+            members,
             declared: Vec::new(),
+            followed: BTreeMap::new(),
         };
-        let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
-        host.listen(&names)?;
-        for (name, robot) in robots {
-            let welcome = host.join(&name)?;
-            // Others may still ask for what the previous incarnation reported last.
-            for last in welcome.state_before.iter().chain(&welcome.last_state) {
-                host.link.board.show(&name, Arc::new(last.clone()));
-            }
-            let member = Member {
-                seat: Seat::new(robot, welcome),
-                is_seated: false,
-                report: host.bus.publisher(&host.keys.report(&name))?,
-                state: host.bus.publisher(&host.keys.query(&name, STATE))?,
-                panel: host.bus.observer_publisher(&host.keys.panel(&name))?,
-                painted: None,
-                last: None,
-            };
-            host.members.insert(name, member);
-        }
-        // Last, so that who sees the token knows that everything above is in effect.
         for name in &names {
-            host.declared
-                .push(host.bus.token(&host.keys.alive_robot(name))?);
+            host.declare(name)?;
         }
+        host.declare_common()?;
         Ok(host)
     }
 
-    fn listen(&mut self, names: &[RobotName]) -> Result<(), BusError> {
-        let queue = self.link.queue();
-        // A full queue holds the link: back-pressure instead of loss. A closed one means that the process ends.
-        self.declared
-            .push(self.bus.subscribe(&self.keys.clock(), move |key, bytes| {
-                let _ = queue.send(Event::Clock(decode(key, "simulator", bytes)));
-            })?);
-        let queue = self.link.queue();
-        self.declared.push(
-            self.bus
-                .liveliness(&self.keys.alive_sim(), move |_, there| {
-                    let _ = queue.send(Event::Simulator(there));
-                })?,
-        );
-        for name in names {
-            self.link.host(name);
-            self.link.board.host(name);
-            let (queue, to) = (self.link.queue(), name.clone());
-            self.declared.push(self.bus.subscribe(
-                &self.keys.commands_to(name),
-                move |key, bytes| {
-                    let Ok(from) = RobotName::new(Keys::last_chunk(key)) else {
-                        return;
-                    };
-                    let command = decode(key, from.as_str(), bytes);
-                    let _ = queue.send(Event::Command {
-                        to: to.clone(),
-                        from,
-                        command,
-                    });
-                },
-            )?);
-            for what in QUERIES.iter().chain([&STATE]) {
-                let board = self.link.board.clone();
-                self.declared.push(
-                    self.bus
-                        .queryable(&self.keys.query(name, what), move |query| board.ask(query))?,
-                );
+    /// Declares what belongs to one robot: the subscriber to its news, and the queryables of its state.
+    fn declare(&mut self, name: &RobotName) -> Result<(), BusError> {
+        let shared = self.shared.clone();
+        let own = name.clone();
+        let news = self.bus.subscribe(&self.keys.news(name), move |key, bytes| {
+            match decode::<News>(key, "simulator", bytes) {
+                Ok(news) => shared.with(&own, |participant, actions| {
+                    participant.news(news.epoch, news.tick, news.joined, news, actions);
+                }),
+                Err(error) => tracing::warn!("{error}"),
             }
+        })?;
+        self.declared.push(news);
+
+        for what in QUERIES.iter().chain([&STATE]) {
+            let shared = self.shared.clone();
+            let own = name.clone();
+            let queryable = self
+                .bus
+                .queryable(&self.keys.query(name, what), move |query| {
+                    match read_query(&query).and_then(|asked| shared.state(&own, asked)) {
+                        Ok(state) => reply(&query, &state),
+                        Err(reason) => query.reply_err(&reason),
+                    }
+                })?;
+            self.declared.push(queryable);
         }
         Ok(())
     }
 
-    fn join(&mut self, name: &RobotName) -> Result<Welcome, HostError> {
-        let request = JoinRequest {
-            protocol: PROTOCOL_VERSION,
-            run: self.options.run.clone(),
-            name: name.clone(),
-            instance: self.bus.id(),
-            sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
-        };
-        let (key, begun) = (self.keys.join_as(name), Instant::now());
-        loop {
-            let is_last_try = begun.elapsed() > self.options.patience;
-            match self.bus.get(&key, "", Some(encode(&request)))? {
-                Some(answer) => {
-                    let bytes = answer.result.unwrap_or_else(String::into_bytes);
-                    match decode(&key, "simulator", &bytes)? {
-                        JoinAnswer::Welcome(welcome) => {
-                            self.link.keep_commands(welcome.repeat_ticks);
-                            return Ok(*welcome);
-                        }
-                        // A predecessor that was killed is noticed within its lease.
-                        JoinAnswer::Refused {
-                            reason: Refusal::NameTaken,
-                            ..
-                        } if !is_last_try => {}
-                        JoinAnswer::Refused {
-                            reason,
-                            explanation,
-                        } => {
-                            return Err(HostError::Refused {
-                                name: name.clone(),
-                                reason,
-                                explanation,
-                            });
-                        }
-                    }
+    /// Declares what the robots of the process share: the subscriber to the clock, and to the simulator's token.
+    fn declare_common(&mut self) -> Result<(), BusError> {
+        let shared = self.shared.clone();
+        let clock = self.bus.subscribe(&self.keys.clock(), move |key, bytes| {
+            match decode::<Clock>(key, "simulator", bytes) {
+                Ok(clock) => {
+                    shared.each(|participant, actions| participant.clock(clock, actions));
                 }
-                None if is_last_try => {
-                    let (run, connect) = (self.options.run.clone(), self.options.connect.clone());
-                    return Err(HostError::NoSimulator { run, connect });
-                }
-                None => {}
+                Err(error) => tracing::warn!("{error}"),
             }
-            std::thread::sleep(JOIN_AGAIN);
-        }
+        })?;
+
+        let shared = self.shared.clone();
+        let patience_s = self.options.gone_patience.as_secs_f64();
+        let simulator = self
+            .bus
+            .liveliness(&self.keys.alive_sim(), move |_, is_present| {
+                if !is_present {
+                    tracing::warn!(
+                        "the simulator, or the link to it, is gone: waiting for it up to {patience_s} s"
+                    );
+                }
+                shared.each(|participant, actions| participant.simulator(is_present, actions));
+            })?;
+        self.declared.extend([clock, simulator]);
+        Ok(())
     }
 
     /// What ends [`Host::run`] from another thread.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
         Stopper {
-            is_stopped: self.link.is_stopped.clone(),
-            queue: self.link.queue(),
+            shared: self.shared.clone(),
         }
     }
 
@@ -290,151 +269,298 @@ impl Host {
     /// [`HostError`] if it cannot go on.
     pub fn run(mut self) -> Result<End, HostError> {
         let outcome = loop {
-            match self.link.next_clock() {
-                Some(Clock { end: Some(end), .. }) => break Ok(end),
-                Some(clock) => {
-                    if let Err(error) = self.on_clock(&clock) {
-                        break Err(error);
-                    }
-                }
-                None if self.link.is_stopped() => break Err(HostError::Stopped),
-                None => {}
-            }
-            if let Some(gone) = self.link.simulator_gone.map(|since| since.elapsed())
-                && gone >= self.options.gone_patience
-            {
-                break Err(HostError::SimulatorGone(gone));
+            let (name, action) = self.shared.next();
+            match self.carry_out(&name, action) {
+                Ok(None) => {}
+                Ok(Some(end)) => break Ok(end),
+                Err(error) => break Err(error),
             }
         };
+
+        for member in self.members.values_mut() {
+            member.token = None;
+        }
+        self.followed.clear();
         self.declared.clear();
         self.bus.close();
         outcome
     }
 
-    /// One tick of every robot of the process, in the order of their names.
-    fn on_clock(&mut self, clock: &Clock) -> Result<(), HostError> {
-        let (asked, current) = ((clock.epoch, clock.tick), self.link.current());
-        if asked < current {
-            return Ok(()); // An echo: the clock has gone on since.
+    /// Does what a participant wants done. Returns how the run ended, when it has.
+    fn carry_out(
+        &mut self,
+        name: &RobotName,
+        action: HostAction,
+    ) -> Result<Option<End>, HostError> {
+        match action {
+            Action::Run(turn) => self.run_tick(name, &turn)?,
+            Action::Leave(leave) => return self.leave(name, leave).map(Some),
+            other => self.carry_out_io(name, other)?,
         }
-        if asked > current {
-            self.link.begin(clock.epoch, clock.tick);
+
+        Ok(None)
+    }
+
+    /// The same for everything that does not run a robot or end the process.
+    fn carry_out_io(&mut self, name: &RobotName, action: HostAction) -> Result<(), HostError> {
+        match action {
+            Action::Join => self.join(name)?,
+            Action::DeclareToken => {
+                let token = self.bus.token(&self.keys.alive_robot(name))?;
+                if let Some(member) = self.members.get_mut(name) {
+                    member.token = Some(token);
+                }
+            }
+            Action::Put(answer) => self.put(name, &answer)?,
+            Action::Query { of, tick, epoch } => {
+                let asked = format!("tick={tick};epoch={epoch}");
+                self.query(name, &of, &asked)?;
+            }
+            Action::Unfollow(of) => drop(self.followed.remove(&(name.clone(), of))),
+            Action::PutWaiting { tick, epoch, on } => {
+                let waiting = Waiting { epoch, tick, on };
+                self.bus.put(&self.keys.waiting(name), encode(&waiting))?;
+            }
+            // Timers are the shared part's, and the other two are the caller's.
+            Action::SetTimer(..) | Action::Run(_) | Action::Leave(_) => {}
         }
-        let names: Vec<RobotName> = self.members.keys().cloned().collect();
-        for name in &names {
-            self.rejoin_if_new_epoch(name, clock)?;
-            if let Some(member) = self.members.get_mut(name) {
-                member.answer(name, clock, &mut self.link)?;
+
+        Ok(())
+    }
+
+    /// Runs one tick of a robot.
+    fn run_tick(&mut self, name: &RobotName, turn: &Turn<News>) -> Result<(), HostError> {
+        let Some(mut member) = self.members.remove(name) else {
+            return Ok(());
+        };
+        if turn.begin != Begin::GoOn {
+            member.take_seat();
+        }
+        let Some(mut seat) = member.seat.take() else {
+            unreachable!("a robot runs after its welcome");
+        };
+
+        // The member is put back first: while the robot waits for an answer, the host goes on carrying things out.
+        self.members.insert(name.clone(), member);
+        let mut network = HostNetwork::new(self, name, turn);
+        let outcome = seat.run(turn, &mut network);
+        if let Some(failed) = network.failed.take() {
+            return Err(failed);
+        }
+        let Done {
+            commands,
+            state,
+            report,
+        } = outcome?;
+        let bytes = encode(report.as_ref());
+        if bytes.len() > MAX_MESSAGE_BYTES {
+            return Err(HostError::Robot(RobotError::TooMuch {
+                robot: name.clone(),
+                field: "its report".to_owned(),
+                reason: format!(
+                    "{} bytes, more than the {MAX_MESSAGE_BYTES} allowed",
+                    bytes.len()
+                ),
+            }));
+        }
+
+        if let Some(member) = self.members.get_mut(name) {
+            member.seat = Some(seat);
+        }
+        self.shared.with(name, |participant, actions| {
+            participant.done(commands, state, bytes.into(), actions);
+        });
+        Ok(())
+    }
+
+    /// Asks the simulator to admit a robot.
+    fn join(&mut self, name: &RobotName) -> Result<(), HostError> {
+        let Some(member) = self.members.get_mut(name) else {
+            return Ok(());
+        };
+        let request = JoinRequest {
+            protocol: PROTOCOL_VERSION,
+            run: self.options.run.clone(),
+            name: name.clone(),
+            instance: self.bus.id(),
+            bodies: member.senses_bodies,
+            sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
+        };
+        let key = self.keys.join_as(name);
+        let Some(answer) = self.bus.get(&key, "", Some(encode(&request)))? else {
+            self.shared
+                .with(name, |participant, actions| participant.unanswered(actions));
+            return Ok(());
+        };
+
+        let bytes = answer.result.unwrap_or_else(String::into_bytes);
+        match decode(&key, "simulator", &bytes)? {
+            JoinAnswer::Welcome(welcome) => {
+                let admission = Admission {
+                    epoch: welcome.epoch,
+                    generation: welcome.generation,
+                    news_flag: welcome.news_flag,
+                };
+                let mut states = Vec::new();
+                for state in welcome.state_before.iter().chain(&welcome.last_state) {
+                    states.push((state.tick, Arc::new(state.clone())));
+                }
+                member.welcome = Some(*welcome);
+                self.shared.with(name, |participant, actions| {
+                    participant.admitted(admission, states, actions);
+                });
+            }
+            JoinAnswer::Refused {
+                reason,
+                explanation,
+            } => {
+                member.explanation = explanation;
+                self.shared.with(name, |participant, actions| {
+                    participant.refused(reason, actions);
+                });
             }
         }
         Ok(())
     }
 
-    /// `init`: the same robot, with what holds for the new epoch.
-    fn rejoin_if_new_epoch(&mut self, name: &RobotName, clock: &Clock) -> Result<(), HostError> {
-        let is_new = |member: &Member| clock.tick == 0 && member.seat.welcome().epoch < clock.epoch;
-        if !self.members.get(name).is_some_and(is_new) {
+    /// Puts what came of a tick: the commands, then the state for those that follow it, then the report. On one session they
+    /// arrive in this order.
+    fn put(&mut self, name: &RobotName, answer: &HostAnswer) -> Result<(), BusError> {
+        let Some(member) = self.members.get_mut(name) else {
             return Ok(());
+        };
+        for (number, sent) in (1..).zip(&answer.commands) {
+            let command = Command {
+                epoch: answer.epoch,
+                tick: answer.tick,
+                generation: answer.generation,
+                number,
+                performative: sent.command.performative,
+                command: sent.command.command.clone(),
+            };
+            self.bus
+                .put(&self.keys.command(&sent.to, name), encode(&command))?;
         }
-        let welcome = self.join(name)?;
-        if let Some(member) = self
-            .members
-            .get_mut(name)
-            .filter(|_| welcome.epoch == clock.epoch)
+        if member.state.has_subscribers() {
+            member.state.put(encode(answer.state.as_ref()))?;
+        }
+        member.report.put(answer.report.to_vec())?;
+
+        let is_due = member
+            .painted
+            .is_none_or(|at| at.elapsed() >= PANEL_INTERVAL);
+        if let Some(seat) = &member.seat
+            && member.panel.has_subscribers()
+            && is_due
         {
-            member.seat.start_over(welcome);
-            (member.is_seated, member.last) = (false, None);
+            member.painted = Some(Instant::now());
+            member.panel.put(encode(&seat.panel()))?;
         }
         Ok(())
+    }
+
+    /// Queries another robot's state once, and subscribes to it from then on: it is put before the clock that follows, so that
+    /// the next query finds its answer here already.
+    fn query(&mut self, name: &RobotName, of: &RobotName, asked: &str) -> Result<(), BusError> {
+        let key = self.keys.query(of, STATE);
+        let shared = self.shared.clone();
+        let own = name.clone();
+        let other = of.clone();
+        self.bus.get_then(&key, asked, move |reply| {
+            let Some(reply) = reply else { return };
+            match reply.result {
+                Ok(bytes) => hear(&shared, &own, &other, &reply.key, &bytes),
+                Err(reason) => tracing::debug!(%other, reason, "a query was refused"),
+            }
+        })?;
+
+        let follows = (name.clone(), of.clone());
+        if !self.followed.contains_key(&follows) {
+            let shared = self.shared.clone();
+            let (own, other) = follows.clone();
+            let subscriber = self.bus.subscribe(&key, move |key, bytes| {
+                hear(&shared, &own, &other, key, bytes);
+            })?;
+            self.followed.insert(follows, subscriber);
+        }
+        Ok(())
+    }
+
+    fn leave(&self, name: &RobotName, leave: Leave) -> Result<End, HostError> {
+        Err(match leave {
+            Leave::End(end) => return Ok(end),
+            Leave::Refused(reason) => HostError::Refused {
+                name: name.clone(),
+                reason,
+                explanation: self
+                    .members
+                    .get(name)
+                    .map(|member| member.explanation.clone())
+                    .unwrap_or_default(),
+            },
+            Leave::NoSimulator => HostError::NoSimulator {
+                run: self.options.run.clone(),
+                connect: self.options.connect.clone(),
+            },
+            Leave::SimulatorGone => HostError::SimulatorGone(self.options.gone_patience),
+            Leave::Replaced => HostError::Replaced(name.clone()),
+            Leave::Stopped => HostError::Stopped,
+        })
     }
 }
 
 impl Member {
-    fn answer(
-        &mut self,
-        name: &RobotName,
-        clock: &Clock,
-        link: &mut Link,
-    ) -> Result<(), HostError> {
-        let welcome = self.seat.welcome();
-        if clock.epoch != welcome.epoch {
-            return Ok(()); // An echo of an earlier epoch.
-        }
-        let joined = clock.news.get(name).and_then(|news| news.joined);
-        if joined.is_some_and(|generation| generation > welcome.generation) {
-            return Err(HostError::Replaced(name.clone()));
-        }
-        if let Some((last, report)) = &self.last
-            && (last.epoch, last.tick) >= (clock.epoch, clock.tick)
-        {
-            if last.tick == clock.tick {
-                link.repeat_commands();
-                self.report.put(report.clone())?;
-            }
-            return Ok(());
-        }
-        let is_named = joined == Some(welcome.generation);
-        let Some((report, state)) = self.tick(clock, is_named, link)? else {
-            return Ok(());
+    /// Seats the robot with its newest welcome.
+    fn take_seat(&mut self) {
+        let Some(welcome) = self.welcome.take() else {
+            return;
         };
-        let bytes = encode(&report);
-        if bytes.len() > MAX_MESSAGE_BYTES {
-            let reason = format!(
-                "{} bytes, more than the {MAX_MESSAGE_BYTES} allowed",
-                bytes.len()
-            );
-            let (robot, field) = (name.clone(), "its report".to_owned());
-            return Err(RobotError::TooMuch {
-                robot,
-                field,
-                reason,
-            }
-            .into());
+        match (&mut self.seat, self.robot.take()) {
+            (Some(seat), _) => seat.start_over(welcome),
+            (none, Some(robot)) => *none = Some(Seat::new(robot, welcome)),
+            (None, None) => unreachable!("a robot that is not seated is here"),
         }
-        // First what others may ask for, then the report: after it the clock may go on and they will ask.
-        // Who follows has the state before the next clock, because both come the same way.
-        if self.state.has_subscribers() {
-            self.state.put(encode(&state))?;
-        }
-        link.board.show(name, Arc::new(state));
-        self.report.put(bytes.clone())?;
-        self.last = Some((
-            Clock {
-                epoch: clock.epoch,
-                tick: clock.tick,
-                ..Clock::default()
-            },
-            bytes,
-        ));
-        self.paint()
-    }
-
-    fn tick(
-        &mut self,
-        clock: &Clock,
-        joins: bool,
-        link: &mut Link,
-    ) -> Result<Option<(Report, PublicState)>, HostError> {
-        if self.is_seated {
-            return Ok(Some(self.seat.tick(clock, link)?));
-        }
-        if clock.tick > 0 && !joins {
-            return Ok(None); // Its turn has not come: the clock that names it is still to be granted.
-        }
-        self.is_seated = true;
-        Ok(Some(if clock.tick == 0 {
-            self.seat.init(clock, link)?
-        } else {
-            self.seat.resume(clock, link)?
-        }))
-    }
-
-    fn paint(&mut self) -> Result<(), HostError> {
-        let is_due = self.painted.is_none_or(|at| at.elapsed() >= PANEL_INTERVAL);
-        if self.panel.has_subscribers() && is_due {
-            self.painted = Some(Instant::now());
-            self.panel.put(encode(&self.seat.panel()))?;
-        }
-        Ok(())
     }
 }
+
+/// Files another robot's state.
+fn hear(shared: &Shared, own: &RobotName, other: &RobotName, key: &str, bytes: &[u8]) {
+    match decode::<PublicState>(key, other.as_str(), bytes) {
+        Ok(state) => shared.with(own, |participant, _| {
+            participant.heard(other.clone(), state.epoch, state.tick, Arc::new(state));
+        }),
+        Err(error) => tracing::warn!("{error}"),
+    }
+}
+
+/// As of when a query asks.
+fn read_query(query: &bus::Query) -> Result<StateQuery, String> {
+    fn number<T: std::str::FromStr>(query: &bus::Query, name: &str) -> Result<Option<T>, String> {
+        let Some(text) = query.parameter(name) else {
+            return Ok(None);
+        };
+        match text.parse() {
+            Ok(number) => Ok(Some(number)),
+            Err(_) => Err(format!("parameter {name}: not a whole number")),
+        }
+    }
+
+    Ok(StateQuery {
+        tick: number(query, "tick")?,
+        epoch: number(query, "epoch")?,
+    })
+}
+
+/// Answers a query with a state, or with the one field of it that the key names.
+fn reply(query: &bus::Query, state: &PublicState) {
+    let what = Keys::last_chunk(query.key());
+    if what == STATE {
+        query.reply(query.key(), encode(state));
+        return;
+    }
+    match state.answer(what) {
+        Some(answer) => query.reply(query.key(), encode(&answer)),
+        None => query.reply_err(&format!("there is no query called {what}")),
+    }
+}
+

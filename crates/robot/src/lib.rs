@@ -36,15 +36,12 @@
 //!
 //! A robot perceives the world only through [`Cars`]: this crate does not depend on the environment.
 
-mod board;
 mod cars;
 mod cri;
 mod entry;
 mod error;
 mod figure7;
-mod held;
 mod host;
-mod link;
 mod local;
 mod seat;
 
@@ -54,15 +51,15 @@ pub use entry::{RobotArgs, main};
 pub use error::{BadParameters, RobotError};
 pub use figure7::{CarsRobotInterface, Paper};
 pub use host::{Host, HostError, HostOptions, Stopper};
-pub use local::{LocalHost, Sense};
+pub use local::LocalHost;
 pub use protocol::messages::{
-    Clock, Command, CommandId, Correction, End, Face, News, Panel, Parameters, Percept, Point,
+    Clock, Command, CommandText, Correction, End, Face, News, Panel, Parameters, Point,
     PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables, Tone, Variable,
     Welcome, Widget,
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RunName, Tick};
-pub use seat::{Network, Seat, Undelivered};
+pub use seat::{Done, Network, Seat, Undelivered};
 
 /// Rounds an angle to 1e-6 rad, so that languages whose arc tangents differ in the last bit publish the same number.
 #[must_use]

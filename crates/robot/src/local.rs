@@ -1,126 +1,207 @@
-//! All robots in one process, without a network: for sweeps, tests and debugging. Same seats, same order of facts.
+//! All robots in one process, without a network: for sweeps, tests and debugging. The two sides of the lock-step, joined by
+//! function calls.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
-use protocol::messages::{Clock, Command, CommandId, Percept, PublicState, Report, Welcome};
-use protocol::{Epoch, RobotName, Tick};
+use lockstep::{
+    Action, Barrier, Exchange, Lateness, Outcome, Output, Participant, Patience, Stamp, StateQuery,
+    Timing, Turn,
+};
+use protocol::messages::{CommandText, MAX_ENTRIES, News, OnLate, PublicState, Report, Welcome};
+use protocol::{RobotName, Tick};
 
-use crate::cri::{Robot, RobotError};
-use crate::held::Held;
-use crate::seat::{Network, Seat, Undelivered};
+use crate::cri::Robot;
+use crate::error::RobotError;
+use crate::seat::{Done, Network, Seat, Undelivered};
 
-/// Senses for a robot: the environment is not this crate's to know.
-pub type Sense<'a> = dyn FnMut(&RobotName) -> Percept + 'a;
+type LocalParticipant = Participant<News, Arc<PublicState>, CommandText, Arc<Report>>;
+type LocalAction = Action<News, Arc<PublicState>, CommandText, Arc<Report>>;
 
-/// The robots of a run, all here.
+/// The robots of a run, all in this process.
 pub struct LocalHost {
+    barrier: Barrier<Arc<Report>, CommandText>,
+    outputs: Vec<Output<Arc<Report>, CommandText>>,
+    names: Vec<RobotName>,
     seats: Vec<Seat>,
-    known: Known,
+    participants: Vec<LocalParticipant>,
 }
 
-/// What the robots of a local host can learn of one another.
-#[derive(Default)]
-struct Known {
-    /// As reported for the last complete tick.
-    states: BTreeMap<RobotName, Arc<PublicState>>,
-    /// Commands under way, by target.
-    commands: BTreeMap<RobotName, Held>,
+/// The other robots of the process, as one of them queries them.
+struct Others<'a> {
+    names: &'a [RobotName],
+    participants: &'a [LocalParticipant],
+    query: StateQuery,
 }
 
-struct LocalNetwork<'a, 'b> {
-    known: &'a mut Known,
-    sense: &'a mut Sense<'b>,
-}
+impl Network for Others<'_> {
+    fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
+        let index = self
+            .names
+            .iter()
+            .position(|name| name == target)
+            .ok_or(Undelivered::Lost)?;
 
-impl Network for LocalNetwork<'_, '_> {
-    fn state_of(
-        &mut self,
-        target: &RobotName,
-        epoch: Epoch,
-        tick: Tick,
-    ) -> Result<Arc<PublicState>, Undelivered> {
-        let state = self
-            .known
-            .states
-            .get(target)
-            .filter(|state| (state.epoch, state.tick) == (epoch, tick));
-        state.cloned().ok_or(Undelivered::Lost)
-    }
-
-    fn percept(
-        &mut self,
-        robot: &RobotName,
-        epoch: Epoch,
-        tick: Tick,
-    ) -> Result<Percept, Undelivered> {
-        Ok(Percept {
-            epoch,
-            tick,
-            ..(self.sense)(robot)
-        })
-    }
-
-    fn send(&mut self, from: &RobotName, to: &RobotName, command: &Command) {
-        self.known
-            .commands
-            .entry(to.clone())
-            .or_default()
-            .hold(from.clone(), command.clone());
-    }
-
-    fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command> {
-        self.known.commands.get_mut(to)?.take(id, epoch)
+        self.participants[index]
+            .query(self.query)
+            .map_err(|_| Undelivered::Lost)
     }
 }
 
 impl LocalHost {
-    /// Seats robots with their welcomes; they act in the order given, which changes nothing.
+    /// Seats robots with their welcomes. The order does not matter.
     #[must_use]
     pub fn new(robots: Vec<(Box<dyn Robot>, Welcome)>) -> Self {
-        let seats = robots
-            .into_iter()
-            .map(|(robot, welcome)| Seat::new(robot, welcome))
+        // No robot of this process is ever late, and no timer ever fires.
+        let lateness = Lateness {
+            on_late: OnLate::Wait,
+            own: BTreeMap::new(),
+            deadline: Duration::MAX,
+            lose_after: 1,
+        };
+        let patience = Patience {
+            join: Duration::MAX,
+            gone: Duration::MAX,
+        };
+        let names: Vec<RobotName> = robots
+            .iter()
+            .map(|(_, welcome)| welcome.name.clone())
             .collect();
+        let epoch = robots.first().map_or(1, |(_, welcome)| welcome.epoch);
+
+        let mut outputs = Vec::new();
+        let max_commands = u32::try_from(MAX_ENTRIES).unwrap_or(u32::MAX);
+        let mut barrier = Barrier::new(
+            names.iter().cloned(),
+            lateness.clone(),
+            Timing::default(),
+            max_commands,
+        );
+        barrier.gather(epoch, lateness, &mut outputs);
+        let mut seats = Vec::new();
+        let mut participants = Vec::new();
+        for (robot, welcome) in robots {
+            let mut actions = Vec::new();
+            let mut participant = Participant::new(patience, &mut actions);
+            let admission = barrier
+                .join(&welcome.name, "local", &mut outputs)
+                .unwrap_or_else(|refused| unreachable!("it is of the roster: {refused:?}"));
+            participant.admitted(admission, [], &mut actions);
+            barrier.token(&welcome.name, true, &mut outputs);
+            participants.push(participant);
+            seats.push(Seat::new(robot, welcome));
+        }
+        outputs.clear();
+
         Self {
+            barrier,
+            outputs,
+            names,
             seats,
-            known: Known::default(),
+            participants,
         }
     }
 
-    /// A command from outside the roster.
-    pub fn inject(&mut self, to: &RobotName, from: &RobotName, command: Command) {
-        self.known
-            .commands
-            .entry(to.clone())
-            .or_default()
-            .hold(from.clone(), command);
+    /// Hands news and clock of a tick to every robot, and collects the ticks that they are to run.
+    fn grant(&mut self, mut news: BTreeMap<RobotName, News>) -> Vec<(usize, Turn<News>)> {
+        let mut turns = Vec::new();
+        for output in std::mem::take(&mut self.outputs) {
+            let Output::Grant { news: to, clock } = output else {
+                continue;
+            };
+            let mut actions: Vec<LocalAction> = Vec::new();
+            for (name, joined) in to {
+                let index = self.names.iter().position(|own| *own == name);
+                if let (Some(index), Some(news)) = (index, news.remove(&name)) {
+                    let participant = &mut self.participants[index];
+                    participant.news(clock.epoch, clock.tick, joined, news, &mut actions);
+                }
+            }
+            for (index, participant) in self.participants.iter_mut().enumerate() {
+                participant.clock(clock, &mut actions);
+                for action in actions.drain(..) {
+                    if let Action::Run(turn) = action {
+                        turns.push((index, turn));
+                    }
+                }
+            }
+        }
+
+        turns
     }
 
-    /// Runs one tick of every robot. Everybody sees the others as they reported themselves for the tick before.
-    ///
-    /// # Errors
-    /// [`RobotError`] if a robot refuses its parameters, or gives up.
-    pub fn exchange(
+    /// Runs one tick of one robot, and hands what came of it to the barrier.
+    fn run(&mut self, index: usize, turn: &Turn<News>) -> Result<(), RobotError> {
+        let mut others = Others {
+            names: &self.names,
+            participants: &self.participants,
+            query: StateQuery {
+                tick: Some(turn.tick),
+                epoch: Some(turn.epoch),
+            },
+        };
+        let Done {
+            commands,
+            state,
+            report,
+        } = self.seats[index].run(turn, &mut others)?;
+
+        let mut actions = Vec::new();
+        self.participants[index].done(commands, state, report, &mut actions);
+        let name = self.names[index].clone();
+        for action in actions {
+            let Action::Put(answer) = action else { continue };
+            let stamp = Stamp {
+                epoch: answer.epoch,
+                tick: answer.tick,
+                generation: answer.generation,
+            };
+            let count = answer.commands.len() as u32;
+            for (number, command) in (1..).zip(answer.commands) {
+                self.barrier
+                    .command(&name, stamp, number, command, &mut self.outputs);
+            }
+            self.barrier
+                .report(&name, stamp, count, answer.report, &mut self.outputs);
+        }
+        Ok(())
+    }
+}
+
+impl Exchange<News, Arc<Report>, CommandText> for LocalHost {
+    type Error = RobotError;
+
+    fn exchange(
         &mut self,
-        clock: &Clock,
-        sense: &mut Sense<'_>,
-    ) -> Result<BTreeMap<RobotName, Report>, RobotError> {
-        let (mut reports, mut states) = (BTreeMap::new(), BTreeMap::new());
-        for seat in &mut self.seats {
-            let mut network = LocalNetwork {
-                known: &mut self.known,
-                sense,
-            };
-            let (report, state) = match clock.tick {
-                0 => seat.init(clock, &mut network)?,
-                _ => seat.tick(clock, &mut network)?,
-            };
-            let name = seat.welcome().name.clone();
-            reports.insert(name.clone(), report);
-            states.insert(name, Arc::new(state));
+        tick: Tick,
+        news: BTreeMap<RobotName, News>,
+    ) -> Result<Outcome<Arc<Report>, CommandText>, RobotError> {
+        let with_news = news.keys().cloned().collect();
+        self.barrier.open(tick, with_news, &mut self.outputs);
+        let complete_at_once = self.take_outcome();
+        if let Some(outcome) = complete_at_once {
+            return Ok(outcome); // A run without robots.
         }
-        self.known.states = states;
-        Ok(reports)
+
+        for (index, turn) in self.grant(news) {
+            self.run(index, &turn)?;
+        }
+        let outcome = self.take_outcome();
+        Ok(outcome.unwrap_or_else(|| unreachable!("every robot has reported tick {tick}")))
+    }
+}
+
+impl LocalHost {
+    fn take_outcome(&mut self) -> Option<Outcome<Arc<Report>, CommandText>> {
+        let index = self
+            .outputs
+            .iter()
+            .position(|output| matches!(output, Output::Complete(_)))?;
+
+        match self.outputs.swap_remove(index) {
+            Output::Complete(outcome) => Some(outcome),
+            _ => None,
+        }
     }
 }

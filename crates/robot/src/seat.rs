@@ -1,47 +1,24 @@
-//! One robot's place in the lock-step: from a clock to a report. Synchronous and without a network of its own, so that
-//! the same code runs in one process and over the bus.
+//! One robot's place in the lock-step: from a tick that it is to run to what came of it. Synchronous and without a network
+//! of its own, so that the same code runs in one process and over the bus.
 
 use std::sync::Arc;
 
-use protocol::messages::{
-    Clock, Command, CommandId, News, Percept, Point, PublicState, Report, Welcome,
-};
+use lockstep::{Begin, Sent, Turn};
+use protocol::messages::{CommandText, News, Panel, Point, PublicState, Report, Welcome};
 use protocol::random::{Stream, stream};
-use protocol::{Epoch, Message, RobotName, Tick};
+use protocol::{FieldError, Message, RobotName, Tick};
 
-use crate::cars::{Cars, Outbox, ReceivedCommand};
+use crate::cars::{Cars, ReceivedCommand};
 use crate::cri::{Action, Robot};
 use crate::error::RobotError;
 
-/// What a seat needs from outside during a tick.
+/// What a robot needs from outside during a tick.
 pub trait Network {
-    /// The state that `target` reported for `tick`.
+    /// The state that `target` reported for the tick before.
     ///
     /// # Errors
     /// [`Undelivered`] says why there is none.
-    fn state_of(
-        &mut self,
-        target: &RobotName,
-        epoch: Epoch,
-        tick: Tick,
-    ) -> Result<Arc<PublicState>, Undelivered>;
-
-    /// What `robot` senses around itself as of `tick`.
-    ///
-    /// # Errors
-    /// [`Undelivered`] says why there is none.
-    fn percept(
-        &mut self,
-        robot: &RobotName,
-        epoch: Epoch,
-        tick: Tick,
-    ) -> Result<Percept, Undelivered>;
-
-    /// Sends a command from one robot to another.
-    fn send(&mut self, from: &RobotName, to: &RobotName, command: &Command);
-
-    /// The command that a clock named; `None` if it never came.
-    fn receive(&mut self, to: &RobotName, epoch: Epoch, id: &CommandId) -> Option<Command>;
+    fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered>;
 }
 
 /// Why a query has no answer.
@@ -49,19 +26,19 @@ pub trait Network {
 pub enum Undelivered {
     /// The other side is gone.
     Lost,
-    /// The epoch is over.
+    /// The tick is over.
     Interrupted,
 }
 
-/// How a robot begins a tick.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Begin {
-    /// From its initial state.
-    Afresh,
-    /// From its initial state, with the variables that a lost process published last.
-    TakeOver,
-    /// From its state after the tick before.
-    GoOn,
+/// What came of a tick.
+#[derive(Debug)]
+pub struct Done {
+    /// The commands that the robot sent, in this order.
+    pub commands: Vec<Sent<CommandText>>,
+    /// What the other robots may query.
+    pub state: Arc<PublicState>,
+    /// Its report.
+    pub report: Arc<Report>,
 }
 
 /// A robot that takes part in an epoch.
@@ -69,8 +46,9 @@ pub struct Seat {
     robot: Box<dyn Robot>,
     welcome: Arc<Welcome>,
     random: Stream,
-    outbox: Outbox,
     proposal: Point,
+    /// The commands of the tick that runs.
+    outbox: Vec<Sent<CommandText>>,
     /// Why the robot cannot go on.
     gave_up: Option<String>,
 }
@@ -79,18 +57,12 @@ impl Seat {
     /// Seats a robot that has been welcomed.
     #[must_use]
     pub fn new(robot: Box<dyn Robot>, welcome: Welcome) -> Self {
-        let random = stream(welcome.seed, &welcome.stream);
-        let proposal = welcome.location;
-        let outbox = Outbox {
-            last_seq: welcome.last_seq,
-            ..Outbox::default()
-        };
         Self {
             robot,
+            random: stream(welcome.seed, &welcome.stream),
+            proposal: welcome.location,
             welcome: Arc::new(welcome),
-            random,
-            outbox,
-            proposal,
+            outbox: Vec::new(),
             gave_up: None,
         }
     }
@@ -104,88 +76,54 @@ impl Seat {
     /// The same robot in a new epoch.
     pub fn start_over(&mut self, welcome: Welcome) {
         self.random = stream(welcome.seed, &welcome.stream);
-        self.outbox = Outbox {
-            last_seq: welcome.last_seq,
-            ..Outbox::default()
-        };
         self.proposal = welcome.location;
         self.welcome = Arc::new(welcome);
     }
 
     /// What the robot chooses to display.
     #[must_use]
-    pub fn panel(&self) -> protocol::messages::Panel {
+    pub fn panel(&self) -> Panel {
         self.robot.panel()
     }
 
-    /// The first tick of the epoch: the robot returns to its initial state and acts from its start.
+    /// Runs a tick: lets the robot perceive and act, and reports what it did.
     ///
     /// # Errors
-    /// [`RobotError`] if the robot refuses its parameters, or gives up.
-    pub fn init(
+    /// [`RobotError`] if the robot refuses its parameters, gives up, or goes beyond the limits of a message.
+    pub fn run(
         &mut self,
-        clock: &Clock,
+        turn: &Turn<News>,
         network: &mut dyn Network,
-    ) -> Result<(Report, PublicState), RobotError> {
-        self.proposal = self.welcome.location;
-        self.act(clock, network, Begin::Afresh)
-    }
-
-    /// The first tick of an incarnation that takes over in the middle of an epoch.
-    ///
-    /// # Errors
-    /// [`RobotError`] if the robot refuses its parameters, or gives up.
-    pub fn resume(
-        &mut self,
-        clock: &Clock,
-        network: &mut dyn Network,
-    ) -> Result<(Report, PublicState), RobotError> {
-        self.act(clock, network, Begin::TakeOver)
-    }
-
-    /// One tick.
-    ///
-    /// # Errors
-    /// [`RobotError`] if the robot gives up.
-    pub fn tick(
-        &mut self,
-        clock: &Clock,
-        network: &mut dyn Network,
-    ) -> Result<(Report, PublicState), RobotError> {
-        self.act(clock, network, Begin::GoOn)
-    }
-
-    /// Lets the robot perceive and act, and reports what it did.
-    fn act(
-        &mut self,
-        clock: &Clock,
-        network: &mut dyn Network,
-        begin: Begin,
-    ) -> Result<(Report, PublicState), RobotError> {
+    ) -> Result<Done, RobotError> {
         let welcome = self.welcome.clone();
-        let news = clock.news.get(&welcome.name).cloned().unwrap_or_default();
+        let quiet = News::default();
+        let news = turn.news.as_ref().unwrap_or(&quiet);
+        if turn.begin == Begin::Init {
+            self.proposal = welcome.location;
+        }
         let location = news
             .correction
             .map_or(self.proposal, |correction| correction.location);
-        let received = receive(&welcome, &news, network);
+        let commands = received(news);
 
         let mut log = Vec::new();
         let mut cars = Cars {
             welcome: &welcome,
-            tick: clock.tick,
+            tick: turn.tick,
             location,
-            commands: &received.commands,
-            news: &news,
+            commands: &commands,
+            news,
+            senses_bodies: self.robot.senses_bodies(),
             random: &mut self.random,
             outbox: &mut self.outbox,
             log: &mut log,
             gave_up: &mut self.gave_up,
             network,
         };
-        if begin != Begin::GoOn {
+        if turn.begin != Begin::GoOn {
             self.robot.init(&mut cars)?;
         }
-        if begin == Begin::TakeOver
+        if turn.begin == Begin::TakeOver
             && let Some(last) = &welcome.last_state
         {
             self.robot.resume(&mut cars, &last.state_variables);
@@ -201,7 +139,7 @@ impl Seat {
                 reason,
             });
         }
-        self.publish(clock.tick, location, action, received.missing, log)
+        self.publish(turn.tick, location, action, log)
     }
 
     /// Makes the report and the public state of an action, once they are fit to be sent.
@@ -210,9 +148,8 @@ impl Seat {
         tick: Tick,
         location: Point,
         mut action: Action,
-        missing: Vec<CommandId>,
         mut log: Vec<String>,
-    ) -> Result<(Report, PublicState), RobotError> {
+    ) -> Result<Done, RobotError> {
         // JSON has no NaN: a number that is not finite is replaced or dropped, and logged.
         let proposal = action.proposal;
         if !(proposal.x.is_finite() && proposal.y.is_finite()) {
@@ -242,21 +179,8 @@ impl Seat {
             emotion_state: action.emotion_state,
             behavior_state: action.behavior_state,
         };
-        let report = self.report(&state, missing, log);
-
-        // The simulator would refuse a report beyond the limits, and wait for another one.
-        match report.check() {
-            Ok(()) => Ok((report, state)),
-            Err((field, reason)) => Err(RobotError::TooMuch {
-                robot: self.welcome.name.clone(),
-                field,
-                reason,
-            }),
-        }
-    }
-
-    fn report(&mut self, state: &PublicState, missing: Vec<CommandId>, log: Vec<String>) -> Report {
-        Report {
+        let commands = std::mem::take(&mut self.outbox);
+        let report = Report {
             epoch: state.epoch,
             tick: state.tick,
             generation: self.welcome.generation,
@@ -266,40 +190,36 @@ impl Seat {
             emotion_state: state.emotion_state.clone(),
             behavior_state: state.behavior_state.clone(),
             state_variables: state.state_variables.clone(),
-            sent: std::mem::take(&mut self.outbox.sent),
-            missing,
+            commands: u32::try_from(commands.len()).unwrap_or(u32::MAX),
             log,
+        };
+
+        // The simulator would refuse a report beyond the limits, and wait for another one.
+        if let Err(FieldError { field, reason }) = report.check() {
+            return Err(RobotError::TooMuch {
+                robot: self.welcome.name.clone(),
+                field,
+                reason,
+            });
         }
+        Ok(Done {
+            commands,
+            state: Arc::new(state),
+            report: Arc::new(report),
+        })
     }
 }
 
-/// The commands that a clock named.
-#[derive(Default)]
-struct Received {
-    commands: Vec<ReceivedCommand>,
-    /// Those that never came.
-    missing: Vec<CommandId>,
-}
-
-/// Takes the commands that the news name from the network.
-fn receive(welcome: &Welcome, news: &News, network: &mut dyn Network) -> Received {
-    let mut received = Received::default();
-    let mut last: Option<(&CommandId, Command)> = None;
-    for id in &news.commands {
-        // A command that the medium has doubled is named twice in a row; the network holds it once.
-        if last.as_ref().is_none_or(|(last_id, _)| *last_id != id) {
-            last = network
-                .receive(&welcome.name, welcome.epoch, id)
-                .map(|command| (id, command));
-        }
-        match &last {
-            Some((_, command)) => received.commands.push(ReceivedCommand {
-                from: id.from.clone(),
-                text: command.command.clone(),
-            }),
-            None => received.missing.push(id.clone()),
-        }
+/// The commands that arrived.
+fn received(news: &News) -> Vec<ReceivedCommand> {
+    let mut received = Vec::with_capacity(news.commands.len());
+    for delivery in &news.commands {
+        received.push(ReceivedCommand {
+            from: delivery.from.clone(),
+            text: delivery.command.clone(),
+        });
     }
+
     received
 }
 

@@ -4,7 +4,7 @@
 //! language; a heading is a unit vector and never an angle. The paper leaves open what a robot does about a collision;
 //! the ways here are chosen \[I\].
 
-use robot::{Action, Cars, Percept, Point};
+use robot::{Action, Cars, Point, SensedBody};
 use serde::{Deserialize, Serialize};
 
 use crate::chance::Chance;
@@ -138,12 +138,11 @@ impl Drive {
         }
 
         self.careful_s -= tick_s;
-        // Without a percept the epoch is over, and the step is discarded.
-        let percept = cars.percept().unwrap_or_default();
+        let bodies = cars.bodies();
         // A narrow gap may take a short step where a long one does not fit.
         for share in SHARES {
             let short_m = step_m * share;
-            if let Some(heading) = self.free_heading(cars, &percept, straight, short_m) {
+            if let Some(heading) = self.free_heading(cars, bodies, straight, short_m) {
                 return self.step(here, heading, short_m, tick_s);
             }
         }
@@ -170,18 +169,18 @@ impl Drive {
     fn free_heading(
         &mut self,
         cars: &Cars<'_>,
-        percept: &Percept,
+        bodies: &[SensedBody],
         straight: (f64, f64),
         step_m: f64,
     ) -> Option<(f64, f64)> {
         let here = cars.location();
-        if is_free(cars, percept, stepped(here, straight, step_m)) {
+        if is_free(cars, bodies, stepped(here, straight, step_m)) {
             return Some(straight);
         }
         for (cos, sin) in OFFSETS {
             for side in [self.side, -self.side] {
                 let heading = turned(straight, cos, side * sin);
-                if is_free(cars, percept, stepped(here, heading, step_m)) {
+                if is_free(cars, bodies, stepped(here, heading, step_m)) {
                     self.side = side;
                     return Some(heading);
                 }
@@ -192,10 +191,10 @@ impl Drive {
 }
 
 /// Whether a body with this center is on the field and overlaps no other.
-fn is_free(cars: &Cars<'_>, percept: &Percept, center: Point) -> bool {
+fn is_free(cars: &Cars<'_>, bodies: &[SensedBody], center: Point) -> bool {
     let apart_m = cars.welcome().body_m - TOUCH_M;
     is_on_field(cars, center)
-        && percept.bodies.iter().all(|body| {
+        && bodies.iter().all(|body| {
             (body.location.x - center.x).abs() >= apart_m
                 || (body.location.y - center.y).abs() >= apart_m
         })

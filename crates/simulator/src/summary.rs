@@ -62,8 +62,6 @@ pub struct RobotSummary {
     pub received: u64,
     /// Commands to it that the medium lost.
     pub dropped: u64,
-    /// Commands to it that were really lost on the wire.
-    pub missing: u64,
     /// Ticks it missed.
     pub missed: u64,
     /// Incarnations after the first.
@@ -140,7 +138,6 @@ impl Summary {
             }
             Event::CommandDelivered { to, .. } => self.robot(to).received += 1,
             Event::CommandDropped { to, .. } => self.robot(to).dropped += 1,
-            Event::CommandMissing { to, .. } => self.robot(to).missing += 1,
             Event::Missed { robot } => self.robot(robot).missed += 1,
             Event::Joined {
                 robot,

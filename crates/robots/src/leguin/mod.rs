@@ -102,6 +102,10 @@ impl Robot for Leguin {
         cars.log("is back, and takes over where the last one was lost");
     }
 
+    fn senses_bodies(&self) -> bool {
+        true
+    }
+
     fn panel(&self) -> Panel {
         let mut widgets = self.feeling_widgets();
         widgets.push(panel::behavior(self.behavior().name()));

@@ -31,8 +31,6 @@ pub struct LinkSummary {
     pub delayed: u64,
     /// Commands that the medium doubled.
     pub duplicated: u64,
-    /// Commands that were really lost on the wire.
-    pub missing: u64,
     /// Ticks in which the sender could not ask the target anything.
     pub unreachable_ticks: u64,
     /// Longest time for which what the sender knew of the target by asking was out of date, simulated seconds.
@@ -84,7 +82,6 @@ impl NetworkSummary {
             }
             Event::CommandDelayed { from, to, .. } => self.link(from, to).delayed += 1,
             Event::CommandDuplicated { from, to, .. } => self.link(from, to).duplicated += 1,
-            Event::CommandMissing { from, to, .. } => self.link(from, to).missing += 1,
             Event::LinkCut {
                 from, to, queries, ..
             } => self.begin_cut(from, to, now_s, *queries),
