@@ -6,17 +6,15 @@ use std::time::Duration;
 
 use bus::{Bus, Reply, Role};
 use clap::{Args, Subcommand, ValueEnum};
+use config::units::Time;
+use config::{Changes, Speed};
 use miette::{IntoDiagnostic, miette};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
 use protocol::{RobotName, RunName, decode, encode};
-use simulator::RunFolder;
-use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG};
-use simulator::scenario::{Changes, Scenario};
-use simulator::units::Time;
-
-use crate::common::{LATEST, Speed};
+use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
+use simulator::{RunFolder, Scenario};
 
 /// How long to try to reach a run.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -136,7 +134,6 @@ enum Button {
     /// Set simulated seconds per second.
     Speed {
         /// A number, or `max`.
-        #[arg(value_parser = |text: &str| simulator::scenario::parse_speed(text).map(Speed))]
         factor: Speed,
     },
     /// Change what the clock does about robots that are late.
