@@ -97,7 +97,7 @@ impl Experiment {
 
         // A mistake in the scenario is reported once, before anything starts.
         if let Some(unit) = units.first() {
-            self.load(options, unit)?;
+            self.scenario(options, unit)?;
         }
 
         let next = AtomicUsize::new(0);
@@ -125,7 +125,7 @@ impl Experiment {
         done.into_iter().map(|(_, outcome)| outcome).collect()
     }
 
-    fn load(&self, options: &Options, unit: &Unit<'_>) -> miette::Result<Scenario> {
+    fn scenario(&self, options: &Options, unit: &Unit<'_>) -> miette::Result<Scenario> {
         let mut set = options.set.clone();
         set.extend(unit.arm.set.iter().cloned());
         set.extend(unit.condition.set.iter().cloned());
@@ -150,7 +150,7 @@ impl Experiment {
             probes.push((&measure.name, Probe::new(measure, unit.condition.time_s)));
         }
 
-        let scenario = self.load(options, unit)?;
+        let scenario = self.scenario(options, unit)?;
         let simulation = play(scenario, &run, |simulation, record| {
             let summary = summary.get_or_insert_with(|| Summary::begin(&run, simulation));
             for line in record.lines() {

@@ -133,7 +133,7 @@ impl Scenario {
 }
 
 /// The same place for the environment.
-pub(crate) fn to_world(point: Point) -> world::Point {
+fn to_world(point: Point) -> world::Point {
     world::Point::new(point.x, point.y)
 }
 

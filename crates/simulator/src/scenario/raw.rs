@@ -2,6 +2,7 @@
 
 mod fault;
 mod network;
+mod range;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ use world::Triangular;
 
 use fault::FaultTable;
 use network::NetworkTable;
+use range::Range;
 
 use super::checked::{self, DEFAULT_SEED, Lateness, Record, RobotSpec};
 use super::network::Network;
@@ -67,14 +69,6 @@ struct GuestsTable {
     count: usize,
     speed: Option<Spanned<Range<Speed>>>,
     duration: Option<Spanned<Range<Time>>>,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct Range<Q> {
-    min: Q,
-    mode: Q,
-    max: Q,
 }
 
 #[derive(Debug, Deserialize, Serialize)]

@@ -11,7 +11,7 @@ use world::Triangular;
 
 use super::super::checked::RobotSpec;
 use super::super::network::{Burst, Channel, Link, Network, Partition, ticks};
-use super::Range;
+use super::range::Range;
 
 /// Longest time for which a command can be held back: whoever sends it must be able to repeat it until then.
 const MAX_DELAY_TICKS: u64 = 1000;
