@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use protocol::messages::{Clock, Point};
+use lab::run::Local;
+use protocol::messages::Point;
 use protocol::{RobotName, RunName};
-use robot::{LocalHost, RobotError};
+use robot::LocalHost;
 use simulator::scenario::Changes;
-use simulator::{Barrier, Event, Exchange, Scenario, Simulation};
+use simulator::{Event, Scenario, Simulation};
 
 use crate::root;
 
@@ -14,22 +15,7 @@ use crate::root;
 pub struct Hall {
     /// The simulation.
     pub simulation: Simulation,
-    robots: Robots,
-}
-
-struct Robots(LocalHost);
-
-impl Barrier for Robots {
-    type Interrupt = RobotError;
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
-        let reports = self
-            .0
-            .exchange(&clock, &mut |name| simulation.percept(name))?;
-        Ok(Exchange {
-            reports,
-            membership: Vec::new(),
-        })
-    }
+    robots: LocalHost,
 }
 
 /// A shipped scenario with changes.
@@ -53,17 +39,10 @@ impl Hall {
     #[must_use]
     pub fn new(scenario: Scenario) -> Self {
         let run = RunName::new("hall").expect("a legal name");
-        let mut simulation = Simulation::new(scenario, 1).expect("the hall can be placed");
-        let seats = simulation.scenario().robots.iter().map(|(name, spec)| {
-            let robot = robots::make(&spec.class).expect("a shipped class");
-            (
-                robot,
-                simulation
-                    .welcome(&run, name, 1)
-                    .expect("it is of the roster"),
-            )
-        });
-        let mut robots = Robots(LocalHost::new(seats.collect()));
+        let Local {
+            mut simulation,
+            mut robots,
+        } = Local::new(scenario, &run).expect("the hall can be set up");
         simulation
             .init(&mut robots)
             .expect("the parameters are good");

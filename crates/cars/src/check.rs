@@ -4,12 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use config::{Changes, FileError};
+use launch::{LaunchFile, is_launch_file};
 use simulator::Scenario;
-use simulator::diagnostic::FileError;
-use simulator::scenario::Changes;
-
-use crate::launch::file::LaunchFile;
-use crate::launch::is_launch_file;
 
 /// `cars check`.
 #[derive(Debug, Args)]

@@ -1,17 +1,14 @@
 //! `cars conform`: checks one robot, in whatever language, against the rules of the protocol.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use clap::Args;
+use config::Changes;
 use conform::{Report, Role, Rule, Setting};
-use miette::{IntoDiagnostic, miette};
-use protocol::messages::PublicState;
-use protocol::{Event, RobotName, RunName, Tick};
-use simulator::{Scenario, Simulation, TickRecord};
-
-use crate::{launch, run};
+use miette::miette;
+use protocol::{RobotName, Tick};
+use simulator::Scenario;
 
 /// `cars conform`.
 ///
@@ -101,66 +98,29 @@ fn check(args: &ConformArgs) -> miette::Result<Report> {
 /// Field and roster of a scenario. What the other robots do, and what they command, is what they do when the scenario is
 /// run in this process; robots of classes that cannot run here stand still.
 fn stage(setting: &mut Setting, file: &Path) -> miette::Result<()> {
-    let scenario = Scenario::load(file, &simulator::scenario::Changes::default())?;
-    (setting.seed, setting.tick_s) = (scenario.seed, scenario.tick_s);
-    (setting.field_m, setting.body_m) = (scenario.field_m, scenario.body_m);
+    let scenario = Scenario::load(file, &Changes::default())?;
+    setting.seed = scenario.seed;
+    setting.tick_s = scenario.tick_s;
+    setting.field_m = scenario.field_m;
+    setting.body_m = scenario.body_m;
     setting.sensing_range_m = scenario.sensing_range_m;
-    let role = |(name, spec): (&RobotName, &simulator::scenario::RobotSpec)| {
-        let (location, parameters) = (spec.at, spec.parameters.clone());
-        (
-            name.clone(),
-            Role {
-                location,
-                parameters,
-                ..Role::default()
-            },
-        )
-    };
-    setting.cast = scenario.robots.iter().map(role).collect();
-    if scenario
-        .robots
-        .values()
-        .all(|spec| robots::make(&spec.class).is_some())
-    {
-        let run = RunName::new("conform").into_diagnostic()?;
-        run::play(scenario, &run, |simulation, record| {
-            watch(&mut setting.cast, setting.ticks, simulation, record);
-            Ok(())
-        })?;
-    }
-    Ok(())
-}
 
-/// Keeps what a tick told of the robots.
-fn watch(
-    cast: &mut BTreeMap<RobotName, Role>,
-    ticks: Tick,
-    simulation: &Simulation,
-    record: &TickRecord,
-) {
-    for event in &record.events {
-        if let Event::CommandSent { to, command, .. } = event
-            && let Some(role) = cast
-                .get_mut(to)
-                .filter(|role| !role.hears.contains(command))
-        {
-            role.hears.push(command.clone());
+    setting.cast.clear();
+    for (name, spec) in &scenario.robots {
+        let role = Role {
+            location: spec.at,
+            parameters: spec.parameters.clone(),
+            ..Role::default()
+        };
+        setting.cast.insert(name.clone(), role);
+    }
+
+    let performances = lab::performances(scenario, setting.ticks)?;
+    for (name, performance) in performances.into_iter().flatten() {
+        if let Some(role) = setting.cast.get_mut(&name) {
+            role.hears = performance.commands;
+            role.states = performance.states;
         }
     }
-    for (name, role) in cast.iter_mut().filter(|_| record.tick <= ticks) {
-        let (Some(report), Some(location)) = (simulation.report(name), simulation.location(name))
-        else {
-            continue;
-        };
-        role.states.push(PublicState {
-            epoch: report.epoch,
-            tick: record.tick,
-            location,
-            speed_mps: report.speed_mps,
-            direction_rad: report.direction_rad,
-            state_variables: report.state_variables.clone(),
-            emotion_state: report.emotion_state.clone(),
-            behavior_state: report.behavior_state.clone(),
-        });
-    }
+    Ok(())
 }

@@ -6,17 +6,15 @@ use std::time::Duration;
 
 use bus::{Bus, Reply, Role};
 use clap::{Args, Subcommand, ValueEnum};
+use config::units::Time;
+use config::{Changes, Speed};
 use miette::{IntoDiagnostic, miette};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
-use protocol::{RobotName, RunName, decode, encode};
-use simulator::RunFolder;
-use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG};
-use simulator::scenario::{Changes, Scenario};
-use simulator::units::Time;
-
-use crate::common::{LATEST, Speed};
+use protocol::messages::{Command, Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
+use protocol::{Message, RobotName, RunName, decode, encode};
+use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
+use simulator::{RunFolder, Scenario};
 
 /// How long to try to reach a run.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -136,7 +134,6 @@ enum Button {
     /// Set simulated seconds per second.
     Speed {
         /// A number, or `max`.
-        #[arg(value_parser = |text: &str| simulator::scenario::parse_speed(text).map(Speed))]
         factor: Speed,
     },
     /// Change what the clock does about robots that are late.
@@ -237,6 +234,18 @@ fn refused(answer: &ControlAnswer) -> miette::Report {
 /// Asks the simulator for something.
 fn ask(run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
     let (bus, keys) = run.open()?;
+    let answer = ask_over(&bus, &keys, run, control);
+    bus.close();
+    answer
+}
+
+/// The same over a session that is open.
+fn ask_over(
+    bus: &Bus,
+    keys: &Keys,
+    run: &RunRef,
+    control: &Control,
+) -> miette::Result<ControlAnswer> {
     let patience = if matches!(control, Control::Step { .. }) {
         STEP_PATIENCE
     } else {
@@ -245,7 +254,6 @@ fn ask(run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
     let answer = bus
         .get_within(&keys.control(), "", Some(encode(control)), patience)
         .into_diagnostic()?;
-    bus.close();
     let bytes = bytes_of(
         answer,
         &format!("no simulator of run {} answers", run.run()?),
@@ -349,20 +357,35 @@ pub(crate) struct CommandArgs {
 
 /// Sends a command from outside the roster; it takes effect at the next tick boundary and is part of the record.
 pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
-    let control = Control::Command {
-        to: args.robot.clone(),
+    let (bus, keys) = args.run.open()?;
+    let command = Command {
         command: args.command.clone(),
+        ..Command::default()
     };
-    match ask(&args.run, &control)? {
-        ControlAnswer::Done(status) => {
-            println!(
-                "{} receives {:?} at the tick after {}",
-                args.robot, args.command, status.tick
-            );
-            Ok(ExitCode::SUCCESS)
-        }
-        other => Err(refused(&other)),
+    command
+        .check()
+        .map_err(|error| miette!("{}: {}", error.field, error.reason))?;
+    let key = keys.command(&args.robot, &RobotName::operator());
+    bus.put(&key, encode(&command)).into_diagnostic()?;
+
+    // On one session the command arrives before the question after it: who answers this has the command.
+    let answer = ask_over(&bus, &keys, &args.run, &Control::Status);
+    bus.close();
+    let ControlAnswer::Done(status) = answer? else {
+        return Err(miette!("the simulator does not answer with its status"));
+    };
+    let is_known = status.robots.iter().any(|robot| robot.name == args.robot);
+    if !is_known {
+        return Err(miette!(
+            "refused: no robot of this run is called {}",
+            args.robot
+        ));
     }
+    println!(
+        "{} receives {:?} at the tick after {}",
+        args.robot, args.command, status.tick
+    );
+    Ok(ExitCode::SUCCESS)
 }
 
 /// `cars log`.

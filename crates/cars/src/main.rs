@@ -2,11 +2,11 @@
 
 mod bench;
 mod check;
-mod common;
 mod conform;
 mod control;
 mod emotionml;
 mod exec;
+mod execution;
 mod experiment;
 mod launch;
 mod net;
@@ -14,7 +14,6 @@ mod new;
 mod router;
 mod run;
 mod secure;
-mod statistics;
 mod table;
 
 use std::process::ExitCode;
@@ -96,18 +95,18 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Exec(args) => exec::exec(&args),
         Subcommands::ExecStart(args) => Ok(exec::start(&args)),
         Subcommands::New(args) => new::new(&args),
-        Subcommands::Run(args) => run::run(&args),
-        Subcommands::Experiment(args) => experiment::experiment(&args),
+        Subcommands::Run(args) => run::run(args),
+        Subcommands::Experiment(args) => experiment::experiment(args),
         Subcommands::Check(args) => check::check(&args),
         Subcommands::Ctl(args) => control::ctl(&args),
         Subcommands::Query(args) => control::query(&args),
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
-        Subcommands::Emotionml(args) => emotionml::emotionml(&args),
+        Subcommands::Emotionml(args) => emotionml::emotionml(args),
         Subcommands::Conform(args) => Ok(conform::conform(&args)),
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),
-        Subcommands::Secure(args) => secure::secure(&args),
+        Subcommands::Secure(args) => secure::secure(args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::BenchRobot(args) => bench::robot(&args),
         Subcommands::BenchEcho { address } => bench::echo(&address),

@@ -1,22 +1,16 @@
-//! `cars run`: the same simulation and the same robots as a launch, in one process and without a network.
+//! `cars run`: a scenario in this process.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 use clap::Args;
 use miette::{IntoDiagnostic, miette};
-use protocol::RunName;
-use protocol::messages::{Clock, End};
-use robot::{LocalHost, Robot, RobotError, Welcome};
-use simulator::{
-    Barrier, Exchange, Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord,
-};
+use simulator::Scenario;
 
-use crate::common::ExecutionArgs;
-use crate::launch;
+use crate::execution::ExecutionArgs;
 use crate::table;
+
+pub(crate) use lab::run::execute;
 
 /// `cars run`.
 #[derive(Debug, Args)]
@@ -31,9 +25,10 @@ pub(crate) struct RunArgs {
 }
 
 /// Runs a scenario in this process.
-pub(crate) fn run(args: &RunArgs) -> miette::Result<ExitCode> {
+pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
+    let options = args.execution.options();
     let file = launch::scenario_file(&args.file)?;
-    let scenario = Scenario::load(&file, &args.execution.changes())?;
+    let scenario = Scenario::load(&file, &options.changes())?;
     if !scenario.faults.is_empty() {
         let help = "play it with `cars launch`, or leave them out with --set 'fault=[]'";
         return Err(miette!(
@@ -41,100 +36,13 @@ pub(crate) fn run(args: &RunArgs) -> miette::Result<ExitCode> {
             "the scenario has faults of processes, and here are none"
         ));
     }
-    let run = args.execution.run_name(&args.file)?;
-    let (folder, _lock) = args.execution.folder(&run, &scenario)?;
-    let speed = args.execution.speed.and_then(|speed| speed.0);
+
+    let run = options.run_name(&args.file).into_diagnostic()?;
+    let (folder, _lock) = options.folder(&run, &scenario)?;
+    let speed = options.speed.and_then(|speed| speed.0);
     let summary = execute(scenario, &run, &folder, speed)?;
     if !args.quiet {
         table::print(&summary, folder.path());
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// All robots here, behind the simulator's barrier.
-struct InProcess(LocalHost);
-
-impl Barrier for InProcess {
-    type Interrupt = RobotError;
-
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
-        let reports = self
-            .0
-            .exchange(&clock, &mut |name| simulation.percept(name))?;
-        Ok(Exchange {
-            reports,
-            membership: Vec::new(),
-        })
-    }
-}
-
-/// Runs a scenario to its end and records it.
-pub(crate) fn execute(
-    scenario: Scenario,
-    run: &RunName,
-    folder: &RunFolder,
-    speed: Option<f64>,
-) -> miette::Result<Summary> {
-    let mut recorder = None;
-    let begun = Instant::now();
-    let simulation = play(scenario, run, |simulation, record| {
-        let recorder = match &mut recorder {
-            Some(recorder) => recorder,
-            none => none.insert(Recorder::begin(folder, run, simulation)?),
-        };
-        recorder.write(simulation, record)?;
-        if let Some(speed) = speed {
-            let due = Duration::try_from_secs_f64(simulation.time_s(simulation.tick()) / speed);
-            std::thread::sleep(due.unwrap_or(Duration::MAX).saturating_sub(begun.elapsed()));
-        }
-        Ok(())
-    })?;
-    let recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
-    Ok(recorder.finish(&simulation)?)
-}
-
-/// Plays a scenario to its end in this process and shows every tick to `each`, the end of the run included.
-pub(crate) fn play(
-    scenario: Scenario,
-    run: &RunName,
-    mut each: impl FnMut(&Simulation, &TickRecord) -> miette::Result<()>,
-) -> miette::Result<Simulation> {
-    let robots = make_robots(&scenario, Path::new("the scenario"))?;
-    let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
-    let seated = robots
-        .into_iter()
-        .filter_map(|(name, robot)| Some((robot, welcome(&simulation, run, &name)?)));
-    let mut barrier = InProcess(LocalHost::new(seated.collect()));
-    let record = simulation.init(&mut barrier).into_diagnostic()?;
-    each(&simulation, &record)?;
-    while simulation.tick() < simulation.scenario().ticks {
-        let record = simulation.step(&mut barrier).into_diagnostic()?;
-        each(&simulation, &record)?;
-    }
-    each(&simulation, &simulation.end(End::Finished))?;
-    Ok(simulation)
-}
-
-fn welcome(simulation: &Simulation, run: &RunName, name: &protocol::RobotName) -> Option<Welcome> {
-    simulation.welcome(run, name, 1)
-}
-
-/// One robot of the right class for each name of the roster.
-pub(crate) fn make_robots(
-    scenario: &Scenario,
-    file: &Path,
-) -> miette::Result<BTreeMap<protocol::RobotName, Box<dyn Robot>>> {
-    let make = |(name, spec): (&protocol::RobotName, &simulator::scenario::RobotSpec)| {
-        let robot = robots::make(&spec.class).ok_or_else(|| {
-            miette!(
-                help = "a robot of another kind runs as a process of its own: name it in a launch file and use `cars launch`",
-                "{}: robot {name} is of class {:?}, and only {} can run in this process",
-                file.display(),
-                spec.class,
-                robots::CLASSES.join(", ")
-            )
-        })?;
-        Ok((name.clone(), robot))
-    };
-    scenario.robots.iter().map(make).collect()
 }

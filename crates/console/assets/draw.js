@@ -226,7 +226,7 @@ export function flight({ context, camera, theme }, flight, from, to) {
   const y1 = camera.y(from.y);
   const x2 = camera.x(to.x);
   const y2 = camera.y(to.y);
-  const isLost = flight.fate === "dropped" || flight.fate === "missing";
+  const isLost = flight.fate === "dropped";
   const eased = flight.progress * flight.progress * (3 - 2 * flight.progress);
   const x = x1 + (x2 - x1) * eased;
   const y = y1 + (y2 - y1) * eased + 60 * flight.fallen * flight.fallen;

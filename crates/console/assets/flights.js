@@ -77,7 +77,7 @@ export class Flights {
  * @param {number} passed_ms
  */
 function step(flight, passed_ms) {
-  const isLost = flight.fate === "dropped" || flight.fate === "missing";
+  const isLost = flight.fate === "dropped";
   const end = isLost ? Math.max(HALF_WAY, flight.progress) : flight.fate === "delivered" ? 1 : BEFORE_TARGET;
   if (flight.progress < end) flight.progress = Math.min(end, flight.progress + passed_ms / FLIGHT_MS);
   else if (isLost) flight.fallen += passed_ms / FALL_MS;

@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 use bus::{Bus, BusError, Declared, Role};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::Keys;
-use protocol::messages::{Control, ControlAnswer};
-use protocol::{Message, RobotName, RunName, decode, encode};
+use protocol::messages::{Command, Control, ControlAnswer};
+use protocol::{FieldError, Message, RobotName, RunName, decode, encode};
 
 use crate::feed::Feed;
 
@@ -201,17 +201,28 @@ impl Live {
         to: &RobotName,
         command: &str,
     ) -> Result<ControlAnswer, String> {
-        let request = Control::Command {
-            to: to.clone(),
+        let message = Command {
             command: command.to_owned(),
+            ..Command::default()
         };
-        self.query(&request, REPLY_TIMEOUT)
+        message.check().map_err(malformed)?;
+        let bus = self.bus.get().ok_or_else(|| self.no_simulator())?;
+        let key = self.keys.command(to, &RobotName::operator());
+        bus.put(&key, encode(&message))
+            .map_err(|error| error.to_string())?;
+
+        // On one session the command arrives before this query: the answer means that the simulator has it.
+        let answer = self.query(&Control::Status, REPLY_TIMEOUT)?;
+        match &answer {
+            ControlAnswer::Done(status) if status.robots.iter().all(|robot| robot.name != *to) => {
+                Err(format!("no robot of this run is called {to}"))
+            }
+            _ => Ok(answer),
+        }
     }
 
     fn query(&self, control: &Control, timeout: Duration) -> Result<ControlAnswer, String> {
-        control
-            .check()
-            .map_err(|(field, reason)| format!("malformed request: {field}: {reason}"))?;
+        control.check().map_err(malformed)?;
         let bus = self.bus.get().ok_or_else(|| self.no_simulator())?;
         let key = self.keys.control();
 
@@ -482,4 +493,8 @@ fn decode_from<M: Message>(key: &str, sender: &str, payload: &[u8]) -> Result<M,
 /// The key expression of all robots' panels.
 fn panels_of(run: &RunName) -> String {
     format!("cars/{run}/robot/*/panel")
+}
+
+fn malformed(error: FieldError) -> String {
+    format!("malformed request: {}: {}", error.field, error.reason)
 }

@@ -132,7 +132,6 @@ fn flight(line: &Line) -> Option<Flight> {
         Event::CommandSent { from, to, seq, .. } => (from, to, seq, Fate::Sent),
         Event::CommandDelivered { from, to, seq, .. } => (from, to, seq, Fate::Delivered),
         Event::CommandDropped { from, to, seq, .. } => (from, to, seq, Fate::Dropped),
-        Event::CommandMissing { from, to, seq, .. } => (from, to, seq, Fate::Missing),
         _ => return None,
     };
 

@@ -3,7 +3,7 @@
 use protocol::messages::{Panel, Point, StateVariables, Variable};
 
 use crate::cars::Cars;
-pub(crate) use crate::error::{BadParameters, RobotError};
+use crate::error::BadParameters;
 
 /// A robot.
 ///

@@ -72,7 +72,9 @@ pub enum HostError {
     #[error("stopped from within this process")]
     Stopped,
     /// No simulator executes the run.
-    #[error("no simulator of run {run} answers at {connect}; is it running, and is the run's name right?")]
+    #[error(
+        "no simulator of run {run} answers at {connect}; is it running, and is the run's name right?"
+    )]
     NoSimulator {
         /// The run.
         run: RunName,
@@ -201,14 +203,16 @@ impl Host {
     fn declare(&mut self, name: &RobotName) -> Result<(), BusError> {
         let shared = self.shared.clone();
         let own = name.clone();
-        let news = self.bus.subscribe(&self.keys.news(name), move |key, bytes| {
-            match decode::<News>(key, "simulator", bytes) {
-                Ok(news) => shared.with(&own, |participant, actions| {
-                    participant.news(news.epoch, news.tick, news.joined, news, actions);
-                }),
-                Err(error) => tracing::warn!("{error}"),
-            }
-        })?;
+        let news = self
+            .bus
+            .subscribe(&self.keys.news(name), move |key, bytes| {
+                match decode::<News>(key, "simulator", bytes) {
+                    Ok(news) => shared.with(&own, |participant, actions| {
+                        participant.news(news.epoch, news.tick, news.joined, news, actions);
+                    }),
+                    Err(error) => tracing::warn!("{error}"),
+                }
+            })?;
         self.declared.push(news);
 
         for what in QUERIES.iter().chain([&STATE]) {
@@ -216,12 +220,15 @@ impl Host {
             let own = name.clone();
             let queryable = self
                 .bus
-                .queryable(&self.keys.query(name, what), move |query| {
-                    match read_query(&query).and_then(|asked| shared.state(&own, asked)) {
+                .queryable(
+                    &self.keys.query(name, what),
+                    move |query| match read_query(&query)
+                        .and_then(|asked| shared.state(&own, asked))
+                    {
                         Ok(state) => reply(&query, &state),
                         Err(reason) => query.reply_err(&reason),
-                    }
-                })?;
+                    },
+                )?;
             self.declared.push(queryable);
         }
         Ok(())
@@ -563,4 +570,3 @@ fn reply(query: &bus::Query, state: &PublicState) {
         None => query.reply_err(&format!("there is no query called {what}")),
     }
 }
-

@@ -151,7 +151,9 @@ impl LocalHost {
         self.participants[index].done(commands, state, report, &mut actions);
         let name = self.names[index].clone();
         for action in actions {
-            let Action::Put(answer) = action else { continue };
+            let Action::Put(answer) = action else {
+                continue;
+            };
             let stamp = Stamp {
                 epoch: answer.epoch,
                 tick: answer.tick,

@@ -4,8 +4,8 @@
 //! It owns the environment and the clock. It neither knows nor cares what a robot feels: there is no dependency on
 //! `affect`.
 
-pub mod diagnostic;
 pub mod digest;
+mod files;
 pub mod medium;
 pub mod recorder;
 pub mod roster;
@@ -13,8 +13,9 @@ pub mod scenario;
 pub mod server;
 pub mod simulation;
 pub mod summary;
-pub mod units;
 
+/// Files that people write, and errors in them: [`Scenario::parse`] takes the one and returns the other.
+pub use config::diagnostic;
 pub use protocol::{Event, Line};
 pub use recorder::{Recorder, RunFolder};
 pub use scenario::{OnLate, Scenario};

@@ -4,57 +4,19 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use config::FileError;
 use protocol::event::log_line;
 use protocol::messages::{LogRecord, RecordedRobot, RecordedTick, RecordingHeader};
 use protocol::{Epoch, Event, RobotName, RunName};
 
-use crate::diagnostic::FileError;
+use crate::files::{LOCK, check_log_name};
 use crate::scenario::Scenario;
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::Summary;
 
-/// File names within a run's folder.
-pub const SCENARIO: &str = "scenario.toml";
-/// What happened, for machines.
-pub const EVENTS: &str = "events.jsonl";
-/// What happened, for people.
-pub const LOG: &str = "cars.log";
-/// Where everything was after every tick, for the console to play again.
-pub const RECORDING: &str = "recording.jsonl";
-/// What came of it.
-pub const SUMMARY: &str = "summary.json";
-/// What each process printed.
-pub const LOGS: &str = "logs";
-/// Where the simulator of a run in progress listens.
-pub const ENDPOINT: &str = "endpoint";
-/// Path of the file with which an operator may control a secured run in progress.
-pub const OPERATOR_CONFIG: &str = "operator_config";
-/// Held by the process that writes the record, as long as it lives.
-const LOCK: &str = ".lock";
-
-/// Refuses a name for the readable log that is no plain file name, or that the run's folder needs for something else.
-pub(crate) fn check_log_name(name: &str) -> Result<(), String> {
-    let is_plain = !name.is_empty()
-        && name.len() <= 100
-        && !name.starts_with('.')
-        && name
-            .bytes()
-            .all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
-    if !is_plain {
-        return Err(format!(
-            "{name:?} is no file name of letters, digits, `.`, `_` and `-`"
-        ));
-    }
-    let is_taken = [EVENTS, RECORDING, SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG].contains(&name)
-        || name.starts_with("scenario")
-        || name.starts_with("events")
-        || name.starts_with("recording");
-    if is_taken {
-        Err(format!("the run keeps something else in {name}"))
-    } else {
-        Ok(())
-    }
-}
+pub use crate::files::{
+    ENDPOINT, EVENTS, LATEST, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO, SUMMARY,
+};
 
 /// The folder of a run: `OUT/NAME`.
 #[derive(Debug, Clone)]
@@ -79,7 +41,7 @@ impl RunFolder {
 
     /// Makes the folder, empty of an earlier run with this name, and writes the resolved scenario into it.
     ///
-    /// The folder is the caller's as long as the returned lock lives: nobody overwrites a run in progress.
+    /// The folder is the caller's as long as the returned lock lives: no other process overwrites a run in progress.
     ///
     /// # Errors
     /// [`FileError`] if that cannot be done, if the folder holds something that is not a run, or a run in progress.
@@ -95,18 +57,37 @@ impl RunFolder {
         }
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
         let lock = self.lock()?;
-        let (log, own) = (
-            self.log(),
-            [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name)),
-        );
+        let log = self.log();
+        let own =
+            [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name));
         for file in self.superseded().into_iter().chain(own).chain([log]) {
             if file.exists() {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
             }
         }
-        std::fs::write(self.file(SCENARIO), scenario.to_toml()?)
-            .map_err(|error| self.failed("write", &error))?;
+        self.write_scenario(scenario)?;
         Ok(lock)
+    }
+
+    /// The one writer of [`SCENARIO`], once for each epoch.
+    fn write_scenario(&self, scenario: &Scenario) -> Result<(), FileError> {
+        std::fs::write(self.file(SCENARIO), scenario.to_toml()?)
+            .map_err(|error| self.failed("write to", &error))
+    }
+
+    /// Points the link [`LATEST`] beside the folder at it. It is a convenience: where links cannot be made, runs are found
+    /// by their names.
+    pub fn point_latest(&self) {
+        let link = self.path.with_file_name(LATEST);
+        if link.is_symlink() {
+            let _ = std::fs::remove_file(&link);
+        }
+        let Some(name) = self.path.file_name() else {
+            return;
+        };
+        if let Err(error) = std::os::unix::fs::symlink(name, &link) {
+            tracing::debug!(%error, "no link to the latest run");
+        }
     }
 
     fn lock(&self) -> Result<RunLock, FileError> {
@@ -207,7 +188,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins an epoch. What an epoch before it left is kept under its number, `events-epoch1.jsonl`.
+    /// Begins an epoch in a folder that [`RunFolder::create`] made. What an epoch before it left is kept under its number, `events-epoch1.jsonl`.
     ///
     /// # Errors
     /// [`FileError`] if the files cannot be made.
@@ -219,9 +200,8 @@ impl Recorder {
         let (scenario, epoch) = (simulation.scenario(), simulation.epoch());
         if epoch > 1 {
             folder.keep(epoch)?;
+            folder.write_scenario(scenario)?;
         }
-        std::fs::write(folder.file(SCENARIO), scenario.to_toml()?)
-            .map_err(|error| folder.failed("write to", &error))?;
         let make = |name| {
             File::create(folder.file(name)).map_err(|error| folder.failed("write to", &error))
         };

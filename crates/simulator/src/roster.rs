@@ -1,6 +1,6 @@
 //! The seed's `CARSConfig.txt`: one robot class a line. Everything else is as in the seed's experiment.
 
-use crate::diagnostic::{FileError, Source};
+use config::diagnostic::{FileError, Source};
 use protocol::RobotName;
 
 /// Most robots a plain roster can place.

@@ -156,3 +156,34 @@ fn a_scenario_from_outside_reads_no_files() {
         error.in_words()
     );
 }
+
+#[test]
+fn a_robot_whose_name_is_a_number_is_reported_by_its_own_name() {
+    let text = "[[robot]]\nname = \"1\"\nat = [\"99 m\", \"5 m\"]\n\
+                [[robot]]\nname = \"Berta\"\nat = [\"7 m\", \"5 m\"]\n";
+    let source = Source {
+        name: "numbers".into(),
+        text: text.into(),
+    };
+    let error = Scenario::parse(&source, Path::new(".")).unwrap_err();
+    assert!(
+        error.in_words().contains("robot 1 at"),
+        "{}",
+        error.in_words()
+    );
+
+    let inside = Source {
+        text: text.replace("99 m", "3 m"),
+        ..source
+    };
+    let scenario = Scenario::parse(&inside, Path::new(".")).unwrap();
+    let mut setup = scenario.setup();
+    setup.robots.insert(name("Berta"), Point::new(3.1, 5.0));
+    let errors = scenario.with_setup(&setup).unwrap_err();
+    assert_eq!(errors[0].field, "robots.Berta");
+    assert!(
+        errors[0].reason.starts_with("robot Berta at") && errors[0].reason.ends_with("robot 1"),
+        "{}",
+        errors[0].reason
+    );
+}

@@ -6,13 +6,14 @@ use std::process::ExitCode;
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
 use clap::Parser;
+use config::Speed;
+use config::units::Time;
 use miette::{IntoDiagnostic, WrapErr};
 use protocol::RunName;
 use protocol::messages::End;
 use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG};
 use simulator::scenario::{Changes, Override, Scenario};
 use simulator::server::{Event, Options, REPEAT_AFTER, Server};
-use simulator::units::Time;
 use simulator::{RunFolder, Summary};
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
@@ -37,7 +38,7 @@ struct Args {
     #[arg(long)]
     duration: Option<Time>,
     /// Simulated seconds per second, or `max`.
-    #[arg(long, default_value = "max", value_parser = speed)]
+    #[arg(long, default_value = "max")]
     speed: Speed,
     /// Changes of the scenario, for example `guests.count=50`.
     #[arg(long, value_name = "PATH=VALUE")]
@@ -55,13 +56,6 @@ struct Args {
     /// and pose as any robot.
     #[arg(long)]
     insecure: bool,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Speed(Option<f64>);
-
-fn speed(text: &str) -> Result<Speed, String> {
-    simulator::scenario::parse_speed(text).map(Speed)
 }
 
 fn main() -> miette::Result<ExitCode> {

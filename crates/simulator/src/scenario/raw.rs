@@ -2,21 +2,26 @@
 
 mod fault;
 mod network;
+mod range;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use config::units::{Length, Speed, Time, quantity};
+use config::{FileError, Source, seed};
 use protocol::RobotName;
-use protocol::messages::{Parameters, Point};
+use protocol::messages::{OnLate, Parameters, Point};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
+use world::Triangular;
 
 use fault::FaultTable;
 use network::NetworkTable;
+use range::Range;
 
-use super::{DEFAULT_SEED, Lateness, OnLate, Record, RobotSpec, check_seed};
-use crate::diagnostic::{FileError, Source};
-use crate::units::{Length, Speed, Time, quantity};
+use super::checked::{self, DEFAULT_SEED, Lateness, Record, RobotSpec};
+use super::network::Network;
+use super::placing;
 
 /// Largest scenario: more than any experiment asks for, less than would exhaust a machine.
 const MAX_TICKS: f64 = 1e9;
@@ -66,14 +71,6 @@ struct GuestsTable {
     duration: Option<Spanned<Range<Time>>>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct Range<Q> {
-    min: Q,
-    mode: Q,
-    max: Q,
-}
-
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct RecordTable {
@@ -83,10 +80,10 @@ struct RecordTable {
 }
 
 /// A triangular distribution in SI units, not checked yet.
-pub(super) struct Triangle {
-    pub(super) min: f64,
-    pub(super) mode: f64,
-    pub(super) max: f64,
+struct Triangle {
+    min: f64,
+    mode: f64,
+    max: f64,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -152,10 +149,10 @@ impl Scenario {
         self,
         source: &Source,
         folder: &Path,
-    ) -> Result<super::Scenario, FileError> {
+    ) -> Result<checked::Scenario, FileError> {
         let seed = match &self.seed {
-            Some(seed) => check_seed(*seed.get_ref())
-                .map_err(|reason| FileError::at(source, Some(seed.span()), &reason))?,
+            Some(seed) => seed::check(*seed.get_ref())
+                .map_err(|error| FileError::at(source, Some(seed.span()), &error.to_string()))?,
             None => DEFAULT_SEED,
         };
         let tick_s = positive(source, self.tick.as_ref(), 0.5, |time| time.0, "a tick")?;
@@ -201,7 +198,7 @@ impl Scenario {
                 "lose_after",
             )? as u32,
         };
-        let scenario = super::Scenario {
+        let scenario = checked::Scenario {
             seed,
             tick_s,
             ticks: ticks as u64,
@@ -229,7 +226,7 @@ impl Scenario {
                 .collect(),
             lateness,
             robots: robots(self.robots, source, folder)?,
-            network: super::Network::default(),
+            network: Network::default(),
             faults: Vec::new(),
             record: record(self.record, source)?,
         };
@@ -241,24 +238,22 @@ impl Scenario {
             tick_s,
             source,
         )?;
-        let scenario = super::Scenario {
+        let scenario = checked::Scenario {
             network,
             faults,
             ..scenario
         };
-        scenario.check_hall(source, self.guests.as_ref().map(Spanned::span))?;
+        check_hall(&scenario, source, self.guests.as_ref().map(Spanned::span))?;
         Ok(scenario)
     }
 
-    fn guest_courses(
-        &self,
-        source: &Source,
-    ) -> Result<(world::Triangular, world::Triangular), FileError> {
+    fn guest_courses(&self, source: &Source) -> Result<(Triangular, Triangular), FileError> {
         let guests = self.guests.as_ref().map(Spanned::get_ref);
         let speed = guests.and_then(|guests| guests.speed.as_ref());
         let duration = guests.and_then(|guests| guests.duration.as_ref());
         let shape = |raw: Triangle, span| {
-            super::triangular(&raw).map_err(|reason| FileError::at(source, span, &reason))
+            Triangular::new(raw.min, raw.mode, raw.max)
+                .map_err(|error| FileError::at(source, span, &error.to_string()))
         };
         let drawn = speed.map_or(GUEST_SPEED, |speed| *speed.get_ref());
         let speed = Triangle {
@@ -282,27 +277,15 @@ impl Scenario {
     }
 }
 
-impl super::Scenario {
-    /// Places everything once, so that a hall that cannot be placed is refused before anything starts.
-    fn check_hall(
-        &self,
-        source: &Source,
-        guests: Option<std::ops::Range<usize>>,
-    ) -> Result<(), FileError> {
-        let stream = protocol::random::stream(self.seed, "guests");
-        let placed = world::World::new(&self.hall(), stream);
-        placed
-            .map(|_| ())
-            .map_err(|error| FileError::at(source, guests, &self.name_robots(&error)))
-    }
-
-    /// The environment counts its robots; people know their names.
-    pub(super) fn name_robots(&self, error: &world::HallError) -> String {
-        let mut text = error.to_string();
-        for (index, name) in self.robots.keys().enumerate() {
-            text = text.replace(&format!("robot {index} "), &format!("robot {name} "));
-        }
-        text
+/// Places everything once, so that a hall that cannot be placed is refused before anything starts.
+fn check_hall(
+    scenario: &checked::Scenario,
+    source: &Source,
+    guests: Option<std::ops::Range<usize>>,
+) -> Result<(), FileError> {
+    match placing::check(scenario) {
+        Ok(()) => Ok(()),
+        Err(error) => Err(FileError::at(source, guests, &error.to_string())),
     }
 }
 
@@ -310,8 +293,8 @@ fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError
     let standard = Record::default();
     let Some(raw) = raw else { return Ok(standard) };
     if let Some(name) = &raw.log_name {
-        crate::recorder::check_log_name(name.get_ref())
-            .map_err(|reason| FileError::at(source, Some(name.span()), &reason))?;
+        crate::files::check_log_name(name.get_ref())
+            .map_err(|error| FileError::at(source, Some(name.span()), &error.to_string()))?;
     }
     Ok(Record {
         log: raw.log.unwrap_or(standard.log),
@@ -412,10 +395,10 @@ fn to_json(value: &toml::Value) -> serde_json::Value {
     }
 }
 
-impl From<&super::Scenario> for Scenario {
-    fn from(scenario: &super::Scenario) -> Self {
+impl From<&checked::Scenario> for Scenario {
+    fn from(scenario: &checked::Scenario) -> Self {
         let spanned = |value| Some(Spanned::new(0..0, value));
-        let range = |shape: &world::Triangular| (shape.min(), shape.mode(), shape.max());
+        let range = |shape: &Triangular| (shape.min(), shape.mode(), shape.max());
         let (min, mode, max) = range(&scenario.guests.speed_mps);
         let speed = Range {
             min: Speed(min),

@@ -1,11 +1,11 @@
 //! What a person can change between two epochs, checked field by field so that each mistake is shown where it was made.
 
 use protocol::messages::{FieldError, LogFile, Range, Setup};
-use protocol::random::MAX_SEED;
-use world::{Guests, HallError, Triangular, World};
+use world::{Guests, Triangular};
 
-use super::Scenario;
-use crate::recorder;
+use super::checked::Scenario;
+use super::placing;
+use crate::files;
 
 /// Longest epoch that a set-up may ask for, ticks.
 const MAX_TICKS: f64 = 1e9;
@@ -47,9 +47,9 @@ impl Scenario {
         let mut errors = Errors::default();
         let mut scenario = self.clone();
         scenario.seed = setup.seed;
-        errors.unless(setup.seed <= MAX_SEED, "seed", || {
-            format!("a seed is a whole number up to {MAX_SEED}")
-        });
+        if let Err(error) = config::seed::check(setup.seed) {
+            errors.add("seed", error.to_string());
+        }
         let ticks = (setup.duration_s / self.tick_s).round();
         errors.unless((1.0..=MAX_TICKS).contains(&ticks), "duration_s", || {
             format!(
@@ -92,43 +92,19 @@ impl Scenario {
             );
         }
         scenario.record.log = setup.log_file.enabled;
-        match recorder::check_log_name(&setup.log_file.name) {
+        match files::check_log_name(&setup.log_file.name) {
             Ok(()) => scenario.record.log_name.clone_from(&setup.log_file.name),
-            Err(reason) => errors.add("log_file.name", reason),
+            Err(error) => errors.add("log_file.name", error.to_string()),
         }
         if errors.0.is_empty()
-            && let Err(error) = World::new(
-                &scenario.hall(),
-                protocol::random::stream(scenario.seed, "guests"),
-            )
+            && let Err(error) = placing::check(&scenario)
         {
-            errors.add(&scenario.blame(&error), scenario.name_robots(&error));
+            errors.add(&error.field(), error.to_string());
         }
         if errors.0.is_empty() {
             Ok(scenario)
         } else {
             Err(errors.0)
-        }
-    }
-
-    /// The field of a set-up that a hall which cannot be placed is the fault of.
-    fn blame(&self, error: &HallError) -> String {
-        let robot = |index: usize| {
-            self.robots
-                .keys()
-                .nth(index)
-                .map_or("robots".to_owned(), |name| format!("robots.{name}"))
-        };
-        match *error {
-            HallError::RobotOffField { index, .. }
-            | HallError::RobotOnObstacle { index, .. }
-            | HallError::RobotOnRobot { index, .. } => robot(index),
-            HallError::ObstacleOffField { .. } => "obstacles".to_owned(),
-            HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => "guests".to_owned(),
-            HallError::OutOfRange { name, .. } if name.contains("guest") => {
-                "guest_speed_mps".to_owned()
-            }
-            _ => "field_m".to_owned(),
         }
     }
 

@@ -44,10 +44,6 @@ impl Pace {
         }
     }
 
-    pub(super) fn phase(&self) -> Phase {
-        self.phase
-    }
-
     /// An epoch begins: robots are awaited.
     pub(super) fn gather(&mut self) {
         self.phase = Phase::Gathering;

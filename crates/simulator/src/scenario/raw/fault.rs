@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use config::units::Time;
+use config::{FileError, Source};
 use protocol::RobotName;
 use protocol::messages::{FaultKind, OnLate};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use super::super::checked::{Lateness, RobotSpec};
 use super::super::fault::{Fault, FaultEnd};
 use super::super::network::ticks;
-use super::super::{Lateness, RobotSpec};
-use crate::diagnostic::{FileError, Source};
-use crate::units::Time;
 
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 10_000;

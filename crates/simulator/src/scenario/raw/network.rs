@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use config::units::Time;
+use config::{FileError, Source};
 use protocol::RobotName;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use world::Triangular;
 
-use super::super::RobotSpec;
+use super::super::checked::RobotSpec;
 use super::super::network::{Burst, Channel, Link, Network, Partition, ticks};
-use super::Range;
-use crate::diagnostic::{FileError, Source};
-use crate::units::Time;
+use super::range::Range;
 
 /// Longest time for which a command can be held back: whoever sends it must be able to repeat it until then.
 const MAX_DELAY_TICKS: u64 = 1000;

@@ -95,7 +95,7 @@ impl Stroller {
         cars.log(format!("obeys {from}: {text}"));
     }
 
-    // To look around: `cars.percept()`; to query another robot: `cars.get_robot_state("Butler")`.
+    // To look around: `cars.bodies()`, and `senses_bodies`; to query another robot: `cars.get_robot_state("Butler")`.
     fn update_progress(&mut self, cars: &mut Cars<'_>) {
         if cars.was_blocked() {
             self.held_up_s += cars.tick_s();

@@ -1,0 +1,66 @@
+//! Options that `launch`, `run` and `net play` have in common.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use config::units::Time;
+use config::{Override, Speed, seed};
+use launch::RunOptions;
+use protocol::RunName;
+use protocol::random::MAX_SEED;
+
+/// Options of one execution.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ExecutionArgs {
+    /// Name of the run, and of its folder; without it the file's name.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) run: Option<RunName>,
+    /// Seed, or `random` to draw one; it is recorded either way.
+    #[arg(long, value_name = "N|random", value_parser = parse_seed)]
+    pub(crate) seed: Option<u64>,
+    /// Simulated time, for example "600 s".
+    #[arg(long, value_name = "TIME")]
+    pub(crate) duration: Option<Time>,
+    /// Simulated seconds per second, or `max` for as fast as it goes.
+    #[arg(long, value_name = "FACTOR|max")]
+    pub(crate) speed: Option<Speed>,
+    /// Where run folders are made.
+    #[arg(long, default_value = "runs", value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// A change of the scenario, for example `guests.count=50` or `robot.Butler.params.refiller=Vonda`.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    pub(crate) set: Vec<Override>,
+}
+
+fn parse_seed(text: &str) -> Result<u64, String> {
+    if text == "random" {
+        return draw_seed();
+    }
+    let number = text
+        .parse()
+        .map_err(|_| format!("a seed is a whole number from 0 to {MAX_SEED}, or `random`"))?;
+    seed::check(number).map_err(|error| error.to_string())
+}
+
+/// A seed drawn by the system; from here on it is part of the run's record.
+fn draw_seed() -> Result<u64, String> {
+    let mut bytes = [0; 8];
+    let read = std::fs::File::open("/dev/urandom")
+        .and_then(|mut source| std::io::Read::read_exact(&mut source, &mut bytes));
+    read.map_err(|error| format!("no seed can be drawn: {error}"))?;
+    Ok(u64::from_le_bytes(bytes) & MAX_SEED)
+}
+
+impl ExecutionArgs {
+    /// The same as the library has it.
+    pub(crate) fn options(self) -> RunOptions {
+        RunOptions {
+            run: self.run,
+            seed: self.seed,
+            duration: self.duration,
+            speed: self.speed,
+            out: self.out,
+            set: self.set,
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! The same launch as containers: one service for each process.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Component, Path, PathBuf};
+
+use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
+use config::FileError;
+use protocol::RunName;
+
+use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
+use super::plan::{name_args, with_own_args};
+use super::restart::Restart;
+use config::Speed;
+
+/// Image of all services.
+const IMAGE: &str = "cars:local";
+/// Addresses of the private network. Fixed ones: looking up a name delays the noticing of a failure, and the healing,
+/// by ten seconds.
+const NETWORK: &str = "172.30.77";
+/// The simulator's place in it; the others follow.
+const FIRST_HOST: usize = 10;
+/// Most services that find an address.
+const MAX_SERVICES: usize = 240;
+const PORT: u16 = 7447;
+/// Port of the console.
+const CONSOLE_PORT: u16 = 7007;
+
+/// Explains the file to those who meet it first.
+const HEAD: &str = "\
+# Made by `cars launch --export compose`: one service for each process of a launch file.
+#
+# The image has the binaries that are built here; docker/Dockerfile says how. Then
+#     docker-compose up --exit-code-from simulator
+# plays the run and leaves its folder in ./runs. The services reach each other, and nobody else reaches them but a
+# browser on this machine: the console's log shows the address.
+";
+
+/// Writes the compose file of a launch file; paths in it are relative to the folder it is put in, the current one.
+pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<String, FileError> {
+    if file.processes.len() > MAX_SERVICES {
+        return Err(FileError::new(format!(
+            "more than {MAX_SERVICES} processes do not fit into one network"
+        )));
+    }
+    let mut text = format!("{HEAD}\nservices:\n");
+    simulator_service(&mut text, file, run, speed)?;
+    for (index, process) in file.processes.iter().enumerate() {
+        robot_service(&mut text, process, run, FIRST_HOST + 1 + index);
+    }
+    if let Some(console) = &file.console {
+        console_service(
+            &mut text,
+            console,
+            run,
+            FIRST_HOST + 1 + file.processes.len(),
+        );
+    }
+    let _infallible = write!(
+        text,
+        "networks:\n  cars:\n    internal: true\n    ipam:\n      config:\n        - subnet: {NETWORK}.0/24\n"
+    );
+    if file.console.is_some() {
+        // A private network publishes nothing; the browser comes in by another one.
+        text += "  browser: {}\n";
+    }
+    Ok(text)
+}
+
+fn simulator_service(
+    text: &mut String,
+    file: &LaunchFile,
+    run: &RunName,
+    speed: Speed,
+) -> Result<(), FileError> {
+    let no_file = || FileError::new(format!("{} names no file", file.scenario.display()));
+    let scenario = file
+        .scenario
+        .file_name()
+        .and_then(|name| name.to_str())
+        .ok_or_else(no_file)?;
+    let mut command = file.simulator.command.clone();
+    command.extend([
+        format!("/configs/{scenario}"),
+        format!("--run={run}"),
+        format!("--listen=tcp/0.0.0.0:{PORT}"),
+        // Everybody in the private network is trusted, and nobody else reaches it.
+        "--insecure".to_owned(),
+        "--out=/runs".to_owned(),
+        format!("--speed={}", speed),
+    ]);
+    let mut env = file.simulator.env.clone();
+    env.entry(RUNTIME_VARIABLE.to_owned())
+        .or_insert_with(|| ONE_THREAD.to_owned());
+    let mut service = Service::begin(text, SIMULATOR, &command);
+    service.map("environment", env.iter());
+    let folder = file.scenario.parent().unwrap_or(Path::new(""));
+    service.list(
+        "volumes",
+        &[
+            format!("{}:/configs:ro", here(folder)),
+            "./runs:/runs".to_owned(),
+        ],
+    );
+    service.end(FIRST_HOST);
+    Ok(())
+}
+
+/// The console, for a browser on the same machine. It is bound to more than loopback in its container, so its address
+/// has a token; the log of the service shows it.
+fn console_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
+    let mut command = process.command.clone();
+    command.retain(|word| !word.starts_with("--bind"));
+    command.push(format!("--bind=0.0.0.0:{CONSOLE_PORT}"));
+    let mut service = Service::begin(text, CONSOLE, &command);
+    service.map("environment", guest_env(process, run).iter());
+    service.list("depends_on", &[SIMULATOR.to_owned()]);
+    service.list(
+        "ports",
+        &[format!("127.0.0.1:{CONSOLE_PORT}:{CONSOLE_PORT}")],
+    );
+    service.end_in(host, "      browser: {}\n");
+}
+
+/// Environment of a service that connects to the simulator.
+fn guest_env(process: &Process, run: &RunName) -> BTreeMap<String, String> {
+    let mut env = process.env.clone();
+    env.insert("CARS_RUN".to_owned(), run.to_string());
+    env.insert(
+        "CARS_CONNECT".to_owned(),
+        format!("tcp/{NETWORK}.{FIRST_HOST}:{PORT}"),
+    );
+    env.entry(RUNTIME_VARIABLE.to_owned())
+        .or_insert_with(|| ONE_THREAD.to_owned());
+    env
+}
+
+fn robot_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
+    let command = with_own_args(&process.command, name_args(&process.robots));
+    let mut service = Service::begin(text, &process.name.to_lowercase(), &command);
+    service.map("environment", guest_env(process, run).iter());
+    service.list("depends_on", &[SIMULATOR.to_owned()]);
+    match process.restart {
+        Restart::Never => {}
+        Restart::OnFailure => service.line("restart: on-failure:5"),
+        Restart::Always => service.line("restart: unless-stopped"),
+    }
+    if process.is_extern {
+        // Not started with the others; `docker-compose --profile extern up` does.
+        service.list("profiles", &["extern".to_owned()]);
+    }
+    service.end(host);
+}
+
+/// A folder as compose reads it: `./configs`, and not the name of a volume.
+fn here(folder: &Path) -> String {
+    let is_anchored =
+        folder.is_absolute() || folder.components().next() == Some(Component::ParentDir);
+    let path = if is_anchored {
+        folder.to_owned()
+    } else {
+        PathBuf::from(".").join(folder)
+    };
+    path.display().to_string().trim_end_matches('/').to_owned()
+}
+
+/// One service of the file. Writing to a text cannot fail.
+struct Service<'a> {
+    text: &'a mut String,
+}
+
+impl<'a> Service<'a> {
+    fn begin(text: &'a mut String, name: &str, command: &[String]) -> Self {
+        *text += &format!("  {name}:\n    image: {IMAGE}\n");
+        let words: Vec<String> = command.iter().map(|word| quote(word)).collect();
+        let service = Self { text };
+        *service.text += &format!("    command: [{}]\n    init: true\n", words.join(", "));
+        service
+    }
+
+    fn line(&mut self, line: &str) {
+        *self.text += &format!("    {line}\n");
+    }
+
+    fn list(&mut self, key: &str, values: &[String]) {
+        self.line(&format!("{key}:"));
+        values
+            .iter()
+            .for_each(|value| *self.text += &format!("      - {}\n", quote(value)));
+    }
+
+    fn map<'b>(&mut self, key: &str, values: impl Iterator<Item = (&'b String, &'b String)>) {
+        self.line(&format!("{key}:"));
+        values.for_each(|(name, value)| *self.text += &format!("      {name}: {}\n", quote(value)));
+    }
+
+    fn end(self, host: usize) {
+        self.end_in(host, "");
+    }
+
+    /// The end of a service that is in other networks, too.
+    fn end_in(self, host: usize, others: &str) {
+        let own = format!("      cars:\n        ipv4_address: {NETWORK}.{host}\n");
+        *self.text += &format!("    networks:\n{own}{others}\n");
+    }
+}
+
+/// A text for YAML, whatever is in it; `$` would begin a variable of compose.
+fn quote(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=".contains(c);
+    let is_word = word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '/' || c == '.');
+    let is_literal = ["yes", "no", "true", "false", "on", "off", "null", "y", "n"];
+    if is_word && word.chars().all(is_plain) && !is_literal.contains(&word.to_lowercase().as_str())
+    {
+        return word.to_owned();
+    }
+    let escaped = serde_json::Value::from(word.replace('$', "$$"));
+    escaped.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_committed_file_is_that_of_the_default_launch() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let path = root.join("launch/hors_doeuvres.toml");
+        let source = config::Source::read(&path).unwrap();
+        let file = LaunchFile::parse(source, Path::new("launch")).unwrap();
+        let run = RunName::new("hors_doeuvres").unwrap();
+        let text = export(&file, &run, file.speed.unwrap()).unwrap();
+        let committed = std::fs::read_to_string(root.join("docker-compose.yml")).unwrap();
+        let how = "cars launch launch/hors_doeuvres.toml --export compose > docker-compose.yml";
+        assert_eq!(
+            text, committed,
+            "make it anew, at the top of the project: {how}"
+        );
+    }
+
+    #[test]
+    fn words_are_safe_in_yaml() {
+        assert_eq!(quote("cars-sim"), "cars-sim");
+        for (word, quoted) in [
+            ("--run=x", r#""--run=x""#),
+            ("on", r#""on""#),
+            ("a: b", r#""a: b""#),
+            ("$HOME", r#""$$HOME""#),
+            ("", r#""""#),
+            ("1.5", r#""1.5""#),
+        ] {
+            assert_eq!(quote(word), quoted);
+        }
+    }
+
+    #[test]
+    fn folders_are_no_volumes() {
+        assert_eq!(here(Path::new("configs")), "./configs");
+        assert_eq!(here(Path::new("")), ".");
+        assert_eq!(here(Path::new("../lab/configs")), "../lab/configs");
+    }
+}

@@ -1,0 +1,224 @@
+//! What is wrong with a launch file, in words.
+
+use config::Changes;
+
+use super::*;
+
+const SCENARIO: &str = r#"
+[[robot]]
+name = "Butler"
+at = ["25 ft", "25 ft"]
+[[robot]]
+name = "Leguin"
+at = ["5 ft", "5 ft"]
+"#;
+
+fn scenario() -> Scenario {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hall.toml");
+    std::fs::write(&path, SCENARIO).unwrap();
+    Scenario::load(&path, &Changes::default()).unwrap()
+}
+
+fn load(text: &str) -> Result<LaunchFile, FileError> {
+    let text = format!("scenario = \"../configs/hall.toml\"\n{text}");
+    let file = LaunchFile::parse(
+        Source {
+            name: "launch/x.toml".to_owned(),
+            text,
+        },
+        Path::new("launch"),
+    )?;
+    file.check_robots(&scenario())?;
+    Ok(file)
+}
+
+/// What is said about a launch file, without colors and lines that frame it.
+#[track_caller]
+fn refusal(text: &str) -> String {
+    let error = load(text).expect_err("this file is to be refused");
+    let mut shown = String::new();
+    let handler =
+        miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none()).with_width(200);
+    handler.render_report(&mut shown, &error).unwrap();
+    shown
+}
+
+/// Every one of `words` is said about the file.
+#[track_caller]
+fn check(text: &str, words: &[&str]) {
+    let shown = refusal(text);
+    for word in words {
+        assert!(shown.contains(word), "{word:?} is not in:\n{shown}");
+    }
+}
+
+const BOTH: &str = r#"
+[[process]]
+name = "Butler"
+command = ["cars-butler"]
+[[process]]
+name = "Leguin"
+command = ["cars-leguin"]
+"#;
+
+#[test]
+fn a_file_means_what_it_says() {
+    let file = load(&format!("speed = 20\n{BOTH}")).unwrap();
+    assert_eq!(file.scenario, Path::new("configs/hall.toml"));
+    assert_eq!(file.speed, Some(Speed(Some(20.0))));
+    let butler = &file.processes[0];
+    assert_eq!(butler.command, ["cars-butler"]);
+    assert_eq!(butler.robots, [RobotName::new("Butler").unwrap()]);
+    assert_eq!(
+        (butler.restart, butler.is_required, butler.is_extern),
+        (Restart::Never, true, false)
+    );
+    let file = load(&format!(
+        "speed = \"max\"\n[simulator]\nenv = {{ RUST_LOG = \"debug\" }}\n{BOTH}\
+         restart = \"on-failure\"\nbackoff = \"250 ms\"\nrequired = false\nextern = true\n"
+    ));
+    let file = file.unwrap();
+    assert_eq!(file.speed, Some(Speed(None)));
+    assert_eq!(file.simulator.env["RUST_LOG"], "debug");
+    let leguin = &file.processes[1];
+    assert_eq!(
+        (leguin.restart, leguin.is_required, leguin.is_extern),
+        (Restart::OnFailure, false, true)
+    );
+    assert_eq!(leguin.backoff, Duration::from_millis(250));
+}
+
+#[test]
+fn the_console_runs_unless_it_is_not_wanted() {
+    let console = load(BOTH).unwrap().console.unwrap();
+    assert_eq!(
+        (console.command, console.is_required),
+        (vec!["cars-console".to_owned()], false)
+    );
+    let bound = load(&format!("[console]\nbind = \"127.0.0.1:8080\"\n{BOTH}"))
+        .unwrap()
+        .console
+        .unwrap();
+    assert_eq!(bound.command, ["cars-console", "--bind=127.0.0.1:8080"]);
+    assert!(
+        load(&format!("[console]\nenabled = false\n{BOTH}"))
+            .unwrap()
+            .console
+            .is_none()
+    );
+}
+
+#[test]
+fn one_process_may_run_several_robots() {
+    let file =
+        load("[[process]]\nname = \"all\"\ncommand = [\"x\"]\nrobots = [\"Leguin\", \"Butler\"]")
+            .unwrap();
+    assert_eq!(file.processes[0].robots.len(), 2);
+}
+
+#[test]
+fn a_misspelt_key_is_shown_with_file_line_and_caret() {
+    let shown = refusal("[[process]]\nname = \"Butler\"\ncomand = [\"cars-butler\"]");
+    let line = shown
+        .lines()
+        .position(|line| line.contains("comand = ["))
+        .expect("the line is shown");
+    assert!(shown.contains("launch/x.toml:4:1"), "{shown}");
+    assert!(
+        shown.lines().nth(line + 1).unwrap().contains('^'),
+        "{shown}"
+    );
+    assert!(shown.contains("unknown field `comand`"), "{shown}");
+}
+
+#[test]
+fn every_robot_is_run_by_exactly_one_process() {
+    let butler = "[[process]]\nname = \"Butler\"\ncommand = [\"cars-butler\"]\n";
+    check(
+        butler,
+        &[
+            "launch/x.toml:1:",
+            "robot Leguin of this scenario is run by no process",
+            "name = \"Leguin\"",
+            "command = [\"cars-leguin\"]",
+        ],
+    );
+    let again =
+        "[[process]]\nname = \"again\"\ncommand = [\"x\"]\nrobots = [\"Leguin\", \"Butler\"]\n";
+    check(
+        &format!("{butler}{again}"),
+        &[
+            "launch/x.toml:8:",
+            "robot Butler is run by process Butler already",
+        ],
+    );
+    let stranger = "[[process]]\nname = \"Vonda\"\ncommand = [\"cars-vonda\"]\n";
+    check(
+        &format!("{BOTH}{stranger}"),
+        &["has no robot Vonda", "its robots are Butler, Leguin"],
+    );
+}
+
+#[test]
+fn names_are_unique_and_fit_for_files() {
+    check(
+        &format!("{BOTH}{BOTH}"),
+        &["a second process called Butler"],
+    );
+    check(
+        "[[process]]\nname = \"simulator\"\ncommand = [\"x\"]",
+        &["simulator's own", "[simulator]"],
+    );
+    check(
+        "[[process]]\nname = \"console\"\ncommand = [\"x\"]",
+        &["console's own", "[console]"],
+    );
+    check(
+        "[[process]]\nname = \"../x\"\ncommand = [\"x\"]",
+        &["not a usable name", "launch/x.toml:3:8"],
+    );
+}
+
+#[test]
+fn values_are_checked_where_they_stand() {
+    check(
+        "speed = 0",
+        &["launch/x.toml:2:9", "neither a number above zero nor `max`"],
+    );
+    check(
+        "speed = true",
+        &["a speed is a number above zero, or \"max\""],
+    );
+    check(
+        "[[process]]\nname = \"B\"\ncommand = []",
+        &["a command names at least a program"],
+    );
+    check(
+        "[simulator]\ncommand = [\"\"]",
+        &["a command names at least a program"],
+    );
+    check(
+        "[[process]]\nname = \"B\"\ncommand = [\"x\"]\nrestart = \"sometimes\"",
+        &["sometimes", "on-failure"],
+    );
+    check(
+        "[[process]]\nname = \"B\"\ncommand = [\"x\"]\nbackoff = \"0 s\"",
+        &["a back-off is more than zero"],
+    );
+    check(
+        "[[process]]\nname = \"B\"\ncommand = [\"x\"]\nbackoff = \"2 ft\"",
+        &["is not a time such as"],
+    );
+    check("[[process]]\nname = \"B\"", &["missing field `command`"]);
+}
+
+#[test]
+fn paths_have_no_detours() {
+    assert_eq!(
+        tidy(Path::new("launch/../configs/./x.toml")),
+        Path::new("configs/x.toml")
+    );
+    assert_eq!(tidy(Path::new("../../x")), Path::new("../../x"));
+    assert_eq!(tidy(Path::new("/a/../x")), Path::new("/x"));
+}

@@ -1,0 +1,34 @@
+//! What is done with processes: launch files and their supervision ([`Launch`]), any program as a robot ([`exec`]), real
+//! links with real faults ([`net`]), and certificates for runs that other machines can reach ([`Certificates`]).
+
+mod bar;
+mod compose;
+mod ending;
+mod endpoint;
+pub mod exec;
+mod file;
+mod launching;
+mod lines;
+mod link;
+pub mod net;
+mod observe;
+mod options;
+mod plan;
+mod process;
+mod program;
+mod restart;
+mod screen;
+mod secure;
+mod signals;
+mod supervise;
+mod tail;
+
+pub use ending::{Failure, code_of};
+pub use file::{LaunchFile, Process, is_launch_file, scenario_file};
+pub use launching::{Launch, LaunchOptions, What};
+pub use link::{Link, LinkError};
+pub use options::RunOptions;
+pub use plan::{CommandLine, Part, Planned};
+pub use restart::Restart;
+pub use secure::Certificates;
+pub use supervise::Outcome;

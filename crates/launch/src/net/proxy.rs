@@ -1,0 +1,413 @@
+//! A TCP proxy that breaks on request. It needs no rights and no tools, only that a robot connects to it instead of to
+//! the simulator. What it cannot do is lose single packets: TCP would send them again.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use bus::endpoint::TLS;
+use miette::{IntoDiagnostic, WrapErr};
+use protocol::RobotName;
+use protocol::random::{stream, unit};
+
+use super::gate::{Gate, Pace};
+use super::plan::Plan;
+use super::shape::{Flow, Shape};
+
+/// Connections at the same time; more are turned away. A robot needs one, and in a long cut it tries once a second.
+const MAX_CONNECTIONS: usize = 256;
+/// Most bytes in a piece.
+const PIECE_BYTES: usize = 16 * 1024;
+/// Pieces on their way in one direction of a connection; then the sender waits.
+const MAX_PIECES: usize = 256;
+/// Longest wait for the other side to take a connection.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+/// A narrow link sends this part of its bits per second at once.
+const SLICES_PER_S: u64 = 20;
+
+/// An endpoint is not an address of TCP.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is no address such as tcp/127.0.0.1:7447")]
+pub struct AddressError(String);
+
+/// The address of an endpoint of TCP, or of TLS, which passes a proxy as it is.
+///
+/// # Errors
+/// [`AddressError`] if it is another kind of endpoint, or names its host.
+pub fn address(endpoint: &str) -> Result<SocketAddr, AddressError> {
+    let bad = || AddressError(endpoint.to_owned());
+    let (protocol, address) = endpoint.split_once('/').ok_or_else(bad)?;
+    if !["tcp", TLS].contains(&protocol) {
+        return Err(bad());
+    }
+    address.parse().map_err(|_| bad())
+}
+
+/// A proxy at work, to the end of the process.
+#[derive(Debug)]
+pub struct Proxy {
+    local: SocketAddr,
+    gate: Arc<Gate>,
+    open: Arc<Connections>,
+}
+
+/// Both sides of every connection, to close them.
+#[derive(Debug, Default)]
+struct Connections(Mutex<BTreeMap<u64, Vec<TcpStream>>>);
+
+impl Connections {
+    fn with<T>(&self, f: impl FnOnce(&mut BTreeMap<u64, Vec<TcpStream>>) -> T) -> T {
+        f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Proxy {
+    /// Begins to forward from one address to the other.
+    ///
+    /// # Errors
+    /// If the address cannot be listened at.
+    pub fn start(listen: SocketAddr, to: SocketAddr) -> std::io::Result<Self> {
+        let listener = TcpListener::bind(listen)?;
+        let proxy = Self {
+            local: listener.local_addr()?,
+            gate: Arc::default(),
+            open: Arc::default(),
+        };
+        let (gate, open) = (proxy.gate.clone(), proxy.open.clone());
+        std::thread::spawn(move || accept(&listener, to, &gate, &open));
+        Ok(proxy)
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.local
+    }
+
+    /// What the link is like now.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        self.gate.shape()
+    }
+
+    /// Plays the faults of a plan, from the first connection on, to their end. `apply` receives each shape, and the time
+    /// since that connection.
+    pub fn play(&self, plan: &Plan, mut apply: impl FnMut(Shape, Duration)) {
+        let apply = |_: &RobotName, shape: Shape, at: Duration| {
+            apply(shape, at);
+            Ok::<(), std::convert::Infallible>(())
+        };
+        let Ok(()) = plan.play(self.gate.wait_for_use(), apply, || false);
+    }
+
+    /// From now on the link is like this.
+    pub fn set(&self, shape: Shape) {
+        self.gate.set(shape);
+        if shape.flow == Flow::Closed {
+            self.open
+                .with(|open| open.values().flatten().for_each(close));
+        }
+    }
+}
+
+/// A side that is closed already needs no more.
+fn close(side: &TcpStream) {
+    let _gone = side.shutdown(Shutdown::Both);
+}
+
+fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<Connections>) {
+    for id in 0.. {
+        let client = match listener.accept() {
+            Ok((client, _)) => client,
+            Err(error) => {
+                // Out of file descriptors, most likely: some will be free again.
+                eprintln!("a connection could not be accepted: {error}");
+                std::thread::sleep(CONNECT_TIMEOUT);
+                continue;
+            }
+        };
+        let is_full = open.with(|open| open.len() >= MAX_CONNECTIONS);
+        if is_full || gate.shape().flow == Flow::Closed {
+            continue; // Dropped, and so closed.
+        }
+        gate.touch();
+        let Ok(own) = client.try_clone() else {
+            continue;
+        };
+        open.with(|open| open.insert(id, vec![own]));
+        let (gate, open) = (gate.clone(), open.clone());
+        std::thread::spawn(move || {
+            if let Err(error) = forward(id, client, to, &gate, &open) {
+                tracing::debug!("a connection through the proxy: {error}");
+            }
+            open.with(|open| open.remove(&id));
+        });
+    }
+}
+
+/// One connection, to its end.
+fn forward(
+    id: u64,
+    client: TcpStream,
+    to: SocketAddr,
+    gate: &Arc<Gate>,
+    open: &Connections,
+) -> std::io::Result<()> {
+    // Who connects into a cut is heard of on the other side when it heals.
+    gate.pass();
+    let server = TcpStream::connect_timeout(&to, CONNECT_TIMEOUT)?;
+    server.set_nodelay(true)?;
+    client.set_nodelay(true)?;
+    let own = server.try_clone()?;
+    let is_open = open.with(|open| open.get_mut(&id).map(|sides| sides.push(own)).is_some());
+    if !is_open || gate.shape().flow == Flow::Closed {
+        return Ok(());
+    }
+    let there = pipe(
+        client.try_clone()?,
+        server.try_clone()?,
+        gate.clone(),
+        id.wrapping_mul(2),
+    );
+    let back = pipe(server, client, gate.clone(), id.wrapping_mul(2) + 1);
+    for writer in [there, back] {
+        drop(writer.join());
+    }
+    Ok(())
+}
+
+/// A piece on its way, and when it may arrive.
+type Piece = (Instant, Vec<u8>);
+
+/// One direction: one thread reads, one writes, and between them is the length of the link. Returns the writer.
+fn pipe(
+    from: TcpStream,
+    to: TcpStream,
+    gate: Arc<Gate>,
+    number: u64,
+) -> std::thread::JoinHandle<()> {
+    let (send, pieces) = sync_channel(MAX_PIECES);
+    let reader = gate.clone();
+    std::thread::spawn(move || read(from, &send, &reader, number));
+    std::thread::spawn(move || write(to, &pieces, &gate))
+}
+
+fn read(mut from: TcpStream, send: &SyncSender<Piece>, gate: &Gate, number: u64) {
+    let (mut luck, mut pace) = (stream(number, "proxy"), Pace::new());
+    let mut buffer = vec![0; PIECE_BYTES];
+    loop {
+        gate.pass();
+        // An error is an end, too: the other side is told by closing.
+        let Ok(bytes @ 1..) = from.read(&mut buffer) else {
+            return;
+        };
+        let due = pace.due(Instant::now(), gate.shape(), unit(&mut luck));
+        if send.send((due, buffer[..bytes].to_vec())).is_err() {
+            return; // The writer has gone: nobody listens on the other side.
+        }
+    }
+}
+
+fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
+    let mut pace = Pace::new();
+    let is_whole = pieces.iter().all(|(due, piece)| {
+        sleep_until(due);
+        let bps = gate.shape().bandwidth_bps.unwrap_or(u64::MAX);
+        let slice = usize::try_from(bps / 8 / SLICES_PER_S)
+            .unwrap_or(usize::MAX)
+            .max(1);
+        piece.chunks(slice).all(|slice| {
+            gate.pass();
+            sleep_until(pace.sent(Instant::now(), gate.shape(), slice.len()));
+            gate.pass();
+            to.write_all(slice).is_ok()
+        })
+    });
+    gate.pass();
+    // The end of one direction leaves the other one open; a failure ends both.
+    let _gone = to.shutdown(if is_whole {
+        Shutdown::Write
+    } else {
+        Shutdown::Both
+    });
+}
+
+fn sleep_until(due: Instant) {
+    std::thread::sleep(due.saturating_duration_since(Instant::now()));
+}
+
+/// A proxy on a free port of loopback.
+pub(super) fn on_loopback(to: &str) -> miette::Result<Proxy> {
+    let to = address(to).into_diagnostic()?;
+    Proxy::start(SocketAddr::from(([127, 0, 0, 1], 0)), to)
+        .into_diagnostic()
+        .wrap_err("no free port of the loopback interface")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHORT: Duration = Duration::from_millis(150);
+
+    /// A server, a proxy before it, and a client: what each side of the link holds.
+    fn link() -> (Proxy, TcpStream, TcpStream) {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let proxy =
+            Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
+        let client = TcpStream::connect(proxy.local).unwrap();
+        let (server, _) = listener.accept().unwrap();
+        for side in [&client, &server] {
+            side.set_read_timeout(Some(Duration::from_secs(20)))
+                .unwrap();
+        }
+        (proxy, client, server)
+    }
+
+    fn receive(from: &mut TcpStream, bytes: usize) -> Vec<u8> {
+        let mut received = vec![0; bytes];
+        from.read_exact(&mut received).unwrap();
+        received
+    }
+
+    fn is_silent(side: &mut TcpStream) -> bool {
+        side.set_read_timeout(Some(SHORT)).unwrap();
+        let read = side.read(&mut [0]);
+        side.set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
+        matches!(read, Err(error) if error.kind() == std::io::ErrorKind::WouldBlock)
+    }
+
+    #[test]
+    fn a_cut_holds_what_is_sent_and_loses_nothing() {
+        let (proxy, mut client, mut server) = link();
+        client.write_all(b"one").unwrap();
+        assert_eq!(receive(&mut server, 3), b"one");
+        proxy.set(Shape {
+            flow: Flow::Cut,
+            ..Shape::default()
+        });
+        client.write_all(b"two").unwrap();
+        server.write_all(b"back").unwrap();
+        assert!(
+            is_silent(&mut server) && is_silent(&mut client),
+            "nothing comes through a cut"
+        );
+        proxy.set(Shape::default());
+        assert_eq!(
+            (receive(&mut server, 3), receive(&mut client, 4)),
+            (b"two".to_vec(), b"back".to_vec())
+        );
+        drop(client);
+        assert_eq!(
+            server.read(&mut [0]).unwrap(),
+            0,
+            "the end comes through, too"
+        );
+    }
+
+    #[test]
+    fn who_connects_into_a_cut_gets_through_when_it_heals() {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let proxy =
+            Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
+        proxy.set(Shape {
+            flow: Flow::Cut,
+            ..Shape::default()
+        });
+        let mut client = TcpStream::connect(proxy.local).unwrap();
+        client.write_all(b"hello").unwrap();
+        listener.set_nonblocking(true).unwrap();
+        std::thread::sleep(SHORT);
+        assert!(listener.accept().is_err(), "nobody has come through");
+        listener.set_nonblocking(false).unwrap();
+        proxy.set(Shape::default());
+        assert_eq!(receive(&mut listener.accept().unwrap().0, 5), b"hello");
+    }
+
+    #[test]
+    fn closing_tells_both_sides_and_turns_newcomers_away() {
+        let (proxy, mut client, mut server) = link();
+        client.write_all(b"one").unwrap();
+        assert_eq!(receive(&mut server, 3), b"one");
+        proxy.set(Shape {
+            flow: Flow::Closed,
+            ..Shape::default()
+        });
+        assert_eq!(
+            (
+                server.read(&mut [0]).unwrap(),
+                client.read(&mut [0]).unwrap()
+            ),
+            (0, 0)
+        );
+        let mut newcomer = TcpStream::connect(proxy.local).unwrap();
+        newcomer
+            .set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
+        assert!(matches!(newcomer.read(&mut [0]), Ok(0) | Err(_)) && !is_silent(&mut newcomer));
+    }
+
+    #[test]
+    fn a_slow_link_is_slow_and_a_narrow_one_narrow() {
+        let (proxy, mut client, mut server) = link();
+        let delay = Duration::from_millis(80);
+        proxy.set(Shape {
+            delay,
+            jitter: delay / 8,
+            ..Shape::default()
+        });
+        let sent = Instant::now();
+        client.write_all(b"ping").unwrap();
+        receive(&mut server, 4);
+        server.write_all(b"pong").unwrap();
+        receive(&mut client, 4);
+        assert!(
+            sent.elapsed() >= 2 * delay,
+            "there and back took {:?}",
+            sent.elapsed()
+        );
+        // 4,000 bytes at 80 kbit/s: 0.4 s.
+        proxy.set(Shape {
+            bandwidth_bps: Some(80_000),
+            ..Shape::default()
+        });
+        let sent = Instant::now();
+        client.write_all(&[7; 4000]).unwrap();
+        assert_eq!(receive(&mut server, 4000), [7; 4000]);
+        assert!(
+            sent.elapsed() >= Duration::from_millis(390),
+            "it took {:?}",
+            sent.elapsed()
+        );
+    }
+
+    #[test]
+    fn megabytes_come_through_whole_although_buffers_are_bounded() {
+        let (_proxy, mut client, mut server) = link();
+        let sent: Vec<u8> = (0..9_000_000_u32)
+            .map(|i| i.to_le_bytes()[i as usize % 3])
+            .collect();
+        let copy = sent.clone();
+        let sender = std::thread::spawn(move || {
+            client.write_all(&copy).unwrap();
+            client.shutdown(Shutdown::Write).unwrap();
+        });
+        std::thread::sleep(SHORT);
+        let mut received = Vec::new();
+        server.read_to_end(&mut received).unwrap();
+        sender.join().unwrap();
+        assert!(sent == received, "what came is not what was sent");
+    }
+
+    #[test]
+    fn addresses_are_endpoints() {
+        assert!(address("tcp/127.0.0.1:7447").is_ok());
+        for bad in ["127.0.0.1:7447", "tcp/localhost", "udp/127.0.0.1:1"] {
+            assert!(address(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! What `cars launch`, `cars run` and `cars net play` let a user choose about one execution.
+
+use std::path::{Path, PathBuf};
+
+use config::units::Time;
+use config::{Changes, Override, Speed};
+use protocol::RunName;
+use protocol::name::BadName;
+use simulator::recorder::RunLock;
+use simulator::{RunFolder, Scenario};
+
+/// Options of one execution of a scenario.
+#[derive(Debug, Clone)]
+pub struct RunOptions {
+    /// Name of the run and of its folder; without it the name of the file.
+    pub run: Option<RunName>,
+    /// Another seed than the scenario's.
+    pub seed: Option<u64>,
+    /// Another duration than the scenario's, simulated time.
+    pub duration: Option<Time>,
+    /// How fast the clock goes.
+    pub speed: Option<Speed>,
+    /// Where run folders are made.
+    pub out: PathBuf,
+    /// Changes of the scenario.
+    pub set: Vec<Override>,
+}
+
+impl RunOptions {
+    /// What these options change of a scenario.
+    #[must_use]
+    pub fn changes(&self) -> Changes {
+        Changes {
+            seed: self.seed,
+            duration_s: self.duration.map(|duration| duration.0),
+            set: self.set.clone(),
+        }
+    }
+
+    /// The same options as arguments of another `cars launch`.
+    #[must_use]
+    pub fn to_args(&self, run: &RunName) -> Vec<String> {
+        let mut args = vec![
+            format!("--run={run}"),
+            format!("--out={}", self.out.display()),
+        ];
+        args.extend(self.seed.map(|seed| format!("--seed={seed}")));
+        args.extend(
+            self.duration
+                .map(|duration| format!("--duration={} s", duration.0)),
+        );
+        args.extend(self.speed.map(|speed| format!("--speed={speed}")));
+        args.extend(self.set.iter().map(|change| format!("--set={change}")));
+        args
+    }
+
+    /// Name of the run: as given, or as the file is called.
+    ///
+    /// # Errors
+    /// [`BadName`] if the name of the file cannot be that of a run.
+    pub fn run_name(&self, file: &Path) -> Result<RunName, BadName> {
+        if let Some(run) = &self.run {
+            return Ok(run.clone());
+        }
+        let stem = file.file_stem().and_then(|stem| stem.to_str());
+        RunName::new(stem.unwrap_or("run"))
+    }
+
+    /// Makes the folder of the run, with the resolved scenario in it, and points `latest` at it. The process that writes
+    /// the record keeps the lock.
+    ///
+    /// # Errors
+    /// [`config::FileError`] as [`RunFolder::create`].
+    pub fn folder(
+        &self,
+        run: &RunName,
+        scenario: &Scenario,
+    ) -> Result<(RunFolder, RunLock), config::FileError> {
+        let folder = RunFolder::new(&self.out, run);
+        let lock = folder.create(scenario)?;
+        folder.point_latest();
+        Ok((folder, lock))
+    }
+}
