@@ -227,10 +227,12 @@ fn share_features(robot: &Path) {
         .clone();
     dependencies.retain(|_, dependency| dependency.get("path").is_none());
 
-    let manifest = format!(
-        "[package]\nname = \"features\"\nedition = \"2024\"\n[dependencies]\n{}",
-        toml::to_string(&dependencies).unwrap()
-    );
+    let mut manifest: toml::Table = "package = { name = \"features\", edition = \"2024\" }"
+        .parse()
+        .unwrap();
+    manifest.insert("dependencies".to_owned(), dependencies.into());
+    let manifest = toml::to_string(&manifest).unwrap();
+
     std::fs::create_dir_all(robot.join("features/src")).unwrap();
     std::fs::write(robot.join("features/Cargo.toml"), manifest).unwrap();
     std::fs::write(robot.join("features/src/lib.rs"), "").unwrap();
