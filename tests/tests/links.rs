@@ -158,30 +158,37 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
     nothing_is_left(&run, &player);
 }
 
-/// Short and long cuts, with the clock that waits and the clock that goes on, side by side: the machine is idle meanwhile.
-fn cuts_of_5_s_and_of_30_s(via: &str) {
-    side_by_side(&[
-        ("5 s, wait", &|| a_cut_changes_nothing(via, 5)),
-        ("30 s, wait", &|| a_cut_changes_nothing(via, 30)),
-        ("5 s, continue", &|| {
-            a_cut_loses_a_robot_that_returns(via, 5);
-        }),
-        ("30 s, continue", &|| {
-            a_cut_loses_a_robot_that_returns(via, 30);
-        }),
-    ]);
-}
-
+/// Short and long cuts, with the clock that waits and the clock that goes on, in two ways: side by side, because all of
+/// them mostly wait.
 #[test]
-fn proxies_cut_for_5_s_and_30_s_change_nothing_or_lose_a_robot_that_returns() {
-    cuts_of_5_s_and_of_30_s("proxy");
-}
-
-#[test]
-fn namespaces_cut_for_5_s_and_30_s_change_nothing_or_lose_a_robot_that_returns() {
+fn links_cut_for_5_s_and_30_s_change_nothing_or_lose_a_robot_that_returns() {
+    let mut checks: Vec<(&str, &(dyn Fn() + Sync))> = vec![
+        ("proxy, 5 s, wait", &|| a_cut_changes_nothing("proxy", 5)),
+        ("proxy, 30 s, wait", &|| a_cut_changes_nothing("proxy", 30)),
+        ("proxy, 5 s, continue", &|| {
+            a_cut_loses_a_robot_that_returns("proxy", 5);
+        }),
+        ("proxy, 30 s, continue", &|| {
+            a_cut_loses_a_robot_that_returns("proxy", 30);
+        }),
+    ];
     if has_namespaces("cuts") {
-        cuts_of_5_s_and_of_30_s("namespaces");
+        checks.extend::<[(&str, &(dyn Fn() + Sync)); 4]>([
+            ("namespaces, 5 s, wait", &|| {
+                a_cut_changes_nothing("namespaces", 5);
+            }),
+            ("namespaces, 30 s, wait", &|| {
+                a_cut_changes_nothing("namespaces", 30);
+            }),
+            ("namespaces, 5 s, continue", &|| {
+                a_cut_loses_a_robot_that_returns("namespaces", 5);
+            }),
+            ("namespaces, 30 s, continue", &|| {
+                a_cut_loses_a_robot_that_returns("namespaces", 30);
+            }),
+        ]);
     }
+    side_by_side(&checks);
 }
 
 /// The partition of the scenario itself, on real links: what is simulated elsewhere is a cable here, and with `wait` the

@@ -95,7 +95,7 @@ impl Center {
     /// Counts a report. Each count is seen by one call only, so each clock is put once, whatever thread calls.
     fn on_report(&self) {
         let reports = self.reports.fetch_add(1, Ordering::SeqCst) + 1;
-        if reports % self.clients != 0 {
+        if !reports.is_multiple_of(self.clients) {
             return;
         }
 
