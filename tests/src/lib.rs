@@ -31,8 +31,8 @@ pub fn root() -> PathBuf {
         .to_owned()
 }
 
-/// Cargo, as a user would call it, who is in no test. What cargo tells a test about its package would make build scripts
-/// that look at it run again, and with them half of the tree be compiled again.
+/// Cargo without the variables that it sets for a test's own package: build scripts that read them would run again, and
+/// half of the tree would be compiled again.
 #[must_use]
 pub fn cargo() -> Command {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));

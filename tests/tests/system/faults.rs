@@ -300,7 +300,8 @@ fn what_the_clock_does_about_late_robots_changes_while_it_is_held() {
 fn a_crash_of_the_scenario_happens_at_its_tick_and_is_the_same_every_time() {
     let lab = Lab::new();
     let fault = "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"40 s\", until = \"70 s\" }]";
-    // Who is gone is waited for until the deadline, in real time; no load of the machine makes anybody else miss it.
+    // The clock waits for the robot that is gone until the deadline, in real time. It is long enough that no load of the
+    // machine makes the other robot miss it.
     let set = [
         "--set",
         fault,
