@@ -31,6 +31,22 @@ pub fn root() -> PathBuf {
         .to_owned()
 }
 
+/// Cargo without the variables that it sets for a test's own package: build scripts that read them would run again, and
+/// half of the tree would be compiled again.
+#[must_use]
+pub fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    for (name, _) in std::env::vars_os() {
+        let is_of_package = name.to_str().is_some_and(|name| {
+            name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_")
+        });
+        if is_of_package {
+            cargo.env_remove(name);
+        }
+    }
+    cargo
+}
+
 /// The folder of the project's programs, built in the profile of this test; examples are in `examples` there.
 #[must_use]
 pub fn programs() -> &'static Path {
@@ -39,25 +55,12 @@ pub fn programs() -> &'static Path {
         // The test itself is `target/{profile}/deps/…`.
         let own = std::env::current_exe().unwrap();
         let folder = own.parent().and_then(Path::parent).unwrap().to_owned();
-        let mut build = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        // As `cargo test --workspace` has built them: with other targets, dependencies would get other features and be
-        // compiled again.
-        build.current_dir(root()).args([
-            "build",
-            "--workspace",
-            "--tests",
-            "--examples",
-            "--quiet",
-        ]);
-        // What cargo tells a test about its package would make build scripts that look at it run again, and with them
-        // half of the tree be compiled again.
-        let is_of_package =
-            |name: &str| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_");
-        for (name, _) in std::env::vars_os() {
-            if name.to_str().is_some_and(is_of_package) {
-                build.env_remove(name);
-            }
-        }
+        let mut build = cargo();
+        // With the features that `cargo test --workspace` gives dependencies, or these would be compiled again: those of
+        // all packages, and, because examples may use them, of what tests depend on. The tests themselves are not built.
+        build
+            .current_dir(root())
+            .args(["build", "--workspace", "--bins", "--examples", "--quiet"]);
         if folder.ends_with("release") {
             build.arg("--release");
         }
@@ -220,6 +223,25 @@ pub fn assert_same(a: (&str, &[u8]), b: (&str, &[u8])) {
         left.get(at).map_or("(end)", String::as_str),
         right.get(at).map_or("(end)", String::as_str)
     );
+}
+
+/// Runs checks side by side, each in a thread of its own, and fails with the names of those that failed. For checks that
+/// mostly wait: the test harness runs no more tests at a time than the machine has processors.
+pub fn side_by_side(checks: &[(&str, &(dyn Fn() + Sync))]) {
+    let mut failed = Vec::new();
+    std::thread::scope(|scope| {
+        let mut running = Vec::new();
+        for (name, check) in checks {
+            let thread = std::thread::Builder::new().name((*name).to_owned());
+            running.push((name, thread.spawn_scoped(scope, check).unwrap()));
+        }
+        for (name, check) in running {
+            if check.join().is_err() {
+                failed.push(*name);
+            }
+        }
+    });
+    assert!(failed.is_empty(), "{failed:?} failed; see above");
 }
 
 /// Waits until `ready` gives something, and fails if it never does.

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use system_tests::network::{Row, has_namespaces, lacks_tool, namespaces_of, skip};
 use system_tests::processes::{Running, find};
-use system_tests::{Lab, assert_same, eventually, programs, root};
+use system_tests::{Lab, assert_same, eventually, programs, root, side_by_side};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
 /// A link that is silent for so long is given up (`bus`).
@@ -24,12 +24,15 @@ const ROOM: Duration = Duration::from_secs(2);
 /// Within this time after healing the clock goes on.
 const HEALED: Duration = Duration::from_secs(1);
 
-/// A plan that cuts the link of Leguin a second after the clock first ran.
-fn plan(lab: &Lab, cut_s: u64, what: &str) -> String {
-    let fault = format!(
-        "[[link_fault]]\nrobot = \"Leguin\"\nat = \"1 s\"\nfor = \"{cut_s} s\"\ndo = {what}\n"
-    );
-    lab.write("plan.toml", &fault).to_str().unwrap().to_owned()
+/// What happens to the link of Leguin a second after the clock first ran.
+fn fault(for_s: u64, what: &str) -> String {
+    format!("[[link_fault]]\nrobot = \"Leguin\"\nat = \"1 s\"\nfor = \"{for_s} s\"\ndo = {what}\n")
+}
+
+/// A plan with nothing but this.
+fn plan(lab: &Lab, for_s: u64, what: &str) -> String {
+    let file = lab.write("plan.toml", &fault(for_s, what));
+    file.to_str().unwrap().to_owned()
 }
 
 fn play(lab: &Lab, run: &str, via: &str, plan: &str, more: &[&str]) -> Running {
@@ -155,19 +158,37 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
     nothing_is_left(&run, &player);
 }
 
+/// Short and long cuts, with the clock that waits and the clock that goes on, in two ways: side by side, because all of
+/// them mostly wait.
 #[test]
-fn proxies_cut_for_5_s_change_nothing() {
-    a_cut_changes_nothing("proxy", 5);
-}
-
-#[test]
-fn proxies_cut_for_30_s_change_nothing() {
-    a_cut_changes_nothing("proxy", 30);
-}
-
-#[test]
-fn proxies_cut_for_5_s_lose_a_robot_that_returns() {
-    a_cut_loses_a_robot_that_returns("proxy", 5);
+fn links_cut_for_5_s_and_30_s_change_nothing_or_lose_a_robot_that_returns() {
+    let mut checks: Vec<(&str, &(dyn Fn() + Sync))> = vec![
+        ("proxy, 5 s, wait", &|| a_cut_changes_nothing("proxy", 5)),
+        ("proxy, 30 s, wait", &|| a_cut_changes_nothing("proxy", 30)),
+        ("proxy, 5 s, continue", &|| {
+            a_cut_loses_a_robot_that_returns("proxy", 5);
+        }),
+        ("proxy, 30 s, continue", &|| {
+            a_cut_loses_a_robot_that_returns("proxy", 30);
+        }),
+    ];
+    if has_namespaces("cuts") {
+        checks.extend::<[(&str, &(dyn Fn() + Sync)); 4]>([
+            ("namespaces, 5 s, wait", &|| {
+                a_cut_changes_nothing("namespaces", 5);
+            }),
+            ("namespaces, 30 s, wait", &|| {
+                a_cut_changes_nothing("namespaces", 30);
+            }),
+            ("namespaces, 5 s, continue", &|| {
+                a_cut_loses_a_robot_that_returns("namespaces", 5);
+            }),
+            ("namespaces, 30 s, continue", &|| {
+                a_cut_loses_a_robot_that_returns("namespaces", 30);
+            }),
+        ]);
+    }
+    side_by_side(&checks);
 }
 
 /// The partition of the scenario itself, on real links: what is simulated elsewhere is a cable here, and with `wait` the
@@ -210,39 +231,6 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
         ("never cut", &lab.bytes("whole")),
     );
     nothing_is_left(run, &player);
-}
-
-#[test]
-fn proxies_cut_for_30_s_lose_a_robot_that_returns() {
-    a_cut_loses_a_robot_that_returns("proxy", 30);
-}
-
-#[test]
-fn namespaces_cut_for_5_s_change_nothing() {
-    if has_namespaces("wait5") {
-        a_cut_changes_nothing("namespaces", 5);
-    }
-}
-
-#[test]
-fn namespaces_cut_for_30_s_change_nothing() {
-    if has_namespaces("wait30") {
-        a_cut_changes_nothing("namespaces", 30);
-    }
-}
-
-#[test]
-fn namespaces_cut_for_5_s_lose_a_robot_that_returns() {
-    if has_namespaces("continue5") {
-        a_cut_loses_a_robot_that_returns("namespaces", 5);
-    }
-}
-
-#[test]
-fn namespaces_cut_for_30_s_lose_a_robot_that_returns() {
-    if has_namespaces("continue30") {
-        a_cut_loses_a_robot_that_returns("namespaces", 30);
-    }
 }
 
 /// Closing a connection that is cut must not keep the simulator from hearing all others (`.cargo/config.toml`).
@@ -303,18 +291,22 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
 fn a_slow_a_narrow_and_a_closed_link_change_nothing() {
     let lab = Lab::new();
     lab.ok(&["run", FILE, "--run", "fast", "--duration", "30 s"]);
-    for (run, what) in [
-        ("slow", "{ delay = \"20 ms\", jitter = \"10 ms\" }"),
-        ("narrow", "{ bandwidth_bps = 200000 }"),
-        ("closed", "\"close\""),
-    ] {
-        let plan = plan(&lab, 1, what);
-        let mut player = play(&lab, run, "proxy", &plan, &["--duration", "30 s"]);
+    let check = |run: &str, what: &str| {
+        let plan = lab.write(&format!("{run}.toml"), &fault(1, what));
+        let plan = plan.to_str().unwrap();
+        let mut player = play(&lab, run, "proxy", plan, &["--duration", "30 s"]);
         player.prints("the link of Leguin is whole");
         player.finish();
         assert_same((run, &lab.bytes(run)), ("fast", &lab.bytes("fast")));
         nothing_is_left(run, &player);
-    }
+    };
+    side_by_side(&[
+        ("slow", &|| {
+            check("slow", "{ delay = \"20 ms\", jitter = \"10 ms\" }");
+        }),
+        ("narrow", &|| check("narrow", "{ bandwidth_bps = 200000 }")),
+        ("closed", &|| check("closed", "\"close\"")),
+    ]);
 }
 
 #[test]

@@ -167,7 +167,7 @@ impl Heard {
     fn on(&self, bus: &Bus, keys: &str) -> Declared {
         let heard = self.0.clone();
         bus.subscribe(keys, move |key, _| {
-            heard.lock().expect("no panic").push(key.to_owned())
+            heard.lock().expect("no panic").push(key.to_owned());
         })
         .unwrap()
     }

@@ -1,302 +1,234 @@
-//! `cars bench`: ticks per second, interleaved in one sitting, beside a raw TCP barrier as the floor.
+//! `cars bench`: ticks per second of the project's barriers, interleaved in one sitting with what the same machine does
+//! without the project: a bare zenoh star, and a raw TCP barrier.
 
-use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+mod floors;
+mod lockstep;
+mod programs;
+pub(crate) mod robot;
+pub(crate) mod star;
+mod table;
+pub(crate) mod tcp;
+
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitCode, Stdio};
-use std::time::Instant;
+use std::process::ExitCode;
 
-use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use clap::Args;
-use miette::{IntoDiagnostic, miette};
-use protocol::RunName;
-use robot::{Action, BadParameters, Cars, Robot, RobotArgs, RobotName};
-use simulator::recorder::SUMMARY;
+use miette::{IntoDiagnostic, WrapErr, miette};
 use simulator::scenario::{Changes, Scenario};
-use simulator::{RunFolder, Summary};
-use tabled::builder::Builder;
-use tabled::settings::Alignment;
-use tabled::settings::Style;
-use tabled::settings::object::Columns;
 
-/// Size of what the raw barrier sends out and back; a clock and a report are about as long.
+use floors::{CROWD, HallPlace, Subject};
+use programs::Programs;
+
+/// Size of the clock that the floors send out, bytes; about as long as a real one.
 const CLOCK_BYTES: usize = 64;
+/// Size of the report that comes back, bytes; about as long as a real one.
 const REPORT_BYTES: usize = 300;
+/// Fewest ticks of one measurement: with less, starting and ending would be measured as well.
+const MIN_TICKS: u64 = 300;
 
 /// `cars bench`.
 #[derive(Debug, Args)]
 pub(crate) struct BenchArgs {
-    /// Times that everything is measured, in turn.
-    #[arg(long, default_value_t = 3)]
-    rounds: usize,
-    /// Numbers of robot processes for the bare barrier.
-    #[arg(long, value_delimiter = ',', default_value = "2,4,16")]
-    robots: Vec<usize>,
+    /// How often everything is measured, in turn.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
+    rounds: u64,
+    /// Numbers of robot processes for the bare lock-step and its floor.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "2,4,16,64",
+        value_parser = clap::value_parser!(u64).range(1..=1000)
+    )]
+    robots: Vec<u64>,
     /// The hall that is measured.
-    #[arg(long, default_value = "configs/hors_doeuvres.toml")]
+    #[arg(
+        long,
+        default_value = "configs/hors_doeuvres.toml",
+        value_name = "FILE"
+    )]
     scenario: PathBuf,
-    /// Ticks of each measurement, divided by the number of robots for the bare barrier.
-    #[arg(long, default_value_t = 20_000)]
+    /// Ticks of a measurement with two processes; more processes do fewer.
+    #[arg(long, default_value_t = 20_000, value_name = "N")]
     ticks: u64,
+    /// A folder with another build of cars, cars-sim, cars-butler and cars-leguin, to compare this build with.
+    #[arg(long, value_name = "DIR")]
+    against: Option<PathBuf>,
+    /// Measure only what has this text in its name, and its floors.
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
 }
 
-/// One thing that is measured, with its results, ticks per second.
-struct Subject {
-    name: String,
-    results: Vec<f64>,
-    /// Index of the subject that it is compared with.
-    floor: usize,
+/// Everything that measurements share.
+struct Bench<'a> {
+    /// Scenario of the hall.
+    hall_file: &'a Path,
+    /// The same, as this build reads it.
+    hall: Scenario,
+    /// Ticks of a measurement with two processes.
+    ticks: u64,
+    /// Where scenarios and runs are kept until the end.
+    scratch: &'a Path,
+}
+
+impl Bench<'_> {
+    /// Ticks of a measurement with so many processes: all measurements take about as long.
+    fn ticks_with(&self, processes: usize) -> u64 {
+        (2 * self.ticks / processes as u64).max(MIN_TICKS)
+    }
+}
+
+/// Results of one subject, ticks per second, by round.
+struct Results {
+    subject: Subject,
+    /// With this build.
+    here: Vec<f64>,
+    /// With the build that it is compared with.
+    there: Vec<f64>,
 }
 
 /// Measures everything in turn, as often as asked for, and prints a table.
 pub(crate) fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
     let scratch = std::env::temp_dir().join(format!("cars-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&scratch).into_diagnostic()?;
+    std::fs::create_dir_all(&scratch)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("making {}", scratch.display()))?;
     let outcome = measure(args, &scratch);
     std::fs::remove_dir_all(&scratch).into_diagnostic()?;
-    print_table(&outcome?);
+
+    table::print(&outcome?);
     Ok(ExitCode::SUCCESS)
 }
 
-fn measure(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Subject>> {
-    let mut subjects = Vec::new();
-    let mut add = |name: String, floor: usize| {
-        subjects.push(Subject {
-            name,
-            results: Vec::new(),
-            floor,
-        })
+fn measure(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Results>> {
+    let here = Programs::of_this_build()?;
+    let there = args.against.as_deref().map(Programs::of).transpose()?;
+    let bench = Bench {
+        hall_file: &args.scenario,
+        hall: Scenario::load(&args.scenario, &Changes::default())?,
+        ticks: args.ticks,
+        scratch,
     };
-    for (index, n) in args.robots.iter().enumerate() {
-        add(format!("raw TCP barrier, {n} processes (floor)"), 2 * index);
-        add(format!("bare lock-step, {n} processes"), 2 * index);
+
+    let mut all = Vec::new();
+    for subject in plan(args, bench.hall.robots.len())? {
+        all.push(Results {
+            subject,
+            here: Vec::new(),
+            there: Vec::new(),
+        });
     }
-    add("the hall, as processes".to_owned(), 0);
-    add("the hall, in one process".to_owned(), 0);
+
     for round in 0..args.rounds {
-        eprintln!("round {} of {}", round + 1, args.rounds);
-        let mut results = Vec::new();
-        for n in &args.robots {
-            let ticks = (2 * args.ticks / *n as u64).max(500);
-            results.push(raw_barrier(*n, ticks)?);
-            results.push(bare(*n, ticks, scratch)?);
-        }
-        results.push(hall_processes(&args.scenario, args.ticks / 2, scratch)?);
-        results.push(hall_local(&args.scenario, args.ticks / 2, scratch)?);
-        for (subject, result) in subjects.iter_mut().zip(results) {
-            subject.results.push(result);
+        for results in &mut all {
+            eprintln!(
+                "round {} of {}: {}",
+                round + 1,
+                args.rounds,
+                results.subject
+            );
+            measure_once(&bench, results, &here, there.as_ref(), round % 2 == 1)?;
         }
     }
-    Ok(subjects)
+    Ok(all)
 }
 
-fn print_table(subjects: &[Subject]) {
-    let median = |results: &[f64]| {
-        let mut sorted = results.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
-    };
-    let mut table = Builder::default();
-    table.push_record([
-        "ticks per second",
-        "median",
-        "best",
-        "worst",
-        "of its floor",
-    ]);
-    for subject in subjects {
-        let (best, worst) = subject
-            .results
-            .iter()
-            .fold((0.0_f64, f64::MAX), |(b, w), r| (b.max(*r), w.min(*r)));
-        // Pair by pair: the machine's speed drifts, and both drift with it.
-        let pairs = subject.results.iter().zip(&subjects[subject.floor].results);
-        let ratios: Vec<f64> = pairs.map(|(own, floor)| own / floor).collect();
-        table.push_record([
-            subject.name.clone(),
-            format!("{:.0}", median(&subject.results)),
-            format!("{best:.0}"),
-            format!("{worst:.0}"),
-            format!("{:.2}", median(&ratios)),
-        ]);
+/// Measures a subject once with each build. Which build is first changes from round to round: the second one finds
+/// a machine that the first one has warmed.
+fn measure_once(
+    bench: &Bench<'_>,
+    results: &mut Results,
+    here: &Programs,
+    there: Option<&Programs>,
+    is_other_first: bool,
+) -> miette::Result<()> {
+    let there = there.filter(|_| results.subject.is_of_the_project());
+    if let Some(there) = there.filter(|_| is_other_first) {
+        results.there.push(results.subject.measure(bench, there)?);
     }
-    let mut table = table.build();
-    println!(
-        "{}",
-        table
-            .with(Style::rounded())
-            .modify(Columns::new(1..), Alignment::right())
-    );
-    println!("Floor of the hall: the raw barrier with {} processes.", 2);
+    results.here.push(results.subject.measure(bench, here)?);
+    if let Some(there) = there.filter(|_| !is_other_first) {
+        results.there.push(results.subject.measure(bench, there)?);
+    }
+    Ok(())
 }
 
-/// A barrier with nothing in it: one write and one read for each process and tick.
-fn raw_barrier(n: usize, ticks: u64) -> miette::Result<f64> {
-    let listener = TcpListener::bind("127.0.0.1:0").into_diagnostic()?;
-    let address = listener.local_addr().into_diagnostic()?.to_string();
-    let me = std::env::current_exe().into_diagnostic()?;
-    let start = |_| Command::new(&me).args(["bench-echo", &address]).spawn();
-    let mut children: Vec<Child> = (0..n)
-        .map(start)
-        .collect::<Result<_, _>>()
-        .into_diagnostic()?;
-    let mut streams = Vec::new();
-    for _ in 0..n {
-        let (stream, _) = listener.accept().into_diagnostic()?;
-        stream.set_nodelay(true).into_diagnostic()?;
-        streams.push(stream);
+/// What is measured, each subject after its floors.
+fn plan(args: &BenchArgs, robots_of_hall: usize) -> miette::Result<Vec<Subject>> {
+    let mut wanted = Vec::new();
+    for robots in &args.robots {
+        let robots = usize::try_from(*robots).into_diagnostic()?;
+        wanted.push(Subject::Lockstep { robots });
     }
-    let begun = Instant::now();
-    let mut report = [0; REPORT_BYTES];
-    for _ in 0..ticks {
-        for stream in &mut streams {
-            stream.write_all(&[1; CLOCK_BYTES]).into_diagnostic()?;
-        }
-        for stream in &mut streams {
-            stream.read_exact(&mut report).into_diagnostic()?;
+    wanted.push(Subject::Crowd { robots: CROWD });
+    for place in [HallPlace::Processes, HallPlace::OneProcess] {
+        wanted.push(Subject::Hall {
+            robots: robots_of_hall,
+            place,
+        });
+    }
+
+    if let Some(text) = &args.only {
+        wanted.retain(|subject| subject.to_string().contains(text));
+    }
+    if wanted.is_empty() {
+        return Err(miette!(
+            help = "leave --only out to see the names of all subjects",
+            "nothing has this text in its name"
+        ));
+    }
+
+    let mut plan = Vec::new();
+    for subject in wanted {
+        for step in [subject.second_floor(), subject.floor(), Some(subject)] {
+            plan.extend(step.filter(|step| !plan.contains(step)));
         }
     }
-    let rate = ticks as f64 / begun.elapsed().as_secs_f64();
-    drop(streams);
-    children
-        .iter_mut()
-        .try_for_each(|child| child.wait().map(drop))
-        .into_diagnostic()?;
-    Ok(rate)
+    Ok(plan)
 }
 
-/// The other side of the raw barrier.
-pub(crate) fn echo(address: &str) -> miette::Result<ExitCode> {
-    let mut stream = TcpStream::connect(address).into_diagnostic()?;
-    stream.set_nodelay(true).into_diagnostic()?;
-    let mut clock = [0; CLOCK_BYTES];
-    while stream.read_exact(&mut clock).is_ok() {
-        stream.write_all(&[2; REPORT_BYTES]).into_diagnostic()?;
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        bench: BenchArgs,
     }
-    Ok(ExitCode::SUCCESS)
-}
 
-/// Lock-step with robots that only answer.
-fn bare(n: usize, ticks: u64, scratch: &Path) -> miette::Result<f64> {
-    let mut text = format!("duration = \"{ticks} s\"\ntick = \"1 s\"\n");
-    for i in 0..n {
-        let (x, y) = (1 + i % 7 * 2, 1 + i / 7 * 2);
-        text += &format!("[[robot]]\nname = \"r{i}\"\nat = [\"{x} m\", \"{y} m\"]\n");
+    fn names(line: &[&str]) -> Vec<String> {
+        let words = ["bench"].iter().chain(line);
+        let args = Line::try_parse_from(words).unwrap().bench;
+        let subjects = plan(&args, 2).unwrap();
+        subjects.iter().map(ToString::to_string).collect()
     }
-    let scenario = scratch.join("bare.toml");
-    std::fs::write(&scenario, text).into_diagnostic()?;
-    let robot = |i: usize| {
-        let mut command = Command::new(std::env::current_exe()?);
-        command.args(["bench-robot", "--name", &format!("r{i}")]);
-        Ok::<Command, std::io::Error>(command)
-    };
-    let robots: Vec<Command> = (0..n)
-        .map(robot)
-        .collect::<Result<_, _>>()
-        .into_diagnostic()?;
-    processes(&scenario, ticks as f64, robots, scratch)
-}
 
-fn hall_processes(scenario: &Path, ticks: u64, scratch: &Path) -> miette::Result<f64> {
-    let loaded = Scenario::load(scenario, &Changes::default())?;
-    let robot = |(name, spec): (&RobotName, &simulator::scenario::RobotSpec)| {
-        let mut command = Command::new(beside(&format!("cars-{}", spec.class.to_lowercase()))?);
-        command.args(["--name", name.as_str()]);
-        Ok(command)
-    };
-    let robots: Vec<Command> = loaded
-        .robots
-        .iter()
-        .map(robot)
-        .collect::<miette::Result<_>>()?;
-    processes(scenario, ticks as f64 * loaded.tick_s, robots, scratch)
-}
-
-/// Starts a simulator and robots as processes and returns the rate that the simulator measured.
-fn processes(
-    scenario: &Path,
-    duration_s: f64,
-    robots: Vec<Command>,
-    scratch: &Path,
-) -> miette::Result<f64> {
-    let port = TcpListener::bind("127.0.0.1:0")
-        .and_then(|listener| listener.local_addr())
-        .into_diagnostic()?
-        .port();
-    let endpoint = format!("tcp/127.0.0.1:{port}");
-    let mut simulator = Command::new(beside("cars-sim")?);
-    simulator.arg(scenario).arg("--out").arg(scratch);
-    simulator.args([
-        "--run",
-        "bench",
-        "--listen",
-        &endpoint,
-        "--duration",
-        &format!("{duration_s} s"),
-    ]);
-    let mut children = Vec::new();
-    for mut command in std::iter::once(simulator).chain(robots) {
-        command
-            .env("CARS_RUN", "bench")
-            .env("CARS_CONNECT", &endpoint)
-            .env(RUNTIME_VARIABLE, ONE_THREAD);
-        children.push(command.stdin(Stdio::null()).spawn().into_diagnostic()?);
-    }
-    for child in &mut children {
-        let status = child.wait().into_diagnostic()?;
-        if !status.success() {
-            return Err(miette!("a process of the benchmark failed: {status}"));
+    #[test]
+    fn every_subject_comes_once_and_after_its_floors() {
+        let names = names(&[]);
+        assert_eq!(names.len(), 1 + 4 + 4 + 1 + 2, "{names:?}");
+        let place = |name: &str| names.iter().position(|other| other == name).unwrap();
+        for (floor, subject) in [
+            ("raw TCP barrier, 2 processes", "zenoh star, 2 clients"),
+            ("zenoh star, 2 clients", "bare lock-step, 2 robots"),
+            ("zenoh star, 64 clients", "bare lock-step, 64 robots"),
+            ("zenoh star, 64 clients", "Butlers and Leguins, 64 robots"),
+            ("zenoh star, 2 clients", "the hall, as processes"),
+        ] {
+            assert!(
+                place(floor) < place(subject),
+                "{floor}, {subject}: {names:?}"
+            );
         }
     }
-    let text = std::fs::read_to_string(scratch.join("bench").join(SUMMARY)).into_diagnostic()?;
-    let summary: Summary = serde_json::from_str(&text).into_diagnostic()?;
-    Ok(summary.ticks as f64 / summary.wall.elapsed_s)
-}
 
-fn hall_local(scenario: &Path, ticks: u64, scratch: &Path) -> miette::Result<f64> {
-    let mut scenario = Scenario::load(scenario, &Changes::default())?;
-    scenario.ticks = ticks;
-    let run = RunName::new("bench-local").into_diagnostic()?;
-    let folder = RunFolder::new(scratch, &run);
-    let _lock = folder.create(&scenario)?;
-    let summary = crate::run::execute(scenario, &run, &folder, None)?;
-    Ok(summary.ticks as f64 / summary.wall.elapsed_s)
-}
-
-/// A program of this project, beside this one.
-fn beside(program: &str) -> miette::Result<PathBuf> {
-    let path = std::env::current_exe()
-        .into_diagnostic()?
-        .with_file_name(program);
-    if path.exists() {
-        return Ok(path);
-    }
-    Err(miette!(
-        help = "build all programs first: `cargo build --release`",
-        "there is no {}",
-        path.display()
-    ))
-}
-
-/// A robot that only answers.
-pub(crate) fn robot(args: &RobotArgs) -> miette::Result<ExitCode> {
-    let names = args
-        .names
-        .iter()
-        .map(|name| (name.clone(), Box::new(Idle) as Box<dyn Robot>));
-    let host = robot::Host::connect(names.collect(), args.options()).into_diagnostic()?;
-    host.run().into_diagnostic()?;
-    Ok(ExitCode::SUCCESS)
-}
-
-struct Idle;
-
-impl Robot for Idle {
-    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
-        Ok(())
-    }
-
-    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
-        Action::stay(cars).emotion("CALM").behavior("IDLE")
+    #[test]
+    fn what_is_left_out_takes_its_floor_along() {
+        assert_eq!(
+            names(&["--only", "16 robots"]),
+            ["zenoh star, 16 clients", "bare lock-step, 16 robots"]
+        );
     }
 }

@@ -63,7 +63,7 @@ enum Subcommands {
     Router(router::RouterArgs),
     /// Make certificates and access control for a roster, for runs that strangers could reach.
     Secure(secure::SecureArgs),
-    /// Measure: ticks per second of the bus, of the hall, and of a raw TCP barrier beside them.
+    /// Measure: ticks per second of the lock-step and of the hall, beside a bare zenoh star and a raw TCP barrier.
     Bench(bench::BenchArgs),
     /// Print shell completions.
     Completions {
@@ -75,10 +75,11 @@ enum Subcommands {
     #[command(hide = true)]
     BenchRobot(robot::RobotArgs),
     #[command(hide = true)]
-    BenchEcho {
-        /// Address of the raw TCP barrier.
-        address: String,
-    },
+    BenchEcho(bench::tcp::EchoArgs),
+    #[command(hide = true)]
+    BenchStar(bench::star::StarArgs),
+    #[command(hide = true)]
+    BenchStarClient(bench::star::ClientArgs),
 }
 
 fn main() -> miette::Result<ExitCode> {
@@ -108,8 +109,10 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Router(args) => router::router(&args),
         Subcommands::Secure(args) => secure::secure(args),
         Subcommands::Bench(args) => bench::bench(&args),
-        Subcommands::BenchRobot(args) => bench::robot(&args),
-        Subcommands::BenchEcho { address } => bench::echo(&address),
+        Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
+        Subcommands::BenchEcho(args) => bench::tcp::echo(&args),
+        Subcommands::BenchStar(args) => bench::star::router(&args),
+        Subcommands::BenchStarClient(args) => bench::star::client(&args),
         Subcommands::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "cars", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use system_tests::conformance::assert_conforms;
 use system_tests::processes::Running;
-use system_tests::{Lab, assert_same, programs, root};
+use system_tests::{Lab, assert_same, cargo, programs, root};
 
 use crate::stage::{nobody_is_left, ready};
 
@@ -171,7 +171,8 @@ fn build(command: &mut Command) {
     );
 }
 
-/// The robot in Rust, built where the project is, so that nothing is compiled twice.
+/// The robot in Rust. What it depends on is what the project depends on, and compiling that takes minutes; so it is built
+/// in the project's target folder, with the project's versions and with the features that the project gives them.
 fn rust() -> Robot {
     // The same folder every time: cargo keeps what it builds by place, and a program is large.
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("new-rust");
@@ -179,14 +180,33 @@ fn rust() -> Robot {
         std::fs::remove_dir_all(&out).unwrap();
     }
     let robot = Robot::new_in(&out, Lab::new(), "rust");
-    // The versions that are here already; a user's first build asks the registry.
-    std::fs::copy(root().join("Cargo.lock"), robot.folder.join("Cargo.lock")).unwrap();
+    share_features(&robot.folder);
+
     let target = programs().parent().unwrap();
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo
+    let output = cargo()
         .current_dir(&robot.folder)
-        .env("CARGO_TARGET_DIR", target);
-    build(cargo.args(["build", "--quiet", "--offline", "--release"]));
+        .env("CARGO_TARGET_DIR", target)
+        .args(["build", "--offline", "--release", "--workspace"])
+        .output()
+        .unwrap();
+    let printed = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{printed}");
+    for line in printed.lines() {
+        let word = line.split_whitespace().next();
+        assert!(
+            matches!(
+                word,
+                Some("Compiling" | "Finished" | "Locking" | "Adding" | "Blocking")
+            ),
+            "a warning:\n{printed}"
+        );
+        // Only packages of a folder have it in their line: the robot, the SDK, and nothing that they have from elsewhere.
+        assert!(
+            word != Some("Compiling") || line.ends_with(')'),
+            "compiled a second time, with other features:\n{printed}"
+        );
+    }
+
     let launch = robot.folder.join("launch.toml");
     let text = std::fs::read_to_string(&launch).unwrap();
     let program = target.join("release/cars-rosie");
@@ -194,6 +214,33 @@ fn rust() -> Robot {
     let text = text.replace("./target/release/cars-rosie", program.to_str().unwrap());
     std::fs::write(&launch, text).unwrap();
     robot
+}
+
+/// Puts a package beside a robot that depends on all that the project depends on. The robot itself stays as it is: it sees
+/// the dependencies that it names and no others, but with the features that the two have together.
+fn share_features(robot: &Path) {
+    let project = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let project: toml::Table = project.parse().unwrap();
+    let mut dependencies = project["workspace"]["dependencies"]
+        .as_table()
+        .unwrap()
+        .clone();
+    dependencies.retain(|_, dependency| dependency.get("path").is_none());
+
+    let mut manifest: toml::Table = "package = { name = \"features\", edition = \"2024\" }"
+        .parse()
+        .unwrap();
+    manifest.insert("dependencies".to_owned(), dependencies.into());
+    let manifest = toml::to_string(&manifest).unwrap();
+
+    std::fs::create_dir_all(robot.join("features/src")).unwrap();
+    std::fs::write(robot.join("features/Cargo.toml"), manifest).unwrap();
+    std::fs::write(robot.join("features/src/lib.rs"), "").unwrap();
+
+    let own = robot.join("Cargo.toml");
+    let text = std::fs::read_to_string(&own).unwrap();
+    assert!(text.trim_end().ends_with("[workspace]"), "{text}");
+    std::fs::write(own, text + "members = [\"features\"]\n").unwrap();
 }
 
 /// As the README of the robot says.

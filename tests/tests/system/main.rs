@@ -6,6 +6,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+mod bench;
 mod boundaries;
 mod chaos;
 mod control;

@@ -1,0 +1,131 @@
+//! The programs of a build, and processes that end with their measurement.
+
+use std::io::Read;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
+use miette::{IntoDiagnostic, WrapErr, miette};
+
+/// How often it is looked whether processes have ended. It is no part of a measurement: each is timed by the process
+/// that has the clock.
+const POLL: Duration = Duration::from_millis(20);
+
+/// The folder of a build's programs.
+#[derive(Debug)]
+pub(super) struct Programs {
+    folder: PathBuf,
+}
+
+impl Programs {
+    /// Those of the build that runs now.
+    pub(super) fn of_this_build() -> miette::Result<Self> {
+        let own = std::env::current_exe().into_diagnostic()?;
+        let folder = own.parent().unwrap_or(Path::new("/"));
+        Self::of(folder)
+    }
+
+    /// Those in a folder.
+    pub(super) fn of(folder: &Path) -> miette::Result<Self> {
+        let programs = Self {
+            folder: folder.to_owned(),
+        };
+        for name in ["cars", "cars-sim", "cars-butler", "cars-leguin"] {
+            let program = folder.join(name);
+            if !program.exists() {
+                return Err(miette!(
+                    help = "build all programs first: `cargo build --release`",
+                    "there is no {}",
+                    program.display()
+                ));
+            }
+        }
+        Ok(programs)
+    }
+
+    /// One of the build's programs, with the threads that suit the lock-step.
+    pub(super) fn command(&self, name: &str) -> Command {
+        command(&self.folder.join(name))
+    }
+}
+
+/// This program, with the threads that suit the lock-step.
+pub(super) fn own_command() -> miette::Result<Command> {
+    let own = std::env::current_exe().into_diagnostic()?;
+    Ok(command(&own))
+}
+
+fn command(program: &Path) -> Command {
+    let mut command = Command::new(program);
+    command
+        .stdin(Stdio::null())
+        .env(RUNTIME_VARIABLE, ONE_THREAD);
+    command
+}
+
+/// An endpoint on this machine where nothing listens.
+pub(super) fn free_endpoint() -> miette::Result<String> {
+    let listener = TcpListener::bind("127.0.0.1:0").into_diagnostic()?;
+    let address = listener.local_addr().into_diagnostic()?;
+    Ok(format!("tcp/{address}"))
+}
+
+/// Processes of one measurement. They are killed when this is dropped, so none outlives a measurement that fails.
+#[derive(Debug, Default)]
+pub(super) struct Processes {
+    children: Vec<Child>,
+}
+
+impl Processes {
+    /// Starts another process.
+    pub(super) fn start(&mut self, command: &mut Command) -> miette::Result<()> {
+        let child = command
+            .spawn()
+            .into_diagnostic()
+            .wrap_err_with(|| format!("starting {}", command.get_program().display()))?;
+        self.children.push(child);
+        Ok(())
+    }
+
+    /// Waits until all have ended well. The first failure counts: the others might wait for that process.
+    pub(super) fn wait(&mut self) -> miette::Result<()> {
+        loop {
+            let mut is_any_left = false;
+            for child in &mut self.children {
+                match child.try_wait().into_diagnostic()? {
+                    None => is_any_left = true,
+                    Some(status) if status.success() => {}
+                    Some(status) => {
+                        return Err(miette!("a process of the benchmark failed: {status}"));
+                    }
+                }
+            }
+            if !is_any_left {
+                return Ok(());
+            }
+            std::thread::sleep(POLL);
+        }
+    }
+
+    /// What the process that was started first has printed, if it was started with its output piped and has ended.
+    pub(super) fn output_of_first(&mut self) -> miette::Result<String> {
+        let mut printed = String::new();
+        let first = self.children.first_mut();
+        if let Some(output) = first.and_then(|child| child.stdout.as_mut()) {
+            output.read_to_string(&mut printed).into_diagnostic()?;
+        }
+        Ok(printed)
+    }
+}
+
+impl Drop for Processes {
+    fn drop(&mut self) {
+        for child in &mut self.children {
+            // One that has ended cannot be killed, which is what is wanted.
+            let _ended_already = child.kill();
+            let _ended_already = child.wait();
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! The robot of the bare lock-step: it only answers.
+
+use std::process::ExitCode;
+
+use miette::IntoDiagnostic;
+use robot::{Action, BadParameters, Cars, Host, Robot, RobotArgs, RobotName};
+
+/// `cars bench-robot`.
+pub(crate) fn take_part(args: &RobotArgs) -> miette::Result<ExitCode> {
+    let mut robots: Vec<(RobotName, Box<dyn Robot>)> = Vec::new();
+    for name in &args.names {
+        robots.push((name.clone(), Box::new(Idle)));
+    }
+    let host = Host::connect(robots, args.options()).into_diagnostic()?;
+    host.run().into_diagnostic()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Stands where it was placed.
+struct Idle;
+
+impl Robot for Idle {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        Action::stay(cars).emotion("CALM").behavior("IDLE")
+    }
+}

@@ -1,0 +1,201 @@
+//! A barrier with nothing in it but zenoh: the router puts a clock, each client puts a report in its subscriber callback,
+//! and the router puts the next clock in the callback that receives the last report. No queue, no thread of ours, no
+//! message to encode: a lock-step over zenoh with the same settings cannot be faster.
+
+use std::process::{ExitCode, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+use bus::{Bus, BusError, Publisher, Role};
+use clap::Args;
+use miette::{IntoDiagnostic, WrapErr, miette};
+
+use super::programs::{Processes, free_endpoint, own_command};
+use super::{CLOCK_BYTES, REPORT_BYTES};
+
+const CLOCK: &str = "cars/star/clock";
+const REPORTS: &str = "cars/star/robot/*/report";
+const TOKENS: &str = "cars/star/alive/robot/*";
+
+/// First byte of a clock that asks for a report.
+const TICK: u8 = 1;
+/// First byte of the last clock.
+const END: u8 = 0;
+
+/// How long a process of the star waits for the others: far longer than any measurement takes.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+/// `cars bench-star`: the router in the middle.
+#[derive(Debug, Args)]
+pub(crate) struct StarArgs {
+    /// Where clients connect.
+    #[arg(long)]
+    listen: String,
+    /// How many to wait for.
+    #[arg(long)]
+    clients: u64,
+    /// How many clocks to put.
+    #[arg(long)]
+    ticks: u64,
+}
+
+/// `cars bench-star-client`: one of the robots.
+#[derive(Debug, Args)]
+pub(crate) struct ClientArgs {
+    /// Where the router listens.
+    #[arg(long)]
+    connect: String,
+    /// Which of the clients it is.
+    #[arg(long)]
+    number: usize,
+}
+
+/// Ticks per second of a star with so many clients.
+pub(super) fn measure(clients: usize, ticks: u64) -> miette::Result<f64> {
+    let endpoint = free_endpoint()?;
+    let mut router = own_command()?;
+    router
+        .args(["bench-star", "--listen", &endpoint])
+        .args(["--clients", &clients.to_string()])
+        .args(["--ticks", &ticks.to_string()])
+        .stdout(Stdio::piped());
+    let mut processes = Processes::default();
+    processes.start(&mut router)?;
+    for number in 0..clients {
+        let mut client = own_command()?;
+        client
+            .args(["bench-star-client", "--connect", &endpoint])
+            .args(["--number", &number.to_string()]);
+        processes.start(&mut client)?;
+    }
+    processes.wait()?;
+
+    let printed = processes.output_of_first()?;
+    let rate = printed.trim().parse();
+    rate.into_diagnostic()
+        .wrap_err_with(|| format!("the star printed {printed:?}"))
+}
+
+/// The center of the star: counts reports and puts clocks.
+struct Center {
+    clock: Publisher,
+    clients: u64,
+    ticks: u64,
+    reports: AtomicU64,
+    outcome: Sender<Result<Instant, BusError>>,
+}
+
+impl Center {
+    fn put_clock(&self, kind: u8) -> Result<(), BusError> {
+        self.clock.put(vec![kind; CLOCK_BYTES])
+    }
+
+    /// Counts a report. Each count is seen by one call only, so each clock is put once, whatever thread calls.
+    fn on_report(&self) {
+        let reports = self.reports.fetch_add(1, Ordering::SeqCst) + 1;
+        if !reports.is_multiple_of(self.clients) {
+            return;
+        }
+
+        let outcome = if reports / self.clients == self.ticks {
+            Ok(Instant::now())
+        } else {
+            match self.put_clock(TICK) {
+                Ok(()) => return,
+                Err(error) => Err(error),
+            }
+        };
+        // The receiver is gone only when the measurement has failed already.
+        let _failed_already = self.outcome.send(outcome);
+    }
+}
+
+/// Runs the router and prints ticks per second.
+pub(crate) fn router(args: &StarArgs) -> miette::Result<ExitCode> {
+    let role = Role::Router {
+        listen: args.listen.clone(),
+        trusts_network: false,
+    };
+    let bus = Bus::open(&role, None).into_diagnostic()?;
+    let (outcome, finished) = channel();
+    let center = Arc::new(Center {
+        clock: bus.publisher(CLOCK).into_diagnostic()?,
+        clients: args.clients,
+        ticks: args.ticks,
+        reports: AtomicU64::new(0),
+        outcome,
+    });
+    let counter = center.clone();
+    let _reports = bus
+        .subscribe(REPORTS, move |_, _| counter.on_report())
+        .into_diagnostic()?;
+    wait_for_clients(&bus, args.clients)?;
+
+    let begun = Instant::now();
+    center.put_clock(TICK).into_diagnostic()?;
+    let ended = wait(&finished)?.into_diagnostic()?;
+    center.put_clock(END).into_diagnostic()?;
+    bus.close();
+
+    println!("{}", args.ticks as f64 / (ended - begun).as_secs_f64());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Waits until all clients have declared their tokens, and so their subscribers.
+fn wait_for_clients(bus: &Bus, clients: u64) -> miette::Result<()> {
+    let (sender, arrivals) = channel();
+    let _tokens = bus
+        .liveliness(TOKENS, move |_, is_there| {
+            if is_there {
+                // The receiver is gone once all have arrived.
+                let _all_are_there = sender.send(());
+            }
+        })
+        .into_diagnostic()?;
+    for _ in 0..clients {
+        wait(&arrivals)?;
+    }
+    Ok(())
+}
+
+/// Answers clocks until the last one.
+pub(crate) fn client(args: &ClientArgs) -> miette::Result<ExitCode> {
+    let role = Role::Client {
+        connect: args.connect.clone(),
+        patience: PATIENCE,
+    };
+    let bus = Bus::open(&role, None).into_diagnostic()?;
+    let report = bus
+        .publisher(&format!("cars/star/robot/r{}/report", args.number))
+        .into_diagnostic()?;
+    let (sender, finished) = channel();
+    let _clock = bus
+        .subscribe(CLOCK, move |_, clock| {
+            let outcome = if clock.first() == Some(&END) {
+                Ok(())
+            } else {
+                match report.put(vec![2; REPORT_BYTES]) {
+                    Ok(()) => return,
+                    Err(error) => Err(error),
+                }
+            };
+            // The receiver is gone only when this client has ended already.
+            let _ended_already = sender.send(outcome);
+        })
+        .into_diagnostic()?;
+    let _token = bus
+        .token(&format!("cars/star/alive/robot/r{}", args.number))
+        .into_diagnostic()?;
+
+    wait(&finished)?.into_diagnostic()?;
+    bus.close();
+    Ok(ExitCode::SUCCESS)
+}
+
+fn wait<T>(receiver: &Receiver<T>) -> miette::Result<T> {
+    receiver
+        .recv_timeout(PATIENCE)
+        .map_err(|_| miette!("the star stands still"))
+}

@@ -1,0 +1,61 @@
+//! A barrier with nothing in it but TCP: one write and one read for each process and tick.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use miette::IntoDiagnostic;
+
+use super::programs::{Processes, own_command};
+use super::{CLOCK_BYTES, REPORT_BYTES};
+
+/// `cars bench-echo`.
+#[derive(Debug, Args)]
+pub(crate) struct EchoArgs {
+    /// Address of the barrier.
+    address: String,
+}
+
+/// Ticks per second of a barrier with so many processes.
+pub(super) fn measure(processes: usize, ticks: u64) -> miette::Result<f64> {
+    let listener = TcpListener::bind("127.0.0.1:0").into_diagnostic()?;
+    let address = listener.local_addr().into_diagnostic()?.to_string();
+    let mut children = Processes::default();
+    let mut streams = Vec::new();
+    for _ in 0..processes {
+        children.start(own_command()?.args(["bench-echo", &address]))?;
+        let (stream, _) = listener.accept().into_diagnostic()?;
+        stream.set_nodelay(true).into_diagnostic()?;
+        streams.push(stream);
+    }
+
+    let begun = Instant::now();
+    let mut report = [0; REPORT_BYTES];
+    for _ in 0..ticks {
+        for stream in &mut streams {
+            stream.write_all(&[1; CLOCK_BYTES]).into_diagnostic()?;
+        }
+        for stream in &mut streams {
+            stream.read_exact(&mut report).into_diagnostic()?;
+        }
+    }
+    let rate = ticks as f64 / begun.elapsed().as_secs_f64();
+
+    // The other side ends with its connection.
+    drop(streams);
+    children.wait()?;
+    Ok(rate)
+}
+
+/// The other side of the barrier.
+pub(crate) fn echo(args: &EchoArgs) -> miette::Result<ExitCode> {
+    let mut stream = TcpStream::connect(&args.address).into_diagnostic()?;
+    stream.set_nodelay(true).into_diagnostic()?;
+    let mut clock = [0; CLOCK_BYTES];
+    while stream.read_exact(&mut clock).is_ok() {
+        stream.write_all(&[2; REPORT_BYTES]).into_diagnostic()?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

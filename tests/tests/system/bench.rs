@@ -1,0 +1,52 @@
+//! `cars bench`, in little: every process that it starts ends, and its table has what was asked for.
+
+use system_tests::{Lab, programs};
+
+#[test]
+fn a_build_is_compared_with_its_floor_and_with_another_build() {
+    let other = programs().to_str().unwrap();
+    let (code, text) = Lab::new().cars_without_out(&[
+        "bench",
+        "--rounds",
+        "2",
+        "--robots",
+        "3",
+        "--ticks",
+        "600",
+        "--only",
+        "bare lock-step",
+        "--against",
+        other,
+    ]);
+    assert_eq!(code, 0, "{text}");
+
+    let cells = |name: &str| -> Vec<f64> {
+        let line = text.lines().find(|line| line.contains(name));
+        let line = line.unwrap_or_else(|| panic!("no {name:?} in\n{text}"));
+        line.split('│')
+            .filter_map(|cell| cell.trim().parse().ok())
+            .collect()
+    };
+    let [median, best, worst] = cells("zenoh star, 3 clients")[..] else {
+        panic!("a star has no floor here, and is no build's:\n{text}")
+    };
+    assert!(worst > 0.0 && worst <= median && median <= best, "{text}");
+    let [median, best, worst, of_star, other, ratio] = cells("bare lock-step, 3 robots")[..] else {
+        panic!("six figures are expected:\n{text}")
+    };
+    assert!(worst > 0.0 && worst <= median && median <= best, "{text}");
+    assert!(of_star > 0.0 && other > 0.0 && ratio > 0.0, "{text}");
+    assert!(
+        !text.contains("hall"),
+        "what is left out is not measured:\n{text}"
+    );
+}
+
+#[test]
+fn a_folder_without_programs_is_refused() {
+    let lab = Lab::new();
+    let folder = lab.out().to_str().unwrap();
+    let (code, text) = lab.cars_without_out(&["bench", "--against", folder]);
+    assert_eq!(code, 1, "{text}");
+    assert!(text.contains("there is no"), "{text}");
+}
