@@ -4,7 +4,8 @@ use protocol::RobotName;
 use protocol::messages::{Panel, Point, StateVariables};
 
 use crate::cars::Cars;
-use crate::cri::{Action, BadParameters, Robot};
+use crate::cri::{Action, Robot};
+use crate::error::BadParameters;
 
 /// The paper's `CARSRobotInterface` (Figure 7) under Rust's names. `getName` is [`Cars::name`], because the scenario
 /// names the robots. [`Paper`] makes a [`Robot`] of it.
