@@ -11,6 +11,8 @@
 mod barrier;
 mod exchange;
 mod member;
+#[cfg(test)]
+mod model;
 mod participant;
 mod rules;
 mod states;

@@ -192,7 +192,7 @@ pub struct Participant<N, S, C, R> {
     others: BTreeMap<RobotName, States<S>>,
     followed: BTreeMap<RobotName, Tick>,
     is_simulator_gone: bool,
-    pub(crate) rules: Rules,
+    rules: Rules,
 }
 
 type Out<N, S, C, R> = Vec<Action<N, S, C, R>>;
@@ -201,6 +201,19 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// A robot that asks to join.
     #[must_use]
     pub fn new(patience: Patience, out: &mut Out<N, S, C, R>) -> Self {
+        Self::with_rules(patience, Rules::default(), out)
+    }
+
+    pub(crate) fn with_rules(
+        patience: Patience,
+        rules: Rules,
+        out: &mut Out<N, S, C, R>,
+    ) -> Self {
+        // A token that is declared before the welcome would keep the robot's own request from being admitted.
+        let has_token = !rules.hold(Rule::TokenAfterWelcome);
+        if has_token {
+            out.push(Action::DeclareToken);
+        }
         out.push(Action::SetTimer(RobotTimer::JoinPatience, patience.join));
         out.push(Action::Join);
 
@@ -209,7 +222,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             standing: Standing::Joining,
             admission: None,
             is_name_taken: false,
-            has_token: false,
+            has_token,
             pending: None,
             news: BTreeMap::new(),
             running: None,
@@ -219,7 +232,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             others: BTreeMap::new(),
             followed: BTreeMap::new(),
             is_simulator_gone: false,
-            rules: Rules::default(),
+            rules,
         }
     }
 
