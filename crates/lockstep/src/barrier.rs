@@ -113,7 +113,9 @@ pub enum Refused {
 enum Phase {
     /// Robots of the roster are missing.
     Gathering,
-    /// No tick is open.
+    /// Every robot is connected, and tick 0 is not granted yet.
+    Gathered,
+    /// A tick is complete, and the next one is not granted yet.
     Between,
     /// A tick is open: reports are awaited.
     Open,
@@ -199,7 +201,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// Grants a tick. `news` are the robots for which the simulation has something new.
     pub fn open(&mut self, tick: Tick, news: BTreeSet<RobotName>, out: &mut Vec<Output<R, C>>) {
         assert!(
-            self.phase == Phase::Between,
+            matches!(self.phase, Phase::Gathered | Phase::Between),
             "a tick is granted when the one before is complete"
         );
         self.phase = Phase::Open;
@@ -249,12 +251,12 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if is_new {
             member.instance = Some(Arc::from(instance));
             member.is_reserved = true;
-            if !member.is_seated {
+            if member.seated == 0 {
                 member.generation = member.generation.max(1);
             } else if self.rules.hold(Rule::CountsGenerations) {
                 member.generation += 1;
             }
-            member.is_coming = member.is_seated;
+            member.is_coming = member.seated > 0;
             if self.rules.hold(Rule::DropsPredecessor) && !member.turn.is_complete(true) {
                 let is_given_up = member.turn.is_given_up;
                 member.turn = Turn {
@@ -309,7 +311,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if self.phase == Phase::Gathering {
             self.look_whether_gathered(out);
         }
-        if self.is_announced && self.phase != Phase::Between {
+        if self.is_announced {
             out.push(Output::Held);
         }
     }
@@ -359,9 +361,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
             return;
         };
-        if stamp.generation < member.generation {
-            member.has_predecessor = true;
-        } else {
+        if stamp.generation == member.generation {
             member.has_recovered |= member.fault.is_none();
         }
         if member.is_lost && stamp.generation == member.generation {
@@ -381,12 +381,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         member.turn.waits_for = None;
         member.turn.report.get_or_insert((commands, report));
         let counts = self.rules.hold(Rule::CountsCommands);
-        if !member.turn.is_complete(counts) {
-            // Commands are put before their report on one session: what is not here is lost, and is repeated with the report.
-            self.repeat(out);
-            return;
+        if member.turn.is_complete(counts) {
+            self.settle(out);
         }
-        self.settle(out);
     }
 
     /// A robot cannot finish its tick because it waits for another robot's answer.
@@ -438,7 +435,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// Puts the last clock and its news again.
     pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
-        if matches!(self.phase, Phase::Open | Phase::Between) && self.epoch > 0 {
+        if matches!(self.phase, Phase::Open | Phase::Between) {
             self.grant(out);
         }
     }
@@ -565,7 +562,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     fn look_whether_gathered(&mut self, out: &mut Vec<Output<R, C>>) {
         if self.members.values().all(Member::is_ready) {
-            self.phase = Phase::Between;
+            self.phase = Phase::Gathered;
             if std::mem::take(&mut self.is_announced) {
                 out.push(Output::Released);
             }
@@ -600,17 +597,14 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// Puts the news and the clock of the tick that was granted last.
     fn grant(&mut self, out: &mut Vec<Output<R, C>>) {
         let mut named = BTreeMap::new();
-        for (name, member) in &mut self.members {
+        for (name, member) in &self.members {
+            let is_replacement =
+                member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
             let is_newcomer = self.tick > 0
-                && member.is_seated
-                && !member.is_lost
                 && !member.has_reported
                 && self.rules.hold(Rule::NamesUntilReported);
-            let is_new_now = self
-                .membership
-                .contains(&Membership::Joined(name.clone(), member.generation));
-            if is_newcomer || is_new_now || std::mem::take(&mut member.has_predecessor) {
-                named.insert(name.clone(), member.generation);
+            if is_replacement || is_newcomer {
+                named.insert(name.clone(), member.seated);
             }
         }
 

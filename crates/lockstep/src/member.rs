@@ -52,16 +52,14 @@ pub(crate) struct Member<R, C> {
     pub(crate) generation: Generation,
     /// Whether its token is declared.
     pub(crate) is_present: bool,
-    /// Whether it has had a place in this epoch, so that a further process is a further incarnation.
-    pub(crate) is_seated: bool,
+    /// The incarnation that was taken in last; 0 before the first epoch. A further process is a further incarnation.
+    pub(crate) seated: Generation,
     /// Whether the clock goes on without it.
     pub(crate) is_lost: bool,
     /// Whether it takes part again as soon as its token is declared: a further incarnation, or a lost one that sends again.
     pub(crate) is_coming: bool,
     /// Whether this incarnation has reported in this epoch since it was taken in.
     pub(crate) has_reported: bool,
-    /// Whether an earlier incarnation still sends, and must learn that it has been replaced.
-    pub(crate) has_predecessor: bool,
     /// The fault that the scenario has brought upon its process.
     pub(crate) fault: Option<FaultKind>,
     /// Whether it has sent anything since its fault was over.
@@ -115,11 +113,10 @@ impl<R, C> Default for Member<R, C> {
             is_reserved: false,
             generation: 0,
             is_present: false,
-            is_seated: false,
+            seated: 0,
             is_lost: false,
             is_coming: false,
             has_reported: false,
-            has_predecessor: false,
             fault: None,
             has_recovered: true,
             missed: 0,
@@ -143,11 +140,10 @@ impl<R, C> Member<R, C> {
 
     /// Takes part from tick 0 of an epoch.
     pub(crate) fn begin_epoch(&mut self) {
-        self.is_seated = true;
+        self.seated = self.generation;
         self.is_lost = false;
         self.is_coming = false;
         self.has_reported = false;
-        self.has_predecessor = false;
         self.missed = 0;
     }
 
@@ -157,6 +153,7 @@ impl<R, C> Member<R, C> {
             return None;
         }
 
+        self.seated = self.generation;
         self.is_coming = false;
         self.is_lost = false;
         self.has_reported = false;

@@ -273,8 +273,12 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return;
         }
 
-        // A predecessor that was killed keeps the name until its lease is over.
-        if reason == Refusal::NameTaken {
+        // A process that was admitted before is refused its own name only if another one has taken its place.
+        let was_admitted = self.admission.is_some() && self.rules.hold(Rule::EndsWhenTaken);
+        if reason == Refusal::NameTaken && was_admitted {
+            self.leave(Leave::Replaced, out);
+        } else if reason == Refusal::NameTaken {
+            // A predecessor that was killed keeps the name until its lease is over.
             self.is_name_taken = true;
             out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
         } else {

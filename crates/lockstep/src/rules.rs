@@ -28,8 +28,10 @@ pub(crate) enum Rule {
     FlagsNews,
     /// A newcomer is taken in while the tick that waits for it is open.
     TakesInWhileOpen,
-    /// A newcomer is named in every tick until it has reported.
+    /// A robot that takes part from the middle of an epoch on is named in every tick until it has reported.
     NamesUntilReported,
+    /// An incarnation that is not the first is named in every tick.
+    NamesReplacement,
     /// Another process gets another generation.
     CountsGenerations,
     /// The name of a connected robot is taken.
@@ -54,8 +56,10 @@ pub(crate) enum Rule {
     JoinsNewEpoch,
     /// A robot that joined in the middle of an epoch waits until it is named.
     WaitsToBeNamed,
-    /// A process ends when another one has taken its place.
+    /// A process ends when news name a later incarnation.
     EndsWhenReplaced,
+    /// A process that was admitted before ends when its name is taken.
+    EndsWhenTaken,
     /// The token is declared after the welcome.
     TokenAfterWelcome,
     /// What was answered in an epoch is forgotten in the next one.

@@ -25,6 +25,7 @@ const NOTHING: Budget = Budget {
     duplicates: 0,
     cuts: 0,
     blips: 0,
+    lapses: 0,
     crashes: 0,
     rivals: 0,
     early: 0,
@@ -86,7 +87,7 @@ fn worlds() -> Vec<Star> {
         },
         Star {
             title: "another process while the first one lives",
-            last_tick: 2,
+            last_tick: 1,
             is_slow: false,
             budget: Budget { cuts: 1, rivals: 1, ..NOTHING },
             ..calm.clone()
@@ -146,6 +147,22 @@ fn worlds() -> Vec<Star> {
             on_late: OnLate::Continue,
             scenario: Some(crash),
             budget: NOTHING,
+            ..calm.clone()
+        },
+        Star {
+            title: "the clock goes on, a hang during which the link dies",
+            last_tick: 4,
+            is_slow: false,
+            on_late: OnLate::Continue,
+            scenario: Some(long),
+            budget: Budget { lapses: 1, early: 1, ..NOTHING },
+            ..calm.clone()
+        },
+        Star {
+            title: "a new epoch while another process takes the place",
+            last_tick: 0,
+            is_slow: false,
+            budget: Budget { inits: 1, cuts: 1, rivals: 1, ..NOTHING },
             ..calm.clone()
         },
         Star {

@@ -56,6 +56,8 @@ pub(super) struct Process {
     pub(super) running: Option<Turn<News>>,
     /// Ghost: the tick that it ran last.
     last_run: Option<(Epoch, Tick)>,
+    /// Whether its link is dead and the router has not noticed.
+    pub(super) is_unnoticed: bool,
     /// Ghost: whether its link was ever cut.
     pub(super) was_cut: bool,
 }
@@ -92,6 +94,7 @@ impl Process {
             asks_again: false,
             running: None,
             last_run: None,
+            is_unnoticed: false,
             was_cut: false,
         };
         let violation = process.carry_out(out, around);

@@ -24,6 +24,8 @@ pub(super) struct Budget {
     pub(super) cuts: u8,
     /// Links that break and are back before the router noticed: what is on them is lost.
     pub(super) blips: u8,
+    /// Links of stopped processes that die; the router notices later.
+    pub(super) lapses: u8,
     /// Processes that die.
     pub(super) crashes: u8,
     /// Processes started while another one of the same name lives.
@@ -82,6 +84,9 @@ pub(super) enum Step {
     Unanswered(usize),
     Cut(usize),
     Blip(usize),
+    Lapse(usize),
+    /// The router notices that a link is dead.
+    Notice(usize),
     Heal(usize),
     Crash(usize),
     Start(RobotName),
@@ -102,6 +107,7 @@ impl Step {
                 | Self::AskAgain(_)
                 | Self::Unanswered(_)
                 | Self::Heal(_)
+                | Self::Notice(_)
                 | Self::Start(_)
                 | Self::Fire(Timer::Repeat | Timer::Token(_))
                 | Self::RepeatBetween
@@ -217,7 +223,9 @@ impl Star {
                     let barrier = &state.barrier;
                     let is_stopped = self.has_fault(state.simulation.tick);
                     let violation = state.simulation.record(outcome, |name| {
-                        let is_out = !barrier.is_present(name) || is_stopped;
+                        // A hang decides alone, whatever the token does.
+                        let is_hang = self.budget.lapses > 0;
+                        let is_out = !barrier.is_present(name) && !is_hang || is_stopped;
                         is_out && self.on_late == OnLate::Continue
                     });
                     state.note(violation);
@@ -364,7 +372,9 @@ impl Star {
     fn show(&self, state: &mut State, number: usize, is_declared: bool) {
         let name = state.process(number).name.clone();
         let was_known = Self::is_known(state, &name);
-        state.process(number).is_known = is_declared;
+        let process = state.process(number);
+        process.is_known = is_declared;
+        process.is_unnoticed &= !is_declared;
         let is_known = Self::is_known(state, &name);
 
         if was_known != is_known {
@@ -416,7 +426,13 @@ impl Star {
                 steps.push(Step::Blip(number));
             }
         }
+        if process.is_unnoticed {
+            steps.push(Step::Notice(number));
+        }
         if process.is_stopped {
+            if left.lapses > 0 && process.is_connected {
+                steps.push(Step::Lapse(number));
+            }
             return;
         }
         if !process.is_connected {
@@ -531,6 +547,17 @@ impl Star {
                 let process = state.process(number);
                 process.clear_link();
                 process.heal();
+            }
+            Step::Lapse(number) => {
+                state.left.lapses -= 1;
+                let process = state.process(number);
+                process.clear_link();
+                process.is_connected = false;
+                process.is_unnoticed = process.is_known;
+            }
+            Step::Notice(number) => {
+                state.process(number).is_unnoticed = false;
+                self.show(state, number, false);
             }
             Step::Heal(number) => state.process(number).heal(),
             Step::Crash(number) => {
