@@ -220,7 +220,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
 
         self.give_up_those_that_are_out();
-        self.grant(out);
+        self.grant(true, out);
         self.set_timers(out);
         self.settle(out);
     }
@@ -436,7 +436,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// Puts the last clock and its news again.
     pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
         if matches!(self.phase, Phase::Open | Phase::Between) {
-            self.grant(out);
+            self.grant(self.rules.hold(Rule::RepeatsNews), out);
         }
     }
 
@@ -595,7 +595,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     }
 
     /// Puts the news and the clock of the tick that was granted last.
-    fn grant(&mut self, out: &mut Vec<Output<R, C>>) {
+    fn grant(&mut self, has_news: bool, out: &mut Vec<Output<R, C>>) {
         let mut named = BTreeMap::new();
         for (name, member) in &self.members {
             let is_replacement =
@@ -616,7 +616,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
         let mut news = Vec::new();
         for (index, name) in self.members.keys().enumerate() {
-            if flags & (1 << (index % NEWS_FLAGS)) != 0 {
+            if has_news && flags & (1 << (index % NEWS_FLAGS)) != 0 {
                 news.push((name.clone(), named.get(name).copied()));
             }
         }
@@ -726,10 +726,6 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let mut reports = BTreeMap::new();
         for (name, member) in &mut self.members {
             let turn = std::mem::take(&mut member.turn);
-            if turn.is_given_up {
-                member.turn.is_given_up = true;
-                continue;
-            }
             let Some((stated, report)) = turn.report else {
                 continue;
             };

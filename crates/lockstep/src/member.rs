@@ -101,7 +101,7 @@ impl<R, C> Turn<R, C> {
             return false;
         };
 
-        let arrived = self.commands.range(1..=stated).count();
+        let arrived = self.commands.range(..=stated).count();
         arrived == stated as usize || !counts_commands
     }
 }
@@ -163,7 +163,10 @@ impl<R, C> Member<R, C> {
 
     /// Misses the open tick. Returns whether it is lost now.
     pub(crate) fn miss(&mut self, lose_after: u32) -> bool {
-        self.turn.is_given_up = true;
+        self.turn = Turn {
+            is_given_up: true,
+            ..Turn::default()
+        };
         self.missed += 1;
 
         // While the scenario keeps its process stopped, its token goes when the lease is over: that is wall clock and decides

@@ -249,10 +249,9 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
 
         let is_new_epoch = self.admission.is_none_or(|old| old.epoch < admission.epoch);
-        if is_new_epoch && self.rules.hold(Rule::ForgetsEpoch) {
-            self.answer = None;
+        if is_new_epoch {
+            // A query that names no epoch means the present one.
             self.states.clear();
-            self.others.clear();
         }
         self.admission = Some(admission);
         self.standing = Standing::Admitted;

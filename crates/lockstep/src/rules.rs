@@ -3,10 +3,6 @@
 
 /// A rule that tests can break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "constructed where a rule is tested")
-)]
 pub(crate) enum Rule {
     /// A tick is complete when every awaited robot has reported.
     WaitsForAll,
@@ -62,8 +58,6 @@ pub(crate) enum Rule {
     EndsWhenTaken,
     /// The token is declared after the welcome.
     TokenAfterWelcome,
-    /// What was answered in an epoch is forgotten in the next one.
-    ForgetsEpoch,
     /// Only the newest clock is run.
     RunsNewest,
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use protocol::messages::OnLate;
 use stateright::Model;
 
 use super::star::{Star, State, Step};
@@ -43,7 +44,8 @@ impl Graph {
         let number = self.reached.len() as u32;
         self.reached.push(reached);
         self.before.push(Vec::new());
-        let has_time = state.simulation.tick + 2 <= star.last_tick;
+        let ticks_to_return = if star.on_late == OnLate::Continue { 2 } else { 1 };
+        let has_time = state.simulation.tick + ticks_to_return <= star.last_tick;
         self.is_early.push(has_time);
         let is_full = state.simulation.is_full && !state.has_replaced_process();
         // A violation is the other search's business.

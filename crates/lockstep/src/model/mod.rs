@@ -27,6 +27,7 @@ const NOTHING: Budget = Budget {
     blips: 0,
     lapses: 0,
     crashes: 0,
+    successors: 0,
     rivals: 0,
     early: 0,
     inits: 0,
@@ -86,10 +87,17 @@ fn worlds() -> Vec<Star> {
             ..calm.clone()
         },
         Star {
-            title: "another process while the first one lives",
+            title: "another process while the first one is cut off",
+            last_tick: 2,
+            is_slow: false,
+            budget: Budget { cuts: 1, successors: 1, ..NOTHING },
+            ..calm.clone()
+        },
+        Star {
+            title: "another process while the first one is connected",
             last_tick: 1,
             is_slow: false,
-            budget: Budget { cuts: 1, rivals: 1, ..NOTHING },
+            budget: Budget { rivals: 1, ..NOTHING },
             ..calm.clone()
         },
         Star {
@@ -108,6 +116,14 @@ fn worlds() -> Vec<Star> {
         },
         Star {
             title: "the clock goes on",
+            last_tick: 3,
+            is_slow: true,
+            on_late: OnLate::Continue,
+            budget: Budget { early: 1, duplicates: 1, ..NOTHING },
+            ..calm.clone()
+        },
+        Star {
+            title: "the clock goes on, losses",
             last_tick: 3,
             is_slow: false,
             on_late: OnLate::Continue,
@@ -160,9 +176,9 @@ fn worlds() -> Vec<Star> {
         },
         Star {
             title: "a new epoch while another process takes the place",
-            last_tick: 0,
+            last_tick: 1,
             is_slow: false,
-            budget: Budget { inits: 1, cuts: 1, rivals: 1, ..NOTHING },
+            budget: Budget { inits: 1, cuts: 1, successors: 1, ..NOTHING },
             ..calm.clone()
         },
         Star {
@@ -236,3 +252,61 @@ fn survey() {
         }
     }
 }
+
+#[test]
+fn survey_of_rules() {
+    let only = std::env::var("RULE").ok();
+    for rule in RULES {
+        if only.as_ref().is_some_and(|only| *only != format!("{rule:?}")) {
+            continue;
+        }
+        let mut found = Vec::new();
+        for (number, mut star) in worlds().into_iter().enumerate() {
+            if star.budget.inits > 0 && star.budget.successors > 0 && rule != Rule::EndsWhenTaken {
+                continue;
+            }
+            star.rules = star::without(Some(rule));
+            let bad = unsafe_steps(&star).0.or_else(|| stuck_steps(&star).0);
+            if let Some(bad) = bad {
+                found.push(format!("{number}: {} ({})", bad.what, bad.steps.len()));
+                if only.is_some() {
+                    println!("{}", bad.steps.join("\n"));
+                } else if found.len() == 2 {
+                    break;
+                }
+            }
+        }
+        println!("{rule:?}: {found:?}");
+    }
+}
+
+const RULES: [Rule; 28] = [
+    Rule::WaitsForAll,
+    Rule::ChecksEpoch,
+    Rule::ChecksTick,
+    Rule::ChecksGeneration,
+    Rule::CountsCommands,
+    Rule::DropsPredecessor,
+    Rule::RepeatsClock,
+    Rule::RepeatsNews,
+    Rule::FlagsNews,
+    Rule::TakesInWhileOpen,
+    Rule::NamesUntilReported,
+    Rule::NamesReplacement,
+    Rule::CountsGenerations,
+    Rule::RefusesTakenName,
+    Rule::TakesBack,
+    Rule::GivesUpForGood,
+    Rule::WaitsForNews,
+    Rule::MatchesNews,
+    Rule::AnswersOnce,
+    Rule::RepeatsReport,
+    Rule::RepeatsCommands,
+    Rule::IgnoresLate,
+    Rule::JoinsNewEpoch,
+    Rule::WaitsToBeNamed,
+    Rule::EndsWhenReplaced,
+    Rule::EndsWhenTaken,
+    Rule::TokenAfterWelcome,
+    Rule::RunsNewest,
+];

@@ -28,7 +28,9 @@ pub(super) struct Budget {
     pub(super) lapses: u8,
     /// Processes that die.
     pub(super) crashes: u8,
-    /// Processes started while another one of the same name lives.
+    /// Processes started while another one of the same name is cut off.
+    pub(super) successors: u8,
+    /// Processes started while another one of the same name is connected.
     pub(super) rivals: u8,
     /// Timers that fire while messages are under way.
     pub(super) early: u8,
@@ -61,6 +63,14 @@ pub(super) struct State {
     reserved: BTreeSet<RobotName>,
     left: Budget,
     pub(super) violation: Option<Violation>,
+}
+
+/// The processes of one name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kin {
+    None,
+    CutOff,
+    Connected,
 }
 
 /// A direction of a link.
@@ -146,6 +156,21 @@ impl State {
             let own = process.robot.admission();
             process.is_connected && own.is_some_and(|own| own.generation < present)
         })
+    }
+
+    fn kin(&self, name: &RobotName) -> Kin {
+        let mut kin = Kin::None;
+        for (_, process) in self.living() {
+            if process.name == *name {
+                let is_connected = process.is_connected || kin == Kin::Connected;
+                kin = if is_connected {
+                    Kin::Connected
+                } else {
+                    Kin::CutOff
+                };
+            }
+        }
+        kin
     }
 
     fn note(&mut self, violation: Option<Violation>) {
@@ -482,9 +507,14 @@ impl Star {
         }
         let tick = state.simulation.next.unwrap_or(state.simulation.tick);
         for name in state.simulation.parts.keys() {
-            let is_running = state.living().any(|(_, process)| process.name == *name);
+            let kin = state.kin(name);
+            let may_start = match kin {
+                Kin::None => true,
+                Kin::CutOff => left.successors > 0,
+                Kin::Connected => left.rivals > 0,
+            };
             let is_stopped = self.has_fault(tick) && name.as_str() == "B";
-            if (!is_running || left.rivals > 0) && !is_stopped {
+            if may_start && !is_stopped {
                 steps.push(Step::Start(name.clone()));
             }
         }
@@ -565,8 +595,10 @@ impl Star {
                 state.process(number).end();
             }
             Step::Start(name) => {
-                if state.living().any(|(_, process)| process.name == name) {
-                    state.left.rivals -= 1;
+                match state.kin(&name) {
+                    Kin::None => {}
+                    Kin::CutOff => state.left.successors -= 1,
+                    Kin::Connected => state.left.rivals -= 1,
                 }
                 self.start(state, name);
             }
