@@ -250,7 +250,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let is_new = member.instance.as_deref() != Some(instance);
         if is_new {
             member.instance = Some(Arc::from(instance));
-            member.is_reserved = true;
+            member.is_reserved = self.rules.hold(Rule::ReservesPlace);
             if member.seated == 0 {
                 member.generation = member.generation.max(1);
             } else if self.rules.hold(Rule::CountsGenerations) {
@@ -303,7 +303,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             }
             self.repeat(out);
         }
-        if !is_present && is_awaited && policy == OnLate::Continue {
+        let goes_on = policy == OnLate::Continue && self.rules.hold(Rule::GoesOnWithoutGone);
+        if !is_present && is_awaited && goes_on {
             // It will not report in time.
             self.give_up(name);
             self.settle(out);
@@ -445,7 +446,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     pub fn fault(&mut self, robot: &RobotName, fault: Option<FaultKind>) {
         if let Some(member) = self.members.get_mut(robot) {
             // A robot that was stopped counts as back when it sends something again.
-            member.has_recovered = fault.is_none() && member.fault != Some(FaultKind::Hang);
+            let was_hung =
+                member.fault == Some(FaultKind::Hang) && self.rules.hold(Rule::AwaitsRecovery);
+            member.has_recovered = fault.is_none() && !was_hung;
             member.fault = fault;
         }
     }
@@ -598,11 +601,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     fn grant(&mut self, has_news: bool, out: &mut Vec<Output<R, C>>) {
         let mut named = BTreeMap::new();
         for (name, member) in &self.members {
-            let is_replacement =
-                member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
-            let is_newcomer = self.tick > 0
-                && !member.has_reported
-                && self.rules.hold(Rule::NamesUntilReported);
+            let is_replacement = member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
+            let is_newcomer =
+                self.tick > 0 && !member.has_reported && self.rules.hold(Rule::NamesUntilReported);
             if is_replacement || is_newcomer {
                 named.insert(name.clone(), member.seated);
             }
@@ -650,6 +651,10 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// Where the clock goes on without late robots, it does not wait for those that cannot report.
     fn give_up_those_that_are_out(&mut self) {
+        if !self.rules.hold(Rule::GoesOnWithoutAbsent) {
+            return;
+        }
+
         let tick = self.tick;
         let lateness = &self.lateness;
         let out: Vec<RobotName> = self
@@ -693,7 +698,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let Some(member) = self.members.get_mut(name) else {
             return;
         };
-        if member.miss(lose_after) {
+        if member.miss(lose_after, self.rules) {
             self.membership.push(Membership::Lost(name.clone()));
         }
     }

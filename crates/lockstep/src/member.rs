@@ -8,6 +8,7 @@ use protocol::messages::{FaultKind, OnLate};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::Sent;
+use crate::rules::{Rule, Rules};
 
 /// What the clock does about robots that are late.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -162,7 +163,7 @@ impl<R, C> Member<R, C> {
     }
 
     /// Misses the open tick. Returns whether it is lost now.
-    pub(crate) fn miss(&mut self, lose_after: u32) -> bool {
+    pub(crate) fn miss(&mut self, lose_after: u32, rules: Rules) -> bool {
         self.turn = Turn {
             is_given_up: true,
             ..Turn::default()
@@ -171,7 +172,8 @@ impl<R, C> Member<R, C> {
 
         // While the scenario keeps its process stopped, its token goes when the lease is over: that is wall clock and decides
         // nothing.
-        let is_gone = !self.is_present && self.fault != Some(FaultKind::Hang);
+        let is_hung = self.fault == Some(FaultKind::Hang) && rules.hold(Rule::HangDecides);
+        let is_gone = !self.is_present && !is_hung;
         self.is_lost = self.missed >= lose_after || is_gone;
         self.is_lost
     }

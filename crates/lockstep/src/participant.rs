@@ -204,11 +204,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         Self::with_rules(patience, Rules::default(), out)
     }
 
-    pub(crate) fn with_rules(
-        patience: Patience,
-        rules: Rules,
-        out: &mut Out<N, S, C, R>,
-    ) -> Self {
+    pub(crate) fn with_rules(patience: Patience, rules: Rules, out: &mut Out<N, S, C, R>) -> Self {
         // A token that is declared before the welcome would keep the robot's own request from being admitted.
         let has_token = !rules.hold(Rule::TokenAfterWelcome);
         if has_token {

@@ -32,6 +32,16 @@ pub(crate) enum Rule {
     CountsGenerations,
     /// The name of a connected robot is taken.
     RefusesTakenName,
+    /// A robot that was admitted has its place until its token is declared.
+    ReservesPlace,
+    /// The clock goes on at once without a robot that cannot report.
+    GoesOnWithoutAbsent,
+    /// The clock goes on at once without a robot whose token is undeclared in the open tick.
+    GoesOnWithoutGone,
+    /// While the scenario keeps a process stopped, its token decides nothing.
+    HangDecides,
+    /// A robot is back after a hang when it has reported again.
+    AwaitsRecovery,
     /// A lost robot that sends again is taken back.
     TakesBack,
     /// A robot that was given up is not counted in that tick any more.

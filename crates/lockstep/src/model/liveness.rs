@@ -44,7 +44,11 @@ impl Graph {
         let number = self.reached.len() as u32;
         self.reached.push(reached);
         self.before.push(Vec::new());
-        let ticks_to_return = if star.on_late == OnLate::Continue { 2 } else { 1 };
+        let ticks_to_return = if star.on_late == OnLate::Continue {
+            2
+        } else {
+            1
+        };
         let has_time = state.simulation.tick + ticks_to_return <= star.last_tick;
         self.is_early.push(has_time);
         let is_full = state.simulation.is_full && !state.has_replaced_process();
@@ -83,8 +87,8 @@ impl Graph {
     }
 }
 
-/// The shortest way to a state from which something that must come cannot come, and how many states there are.
-pub(super) fn stuck(star: &Star) -> (Option<Stuck>, usize) {
+/// The shortest way to a state from which something that must come is out of reach.
+pub(super) fn stuck(star: &Star) -> Option<Stuck> {
     let mut graph = Graph::default();
     let mut open = VecDeque::new();
     for state in star.init_states() {
@@ -119,9 +123,8 @@ pub(super) fn stuck(star: &Star) -> (Option<Stuck>, usize) {
         let number = graph.stuck(&graph.full_ends, is_early)?;
         Some(("an end with all robots is out of reach", number))
     };
-    let found = end.or_else(full).map(|(what, number)| Stuck {
+    end.or_else(full).map(|(what, number)| Stuck {
         what,
         steps: graph.steps_to(number),
-    });
-    (found, graph.reached.len())
+    })
 }

@@ -41,13 +41,14 @@ pub(super) struct Budget {
 /// What is explored: bounds, and perhaps a broken rule.
 #[derive(Debug, Clone)]
 pub(super) struct Star {
-    pub(super) title: &'static str,
     pub(super) last_tick: Tick,
     pub(super) on_late: OnLate,
     pub(super) lose_after: u32,
     /// Whether a tick takes time, so that things happen meanwhile.
     pub(super) is_slow: bool,
     pub(super) scenario: Option<Ordered>,
+    /// The only robot whose links break and whose place is taken; `None` for both.
+    pub(super) victim: Option<&'static str>,
     pub(super) budget: Budget,
     pub(super) rules: Rules,
 }
@@ -179,6 +180,11 @@ impl State {
 }
 
 impl Star {
+    /// The same within another budget.
+    pub(super) fn with(self, budget: Budget) -> Self {
+        Self { budget, ..self }
+    }
+
     fn lateness(&self) -> Lateness {
         Lateness {
             on_late: self.on_late,
@@ -342,6 +348,10 @@ impl Star {
         }
     }
 
+    fn may_strike(&self, robot: &RobotName) -> bool {
+        self.victim.is_none_or(|victim| victim == robot.as_str())
+    }
+
     fn end(state: &mut State, end: End) {
         state.barrier.end(end);
         state.simulation.is_over = true;
@@ -443,7 +453,7 @@ impl Star {
         if !process.is_alive {
             return;
         }
-        if process.is_connected {
+        if process.is_connected && self.may_strike(&process.name) {
             if left.cuts > 0 {
                 steps.push(Step::Cut(number));
             }
@@ -481,7 +491,7 @@ impl Star {
         if process.asks_again && process.is_connected {
             steps.push(Step::AskAgain(number));
         }
-        if left.crashes > 0 {
+        if left.crashes > 0 && self.may_strike(&process.name) {
             steps.push(Step::Crash(number));
         }
     }
@@ -510,8 +520,8 @@ impl Star {
             let kin = state.kin(name);
             let may_start = match kin {
                 Kin::None => true,
-                Kin::CutOff => left.successors > 0,
-                Kin::Connected => left.rivals > 0,
+                Kin::CutOff => left.successors > 0 && self.may_strike(name),
+                Kin::Connected => left.rivals > 0 && self.may_strike(name),
             };
             let is_stopped = self.has_fault(tick) && name.as_str() == "B";
             if may_start && !is_stopped {
@@ -645,8 +655,7 @@ impl Model for Star {
 
     fn init_states(&self) -> Vec<State> {
         let roster = [super::name("A"), super::name("B")];
-        let mut barrier =
-            Barrier::new(roster.clone(), self.lateness(), Timing::default(), 4);
+        let mut barrier = Barrier::new(roster.clone(), self.lateness(), Timing::default(), 4);
         barrier.rules = self.rules;
         let mut state = State {
             barrier,
