@@ -251,9 +251,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if is_new {
             member.instance = Some(Arc::from(instance));
             member.is_reserved = self.rules.hold(Rule::ReservesPlace);
-            if member.seated == 0 {
-                member.generation = member.generation.max(1);
-            } else if self.rules.hold(Rule::CountsGenerations) {
+            if member.generation == 0 || self.rules.hold(Rule::CountsGenerations) {
                 member.generation += 1;
             }
             member.is_coming = member.seated > 0;
@@ -303,8 +301,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             }
             self.repeat(out);
         }
-        let goes_on = policy == OnLate::Continue && self.rules.hold(Rule::GoesOnWithoutGone);
-        if !is_present && is_awaited && goes_on {
+        if !is_present && is_awaited && policy == OnLate::Continue {
             // It will not report in time.
             self.give_up(name);
             self.settle(out);

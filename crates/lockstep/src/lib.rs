@@ -16,6 +16,8 @@ mod model;
 mod participant;
 mod rules;
 mod states;
+#[cfg(test)]
+mod tests;
 
 pub use barrier::{Barrier, Ignored, Output, Refused, Stamp, Timer, Timing};
 pub use exchange::{Exchange, Membership, Outcome, Sent};

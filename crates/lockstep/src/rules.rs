@@ -28,7 +28,7 @@ pub(crate) enum Rule {
     NamesUntilReported,
     /// An incarnation that is not the first is named in every tick.
     NamesReplacement,
-    /// Another process gets another generation.
+    /// Every process gets a generation of its own.
     CountsGenerations,
     /// The name of a connected robot is taken.
     RefusesTakenName,
@@ -36,8 +36,6 @@ pub(crate) enum Rule {
     ReservesPlace,
     /// The clock goes on at once without a robot that cannot report.
     GoesOnWithoutAbsent,
-    /// The clock goes on at once without a robot whose token is undeclared in the open tick.
-    GoesOnWithoutGone,
     /// While the scenario keeps a process stopped, its token decides nothing.
     HangDecides,
     /// A robot is back after a hang when it has reported again.

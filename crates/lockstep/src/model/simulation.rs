@@ -58,6 +58,10 @@ pub(super) enum Violation {
     TokenBeforeWelcome,
     /// A process that was connected all the time has been replaced.
     ReplacedConnected,
+    /// Two processes of one name are the same incarnation.
+    SameIncarnation,
+    /// A robot that the scenario has stopped was lost in another tick than the scenario's.
+    LostByAccident,
 }
 
 /// How many commands A sends in a tick. B sends none.

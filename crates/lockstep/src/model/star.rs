@@ -10,6 +10,7 @@ use stateright::{Model, Property};
 use super::process::{Around, Down, Process, Up};
 use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
 use crate::barrier::{Barrier, Output, Timer, Timing};
+use crate::exchange::Membership;
 use crate::member::Lateness;
 use crate::rules::{Rule, Rules};
 
@@ -49,6 +50,10 @@ pub(super) struct Star {
     pub(super) scenario: Option<Ordered>,
     /// The only robot whose links break and whose place is taken; `None` for both.
     pub(super) victim: Option<&'static str>,
+    /// A robot for which the clock waits whatever it does about others.
+    pub(super) waits_for: Option<&'static str>,
+    /// Whether the exploration begins when tick 0 is granted.
+    pub(super) is_gathered: bool,
     pub(super) budget: Budget,
     pub(super) rules: Rules,
 }
@@ -159,6 +164,15 @@ impl State {
         })
     }
 
+    /// Whether two living processes of one name were admitted as the same incarnation.
+    fn has_twins(&self) -> bool {
+        let mut admitted = BTreeSet::new();
+        self.living().any(|(_, process)| {
+            let own = process.robot.admission();
+            own.is_some_and(|own| !admitted.insert((&process.name, own.generation)))
+        })
+    }
+
     fn kin(&self, name: &RobotName) -> Kin {
         let mut kin = Kin::None;
         for (_, process) in self.living() {
@@ -188,7 +202,11 @@ impl Star {
     fn lateness(&self) -> Lateness {
         Lateness {
             on_late: self.on_late,
-            own: Default::default(),
+            own: self
+                .waits_for
+                .map(|robot| (super::name(robot), OnLate::Wait))
+                .into_iter()
+                .collect(),
             deadline: Duration::from_secs(1),
             lose_after: self.lose_after,
         }
@@ -251,14 +269,16 @@ impl Star {
                 Output::Gathered => state.simulation.next = Some(0),
                 Output::Grant { news, clock } => Self::put(state, news, clock),
                 Output::Complete(outcome) => {
+                    let accident = self.lost_by_accident(state, &outcome.membership);
                     let barrier = &state.barrier;
                     let is_stopped = self.has_fault(state.simulation.tick);
                     let violation = state.simulation.record(outcome, |name| {
                         // A hang decides alone, whatever the token does.
                         let is_hang = self.budget.lapses > 0;
                         let is_out = !barrier.is_present(name) && !is_hang || is_stopped;
-                        is_out && self.on_late == OnLate::Continue
+                        is_out && barrier.lateness().of(name) == OnLate::Continue
                     });
+                    state.note(accident);
                     state.note(violation);
                     self.go_on(state);
                 }
@@ -269,6 +289,19 @@ impl Star {
                 _ => {}
             }
         }
+    }
+
+    /// Where nothing but a hang happens, the scenario alone decides when its robot is lost.
+    fn lost_by_accident(&self, state: &State, membership: &[Membership]) -> Option<Violation> {
+        let fault = self.scenario?;
+        let tick = fault.from + Tick::from(self.lose_after) - 1;
+        let is_due = state.simulation.tick == tick && tick < fault.until;
+        let is_lost = membership
+            .iter()
+            .any(|change| matches!(change, Membership::Lost(_)));
+        let decides_alone = self.budget.lapses > 0 && !state.simulation.is_late;
+
+        (decides_alone && is_lost && !is_due).then_some(Violation::LostByAccident)
     }
 
     /// The news each to its robot, then the clock to all, as [`Output::Grant`] wants it.
@@ -646,6 +679,9 @@ impl Star {
                 *process = None;
             }
         }
+        if state.has_twins() {
+            state.note(Some(Violation::SameIncarnation));
+        }
     }
 }
 
@@ -671,6 +707,15 @@ impl Model for Star {
         });
         for name in roster {
             self.start(&mut state, name);
+        }
+        let mut steps = Vec::new();
+        while self.is_gathered && !state.barrier.is_open() {
+            self.actions(&state, &mut steps);
+            let delivery = steps
+                .drain(..)
+                .find(|step| matches!(step, Step::Deliver(..)));
+            let Some(delivery) = delivery else { break };
+            self.take(&mut state, delivery);
         }
         vec![state]
     }
