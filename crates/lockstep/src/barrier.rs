@@ -290,6 +290,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if is_present {
             // From now on its place is free as soon as its token goes.
             member.is_reserved = false;
+            member.has_recovered |= member.fault.is_none();
             member.is_coming |= member.is_lost && self.rules.hold(Rule::TakesBack);
         }
         let is_awaited = is_awaited(self.phase, member, self.rules);
@@ -359,9 +360,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
             return;
         };
-        if stamp.generation == member.generation {
-            member.has_recovered |= member.fault.is_none();
-        }
+        member.has_recovered |= member.fault.is_none();
         if member.is_lost && stamp.generation == member.generation {
             member.is_coming |= self.rules.hold(Rule::TakesBack);
             out.push(Output::Ignored(Ignored::Lost, from.clone()));

@@ -63,7 +63,7 @@ pub(crate) struct Member<R, C> {
     pub(crate) has_reported: bool,
     /// The fault that the scenario has brought upon its process.
     pub(crate) fault: Option<FaultKind>,
-    /// Whether it has sent anything since its fault was over.
+    /// Whether it has reported or declared its token since its fault was over.
     pub(crate) has_recovered: bool,
     /// Ticks in a row that it has missed.
     pub(crate) missed: u32,

@@ -38,7 +38,7 @@ pub(crate) enum Rule {
     GoesOnWithoutAbsent,
     /// While the scenario keeps a process stopped, its token decides nothing.
     HangDecides,
-    /// A robot is back after a hang when it has reported again.
+    /// A robot is back after a hang when it has reported, or declared its token, again.
     AwaitsRecovery,
     /// A lost robot that sends again is taken back.
     TakesBack,

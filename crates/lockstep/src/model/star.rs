@@ -7,11 +7,12 @@ use protocol::messages::{Clock, End, FaultKind, OnLate};
 use protocol::{Epoch, Generation, RobotName, Tick};
 use stateright::{Model, Property};
 
-use super::process::{Around, Down, Process, Up};
+use super::process::{Around, Down, Process, Robot, Up};
 use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
 use crate::barrier::{Barrier, Output, Timer, Timing};
 use crate::exchange::Membership;
 use crate::member::Lateness;
+use crate::participant::RobotTimer;
 use crate::rules::{Rule, Rules};
 
 /// How often each thing may still happen.
@@ -598,14 +599,14 @@ impl Star {
                 state.process(number).asks_again = false;
                 self.feed(state, number, |process, around| {
                     process.feed(around, |robot, out| {
-                        robot.timer(crate::participant::RobotTimer::Join, out);
+                        robot.timer(RobotTimer::Join, out);
                     })
                 });
             }
             Step::Unanswered(number) => {
                 state.process(number).is_asking = false;
                 self.feed(state, number, |process, around| {
-                    process.feed(around, |robot, out| robot.unanswered(out))
+                    process.feed(around, Robot::unanswered)
                 });
             }
             Step::Cut(number) => {
