@@ -638,6 +638,21 @@ impl Star {
                 state.left.crashes -= 1;
                 state.process(number).end();
             }
+            step => self.take_at_simulator(state, step),
+        }
+
+        for process in &mut state.processes {
+            if process.as_ref().is_some_and(Process::is_gone) {
+                *process = None;
+            }
+        }
+        if state.has_twins() {
+            state.note(Some(Violation::SameIncarnation));
+        }
+    }
+
+    fn take_at_simulator(&self, state: &mut State, step: Step) {
+        match step {
             Step::Start(name) => {
                 match state.kin(&name) {
                     Kin::None => {}
@@ -673,15 +688,7 @@ impl Star {
                     barrier.gather(epoch, self.lateness(), out);
                 });
             }
-        }
-
-        for process in &mut state.processes {
-            if process.as_ref().is_some_and(Process::is_gone) {
-                *process = None;
-            }
-        }
-        if state.has_twins() {
-            state.note(Some(Violation::SameIncarnation));
+            _ => unreachable!("{step:?} is a step of a process"),
         }
     }
 }
