@@ -113,7 +113,9 @@ pub enum Refused {
 enum Phase {
     /// Robots of the roster are missing.
     Gathering,
-    /// No tick is open.
+    /// Every robot is connected, and tick 0 is not granted yet.
+    Gathered,
+    /// A tick is complete, and the next one is not granted yet.
     Between,
     /// A tick is open: reports are awaited.
     Open,
@@ -199,7 +201,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// Grants a tick. `news` are the robots for which the simulation has something new.
     pub fn open(&mut self, tick: Tick, news: BTreeSet<RobotName>, out: &mut Vec<Output<R, C>>) {
         assert!(
-            self.phase == Phase::Between,
+            matches!(self.phase, Phase::Gathered | Phase::Between),
             "a tick is granted when the one before is complete"
         );
         self.phase = Phase::Open;
@@ -218,7 +220,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
 
         self.give_up_those_that_are_out();
-        self.grant(out);
+        self.grant(true, out);
         self.set_timers(out);
         self.settle(out);
     }
@@ -248,13 +250,11 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let is_new = member.instance.as_deref() != Some(instance);
         if is_new {
             member.instance = Some(Arc::from(instance));
-            member.is_reserved = true;
-            if !member.is_seated {
-                member.generation = member.generation.max(1);
-            } else if self.rules.hold(Rule::CountsGenerations) {
+            member.is_reserved = self.rules.hold(Rule::ReservesPlace);
+            if member.generation == 0 || self.rules.hold(Rule::CountsGenerations) {
                 member.generation += 1;
             }
-            member.is_coming = member.is_seated;
+            member.is_coming = member.seated > 0;
             if self.rules.hold(Rule::DropsPredecessor) && !member.turn.is_complete(true) {
                 let is_given_up = member.turn.is_given_up;
                 member.turn = Turn {
@@ -290,6 +290,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if is_present {
             // From now on its place is free as soon as its token goes.
             member.is_reserved = false;
+            member.has_recovered |= member.fault.is_none();
             member.is_coming |= member.is_lost && self.rules.hold(Rule::TakesBack);
         }
         let is_awaited = is_awaited(self.phase, member, self.rules);
@@ -309,7 +310,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if self.phase == Phase::Gathering {
             self.look_whether_gathered(out);
         }
-        if self.is_announced && self.phase != Phase::Between {
+        if self.is_announced {
             out.push(Output::Held);
         }
     }
@@ -359,11 +360,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
             return;
         };
-        if stamp.generation < member.generation {
-            member.has_predecessor = true;
-        } else {
-            member.has_recovered |= member.fault.is_none();
-        }
+        member.has_recovered |= member.fault.is_none();
         if member.is_lost && stamp.generation == member.generation {
             member.is_coming |= self.rules.hold(Rule::TakesBack);
             out.push(Output::Ignored(Ignored::Lost, from.clone()));
@@ -381,12 +378,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         member.turn.waits_for = None;
         member.turn.report.get_or_insert((commands, report));
         let counts = self.rules.hold(Rule::CountsCommands);
-        if !member.turn.is_complete(counts) {
-            // Commands are put before their report on one session: what is not here is lost, and is repeated with the report.
-            self.repeat(out);
-            return;
+        if member.turn.is_complete(counts) {
+            self.settle(out);
         }
-        self.settle(out);
     }
 
     /// A robot cannot finish its tick because it waits for another robot's answer.
@@ -438,8 +432,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// Puts the last clock and its news again.
     pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
-        if matches!(self.phase, Phase::Open | Phase::Between) && self.epoch > 0 {
-            self.grant(out);
+        if matches!(self.phase, Phase::Open | Phase::Between) {
+            self.grant(self.rules.hold(Rule::RepeatsNews), out);
         }
     }
 
@@ -448,7 +442,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     pub fn fault(&mut self, robot: &RobotName, fault: Option<FaultKind>) {
         if let Some(member) = self.members.get_mut(robot) {
             // A robot that was stopped counts as back when it sends something again.
-            member.has_recovered = fault.is_none() && member.fault != Some(FaultKind::Hang);
+            let was_hung =
+                member.fault == Some(FaultKind::Hang) && self.rules.hold(Rule::AwaitsRecovery);
+            member.has_recovered = fault.is_none() && !was_hung;
             member.fault = fault;
         }
     }
@@ -565,7 +561,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     fn look_whether_gathered(&mut self, out: &mut Vec<Output<R, C>>) {
         if self.members.values().all(Member::is_ready) {
-            self.phase = Phase::Between;
+            self.phase = Phase::Gathered;
             if std::mem::take(&mut self.is_announced) {
                 out.push(Output::Released);
             }
@@ -598,19 +594,14 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     }
 
     /// Puts the news and the clock of the tick that was granted last.
-    fn grant(&mut self, out: &mut Vec<Output<R, C>>) {
+    fn grant(&mut self, has_news: bool, out: &mut Vec<Output<R, C>>) {
         let mut named = BTreeMap::new();
-        for (name, member) in &mut self.members {
-            let is_newcomer = self.tick > 0
-                && member.is_seated
-                && !member.is_lost
-                && !member.has_reported
-                && self.rules.hold(Rule::NamesUntilReported);
-            let is_new_now = self
-                .membership
-                .contains(&Membership::Joined(name.clone(), member.generation));
-            if is_newcomer || is_new_now || std::mem::take(&mut member.has_predecessor) {
-                named.insert(name.clone(), member.generation);
+        for (name, member) in &self.members {
+            let is_replacement = member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
+            let is_newcomer =
+                self.tick > 0 && !member.has_reported && self.rules.hold(Rule::NamesUntilReported);
+            if is_replacement || is_newcomer {
+                named.insert(name.clone(), member.seated);
             }
         }
 
@@ -622,7 +613,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
         let mut news = Vec::new();
         for (index, name) in self.members.keys().enumerate() {
-            if flags & (1 << (index % NEWS_FLAGS)) != 0 {
+            if has_news && flags & (1 << (index % NEWS_FLAGS)) != 0 {
                 news.push((name.clone(), named.get(name).copied()));
             }
         }
@@ -656,6 +647,10 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// Where the clock goes on without late robots, it does not wait for those that cannot report.
     fn give_up_those_that_are_out(&mut self) {
+        if !self.rules.hold(Rule::GoesOnWithoutAbsent) {
+            return;
+        }
+
         let tick = self.tick;
         let lateness = &self.lateness;
         let out: Vec<RobotName> = self
@@ -699,7 +694,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let Some(member) = self.members.get_mut(name) else {
             return;
         };
-        if member.miss(lose_after) {
+        if member.miss(lose_after, self.rules) {
             self.membership.push(Membership::Lost(name.clone()));
         }
     }
@@ -732,10 +727,6 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let mut reports = BTreeMap::new();
         for (name, member) in &mut self.members {
             let turn = std::mem::take(&mut member.turn);
-            if turn.is_given_up {
-                member.turn.is_given_up = true;
-                continue;
-            }
             let Some((stated, report)) = turn.report else {
                 continue;
             };

@@ -11,9 +11,13 @@
 mod barrier;
 mod exchange;
 mod member;
+#[cfg(test)]
+mod model;
 mod participant;
 mod rules;
 mod states;
+#[cfg(test)]
+mod tests;
 
 pub use barrier::{Barrier, Ignored, Output, Refused, Stamp, Timer, Timing};
 pub use exchange::{Exchange, Membership, Outcome, Sent};

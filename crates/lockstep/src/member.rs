@@ -8,6 +8,7 @@ use protocol::messages::{FaultKind, OnLate};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::Sent;
+use crate::rules::{Rule, Rules};
 
 /// What the clock does about robots that are late.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -52,19 +53,17 @@ pub(crate) struct Member<R, C> {
     pub(crate) generation: Generation,
     /// Whether its token is declared.
     pub(crate) is_present: bool,
-    /// Whether it has had a place in this epoch, so that a further process is a further incarnation.
-    pub(crate) is_seated: bool,
+    /// The incarnation that was taken in last; 0 before the first epoch. A further process is a further incarnation.
+    pub(crate) seated: Generation,
     /// Whether the clock goes on without it.
     pub(crate) is_lost: bool,
     /// Whether it takes part again as soon as its token is declared: a further incarnation, or a lost one that sends again.
     pub(crate) is_coming: bool,
     /// Whether this incarnation has reported in this epoch since it was taken in.
     pub(crate) has_reported: bool,
-    /// Whether an earlier incarnation still sends, and must learn that it has been replaced.
-    pub(crate) has_predecessor: bool,
     /// The fault that the scenario has brought upon its process.
     pub(crate) fault: Option<FaultKind>,
-    /// Whether it has sent anything since its fault was over.
+    /// Whether it has reported or declared its token since its fault was over.
     pub(crate) has_recovered: bool,
     /// Ticks in a row that it has missed.
     pub(crate) missed: u32,
@@ -103,7 +102,7 @@ impl<R, C> Turn<R, C> {
             return false;
         };
 
-        let arrived = self.commands.range(1..=stated).count();
+        let arrived = self.commands.range(..=stated).count();
         arrived == stated as usize || !counts_commands
     }
 }
@@ -115,11 +114,10 @@ impl<R, C> Default for Member<R, C> {
             is_reserved: false,
             generation: 0,
             is_present: false,
-            is_seated: false,
+            seated: 0,
             is_lost: false,
             is_coming: false,
             has_reported: false,
-            has_predecessor: false,
             fault: None,
             has_recovered: true,
             missed: 0,
@@ -143,11 +141,10 @@ impl<R, C> Member<R, C> {
 
     /// Takes part from tick 0 of an epoch.
     pub(crate) fn begin_epoch(&mut self) {
-        self.is_seated = true;
+        self.seated = self.generation;
         self.is_lost = false;
         self.is_coming = false;
         self.has_reported = false;
-        self.has_predecessor = false;
         self.missed = 0;
     }
 
@@ -157,6 +154,7 @@ impl<R, C> Member<R, C> {
             return None;
         }
 
+        self.seated = self.generation;
         self.is_coming = false;
         self.is_lost = false;
         self.has_reported = false;
@@ -165,13 +163,17 @@ impl<R, C> Member<R, C> {
     }
 
     /// Misses the open tick. Returns whether it is lost now.
-    pub(crate) fn miss(&mut self, lose_after: u32) -> bool {
-        self.turn.is_given_up = true;
+    pub(crate) fn miss(&mut self, lose_after: u32, rules: Rules) -> bool {
+        self.turn = Turn {
+            is_given_up: true,
+            ..Turn::default()
+        };
         self.missed += 1;
 
         // While the scenario keeps its process stopped, its token goes when the lease is over: that is wall clock and decides
         // nothing.
-        let is_gone = !self.is_present && self.fault != Some(FaultKind::Hang);
+        let is_hung = self.fault == Some(FaultKind::Hang) && rules.hold(Rule::HangDecides);
+        let is_gone = !self.is_present && !is_hung;
         self.is_lost = self.missed >= lose_after || is_gone;
         self.is_lost
     }

@@ -192,7 +192,7 @@ pub struct Participant<N, S, C, R> {
     others: BTreeMap<RobotName, States<S>>,
     followed: BTreeMap<RobotName, Tick>,
     is_simulator_gone: bool,
-    pub(crate) rules: Rules,
+    rules: Rules,
 }
 
 type Out<N, S, C, R> = Vec<Action<N, S, C, R>>;
@@ -201,6 +201,15 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// A robot that asks to join.
     #[must_use]
     pub fn new(patience: Patience, out: &mut Out<N, S, C, R>) -> Self {
+        Self::with_rules(patience, Rules::default(), out)
+    }
+
+    pub(crate) fn with_rules(patience: Patience, rules: Rules, out: &mut Out<N, S, C, R>) -> Self {
+        // A token that is declared before the welcome would keep the robot's own request from being admitted.
+        let has_token = !rules.hold(Rule::TokenAfterWelcome);
+        if has_token {
+            out.push(Action::DeclareToken);
+        }
         out.push(Action::SetTimer(RobotTimer::JoinPatience, patience.join));
         out.push(Action::Join);
 
@@ -209,7 +218,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             standing: Standing::Joining,
             admission: None,
             is_name_taken: false,
-            has_token: false,
+            has_token,
             pending: None,
             news: BTreeMap::new(),
             running: None,
@@ -219,7 +228,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             others: BTreeMap::new(),
             followed: BTreeMap::new(),
             is_simulator_gone: false,
-            rules: Rules::default(),
+            rules,
         }
     }
 
@@ -236,10 +245,9 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
 
         let is_new_epoch = self.admission.is_none_or(|old| old.epoch < admission.epoch);
-        if is_new_epoch && self.rules.hold(Rule::ForgetsEpoch) {
-            self.answer = None;
+        if is_new_epoch {
+            // A query that names no epoch means the present one.
             self.states.clear();
-            self.others.clear();
         }
         self.admission = Some(admission);
         self.standing = Standing::Admitted;
@@ -260,8 +268,12 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return;
         }
 
-        // A predecessor that was killed keeps the name until its lease is over.
-        if reason == Refusal::NameTaken {
+        // A process that was admitted before is refused its own name only if another one has taken its place.
+        let was_admitted = self.admission.is_some() && self.rules.hold(Rule::EndsWhenTaken);
+        if reason == Refusal::NameTaken && was_admitted {
+            self.leave(Leave::Replaced, out);
+        } else if reason == Refusal::NameTaken {
+            // A predecessor that was killed keeps the name until its lease is over.
             self.is_name_taken = true;
             out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
         } else {

@@ -3,10 +3,6 @@
 
 /// A rule that tests can break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "constructed where a rule is tested")
-)]
 pub(crate) enum Rule {
     /// A tick is complete when every awaited robot has reported.
     WaitsForAll,
@@ -28,12 +24,22 @@ pub(crate) enum Rule {
     FlagsNews,
     /// A newcomer is taken in while the tick that waits for it is open.
     TakesInWhileOpen,
-    /// A newcomer is named in every tick until it has reported.
+    /// A robot that takes part from the middle of an epoch on is named in every tick until it has reported.
     NamesUntilReported,
-    /// Another process gets another generation.
+    /// An incarnation that is not the first is named in every tick.
+    NamesReplacement,
+    /// Every process gets a generation of its own.
     CountsGenerations,
     /// The name of a connected robot is taken.
     RefusesTakenName,
+    /// A robot that was admitted has its place until its token is declared.
+    ReservesPlace,
+    /// The clock goes on at once without a robot that cannot report.
+    GoesOnWithoutAbsent,
+    /// While the scenario keeps a process stopped, its token decides nothing.
+    HangDecides,
+    /// A robot is back after a hang when it has reported, or declared its token, again.
+    AwaitsRecovery,
     /// A lost robot that sends again is taken back.
     TakesBack,
     /// A robot that was given up is not counted in that tick any more.
@@ -54,12 +60,12 @@ pub(crate) enum Rule {
     JoinsNewEpoch,
     /// A robot that joined in the middle of an epoch waits until it is named.
     WaitsToBeNamed,
-    /// A process ends when another one has taken its place.
+    /// A process ends when news name a later incarnation.
     EndsWhenReplaced,
+    /// A process that was admitted before ends when its name is taken.
+    EndsWhenTaken,
     /// The token is declared after the welcome.
     TokenAfterWelcome,
-    /// What was answered in an epoch is forgotten in the next one.
-    ForgetsEpoch,
     /// Only the newest clock is run.
     RunsNewest,
 }

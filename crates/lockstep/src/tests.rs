@@ -1,0 +1,357 @@
+//! Rules that are local to one of the two types.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use protocol::RobotName;
+use protocol::messages::{Clock, FaultKind, OnLate, Refusal};
+
+use crate::states::States;
+use crate::{
+    Action, Admission, Barrier, Ignored, Lateness, Leave, Membership, NoState, Outcome, Output,
+    Participant, Patience, Refused, RobotTimer, Sent, Stamp, StateQuery, Timer, Timing,
+};
+
+type Simulator = Barrier<&'static str, &'static str>;
+type Outputs = Vec<Output<&'static str, &'static str>>;
+
+fn name(name: &str) -> RobotName {
+    RobotName::new(name).expect("a name")
+}
+
+fn lateness(on_late: OnLate, lose_after: u32) -> Lateness {
+    Lateness {
+        on_late,
+        own: Default::default(),
+        deadline: Duration::from_secs(1),
+        lose_after,
+    }
+}
+
+/// A barrier with A and B, both connected, before tick 0.
+fn gathered(lateness: Lateness) -> Simulator {
+    let mut out = Vec::new();
+    let roster = [name("A"), name("B")];
+    let mut barrier = Barrier::new(roster, lateness.clone(), Timing::default(), 4);
+    barrier.gather(1, lateness, &mut out);
+    for robot in ["A", "B"] {
+        barrier.join(&name(robot), robot, &mut out).expect("joins");
+        barrier.token(&name(robot), true, &mut out);
+    }
+
+    assert!(out.contains(&Output::Gathered), "{out:?}");
+    barrier
+}
+
+fn report(barrier: &mut Simulator, robot: &str, tick: u64) -> Outputs {
+    let mut out = Vec::new();
+    let stamp = Stamp {
+        epoch: 1,
+        tick,
+        generation: 1,
+    };
+    barrier.report(&name(robot), stamp, 0, "report", &mut out);
+    out
+}
+
+fn open(barrier: &mut Simulator, tick: u64) -> Outputs {
+    let mut out = Vec::new();
+    barrier.open(tick, BTreeSet::new(), &mut out);
+    out
+}
+
+fn outcome(out: Outputs) -> Option<Outcome<&'static str, &'static str>> {
+    out.into_iter().find_map(|output| match output {
+        Output::Complete(outcome) => Some(outcome),
+        _ => None,
+    })
+}
+
+#[test]
+fn a_place_is_taken_until_its_token_goes() {
+    let mut barrier = gathered(lateness(OnLate::Wait, 1));
+    let mut out = Vec::new();
+
+    let again = barrier.join(&name("A"), "A", &mut out);
+    let other = barrier.join(&name("A"), "other", &mut out);
+    let unknown = barrier.join(&name("C"), "C", &mut out);
+    barrier.token(&name("A"), false, &mut out);
+    let after = barrier.join(&name("A"), "other", &mut out);
+
+    assert_eq!(again.map(|admission| admission.generation), Ok(1));
+    assert_eq!(other, Err(Refused::NameTaken));
+    assert_eq!(unknown, Err(Refused::UnknownName));
+    assert_eq!(after.map(|admission| admission.generation), Ok(2));
+}
+
+#[test]
+fn a_place_is_reserved_until_the_timer_fires() {
+    let mut barrier = gathered(lateness(OnLate::Wait, 1));
+    let mut out = Vec::new();
+    barrier.token(&name("A"), false, &mut out);
+    let timer = Timer::Token(name("A"));
+
+    barrier.join(&name("A"), "second", &mut out).expect("joins");
+    let early = barrier.join(&name("A"), "third", &mut out);
+    barrier.timer(&timer, &mut out);
+    let late = barrier.join(&name("A"), "third", &mut out);
+
+    assert!(out.contains(&Output::SetTimer(timer, Timing::default().token)));
+    assert_eq!(early, Err(Refused::NameTaken));
+    assert_eq!(late.map(|admission| admission.generation), Ok(3));
+}
+
+#[test]
+fn a_held_clock_is_announced_once_and_released() {
+    let mut barrier = gathered(lateness(OnLate::Wait, 1));
+    open(&mut barrier, 0);
+    report(&mut barrier, "A", 0);
+    let mut first = Vec::new();
+    let mut second = Vec::new();
+
+    barrier.timer(&Timer::Announce, &mut first);
+    barrier.timer(&Timer::Announce, &mut second);
+    let complete = report(&mut barrier, "B", 0);
+
+    assert_eq!(first, [Output::Held]);
+    assert_eq!(second, []);
+    assert_eq!(complete.first(), Some(&Output::Released));
+}
+
+#[test]
+fn a_clock_is_repeated_while_its_tick_is_open() {
+    let mut barrier = gathered(lateness(OnLate::Wait, 1));
+    let mut before = Vec::new();
+    barrier.repeat(&mut before);
+    let granted = open(&mut barrier, 0);
+    let mut repeated = Vec::new();
+    barrier.timer(&Timer::Repeat, &mut repeated);
+    report(&mut barrier, "A", 0);
+    report(&mut barrier, "B", 0);
+    let mut after = Vec::new();
+    barrier.timer(&Timer::Repeat, &mut after);
+
+    assert_eq!(before, [], "nothing was granted");
+    assert_eq!(repeated.first(), granted.first());
+    assert_eq!(after, [], "the tick is complete");
+}
+
+#[test]
+fn a_deadline_does_what_the_scenario_wants() {
+    for (on_late, expected) in [
+        (OnLate::Wait, vec![]),
+        (OnLate::Abort, vec![Output::Aborted]),
+    ] {
+        let mut barrier = gathered(lateness(on_late, 1));
+        open(&mut barrier, 0);
+        let mut out = Vec::new();
+        barrier.timer(&Timer::Deadline, &mut out);
+        assert_eq!(out, expected, "{on_late:?}");
+    }
+
+    let mut barrier = gathered(lateness(OnLate::Continue, 1));
+    open(&mut barrier, 0);
+    report(&mut barrier, "A", 0);
+    let mut out = Vec::new();
+    barrier.timer(&Timer::Deadline, &mut out);
+    let outcome = outcome(out).expect("the tick is complete");
+    assert_eq!(outcome.membership, [Membership::Lost(name("B"))]);
+    assert_eq!(outcome.reports.len(), 1);
+}
+
+#[test]
+fn a_robot_whose_token_goes_is_lost_at_once_where_the_clock_goes_on() {
+    let mut barrier = gathered(lateness(OnLate::Continue, 3));
+    open(&mut barrier, 0);
+    report(&mut barrier, "A", 0);
+    let mut out = Vec::new();
+
+    barrier.token(&name("B"), false, &mut out);
+
+    let outcome = outcome(out).expect("the tick is complete");
+    assert_eq!(outcome.membership, [Membership::Lost(name("B"))]);
+}
+
+#[test]
+fn a_hang_is_lost_at_the_tick_of_the_scenario_whatever_its_token_does() {
+    // Before which ticks the token goes and comes back.
+    for (goes, returns) in [(9, 9), (1, 9), (2, 9), (1, 2), (2, 3), (3, 9)] {
+        let mut barrier = gathered(lateness(OnLate::Continue, 3));
+        open(&mut barrier, 0);
+        report(&mut barrier, "A", 0);
+        report(&mut barrier, "B", 0);
+        barrier.fault(&name("B"), Some(FaultKind::Hang));
+
+        let mut lost = Vec::new();
+        for tick in 1..5 {
+            let mut out = Vec::new();
+            if tick == goes {
+                barrier.token(&name("B"), false, &mut out);
+            }
+            if tick == returns {
+                barrier.token(&name("B"), true, &mut out);
+            }
+            out.extend(open(&mut barrier, tick));
+            out.extend(report(&mut barrier, "A", tick));
+            let outcome = outcome(out).expect("B is not awaited");
+            if outcome.membership == [Membership::Lost(name("B"))] {
+                lost.push(tick);
+            }
+        }
+
+        assert_eq!(lost, [3], "gone before {goes}, back before {returns}");
+    }
+}
+
+#[test]
+fn a_robot_is_back_after_a_hang_when_it_has_reported() {
+    let mut barrier = gathered(lateness(OnLate::Continue, 3));
+    open(&mut barrier, 0);
+    report(&mut barrier, "A", 0);
+    report(&mut barrier, "B", 0);
+    barrier.fault(&name("B"), Some(FaultKind::Hang));
+    open(&mut barrier, 1);
+    report(&mut barrier, "A", 1);
+    barrier.fault(&name("B"), None);
+    assert!(!barrier.is_back(&name("B")));
+
+    let out = report(&mut barrier, "B", 1);
+
+    assert_eq!(out, [Output::Ignored(Ignored::Stale, name("B"))]);
+    assert!(barrier.is_back(&name("B")));
+}
+
+#[test]
+fn a_report_that_states_fewer_commands_than_arrived_counts() {
+    let mut barrier = gathered(lateness(OnLate::Wait, 1));
+    open(&mut barrier, 0);
+    let stamp = Stamp {
+        epoch: 1,
+        tick: 0,
+        generation: 1,
+    };
+    let stray = Sent {
+        to: name("B"),
+        command: "stray",
+    };
+    barrier.command(&name("A"), stamp, 1, stray, &mut Vec::new());
+    report(&mut barrier, "A", 0);
+
+    let outcome = outcome(report(&mut barrier, "B", 0)).expect("the tick is complete");
+
+    assert_eq!(outcome.reports[&name("A")], ("report", vec![]));
+}
+
+#[test]
+fn the_last_two_states_are_kept() {
+    let at = |epoch: Option<u32>, tick: Option<u64>| StateQuery { tick, epoch };
+    let mut states = States::default();
+    assert_eq!(states.answer(at(None, None)), Err(NoState::NotYet));
+
+    for (epoch, tick) in [(1, 9), (2, 4), (2, 3), (2, 5), (1, 10)] {
+        states.add(epoch, tick, (epoch, tick));
+    }
+    states.add(2, 5, (0, 0));
+
+    assert_eq!(states.answer(at(None, None)), Ok((2, 5)));
+    assert_eq!(states.answer(at(Some(2), Some(5))), Ok((2, 4)));
+    assert_eq!(states.answer(at(Some(2), Some(6))), Ok((2, 5)));
+    assert_eq!(states.answer(at(Some(2), Some(7))), Err(NoState::NotYet));
+    assert_eq!(
+        states.answer(at(Some(2), Some(8))),
+        Err(NoState::OutOfRange)
+    );
+    assert_eq!(states.answer(at(Some(2), Some(4))), Err(NoState::Over));
+    assert_eq!(
+        states.answer(at(Some(2), Some(0))),
+        Err(NoState::OutOfRange)
+    );
+    assert_eq!(states.answer(at(Some(1), Some(5))), Err(NoState::Over));
+    assert_eq!(states.answer(at(Some(3), Some(1))), Err(NoState::NotYet));
+}
+
+type Robot = Participant<(), &'static str, (), ()>;
+
+const ADMISSION: Admission = Admission {
+    epoch: 1,
+    generation: 1,
+    news_flag: 1,
+};
+
+fn robot() -> Robot {
+    let patience = Patience {
+        join: Duration::from_secs(1),
+        gone: Duration::from_secs(1),
+    };
+    Robot::new(patience, &mut Vec::new())
+}
+
+fn clock(epoch: u32, tick: u64) -> Clock {
+    Clock {
+        epoch,
+        tick,
+        ..Clock::default()
+    }
+}
+
+#[test]
+fn a_newcomer_asks_again_while_its_name_is_taken() {
+    let mut robot = robot();
+    let mut out = Vec::new();
+
+    robot.refused(Refusal::NameTaken, &mut out);
+    assert!(matches!(out[..], [Action::SetTimer(RobotTimer::Join, _)]));
+    out.clear();
+    robot.timer(RobotTimer::Join, &mut out);
+    assert_eq!(out, [Action::Join]);
+    out.clear();
+    robot.timer(RobotTimer::JoinPatience, &mut out);
+    assert_eq!(out, [Action::Leave(Leave::Refused(Refusal::NameTaken))]);
+}
+
+#[test]
+fn a_robot_whose_name_is_taken_in_a_further_epoch_has_been_replaced() {
+    let mut robot = robot();
+    robot.admitted(ADMISSION, [], &mut Vec::new());
+    let mut out = Vec::new();
+
+    robot.clock(clock(2, 0), &mut out);
+    robot.refused(Refusal::NameTaken, &mut out);
+
+    assert_eq!(out, [Action::Join, Action::Leave(Leave::Replaced)]);
+}
+
+#[test]
+fn states_of_the_epoch_before_are_no_answer() {
+    let mut robot = robot();
+    let mut out = Vec::new();
+    robot.admitted(ADMISSION, [], &mut out);
+    robot.clock(clock(1, 0), &mut out);
+    robot.done(Vec::new(), "of epoch 1", (), &mut out);
+    assert_eq!(robot.query(StateQuery::default()), Ok("of epoch 1"));
+
+    robot.clock(clock(2, 0), &mut out);
+    let admission = Admission {
+        epoch: 2,
+        ..ADMISSION
+    };
+    robot.admitted(admission, [], &mut out);
+
+    assert_eq!(robot.query(StateQuery::default()), Err(NoState::NotYet));
+}
+
+#[test]
+fn a_simulator_that_is_back_in_time_is_not_gone() {
+    let mut robot = robot();
+    let mut out = Vec::new();
+    robot.admitted(ADMISSION, [], &mut Vec::new());
+
+    robot.simulator(false, &mut out);
+    robot.simulator(true, &mut out);
+    robot.timer(RobotTimer::Gone, &mut out);
+    assert!(!robot.has_left());
+    robot.simulator(false, &mut out);
+    robot.timer(RobotTimer::Gone, &mut out);
+
+    assert_eq!(out.last(), Some(&Action::Leave(Leave::SimulatorGone)));
+}
