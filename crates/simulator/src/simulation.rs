@@ -71,6 +71,9 @@ pub struct Simulation {
     /// Robots whose report of the last tick is missing: they propose nothing and cannot be queried.
     silent: Vec<RobotName>,
     blocked: Vec<bool>,
+    /// The generation that each robot took part with last in this epoch, and which incarnation of the epoch that is, from 1.
+    /// The record counts incarnations, because generations also count processes that never took part.
+    incarnations: BTreeMap<RobotName, (Generation, u32)>,
     /// Commands that each sender has sent in this epoch.
     sent: BTreeMap<RobotName, Seq>,
     /// What happened between the last tick and the next.
@@ -109,6 +112,7 @@ impl Simulation {
             reports: BTreeMap::new(),
             stood_at: Vec::new(),
             silent: Vec::new(),
+            incarnations: BTreeMap::new(),
             sent: BTreeMap::new(),
             between: Vec::new(),
             digest: Digest::default(),
@@ -364,13 +368,27 @@ impl Simulation {
     fn note_membership(&mut self, membership: Vec<Membership>) {
         for change in membership {
             self.events.push(match change {
-                Membership::Joined(robot, generation) => Event::Joined {
-                    at: self.location(&robot).unwrap_or_default(),
-                    robot,
-                    generation: Some(generation),
-                },
+                Membership::Joined(robot, generation) => {
+                    let incarnation = self.incarnation(&robot, generation);
+                    self.incarnations
+                        .insert(robot.clone(), (generation, incarnation));
+                    Event::Joined {
+                        at: self.location(&robot).unwrap_or_default(),
+                        robot,
+                        generation: Some(incarnation),
+                    }
+                }
                 Membership::Lost(robot) => Event::Lost { robot },
             });
+        }
+    }
+
+    /// Which incarnation of this epoch a generation is, if it takes part next.
+    fn incarnation(&self, robot: &RobotName, generation: Generation) -> u32 {
+        match self.incarnations.get(robot) {
+            Some((last, incarnation)) if *last == generation => *incarnation,
+            Some((_, incarnation)) => incarnation + 1,
+            None => 1,
         }
     }
 
@@ -416,6 +434,9 @@ impl Simulation {
     }
 
     fn note_report(&mut self, robot: &RobotName, report: Arc<Report>, underway: Vec<Underway>) {
+        self.incarnations
+            .entry(robot.clone())
+            .or_insert((report.generation, 1));
         let before = self.reports.insert(robot.clone(), report.clone());
         let emotion_before = before.as_ref().map(|report| report.emotion_state.clone());
         let behavior_before = before.as_ref().map(|report| report.behavior_state.clone());
@@ -544,7 +565,12 @@ impl Simulation {
         let stream = if is_first {
             format!("robot/{name}")
         } else {
-            format!("robot/{name}#{generation}")
+            let incarnation = match open {
+                // It has reported for tick 0, which is not complete.
+                Some(_) if last.is_none() => 2,
+                _ => self.incarnation(name, generation),
+            };
+            format!("robot/{name}#{incarnation}")
         };
 
         Some(Welcome {
