@@ -1,4 +1,4 @@
-//! `docs/protocol.md` says what the code does: keys, limits, times, variables, examples, random streams, links.
+//! `docs/protocol.md` agrees with the code: keys, limits, times, variables, rules, examples, random streams, links.
 
 #![expect(
     clippy::unwrap_used,
@@ -12,7 +12,7 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, Percept, PublicState, Report, Waiting,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report, Waiting,
     WorldFrame,
 };
 use protocol::name::MAX_NAME_LEN;
@@ -98,7 +98,8 @@ fn the_sections_have_the_names_that_others_link_to() {
 /// `cars conform` names these rules: each is one sentence of the page.
 #[test]
 fn the_rules_are_there_once_each() {
-    const RULES: [&str; 28] = [
+    const RULES: [&str; 32] = [
+        "wire.qos",
         "join.request",
         "join.ready-last",
         "join.refused",
@@ -106,27 +107,31 @@ fn the_rules_are_there_once_each() {
         "tick.correction",
         "tick.initial",
         "tick.state-first",
+        "news.wait",
         "command.order",
-        "command.held",
         "command.twice",
-        "command.missing",
         "command.sent",
+        "operator.commands",
+        "query.asking",
         "query.tick",
-        "query.early",
+        "query.at-once",
+        "query.once",
         "query.unknown",
         "clock.duplicate",
         "clock.late",
         "epoch.init",
+        "epoch.late",
         "determinism.seed",
         "return.generation",
-        "return.numbers",
         "return.replaced",
         "end.clock",
         "end.sigterm",
+        "end.gone",
         "compat.unknown-fields",
         "robust.malformed",
         "number.angles",
         "number.finite",
+        "number.integers",
     ];
     let page: &'static str = page().leak();
     let found: Vec<&str> = page
@@ -154,7 +159,7 @@ fn the_table_of_keys_is_that_of_the_code() {
         keys.waiting(&robot),
         keys.command(&robot, &from),
         keys.query(&robot, STATE),
-        keys.percept(&robot),
+        keys.news(&robot),
         keys.panel(&robot),
         keys.alive_robot(&robot),
         keys.alive_sim(),
@@ -214,38 +219,28 @@ fn limits_times_and_version_are_those_of_the_code() {
         "The version of the protocol is {PROTOCOL_VERSION}."
     )));
 
-    // Constants that are nobody else's business stay private; the page names their values.
+    // Constants that no other crate needs stay private; the page names their values.
     let flat = page.split_whitespace().collect::<Vec<_>>().join(" ");
     for (file, constant, sentence) in [
         (
-            "robot/src/link.rs",
-            "COMMAND_PATIENCE: Duration = Duration::from_secs(10)",
-            "waited for, each up to 10 s",
+            "lockstep/src/participant.rs",
+            "WAITING_AFTER: Duration = Duration::from_millis(250)",
+            "once for each query, after 0.25 s",
         ),
         (
-            "robot/src/link.rs",
-            "LOOK_AGAIN: Duration = Duration::from_millis(250)",
-            "once for each wait, after 0.25 s",
+            "lockstep/src/participant.rs",
+            "QUERY_AGAIN: Duration = Duration::from_millis(500)",
+            "try again every 0.5 s",
         ),
         (
-            "robot/src/link.rs",
-            "ASK_AGAIN: Duration = Duration::from_millis(500)",
-            "ask again every 0.5 s",
-        ),
-        (
-            "robot/src/held.rs",
-            "MAX_COMMANDS: usize = 16_384",
-            "Keep 16384 at least",
-        ),
-        (
-            "robot/src/board.rs",
-            "MAX_EARLY: usize = 1024",
-            "at most 1024 are kept",
-        ),
-        (
-            "robot/src/host.rs",
+            "lockstep/src/participant.rs",
             "JOIN_AGAIN: Duration = Duration::from_millis(100)",
-            "every 0.1 s or so",
+            "about every 0.1 s",
+        ),
+        (
+            "protocol/src/messages/step.rs",
+            "NEWS_FLAGS: usize = 32",
+            "more than 32 robots",
         ),
         (
             "robot/src/host.rs",
@@ -253,24 +248,19 @@ fn limits_times_and_version_are_those_of_the_code() {
             "at most 20 times a second",
         ),
         (
-            "simulator/src/server.rs",
-            "SAY_AFTER: Duration = Duration::from_millis(500)",
-            "business for 0.5 s",
+            "lockstep/src/barrier.rs",
+            "announce: Duration::from_millis(500)",
+            "missing after 0.5 s",
         ),
         (
             "simulator/src/server.rs",
             "REPEAT_AFTER: Duration = Duration::from_secs(2)",
-            "same clock again every 2 s",
+            "with its news, again every 2 s",
         ),
         (
-            "simulator/src/server/member.rs",
-            "TOKEN_PATIENCE: Duration = Duration::from_secs(2)",
+            "lockstep/src/barrier.rs",
+            "token: Duration::from_secs(2)",
             "within 2 s of its welcome",
-        ),
-        (
-            "simulator/src/simulation.rs",
-            "SEQS_OF_A_GENERATION: Seq = 1_000_000_000",
-            "1,000,000,001 for generation 2",
         ),
         (
             "bus/src/lib.rs",
@@ -286,11 +276,11 @@ fn limits_times_and_version_are_those_of_the_code() {
         let source = std::fs::read_to_string(root().join("crates").join(file)).unwrap();
         assert!(
             source.contains(constant),
-            "{file} does not say {constant} any more: mend the page and this list"
+            "{constant} is not in {file} anymore: update the page and this list"
         );
         assert!(
             flat.contains(sentence),
-            "the page does not say {sentence:?} any more"
+            "{sentence:?} is not in the page anymore"
         );
     }
 }
@@ -337,8 +327,8 @@ fn check_as(schema: &str, text: &str) -> Result<(), Malformed> {
         "join_answer" => check::<JoinAnswer>(text),
         "join_request" => check::<JoinRequest>(text),
         "log_record" => check::<LogRecord>(text),
+        "news" => check::<News>(text),
         "panel" => check::<Panel>(text),
-        "percept" => check::<Percept>(text),
         "public_state" => check::<PublicState>(text),
         "report" => check::<Report>(text),
         "waiting" => check::<Waiting>(text),
@@ -381,10 +371,11 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
         shown.insert(schema);
         before = rest;
     }
-    // Those that a robot says or hears come from runs.
-    assert!(recorded >= 11, "{recorded}");
+    // The messages that robots put and receive are from recorded runs.
+    assert!(recorded >= 9, "{recorded}");
     for schema in [
         "clock",
+        "news",
         "join_request",
         "join_answer",
         "report",
@@ -396,7 +387,7 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
     }
 }
 
-/// Every line of the transcripts reads as what its key says.
+/// Every line of the transcripts is a message of its key.
 #[test]
 fn the_transcripts_are_messages() {
     let mut count = 0;
@@ -421,9 +412,8 @@ fn the_transcripts_are_messages() {
                 "command" => check::<Command>(&message),
                 "clock" => check::<Clock>(&message),
                 "report" => check::<Report>(&message),
-                "waiting" => check::<Waiting>(&message),
+                "news" => check::<News>(&message),
                 _ if line["refused"].is_string() => Ok(()),
-                "percept" => check::<Percept>(&answer),
                 STATE if line["way"] == "from" => check::<PublicState>(&message),
                 STATE => check::<PublicState>(&answer),
                 what => {

@@ -3,8 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use protocol::messages::{
-    Clock, Command, CommandId, Control, Correction, Face, JoinRequest, News, Panel, Performative,
-    Point, Report, SensedRobot, SentCommand, Tone, Variable, Widget,
+    Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, MAX_ENTRIES,
+    MAX_TEXT_BYTES, NEWS_FLAGS, News, Panel, Performative, Point, Report, SensedBody, SensedKind,
+    SensedRobot, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode, schema};
 
@@ -28,17 +29,34 @@ fn report() -> Report {
             ("who".into(), "x".into()),
         ]
         .into(),
-        sent: vec![SentCommand {
-            to: name("Leguin"),
-            seq: 3,
+        commands: 3,
+        log: vec!["jokes".into()],
+    }
+}
+
+fn news() -> News {
+    News {
+        epoch: 2,
+        tick: 7,
+        joined: Some(2),
+        correction: Some(Correction {
+            location: Point::new(1.0, 2.0),
+            blocked: true,
+        }),
+        commands: vec![Delivery {
+            from: name("Butler"),
             performative: Performative::Achieve,
             command: "refill".into(),
         }],
-        missing: vec![CommandId {
-            from: name("Vonda"),
-            seq: 1,
+        unreachable: vec![name("Vonda")],
+        sensed: vec![SensedRobot {
+            name: name("Vonda"),
+            location: Point::new(0.3, 0.7),
         }],
-        log: vec!["jokes".into()],
+        bodies: vec![SensedBody {
+            kind: SensedKind::Guest,
+            location: Point::new(0.1 + 0.2, 1e-300),
+        }],
     }
 }
 
@@ -55,34 +73,28 @@ fn round_trip<M: Message + PartialEq + std::fmt::Debug>(message: &M) {
 #[test]
 fn what_is_written_is_read_back_to_the_last_bit() {
     round_trip(&report());
-    let news = News {
-        correction: Some(Correction {
-            location: Point::new(1.0, 2.0),
-            blocked: true,
-        }),
-        commands: vec![CommandId {
-            from: name("Butler"),
-            seq: 1,
-        }],
-        unreachable: vec![name("Vonda")],
-        sensed: vec![SensedRobot {
-            name: name("Vonda"),
-            location: Point::new(0.3, 0.7),
-        }],
-        joined: Some(2),
-    };
+    round_trip(&news());
     round_trip(&Clock {
         epoch: 2,
         tick: 7,
-        news: [(name("Leguin"), news)].into(),
-        end: None,
+        news: 1 << 31,
+        end: Some(End::Finished),
     });
     round_trip(&Command {
         epoch: 1,
         tick: 2,
-        seq: 3,
+        generation: 3,
+        number: 4,
         performative: Performative::Tell,
         command: "hurry".into(),
+    });
+    round_trip(&JoinRequest {
+        protocol: 2,
+        run: RunName::new("demo").unwrap(),
+        name: name("Butler"),
+        instance: "a".into(),
+        bodies: true,
+        sdk: "rust".into(),
     });
     round_trip(&Control::Step { n: 10 });
     let widgets = vec![
@@ -113,13 +125,73 @@ fn a_quiet_clock_is_small() {
     assert_eq!(encode(&clock), br#"{"epoch":1,"tick":123456}"#);
 }
 
+/// The clock of a tick in which every robot of a roster has news.
+fn full_clock(robots: usize) -> Clock {
+    let flags = (0..robots).map(|index| 1_u32 << (index % NEWS_FLAGS));
+
+    Clock {
+        epoch: 1,
+        tick: 123_456,
+        news: flags.fold(0, |all, flag| all | flag),
+        end: None,
+    }
+}
+
+#[test]
+fn the_size_of_a_clock_does_not_depend_on_the_number_of_robots() {
+    let one_robot = encode(&full_clock(1)).len();
+    let many_robots = encode(&full_clock(64)).len();
+    let digits_of_flags = u32::MAX.to_string().len() - 1;
+
+    assert_eq!(one_robot + digits_of_flags, many_robots);
+    assert_eq!(encode(&full_clock(10_000)).len(), many_robots);
+    let largest = Clock {
+        epoch: u32::MAX,
+        tick: (1 << 53) - 1,
+        news: u32::MAX,
+        end: Some(End::Finished),
+    };
+    assert!(encode(&largest).len() < 100);
+}
+
+#[test]
+fn news_of_nothing_are_empty() {
+    let nothing = News {
+        epoch: 2,
+        tick: 7,
+        ..News::default()
+    };
+    assert_eq!(encode(&nothing), br#"{"epoch":2,"tick":7}"#);
+    assert!(nothing.is_empty());
+    assert!(!news().is_empty());
+}
+
+/// The command of an operator needs nothing but its text.
+#[test]
+fn a_command_may_be_its_text_alone() {
+    let command: Command = decode("key", "operator", br#"{"command":"refill"}"#).unwrap();
+    let expected = Command {
+        command: "refill".into(),
+        ..Command::default()
+    };
+    assert_eq!(command, expected);
+    assert_eq!(command.performative, Performative::Achieve);
+}
+
 #[test]
 fn unknown_fields_are_ignored_and_absent_lists_are_empty() {
     let text = br#"{"epoch":1,"tick":2,"generation":1,"proposal":{"x":1,"y":2,"z":3},"speed_mps":0,"direction_rad":0,
         "emotion_state":"","behavior_state":"","weather":"fine"}"#;
     let report: Report = decode("key", "sender", text).unwrap();
-    assert!(report.sent.is_empty() && report.state_variables.is_empty());
+    assert!(report.log.is_empty() && report.state_variables.is_empty());
+    assert_eq!(report.commands, 0);
     assert_eq!(report.proposal, Point::new(1.0, 2.0));
+
+    let text = br#"{"epoch":1,"tick":2,"weather":"fine"}"#;
+    let clock: Clock = decode("key", "sender", text).unwrap();
+    assert_eq!((clock.news, clock.end), (0, None));
+    let news: News = decode("key", "sender", text).unwrap();
+    assert!(news.is_empty());
 }
 
 #[test]
@@ -148,8 +220,8 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
             r#""treats":[7]"#,
             "state_variables.treats",
         ),
-        (r#""to":"Leguin""#, r#""to":"Le/guin""#, "sent[0].to"),
-        (r#""seq":3"#, r#""seq":3.5"#, "sent[0].seq"),
+        (r#""commands":3"#, r#""commands":3.5"#, "commands"),
+        (r#""commands":3"#, r#""commands":4294967296"#, "commands"),
         (r#"{"epoch""#, r#"["epoch""#, "[0]"),
         (r#""log":["jokes"]}"#, r#""log":["jokes"]} trailing"#, "."),
     ] {
@@ -159,6 +231,64 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
         assert_eq!(error.field, field, "{to}: {error}");
         assert!(error.to_string().contains(key), "{error}");
     }
+}
+
+#[test]
+fn malformed_news_are_named_by_key_sender_and_field() {
+    let good = String::from_utf8(encode(&news())).unwrap();
+    let key = "cars/demo/robot/Butler/news";
+    for (from, to, field) in [
+        (r#""epoch":2"#, r#""epoch":2.5"#, "epoch"),
+        (r#""tick":7"#, r#""tick":9007199254740992"#, "tick"),
+        (r#""joined":2"#, r#""joined":"two""#, "joined"),
+        (
+            r#""from":"Butler""#,
+            r#""from":"But/ler""#,
+            "commands[0].from",
+        ),
+        (
+            r#""command":"refill""#,
+            r#""command":7"#,
+            "commands[0].command",
+        ),
+        (
+            r#""unreachable":["Vonda"]"#,
+            r#""unreachable":[7]"#,
+            "unreachable[0]",
+        ),
+        (r#""kind":"guest""#, r#""kind":"ghost""#, "bodies[0].kind"),
+    ] {
+        assert!(good.contains(from), "{from} is not in {good}");
+        let damaged = good.replacen(from, to, 1);
+        let error = decode::<News>(key, "simulator", damaged.as_bytes()).unwrap_err();
+        assert_eq!(
+            (error.key.as_str(), error.sender.as_str()),
+            (key, "simulator")
+        );
+        assert_eq!(error.field, field, "{to}: {error}");
+    }
+}
+
+#[test]
+fn news_are_bounded() {
+    let with_text = |bytes: usize| {
+        let mut long = news();
+        long.commands[0].command = "x".repeat(bytes);
+        decode::<News>("key", "simulator", &encode(&long))
+    };
+    assert!(with_text(MAX_TEXT_BYTES).is_ok());
+    let error = with_text(MAX_TEXT_BYTES + 1).unwrap_err();
+    assert_eq!(error.field, "commands.command");
+
+    // Many robots may send to one, so there may be more commands than one robot may send; the message is bounded.
+    let with_commands = |count: usize| {
+        let mut many = news();
+        many.commands = vec![many.commands[0].clone(); count];
+        decode::<News>("key", "simulator", &encode(&many))
+    };
+    assert!(with_commands(MAX_ENTRIES + 1).is_ok());
+    let error = with_commands(100_000).unwrap_err();
+    assert!(error.reason.contains("bytes"), "{error}");
 }
 
 #[test]
@@ -176,6 +306,20 @@ fn sizes_are_bounded() {
             .field,
         "log"
     );
+
+    let mut sent = report();
+    sent.commands = MAX_ENTRIES as u32;
+    assert!(decode::<Report>("key", "Butler", &encode(&sent)).is_ok());
+    sent.commands += 1;
+    let error = decode::<Report>("key", "Butler", &encode(&sent)).unwrap_err();
+    assert_eq!(error.field, "commands");
+
+    let command = Command {
+        command: "x".repeat(MAX_TEXT_BYTES + 1),
+        ..Command::default()
+    };
+    let error = decode::<Command>("key", "Butler", &encode(&command)).unwrap_err();
+    assert_eq!(error.field, "command");
 
     let huge = vec![b' '; 2 << 20];
     assert!(
@@ -206,6 +350,8 @@ fn garbage_never_panics() {
             .collect();
         assert!(decode::<Report>("key", "x", &bytes).is_err());
         assert!(decode::<JoinRequest>("key", "x", &bytes).is_err());
+        assert!(decode::<Clock>("key", "x", &bytes).is_err());
+        assert!(decode::<News>("key", "x", &bytes).is_err());
     }
 }
 

@@ -6,7 +6,7 @@
 use proptest::prelude::*;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, Percept, PublicState, RecordedTick,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, RecordedTick,
     RecordingHeader, Report, Waiting, WorldFrame,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
@@ -14,13 +14,14 @@ use serde_json::Value;
 
 /// Good messages, with which most kinds can be reached.
 const GOOD: &[&str] = &[
-    r#"{"epoch":1,"tick":12,"generation":1,"proposal":{"x":0.5,"y":1},"speed_mps":0.3,"direction_rad":-3,"emotion_state":"HAPPY","behavior_state":"SERVE","state_variables":{"treats":7,"need":true,"who":"x"},"sent":[{"to":"Leguin","seq":3,"performative":"achieve","command":"refill"}],"missing":[{"from":"Vonda","seq":1}],"log":["jokes"]}"#,
-    r#"{"epoch":2,"tick":7,"news":{"Leguin":{"correction":{"location":{"x":1,"y":2},"blocked":true},"commands":[{"from":"Butler","seq":1}],"unreachable":["Vonda"],"sensed":[{"name":"Vonda","location":{"x":0.3,"y":0.7}}],"joined":2}},"end":"finished"}"#,
-    r#"{"epoch":1,"tick":2,"seq":3,"performative":"tell","command":"hurry"}"#,
+    r#"{"epoch":1,"tick":12,"generation":1,"proposal":{"x":0.5,"y":1},"speed_mps":0.3,"direction_rad":-3,"emotion_state":"HAPPY","behavior_state":"SERVE","state_variables":{"treats":7,"need":true,"who":"x"},"commands":3,"log":["jokes"]}"#,
+    r#"{"epoch":2,"tick":7,"news":2147483649,"end":"finished"}"#,
+    r#"{"epoch":2,"tick":7,"joined":2,"correction":{"location":{"x":1,"y":2},"blocked":true},"commands":[{"from":"Butler","performative":"achieve","command":"refill"}],"unreachable":["Vonda"],"sensed":[{"name":"Vonda","location":{"x":0.3,"y":0.7}}],"bodies":[{"kind":"guest","location":{"x":0.3,"y":0.7}}]}"#,
+    r#"{"epoch":1,"tick":2,"generation":1,"number":3,"performative":"tell","command":"hurry"}"#,
     r#"{"do":"init","seed":5,"setup":{"seed":1,"duration_s":60,"field_m":[15,15],"guests":100,"guest_speed_mps":{"min":0,"mode":1,"max":2},"guest_duration_s":{"min":1,"mode":2,"max":3},"obstacles":[{"x":1,"y":1}],"robots":{"A":{"x":2,"y":2}},"log_file":{"enabled":true,"name":"cars.log"}}}"#,
     r#"{"do":"late","robot":"A","on_late":"continue","deadline_s":0.5}"#,
     r#"{"widgets":[{"widget":"face","face":"happy","intensity":0.5},{"widget":"badge","label":"e","text":"H","tone":"good"},{"widget":"bar","label":"b","value":1,"min":0,"max":2},{"widget":"sparkline","label":"s","values":[1,2]},{"widget":"table","rows":[["a","b"]]},{"widget":"svg","label":"p","svg":"<svg/>"},{"widget":"button","label":"R","command":"refill"}]}"#,
-    r#"{"protocol":1,"run":"demo","name":"Butler","instance":"x","sdk":"rust"}"#,
+    r#"{"protocol":1,"run":"demo","name":"Butler","instance":"x","bodies":true,"sdk":"rust"}"#,
     r#"{"epoch":1,"tick":5,"orders":[{"robot":"A","kind":"crash","begins":true,"for_s":1.5}]}"#,
 ];
 
@@ -72,15 +73,15 @@ fn replace(value: &mut Value, at: &mut usize, with: &Value) {
 /// Reads bytes as every kind of message; what is accepted can be written and read again.
 fn survives(bytes: &[u8]) {
     fn one<M: Message + PartialEq + std::fmt::Debug>(bytes: &[u8]) {
-        match decode::<M>("cars/demo/key", "somebody", bytes) {
+        match decode::<M>("cars/demo/key", "a sender", bytes) {
             Ok(message) => {
-                let again = decode::<M>("cars/demo/key", "somebody", &encode(&message));
+                let again = decode::<M>("cars/demo/key", "a sender", &encode(&message));
                 assert_eq!(again.unwrap(), message);
             }
             Err(error) => {
                 let text = error.to_string();
                 assert!(
-                    text.contains("cars/demo/key") && text.contains("somebody"),
+                    text.contains("cars/demo/key") && text.contains("a sender"),
                     "{text}"
                 );
                 assert!(
@@ -100,8 +101,8 @@ fn survives(bytes: &[u8]) {
     one::<JoinAnswer>(bytes);
     one::<JoinRequest>(bytes);
     one::<LogRecord>(bytes);
+    one::<News>(bytes);
     one::<Panel>(bytes);
-    one::<Percept>(bytes);
     one::<PublicState>(bytes);
     one::<RecordedTick>(bytes);
     one::<RecordingHeader>(bytes);
@@ -110,14 +111,19 @@ fn survives(bytes: &[u8]) {
     one::<WorldFrame>(bytes);
 }
 
-/// What an accepted report or panel may hold at most.
+/// What an accepted report, panel or list of news may hold at most.
 fn is_bounded(bytes: &[u8]) {
-    if let Ok(report) = decode::<Report>("key", "somebody", bytes) {
-        assert!(report.log.len() <= MAX_ENTRIES && report.sent.len() <= MAX_ENTRIES);
+    if let Ok(report) = decode::<Report>("key", "a sender", bytes) {
+        assert!(report.log.len() <= MAX_ENTRIES && report.commands as usize <= MAX_ENTRIES);
         assert!(report.log.iter().all(|line| line.len() <= MAX_TEXT_BYTES));
         assert!(report.proposal.x.is_finite() && report.speed_mps.is_finite());
     }
-    if let Ok(panel) = decode::<Panel>("key", "somebody", bytes) {
+    if let Ok(news) = decode::<News>("key", "a sender", bytes) {
+        let texts = news.commands.iter().map(|delivery| &delivery.command);
+        assert!(texts.map(String::len).all(|bytes| bytes <= MAX_TEXT_BYTES));
+        assert!(news.tick < 1 << 53);
+    }
+    if let Ok(panel) = decode::<Panel>("key", "a sender", bytes) {
         assert!(panel.widgets.len() <= MAX_WIDGETS);
     }
 }

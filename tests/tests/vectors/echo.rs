@@ -15,7 +15,7 @@ const REACH_M: f64 = 0.2;
 pub(super) struct Echo {
     heard: u32,
     last: String,
-    /// What it learned from percepts and queries.
+    /// What it perceived and learned from queries.
     seen: StateVariables,
 }
 
@@ -58,6 +58,10 @@ impl Robot for Echo {
             .variable("draw", draw)
     }
 
+    fn senses_bodies(&self) -> bool {
+        true
+    }
+
     fn resume(&mut self, _: &mut Cars<'_>, last: &StateVariables) {
         self.heard = last
             .get("heard")
@@ -80,10 +84,8 @@ impl Echo {
     }
 
     fn look(&mut self, cars: &mut Cars<'_>) {
-        if let Ok(percept) = cars.percept() {
-            let near = percept.bodies.len() as f64;
-            self.seen.insert("near".to_owned(), near.into());
-        }
+        let near = cars.bodies().len() as f64;
+        self.seen.insert("near".to_owned(), near.into());
 
         for other in &cars.welcome().roster {
             if other == cars.name() {

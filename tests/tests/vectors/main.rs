@@ -1,4 +1,4 @@
-//! The test vectors in `docs/vectors`: what a robot hears and says, for authors who want to test without a simulator.
+//! The test vectors in `docs/vectors`: what a robot receives and puts, for authors who want to test without a simulator.
 //!
 //! Set `CARS_UPDATE=1` to write the files anew. They are transcripts of the real simulator and the real robots' loop over
 //! a network in this process, and a run writes the same bytes whatever its schedule.
@@ -83,7 +83,7 @@ fn leguin_in_the_hall() {
 #[test]
 fn echo_through_everything_that_a_network_does() {
     let mut stage = Stage::new(ECHO, &[], "Echo");
-    stage.seat_caller();
+    stage.seat("Caller", || Box::new(caller::Caller));
     stage.seat("Echo", || Box::<echo::Echo>::default());
     stage.begin(1);
     stage.step_to(28);
@@ -102,10 +102,7 @@ fn echo_through_everything_that_a_network_does() {
     }
     let clock = last_clock(&stage.transcript.text());
     stage.repeat_clock(clock.as_bytes());
-    stage.order(&Control::Command {
-        to: name("Echo"),
-        command: "hello".to_owned(),
-    });
+    stage.command_as_operator(r#"{"command":"hello"}"#);
     stage.step_to(30);
     stage.order(&Control::Init {
         seed: Some(8),
@@ -119,7 +116,7 @@ fn echo_through_everything_that_a_network_does() {
 #[test]
 fn echo_returns() {
     let mut stage = Stage::new(ECHO, &[], "Echo");
-    stage.seat_caller();
+    stage.seat("Caller", || Box::new(caller::Caller));
     stage.seat("Echo", || Box::<echo::Echo>::default());
     stage.begin(1);
     stage.step_to(3);
@@ -189,8 +186,8 @@ fn leguin_in_the_hall_as_processes() {
     };
     let _listening = [
         listen(&keys.clock()),
+        listen(&keys.news(&leguin)),
         listen(&keys.report(&leguin)),
-        listen(&keys.commands_to(&leguin)),
         listen(&keys.command(&name("Butler"), &leguin)),
     ];
     // An answer shows that what was declared before the query is in effect.

@@ -15,7 +15,6 @@ use simulator::server::{Options, Server};
 use simulator::{RunFolder, Scenario};
 use system_tests::{PATIENCE, eventually, root};
 
-use crate::caller::Caller;
 use crate::transcript::Transcript;
 
 /// Longer than any step: the clock is repeated only where a test does it.
@@ -70,12 +69,11 @@ impl Stage {
             server.run(loaded, &run_folder).unwrap();
         });
         let observer = network.client();
-        // Who follows everything from the beginning has everything that a robot could ever ask for.
+        // With a subscriber from the beginning, robots put all of their states: whatever a robot can query is overheard.
         let watch = |key: String| observer.subscribe(&key, |_, _| {}).unwrap();
-        let watching = vec![
-            watch(keys.query(&robot, STATE).replace(robot.as_str(), "*")),
-            watch(keys.percepts()),
-        ];
+        let watching = vec![watch(
+            keys.query(&robot, STATE).replace(robot.as_str(), "*"),
+        )];
         let transcript = Transcript::new(keys.clone(), robot.clone(), scenario);
         // Who is answered knows that the simulator is there, and that what it declared before it asked is in effect.
         let status = encode(&Control::Status);
@@ -119,17 +117,6 @@ impl Stage {
                 Err(error) => panic!("{error}"),
             }
         }));
-    }
-
-    /// Echo's partner takes part.
-    pub(super) fn seat_caller(&mut self) {
-        let caller = Caller::new(
-            self.network.client(),
-            &self.run,
-            &name("Caller"),
-            &self.robot,
-        );
-        self.threads.push(std::thread::spawn(move || caller.run()));
     }
 
     /// Kills the process of the robot whose story is told, between two ticks.
@@ -214,7 +201,15 @@ impl Stage {
         self.control(control);
     }
 
-    /// Says the last clock again, and waits for the robot's answer.
+    /// Puts a command to the robot as an operator does, with any tool.
+    pub(super) fn command_as_operator(&self, payload: &str) {
+        let key = self.keys.command(&self.robot, &RobotName::operator());
+        self.observer
+            .put(&key, payload.as_bytes().to_vec())
+            .unwrap();
+    }
+
+    /// Puts the last clock again, and waits for the robot's answer.
     pub(super) fn repeat_clock(&mut self, clock: &[u8]) {
         self.observer
             .put(&self.keys.clock(), clock.to_vec())

@@ -76,14 +76,6 @@ export type Control =
     }
   | {
       do: "status";
-    }
-  | {
-      /**
-       * What it says.
-       */
-      command: string;
-      do: "command";
-      to: RobotName;
     };
 /**
  * What the clock does about a robot that is late.
@@ -250,7 +242,7 @@ export type Variable = boolean | number | string;
 /**
  * What became of a command.
  */
-export type Fate = "sent" | "delivered" | "dropped" | "missing";
+export type Fate = "sent" | "delivered" | "dropped";
 
 /**
  * What a person can change between two epochs: the set-up screen of the paper ("Overall Architecture"). Everything else
@@ -421,15 +413,15 @@ export interface SetupAnswer {
   setup: Setup;
 }
 /**
- * What is wrong with one field of a set-up.
+ * A field that is wrong, and why.
  */
 export interface FieldError {
   /**
-   * The field, as a path in the [`Setup`]: `guests`, `guest_speed_mps`, `robots.Butler`, `obstacles`.
+   * Path of the field: `sent.command`, `robots.Butler`, `setup.obstacles`.
    */
   field: string;
   /**
-   * What is wrong with it and what would be right.
+   * What is wrong with it, and what would be right.
    */
   reason: string;
 }
