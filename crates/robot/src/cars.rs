@@ -12,7 +12,7 @@ use protocol::random::Stream;
 use protocol::{RobotName, Tick};
 
 use crate::error::BadParameters;
-use crate::seat::{Network, Undelivered};
+use crate::network::{Network, Undelivered};
 
 /// Most bytes that a robot may write to the log in a tick, all lines together.
 const MAX_LOG_BYTES: usize = 256 * 1024;

@@ -5,7 +5,6 @@
 //! also while a robot computes. What the participants want done is carried out by the host's own thread, which also runs the
 //! robots.
 
-mod network;
 mod shared;
 
 use std::collections::BTreeMap;
@@ -24,9 +23,9 @@ use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
 use crate::cri::Robot;
 use crate::error::RobotError;
+use crate::network::{Network, Undelivered};
 use crate::seat::{Done, Seat};
-use network::HostNetwork;
-use shared::{HostAction, HostAnswer, Shared};
+use shared::{HostAction, HostAnswer, Shared, Waited};
 
 /// A panel is for eyes: it is put no more often than this.
 const PANEL_INTERVAL: Duration = Duration::from_millis(50);
@@ -526,6 +525,53 @@ impl Member {
             (Some(seat), _) => seat.start_over(welcome),
             (none, Some(robot)) => *none = Some(Seat::new(robot, welcome)),
             (None, None) => unreachable!("a robot that is not seated is here"),
+        }
+    }
+}
+
+/// The bus, as a robot sees it that runs a tick: it waits here for other robots' answers, and the host goes on meanwhile.
+struct HostNetwork<'a> {
+    host: &'a mut Host,
+    name: &'a RobotName,
+    query: StateQuery,
+    /// Why the host cannot go on.
+    failed: Option<HostError>,
+}
+
+impl<'a> HostNetwork<'a> {
+    fn new(host: &'a mut Host, name: &'a RobotName, turn: &Turn<News>) -> Self {
+        Self {
+            host,
+            name,
+            query: StateQuery {
+                tick: Some(turn.tick),
+                epoch: Some(turn.epoch),
+            },
+            failed: None,
+        }
+    }
+}
+
+impl Network for HostNetwork<'_> {
+    fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
+        let shared = self.host.shared.clone();
+        if shared.has(target) {
+            return shared
+                .state(target, self.query)
+                .map_err(|_| Undelivered::Lost);
+        }
+
+        loop {
+            match shared.wait_for(self.name, target) {
+                Waited::Found(state) => return Ok(state),
+                Waited::Interrupted => return Err(Undelivered::Interrupted),
+                Waited::Act(name, action) => {
+                    if let Err(error) = self.host.carry_out_io(&name, action) {
+                        self.failed = Some(error);
+                        return Err(Undelivered::Interrupted);
+                    }
+                }
+            }
         }
     }
 }

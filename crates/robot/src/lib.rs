@@ -43,6 +43,7 @@ mod error;
 mod figure7;
 mod host;
 mod local;
+mod network;
 mod seat;
 
 pub use cars::{CallError, Cars, ReceivedCommand};
@@ -52,6 +53,7 @@ pub use error::{BadParameters, RobotError};
 pub use figure7::{CarsRobotInterface, Paper};
 pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::LocalHost;
+pub use network::{Network, Undelivered};
 pub use protocol::messages::{
     Clock, Command, CommandText, Correction, End, Face, News, Panel, Parameters, Point,
     PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables, Tone, Variable,
@@ -59,7 +61,7 @@ pub use protocol::messages::{
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RunName, Tick};
-pub use seat::{Done, Network, Seat, Undelivered};
+pub use seat::{Done, Seat};
 
 /// Rounds an angle to 1e-6 rad, so that languages whose arc tangents differ in the last bit publish the same number.
 #[must_use]

@@ -14,7 +14,8 @@ use protocol::{RobotName, Tick};
 
 use crate::cri::Robot;
 use crate::error::RobotError;
-use crate::seat::{Done, Network, Seat, Undelivered};
+use crate::network::{Network, Undelivered};
+use crate::seat::{Done, Seat};
 
 type LocalParticipant = Participant<News, Arc<PublicState>, CommandText, Arc<Report>>;
 type LocalAction = Action<News, Arc<PublicState>, CommandText, Arc<Report>>;

@@ -6,29 +6,12 @@ use std::sync::Arc;
 use lockstep::{Begin, Sent, Turn};
 use protocol::messages::{CommandText, News, Panel, Point, PublicState, Report, Welcome};
 use protocol::random::{Stream, stream};
-use protocol::{FieldError, Message, RobotName, Tick};
+use protocol::{FieldError, Message, Tick};
 
 use crate::cars::{Cars, ReceivedCommand};
 use crate::cri::{Action, Robot};
 use crate::error::RobotError;
-
-/// What a robot needs from outside during a tick.
-pub trait Network {
-    /// The state that `target` reported for the tick before.
-    ///
-    /// # Errors
-    /// [`Undelivered`] says why there is none.
-    fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered>;
-}
-
-/// Why a query has no answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Undelivered {
-    /// The other side is gone.
-    Lost,
-    /// The tick is over.
-    Interrupted,
-}
+use crate::network::Network;
 
 /// What came of a tick.
 #[derive(Debug)]

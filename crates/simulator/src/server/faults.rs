@@ -3,12 +3,12 @@
 
 use std::time::{Duration, Instant};
 
-use bus::{BusError, Publisher};
+use bus::BusError;
 use protocol::encode;
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
-use protocol::{Epoch, Tick};
 
-use super::{REPEAT_AFTER, Server};
+use super::orders::Underway;
+use super::process::{REPEAT_AFTER, Server, Stage};
 use crate::simulation::Simulation;
 
 /// Longest wait for a launcher to carry out an order, and for a robot to go or to come back; then the run goes on and logs
@@ -20,38 +20,6 @@ const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(20);
 /// A robot whose hang is over gets the clock again this often, and counts as back when it answers.
 const NUDGE: Duration = Duration::from_millis(100);
-
-/// Orders to the launcher.
-pub(super) struct Orders {
-    publisher: Publisher,
-    /// The order that has been carried out last.
-    done: Option<(Epoch, Tick)>,
-    has_complained: bool,
-}
-
-impl Orders {
-    pub(super) fn new(publisher: Publisher) -> Self {
-        Self {
-            publisher,
-            done: None,
-            has_complained: false,
-        }
-    }
-
-    /// The launcher has carried out an order.
-    pub(super) fn done(&mut self, epoch: Epoch, tick: Tick) {
-        self.done = Some((epoch, tick));
-    }
-}
-
-/// An order that is being carried out.
-pub(super) struct Underway {
-    order: FaultOrder,
-    begun: Instant,
-    /// When it was put last; `None` while no launcher subscribes.
-    put: Option<Instant>,
-    nudged: Instant,
-}
 
 impl Server {
     /// Begins to have the faults carried out that are due before the next tick, if there are any.
@@ -87,7 +55,7 @@ impl Server {
         &mut self,
         simulation: &Simulation,
     ) -> Result<Option<Duration>, BusError> {
-        let super::Stage::Faults(underway) = &mut self.stage else {
+        let Stage::Faults(underway) = &mut self.stage else {
             return Ok(None);
         };
         let Some(put) = underway.put else {
@@ -122,7 +90,7 @@ impl Server {
     /// Puts the order as soon as a launcher subscribes. If none does in time, the run goes on and has logged it.
     fn await_launcher(&mut self, begun: Instant) -> Result<Option<Duration>, BusError> {
         if self.orders.publisher.has_subscribers() {
-            if let super::Stage::Faults(underway) = &mut self.stage {
+            if let Stage::Faults(underway) = &mut self.stage {
                 underway.put = Some(Instant::now());
                 self.orders.publisher.put(encode(&underway.order))?;
             }

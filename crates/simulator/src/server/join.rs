@@ -6,7 +6,7 @@ use protocol::keys::Keys;
 use protocol::messages::{JoinAnswer, JoinRequest, Refusal};
 use protocol::{PROTOCOL_VERSION, RobotName, decode, encode};
 
-use super::Server;
+use super::process::Server;
 use crate::simulation::Simulation;
 
 /// Why a robot may not take part.

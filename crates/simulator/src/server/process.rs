@@ -1,0 +1,688 @@
+//! The loop of a simulator process.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender};
+use std::time::{Duration, Instant};
+
+use bus::{Bus, BusError, Declared, Publisher, Query};
+use lockstep::{Barrier, Outcome, Output, Sent, Stamp, Timing};
+use protocol::keys::Keys;
+use protocol::messages::{
+    Clock, Command, CommandText, End, MAX_ENTRIES, Presence, Reason, Report, Waiting,
+};
+use protocol::{Epoch, Generation, Malformed, RobotName, RunName, decode, encode};
+
+use crate::diagnostic::FileError;
+use crate::recorder::{Recorder, RunFolder};
+use crate::scenario::Scenario;
+use crate::simulation::Simulation;
+use crate::summary::{Summary, Wall};
+
+use super::observers::Observers;
+use super::orders::{Orders, Underway};
+use super::pace::Pace;
+use super::timers::Timers;
+
+/// Messages that may queue up before links are slowed down.
+const QUEUE: usize = 65_536;
+/// While the clock is held it is repeated this often: what was lost on the wire is then sent again.
+pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
+/// How long the simulator waits at the end of a run for the robots to leave.
+const GOODBYE: Duration = Duration::from_secs(1);
+/// Most commands of the operator that wait for the next tick.
+const MAX_OPERATOR_COMMANDS: usize = 1024;
+
+/// How a simulator process runs.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Name of the run.
+    pub run: RunName,
+    /// Simulated seconds per second; `None` is as fast as the barrier goes.
+    pub speed: Option<f64>,
+    /// Whether the clock waits for `start` once every robot is connected.
+    pub is_paused: bool,
+    /// While the clock is held it is repeated this often; [`REPEAT_AFTER`] unless a test is in a hurry.
+    pub repeat_after: Duration,
+}
+
+/// Why a simulator process ended before its time.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The record cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The environment cannot be set up.
+    #[error(transparent)]
+    Hall(#[from] world::HallError),
+}
+
+/// Everything that can happen to a simulator process.
+pub enum Event {
+    /// A robot has done its tick.
+    Report {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        report: Result<Report, Malformed>,
+    },
+    /// A robot, or the operator, sent a command.
+    Command {
+        /// The sender that the key names.
+        from: String,
+        /// The target that the key names.
+        to: String,
+        /// What was put.
+        command: Result<Command, Malformed>,
+    },
+    /// A robot waits for another robot's answer.
+    Waiting {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        waiting: Result<Waiting, Malformed>,
+    },
+    /// A robot asks to take part.
+    Join(Query),
+    /// An operator asks for something.
+    Control(Query),
+    /// A robot's liveliness token was declared or undeclared.
+    Token {
+        /// The robot that the key names.
+        robot: String,
+        /// Whether it is declared.
+        is_present: bool,
+    },
+    /// The process is asked to end.
+    Terminate,
+}
+
+/// Why an epoch ended.
+#[derive(Debug)]
+pub enum Interrupt {
+    /// Start the next epoch with this scenario.
+    Init(Box<Scenario>),
+    /// End the run.
+    End(End),
+    /// The process cannot go on.
+    Failed(ServerError),
+}
+
+impl From<BusError> for Interrupt {
+    fn from(error: BusError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<FileError> for Interrupt {
+    fn from(error: FileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// What the loop waits for.
+pub(super) enum Stage {
+    /// The robots: to join, or to report.
+    Robots,
+    /// The next tick to be due.
+    Grant,
+    /// The launcher, to carry out the faults that are due before the next tick.
+    Faults(Underway),
+}
+
+/// A simulator process.
+pub struct Server {
+    pub(super) options: Options,
+    bus: Bus,
+    keys: Keys,
+    queue: SyncSender<Event>,
+    events: Receiver<Event>,
+    declared: Vec<Declared>,
+    clock: Publisher,
+    news: BTreeMap<RobotName, Publisher>,
+    pub(super) observers: Observers,
+    pub(super) orders: Orders,
+    pub(super) pace: Pace,
+    pub(super) barrier: Barrier<Arc<Report>, CommandText>,
+    pub(super) outputs: Vec<Output<Arc<Report>, CommandText>>,
+    timers: Timers,
+    pub(super) stage: Stage,
+    /// Robots whose news list the bodies around them.
+    pub(super) with_bodies: BTreeSet<RobotName>,
+    /// Since when the loop waits for robots.
+    pub(super) waiting_since: Instant,
+    /// Robots that hold the clock up: awaited when people were told, and not waiting for another robot.
+    culprits: Vec<RobotName>,
+    pub(super) wall: Wall,
+    /// Commands from outside the roster that are sent at the next tick boundary.
+    operator: Vec<(RobotName, String)>,
+}
+
+impl Server {
+    /// Declares the simulator's side of the contract on an open bus.
+    ///
+    /// # Errors
+    /// [`BusError`] if something cannot be declared.
+    pub fn open(bus: Bus, scenario: &Scenario, options: Options) -> Result<Self, BusError> {
+        let keys = Keys::new(&options.run);
+        let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
+        let mut news = BTreeMap::new();
+        for name in scenario.robots.keys() {
+            news.insert(name.clone(), bus.publisher(&keys.news(name))?);
+        }
+        let timing = Timing {
+            repeat: options.repeat_after,
+            ..Timing::default()
+        };
+        let barrier = Barrier::new(
+            scenario.robots.keys().cloned(),
+            scenario.lateness.to_lockstep(),
+            timing,
+            u32::try_from(MAX_ENTRIES).unwrap_or(u32::MAX),
+        );
+
+        let mut server = Self {
+            clock: bus.publisher(&keys.clock())?,
+            news,
+            observers: Observers::new(&bus, &keys)?,
+            orders: Orders::new(bus.publisher(&keys.faults())?),
+            pace: Pace::new(options.speed, options.is_paused),
+            barrier,
+            outputs: Vec::new(),
+            timers: Timers::default(),
+            stage: Stage::Robots,
+            with_bodies: BTreeSet::new(),
+            waiting_since: Instant::now(),
+            culprits: Vec::new(),
+            wall: Wall::default(),
+            operator: Vec::new(),
+            declared: Vec::new(),
+            options,
+            bus,
+            keys,
+            queue,
+            events,
+        };
+        server.declare()?;
+        Ok(server)
+    }
+
+    /// Where signals and tests put events.
+    #[must_use]
+    pub fn queue(&self) -> SyncSender<Event> {
+        self.queue.clone()
+    }
+
+    /// Declares what the simulator subscribes to and answers, its token last.
+    fn declare(&mut self) -> Result<(), BusError> {
+        // A send fails only when the process ends, and then no message matters any more.
+        let queue = self.queue();
+        let reports = self
+            .bus
+            .subscribe(&self.keys.reports(), move |key, bytes| {
+                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let report = decode(key, &robot, bytes);
+                let _ = queue.send(Event::Report { robot, report });
+            })?;
+
+        let queue = self.queue();
+        let commands = self
+            .bus
+            .subscribe(&self.keys.commands(), move |key, bytes| {
+                let to = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let from = Keys::last_chunk(key).to_owned();
+                let command = decode(key, &from, bytes);
+                let _ = queue.send(Event::Command { from, to, command });
+            })?;
+
+        let queue = self.queue();
+        let waiting = self
+            .bus
+            .subscribe(&self.keys.all_waiting(), move |key, bytes| {
+                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let waiting = decode(key, &robot, bytes);
+                let _ = queue.send(Event::Waiting { robot, waiting });
+            })?;
+
+        let queue = self.queue();
+        let tokens = self
+            .bus
+            .liveliness(&self.keys.alive_robots(), move |key, is_present| {
+                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let _ = queue.send(Event::Token { robot, is_present });
+            })?;
+        self.declared.extend([reports, commands, waiting, tokens]);
+
+        for (key, event) in [
+            (self.keys.join(), Event::Join as fn(Query) -> Event),
+            (self.keys.joins(), Event::Join),
+            (self.keys.control(), Event::Control),
+        ] {
+            let queue = self.queue();
+            self.declared.push(self.bus.queryable(&key, move |query| {
+                let _ = queue.send(event(query));
+            })?);
+        }
+        self.declared.push(self.bus.token(&self.keys.alive_sim())?);
+        Ok(())
+    }
+
+    /// Runs until the run ends: epoch after epoch, tick after tick.
+    ///
+    /// # Errors
+    /// [`ServerError`] if it cannot go on; what was recorded until then is kept.
+    pub fn run(
+        mut self,
+        mut scenario: Scenario,
+        folder: &RunFolder,
+    ) -> Result<Summary, ServerError> {
+        let mut epoch: Epoch = 1;
+        loop {
+            let mut simulation = Simulation::new(scenario.clone(), epoch)?;
+            let mut recorder = Recorder::begin(folder, &self.options.run, &simulation)?;
+            self.wall = Wall::default();
+            let interrupt = match self.epoch(&mut simulation, &mut recorder) {
+                Ok(()) => Interrupt::End(End::Finished),
+                Err(interrupt) => interrupt,
+            };
+            match interrupt {
+                Interrupt::Init(next) => {
+                    scenario = *next;
+                    epoch += 1;
+                }
+                Interrupt::End(end) => return self.end(end, &mut simulation, recorder),
+                Interrupt::Failed(error) => return Err(error),
+            }
+        }
+    }
+
+    fn epoch(
+        &mut self,
+        simulation: &mut Simulation,
+        recorder: &mut Recorder,
+    ) -> Result<(), Interrupt> {
+        // Nothing of an epoch before may reach into this one.
+        self.operator.clear();
+        self.outputs.clear();
+        self.culprits.clear();
+        for name in &self.with_bodies {
+            simulation.list_bodies(name, true);
+        }
+        self.pace.gather();
+        self.stage = Stage::Robots;
+        self.waiting_since = Instant::now();
+        let lateness = simulation.scenario().lateness.to_lockstep();
+        self.barrier
+            .gather(simulation.epoch(), lateness, &mut self.outputs);
+
+        loop {
+            while let Ok(event) = self.events.try_recv() {
+                self.handle(event, simulation)?;
+            }
+            while let Some(timer) = self.timers.take_due() {
+                self.barrier.timer(&timer, &mut self.outputs);
+            }
+            self.carry_out(simulation, recorder)?;
+            if simulation.tick() >= simulation.scenario().ticks && !self.is_waiting_for_robots() {
+                return Ok(());
+            }
+
+            let patience = match self.advance(simulation)? {
+                Next::Opened => continue,
+                Next::Wait(patience) => patience,
+            };
+            if let Some(event) = self.receive(patience) {
+                self.handle(event, simulation)?;
+            }
+        }
+    }
+
+    fn is_waiting_for_robots(&self) -> bool {
+        matches!(self.stage, Stage::Robots)
+    }
+
+    /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.
+    fn advance(&mut self, simulation: &mut Simulation) -> Result<Next, Interrupt> {
+        match &self.stage {
+            Stage::Robots => return Ok(Next::Wait(self.timers.next())),
+            Stage::Grant => {
+                if let Err(patience) = self.pace.take_grant(simulation.scenario().tick_s) {
+                    return Ok(Next::Wait(patience));
+                }
+                if let Some(underway) = self.order_faults(simulation)? {
+                    self.stage = Stage::Faults(underway);
+                    return Ok(Next::Opened);
+                }
+            }
+            Stage::Faults(_) => {
+                if let Some(patience) = self.await_faults(simulation)? {
+                    return Ok(Next::Wait(Some(patience)));
+                }
+            }
+        }
+
+        for (to, command) in std::mem::take(&mut self.operator) {
+            simulation.command(&to, &command);
+        }
+        let tick = simulation.begin_tick();
+        self.stage = Stage::Robots;
+        self.waiting_since = Instant::now();
+        self.barrier
+            .open(tick, simulation.robots_with_news(), &mut self.outputs);
+        Ok(Next::Opened)
+    }
+
+    /// Carries out what the barrier wants done.
+    fn carry_out(
+        &mut self,
+        simulation: &mut Simulation,
+        recorder: &mut Recorder,
+    ) -> Result<(), Interrupt> {
+        while !self.outputs.is_empty() {
+            for output in std::mem::take(&mut self.outputs) {
+                match output {
+                    Output::Gathered => self.begin(simulation),
+                    Output::Grant { news, clock } => self.put(simulation, &news, clock)?,
+                    Output::Complete(outcome) => self.complete(outcome, simulation, recorder)?,
+                    Output::Held => self.tell_held(simulation),
+                    Output::Released => {
+                        let status = self.status(simulation);
+                        self.observers.released(simulation, &status);
+                    }
+                    Output::Aborted => return Err(Interrupt::End(End::Aborted)),
+                    Output::SetTimer(timer, after) => self.timers.set(timer, after),
+                    Output::Ignored(reason, robot) => self.ignore(reason.as_str(), robot.as_str()),
+                }
+            }
+        }
+
+        Ok(())
+    }
+
+    /// Every robot of the roster is connected: tick 0.
+    fn begin(&mut self, simulation: &mut Simulation) {
+        simulation.begin_init();
+        self.waiting_since = Instant::now();
+        self.barrier
+            .open(0, simulation.robots_with_news(), &mut self.outputs);
+    }
+
+    /// News first, then the clock: on one session they arrive in this order.
+    fn put(
+        &mut self,
+        simulation: &Simulation,
+        news: &[(RobotName, Option<Generation>)],
+        clock: Clock,
+    ) -> Result<(), BusError> {
+        for (name, joined) in news {
+            if let Some(publisher) = self.news.get(name) {
+                publisher.put(encode(&simulation.news(name, *joined)))?;
+            }
+        }
+
+        self.clock.put(encode(&clock))
+    }
+
+    /// A tick is complete.
+    fn complete(
+        &mut self,
+        outcome: Outcome<Arc<Report>, CommandText>,
+        simulation: &mut Simulation,
+        recorder: &mut Recorder,
+    ) -> Result<(), Interrupt> {
+        self.blame_culprits();
+        let record = simulation.end_tick(outcome);
+        self.observers.note(&record);
+        self.observers.log(&recorder.write(simulation, &record)?);
+        if record.tick == 0 {
+            self.pace.ready();
+        }
+        self.stage = Stage::Grant;
+
+        if let Some((query, _)) = self.pace.reached(simulation.tick()) {
+            self.answer_status(&query, simulation);
+        }
+        if self.observers.is_frame_due() {
+            self.observers.frame(simulation, &self.status(simulation));
+        }
+        Ok(())
+    }
+
+    /// The clock is held: people are told for whom, and so is a client that waits for a step.
+    fn tell_held(&mut self, simulation: &Simulation) {
+        if self.culprits.is_empty() && self.barrier.is_open() {
+            for (name, reason) in self.barrier.awaited() {
+                if !matches!(reason, Reason::WaitsFor(_)) {
+                    self.culprits.push(name);
+                }
+            }
+        }
+
+        let status = self.status(simulation);
+        self.observers.held(simulation, &status);
+        if let Some(query) = self.pace.give_up_stepping() {
+            self.answer_status(&query, simulation);
+        }
+    }
+
+    fn blame_culprits(&mut self) {
+        let held_s = self.waiting_since.elapsed().as_secs_f64();
+        for name in std::mem::take(&mut self.culprits) {
+            let held = self.wall.held_up_by.entry(name).or_default();
+            held.ticks += 1;
+            held.waited_s += held_s;
+            held.longest_s = held.longest_s.max(held_s);
+        }
+    }
+
+    /// Puts the end of the run, and writes what came of it.
+    fn end(
+        mut self,
+        end: End,
+        simulation: &mut Simulation,
+        mut recorder: Recorder,
+    ) -> Result<Summary, ServerError> {
+        self.pace.end();
+        if let Some(query) = self.pace.give_up_stepping() {
+            self.answer_status(&query, simulation);
+        }
+        let lines = recorder.write(simulation, &simulation.end(end))?;
+        self.observers.log(&lines);
+        self.observers.frame(simulation, &self.status(simulation));
+        recorder.summary().wall = std::mem::take(&mut self.wall);
+        let summary = recorder.finish(simulation)?;
+
+        let clock = self.barrier.end(end);
+        self.clock.put(encode(&clock))?;
+        self.say_goodbye(&clock, simulation);
+        self.declared.clear();
+        self.bus.close();
+        Ok(summary)
+    }
+
+    /// Waits for the robots to leave, for a limited time. A robot whose link has just lost the end of the run gets it again.
+    fn say_goodbye(&mut self, clock: &Clock, simulation: &mut Simulation) {
+        let deadline = Instant::now() + GOODBYE;
+        let mut awaited: Vec<RobotName> = Vec::new();
+        for name in self.barrier.roster() {
+            let took_part = simulation
+                .report(name)
+                .is_some_and(|report| report.tick == simulation.tick());
+            if self.barrier.is_present(name) || took_part {
+                awaited.push(name.clone());
+            }
+        }
+
+        while !awaited.is_empty() && Instant::now() < deadline {
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.receive(Some(self.options.repeat_after.min(left))) {
+                Some(Event::Token {
+                    robot,
+                    is_present: false,
+                }) => awaited.retain(|name| name.as_str() != robot),
+                Some(Event::Token { .. }) | None => {
+                    if let Err(error) = self.clock.put(encode(clock)) {
+                        tracing::debug!("{error}");
+                    }
+                }
+                // The run is over: nothing else changes anything any more.
+                Some(event) => drop(self.handle(event, simulation)),
+            }
+        }
+    }
+
+    /// The next event, or `None` after `patience`.
+    fn receive(&self, patience: Option<Duration>) -> Option<Event> {
+        match patience {
+            Some(patience) => self.events.recv_timeout(patience).ok(),
+            None => self.events.recv().ok(),
+        }
+    }
+
+    /// One event. The arms call; they do not decide.
+    fn handle(&mut self, event: Event, simulation: &mut Simulation) -> Result<(), Interrupt> {
+        match event {
+            Event::Report {
+                robot,
+                report: Ok(report),
+            } => self.on_report(&robot, report),
+            Event::Command {
+                from,
+                to,
+                command: Ok(command),
+            } => self.on_command(&from, &to, command),
+            Event::Waiting {
+                robot,
+                waiting: Ok(waiting),
+            } => self.on_waiting(&robot, waiting),
+            Event::Report {
+                report: Err(error), ..
+            }
+            | Event::Command {
+                command: Err(error),
+                ..
+            }
+            | Event::Waiting {
+                waiting: Err(error),
+                ..
+            } => self.ignore("malformed", &error.to_string()),
+            Event::Join(query) => self.on_join(&query, simulation),
+            Event::Token { robot, is_present } => self.on_token(&robot, is_present),
+            Event::Control(query) => self.on_control(query, simulation)?,
+            Event::Terminate => return Err(Interrupt::End(End::Stopped)),
+        }
+
+        Ok(())
+    }
+
+    /// Counts a message that changes nothing, and logs it once in a while.
+    fn ignore(&mut self, reason: &str, text: &str) {
+        let count = self.wall.ignored.entry(reason.to_owned()).or_default();
+        *count += 1;
+        if count.is_power_of_two() {
+            tracing::warn!(count = *count, "ignored a message, {reason}: {text}");
+        }
+    }
+
+    /// The name of a robot of the roster, or `None` after having counted the message.
+    fn known(&mut self, robot: &str) -> Option<RobotName> {
+        let name = RobotName::new(robot)
+            .ok()
+            .filter(|name| self.barrier.has(name));
+        if name.is_none() {
+            self.ignore("unknown robot", robot);
+        }
+
+        name
+    }
+
+    fn on_report(&mut self, robot: &str, report: Report) {
+        let Some(name) = self.known(robot) else {
+            return;
+        };
+        let stamp = Stamp {
+            epoch: report.epoch,
+            tick: report.tick,
+            generation: report.generation,
+        };
+
+        let commands = report.commands;
+        self.barrier
+            .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
+    }
+
+    fn on_command(&mut self, from: &str, to: &str, command: Command) {
+        // Any name will do as a target: the medium drops what goes to robots that do not exist.
+        let Ok(to) = RobotName::new(to) else {
+            return self.ignore("unknown robot", to);
+        };
+        if from == RobotName::operator().as_str() {
+            return self.on_operator(to, command.command);
+        }
+        let Some(from) = self.known(from) else { return };
+        let stamp = Stamp {
+            epoch: command.epoch,
+            tick: command.tick,
+            generation: command.generation,
+        };
+
+        let sent = Sent {
+            to,
+            command: CommandText {
+                performative: command.performative,
+                command: command.command,
+            },
+        };
+        self.barrier
+            .command(&from, stamp, command.number, sent, &mut self.outputs);
+    }
+
+    fn on_operator(&mut self, to: RobotName, command: String) {
+        if !self.barrier.has(&to) {
+            return self.ignore("unknown robot", to.as_str());
+        }
+        if self.operator.len() >= MAX_OPERATOR_COMMANDS {
+            return self.ignore("too many commands", "of the operator for one tick");
+        }
+
+        self.operator.push((to, command));
+    }
+
+    fn on_waiting(&mut self, robot: &str, waiting: Waiting) {
+        let Some(name) = self.known(robot) else {
+            return;
+        };
+
+        self.barrier.waiting(
+            &name,
+            waiting.epoch,
+            waiting.tick,
+            waiting.on,
+            &mut self.outputs,
+        );
+    }
+
+    fn on_token(&mut self, robot: &str, is_present: bool) {
+        let Some(name) = self.known(robot) else {
+            return;
+        };
+
+        self.barrier.token(&name, is_present, &mut self.outputs);
+    }
+
+    /// Whether a robot's process is connected, for people.
+    pub(super) fn presence(&self, name: &RobotName) -> (Generation, Presence) {
+        self.barrier.presence(name)
+    }
+}
+
+/// What the loop does next.
+enum Next {
+    /// Something was put: look at what comes of it.
+    Opened,
+    /// Wait for an event, at most for this long.
+    Wait(Option<Duration>),
+}
