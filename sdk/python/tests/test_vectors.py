@@ -32,9 +32,8 @@ class Replay:
             for line in self.lines
             if line["way"] == "ask" and "/join" not in line["key"]
         }
-        others = {key for key, _ in self.answers} - {f"cars/vectors/robot/{self.name}/percept"}
+        others = {key for key, _ in self.answers}
         self.queryables = [self.stage.session.declare_queryable(key, self.answer) for key in sorted(others)]
-        self.stage.percept = lambda query: self.answers[(str(query.key_expr), str(query.parameters))]
 
     def answer(self, query: zenoh.Query) -> None:
         """Answers what the robot asks another one, as it was answered then."""

@@ -77,7 +77,7 @@ class Board:
         """The state that answers it."""
         states = self._states.get(robot_of(question.key) or "")
         if states is None:
-            raise _NoState("ask one robot by its name")
+            raise _NoState("get one robot by its name")
         tick = _number(question, "tick")
         epoch = _number(question, "epoch")
         not_yet = _NoState("that tick has not been reported yet: ask again")

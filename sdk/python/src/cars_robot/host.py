@@ -324,6 +324,7 @@ class _Member:
         finally:
             self._running = None
         # What was run in an epoch that is over is thrown away.
+        self._link.drain()
         if not self.must_join:
             self._answer_with(report)
         return True

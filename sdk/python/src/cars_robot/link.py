@@ -104,11 +104,19 @@ class Link:
     # What becomes of it, on the robots' own thread.
 
     def pump(self, patience_s: float = LOOK_FOR_SIMULATOR_S) -> None:
-        """Waits for one event and files it."""
+        """Waits for an event, and files all that have arrived."""
         try:
-            event = self._events.get(timeout=min(patience_s, self.patience_left_s()))
+            self._file(self._events.get(timeout=min(patience_s, self.patience_left_s())))
         except queue.Empty:
             return
+        self.drain()
+
+    def drain(self) -> None:
+        """Files the events that have arrived."""
+        for _ in range(self._events.qsize()):
+            self._file(self._events.get())
+
+    def _file(self, event: Event) -> None:
         if not self._has_room.is_set() and self._events.qsize() < QUEUE:
             self._has_room.set()
         try:
