@@ -168,7 +168,7 @@ def test_news_that_are_flagged_are_waited_for(stage: Stage) -> None:
 
 
 def test_questions_get_the_state_of_the_tick_before(stage: Stage) -> None:
-    """[query.tick, query.early, query.unknown, tick.state-first]"""
+    """[query.tick, query.at-once, query.unknown, tick.state-first]"""
     begin(stage)
     stage.tick(1)
     stage.tick(2)
@@ -191,7 +191,7 @@ def test_questions_get_the_state_of_the_tick_before(stage: Stage) -> None:
 
 
 def test_questions_are_answered_while_it_is_busy(stage: Stage) -> None:
-    """[query.prompt] While it computes, and while it waits for another robot's answer."""
+    """[query.at-once] While it computes, and while it waits for another robot's answer."""
     robot = begin(stage)
     stage.tick(1)
     stage.clock(2, A={"commands": [says("ask B")]})
@@ -212,6 +212,7 @@ def test_who_follows_has_the_state_before_the_report(stage: Stage) -> None:
 
 
 def test_it_asks_others_once_and_follows_them(stage: Stage) -> None:
+    """[query.asking]"""
     begin(stage)
     refusals = ["that tick has not been reported yet: ask again"]
     state = {

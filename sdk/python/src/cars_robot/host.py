@@ -20,7 +20,6 @@ from .messages import (
     PROTOCOL_VERSION,
     Clock,
     News,
-    PublicState,
     Refused,
     Report,
     Welcome,
@@ -240,8 +239,8 @@ class _Member:
         self._answered = (0, -1)
         """Epoch and tick of the last answer."""
         self._commands: list[tuple[str, bytes]] = []
-        self._data = b""
-        """The commands and the report of the last answer, for the case that something got lost."""
+        self._own_state = self._own_report = b""
+        """What came of the last tick, for the case that something got lost; no state where no robot follows it."""
         keys = link.keys
         self._report: Publisher = link.bus.publisher(keys.report(name))
         self._state: Publisher = link.bus.publisher(keys.query(name, STATE))
@@ -342,21 +341,22 @@ class _Member:
             (self._link.keys.command(to, self.name), encode(command_json(report, number, text)))
             for number, (to, text) in enumerate(report.commands, start=1)
         ]
-        self._data = data
+        self._own_state = encode(state_json(report.state)) if self._state.is_watched else b""
+        self._own_report = data
         # First what others may ask for, then the report: after it the clock may go on and they will ask.
         self._link.board.show(self.name, report.state)
-        self._put(report.state)
+        self._put()
         if self._panel.is_watched:
             self._paint()
 
-    def _put(self, state: PublicState | None = None) -> None:
+    def _put(self) -> None:
         """Puts what came of the last tick. Who follows has the state before the next clock, because both come the same
         way."""
         for key, command in self._commands:
             self._link.put(key, command)
-        if state is not None and self._state.is_watched:
-            self._state.put(encode(state_json(state)))
-        self._report.put(self._data)
+        if self._own_state:
+            self._state.put(self._own_state)
+        self._report.put(self._own_report)
 
     def _paint(self) -> None:
         now = time.monotonic()
