@@ -10,6 +10,8 @@ from cars_robot import Cars, Point, StateVariables
 class Idle(cars_robot.Robot):
     """Stands where it stands."""
 
+    senses_bodies = False
+
     def init_robot(self, cars: Cars) -> None:
         self.at = cars.welcome.location
 

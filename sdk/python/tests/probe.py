@@ -51,6 +51,7 @@ class Probe(cars_robot.Robot):
             elif verb == "fail":
                 raise ZeroDivisionError("as it was told")
             elif verb == "sleep":
+                print("sleeps", flush=True)
                 time.sleep(float(first))
         except Interrupted:
             raise

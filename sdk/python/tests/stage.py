@@ -1,5 +1,5 @@
 """A simulator that says what a test wants, for what a real one says only when something is broken: clocks that come twice,
-commands that never come, messages that are damaged. Robots are real processes."""
+news that get lost, messages that are damaged. Robots are real processes."""
 
 from __future__ import annotations
 
@@ -41,10 +41,9 @@ class Stage:
         """Requests to join, and with each whether the robot already listened to the clock, and showed its token."""
         self.welcome: Callable[[Json], Json] = lambda request: welcome(name=request["name"])
         """What is answered to a request."""
-        self.percept: Callable[[zenoh.Query], Json] = one_guest
-        """What is answered to a robot that looks around."""
         self.alive: set[str] = set()
-        self.percepts_asked = 0
+        self.said: list[str] = []
+        """The keys on which robots have put something, in that order."""
         self._heard: dict[str, queue.Queue[bytes]] = {}
         self._lock = threading.Lock()
         self._processes: list[subprocess.Popen[str]] = []
@@ -53,7 +52,6 @@ class Stage:
         )
         self._keep: list[object] = [
             self.session.declare_queryable(f"{self.root}/join/**", self._on_join),
-            self.session.declare_queryable(f"{self.root}/robot/*/percept", self._on_percept),
             self.session.declare_subscriber(f"{self.root}/robot/**", self._on_message),
             self.session.liveliness().declare_subscriber(f"{self.root}/alive/robot/*", self._on_token, history=True),
             self.session.liveliness().declare_token(f"{self.root}/alive/sim"),
@@ -80,12 +78,8 @@ class Stage:
             )
             query.reply(query.key_expr, json.dumps(self.welcome(request)))
 
-    def _on_percept(self, query: zenoh.Query) -> None:
-        with query:
-            self.percepts_asked += 1
-            query.reply(query.key_expr, json.dumps(self.percept(query)))
-
     def _on_message(self, sample: zenoh.Sample) -> None:
+        self.said.append(str(sample.key_expr).removeprefix(f"{self.root}/"))
         self._queue(str(sample.key_expr)).put(sample.payload.to_bytes())
 
     def _on_token(self, sample: zenoh.Sample) -> None:
@@ -121,9 +115,15 @@ class Stage:
         eventually(f"{names} to be there", lambda: self.alive == set(names) or None, PATIENCE_S)
 
     def clock(self, tick: int, epoch: int = 1, end: str | None = None, **news: Json) -> None:
-        """Grants a tick."""
-        message: Json = {"epoch": epoch, "tick": tick, "news": news, "unknown": [1]}
+        """Grants a tick, with news for some robots."""
+        for name, what in news.items():
+            self.news(name, tick, epoch, **what)
+        message: Json = {"epoch": epoch, "tick": tick, "news": sum(map(flag, news)), "unknown": [1]}
         self.put("clock", message | ({"end": end} if end else {}))
+
+    def news(self, name: str, tick: int, epoch: int = 1, **what: Any) -> None:
+        """Puts news for a robot."""
+        self.put(f"robot/{name}/news", {"epoch": epoch, "tick": tick, "unknown": [1]} | what)
 
     def put(self, key: str, message: Json | bytes) -> None:
         """Puts something on a key of the run."""
@@ -132,11 +132,6 @@ class Stage:
             self._clock.put(data)
         else:
             self.session.put(f"{self.root}/{key}", data, congestion_control=zenoh.CongestionControl.BLOCK)
-
-    def command(self, seq: int, text: str, to: str = "A", sender: str = "B", **more: Any) -> None:
-        """Sends a command in another robot's name."""
-        message = {"epoch": 1, "tick": 0, "seq": seq, "command": text} | more
-        self.put(f"robot/{to}/command/{sender}", message)
 
     def heard_bytes(self, key: str, patience_s: float = PATIENCE_S) -> bytes:
         """What was put next on a key of the run."""
@@ -184,17 +179,16 @@ class Stage:
         raise AssertionError(f"nobody answered {what}?{parameters}")
 
 
-def one_guest(query: zenoh.Query) -> Json:
-    """What a robot senses as of the tick for which it asks."""
-    bodies = [{"kind": "guest", "location": {"x": 1, "y": 2}, "unknown": None}]
-    return {"epoch": 1, "tick": int(query.parameters.get("tick") or "0"), "bodies": bodies}
+def flag(name: str) -> int:
+    """The flag of a robot in the clock."""
+    return 1 << ["A", "B", "C"].index(name)
 
 
 def welcome(**more: Any) -> Json:
     """What a simulator answers to a robot that it lets in."""
     facts = {
         "answer": "welcome",
-        "protocol": 1,
+        "protocol": 2,
         "run": "r",
         "name": "A",
         "generation": 1,
@@ -209,6 +203,7 @@ def welcome(**more: Any) -> Json:
         "location": {"x": 3.0, "y": 4.0},
         "roster": ["A", "B", "C"],
         "parameters": {"speed_mps": 1.0},
+        "news_flag": flag(more.get("name", "A")),
         "from_the_future": {"a": 1},
     }
     return facts | more

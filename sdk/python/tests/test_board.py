@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 
-from cars_robot.board import MAX_EARLY, Board
+from cars_robot.board import Board
 from cars_robot.messages import Point, PublicState
+
+NOT_YET = "that tick has not been reported yet: ask again"
 
 
 class Asked:
@@ -41,8 +43,9 @@ def said(made: Board, question: Asked) -> object:
 
 def test_the_last_two_states_are_kept() -> None:
     made = board((1, 0), (1, 1), (1, 2))
-    asked = {tick: said(made, Asked(tick=str(tick), epoch="1")) for tick in (1, 2, 3, 4, 5)}
-    assert asked == {1: "that tick is over", 2: 1, 3: 2, 4: None, 5: "that tick is far away"}
+    asked = {tick: said(made, Asked(tick=str(tick), epoch="1")) for tick in (0, 1, 2, 3, 4, 5)}
+    out, over = "that tick is out of range", "that tick is over"
+    assert asked == {0: out, 1: over, 2: 1, 3: 2, 4: NOT_YET, 5: out}
     assert said(made, Asked()) == 2
     assert [made.get("A", 1, tick) is not None for tick in (0, 1, 2)] == [False, True, True]
 
@@ -50,24 +53,23 @@ def test_the_last_two_states_are_kept() -> None:
 def test_questions_that_cannot_be_answered_are_refused() -> None:
     made = board((2, 5))
     for question, reason in [
-        (Asked(robot="B"), "ask one robot by its name"),
-        (Asked(robot="*"), "ask one robot by its name"),
+        (Asked(robot="B"), "get one robot by its name"),
+        (Asked(robot="*"), "get one robot by its name"),
         (Asked(what="mood"), "there is no query called mood"),
         (Asked(tick="-1"), "parameter tick: not a whole number"),
         (Asked(tick="6", epoch="1.5"), "parameter epoch: not a whole number"),
-        (Asked(tick="6", epoch="1"), "that epoch is over"),
+        (Asked(tick="6", epoch="1"), "that tick is over"),
     ]:
         assert said(made, question) == reason
 
 
-def test_early_questions_wait_and_are_bounded() -> None:
+def test_early_questions_are_refused_and_may_be_asked_again() -> None:
     made = board()
-    early = [Asked(tick="1", epoch="1") for _ in range(MAX_EARLY + 1)]
-    for question in early:
-        made.ask(question)
-    assert early[-1].said == "too many questions are waiting already"
+    early = {"tick": "1", "epoch": "1"}
+    assert [said(made, Asked(**early)), said(made, Asked())] == [NOT_YET, NOT_YET]
     made.show("A", PublicState(1, 0, Point(0, 0), 0, 0, {}, "", ""))
-    assert all(question.said == 0 for question in early[:-1])
+    assert [said(made, Asked(**early)), said(made, Asked())] == [0, 0]
+    assert said(made, Asked(tick="1", epoch="2")) == NOT_YET
 
 
 def test_a_new_epoch_forgets_the_old_one() -> None:

@@ -12,16 +12,18 @@ from cars_robot import Panel, panel
 from cars_robot.messages import (
     Clock,
     Correction,
+    Delivery,
     Malformed,
     Point,
     Refused,
+    SensedBody,
     Welcome,
     decode,
     encode,
     is_name,
     read_clock,
     read_join_answer,
-    read_percept,
+    read_news,
     read_state,
     shortened,
     state_json,
@@ -79,23 +81,38 @@ def test_what_is_missing_is_named() -> None:
             decode("k", "A", encode(lacking), read_state)
 
 
-def test_a_clock_tells_exceptions_only() -> None:
+def test_a_clock_has_flags_of_news() -> None:
     quiet = decode("k", "s", b'{"epoch":1,"tick":3,"from_the_future":[]}', read_clock)
     assert quiet == Clock(1, 3)
-    news = b'{"A":{"correction":{"location":{"x":1,"y":2}},"unreachable":["B"],"joined":null}}'
-    clock = decode("k", "s", b'{"epoch":1,"tick":3,"end":null,"news":' + news + b"}", read_clock)
-    assert clock.news["A"].correction == Correction(Point(1.0, 2.0), False)
-    assert clock.news["A"].unreachable == ("B",) and clock.news["A"].joined is None
+    assert decode("k", "s", b'{"epoch":1,"tick":3,"end":null,"news":4294967295}', read_clock).news == (1 << 32) - 1
+    with pytest.raises(Malformed, match="field news: not a whole number"):
+        decode("k", "s", b'{"epoch":1,"tick":3,"news":4294967296}', read_clock)
+
+
+def test_news_tell_exceptions_only() -> None:
+    quiet = decode("k", "s", b'{"epoch":1,"tick":3,"from_the_future":[]}', read_news)
+    assert (quiet.joined, quiet.correction, quiet.commands, quiet.bodies) == (None, None, (), ())
+    told = {
+        "epoch": 1,
+        "tick": 3,
+        "joined": 2,
+        "correction": {"location": {"x": 1, "y": 2}},
+        "commands": [{"from": "B", "performative": "achieve", "command": "go"}] * 2,
+        "unreachable": ["B"],
+        "bodies": [{"kind": "guest", "location": {"x": 1, "y": 2}}],
+    }
+    news = decode("k", "s", encode(told), read_news)
+    assert news.correction == Correction(Point(1.0, 2.0), False) and news.joined == 2
+    assert news.commands == (Delivery("B", "go"),) * 2 and news.unreachable == ("B",)
+    assert news.bodies == (SensedBody("guest", Point(1.0, 2.0)),)
 
 
 def test_a_welcome_is_read_with_defaults() -> None:
     answer = decode("k", "s", encode(welcome(seed=(1 << 64) - 1)), read_join_answer)
     assert isinstance(answer, Welcome)
-    assert (answer.seed, answer.last_seq, answer.repeat_ticks, answer.last_state) == ((1 << 64) - 1, 0, 2, None)
+    assert (answer.seed, answer.news_flag, answer.last_state) == ((1 << 64) - 1, 1, None)
     refused = decode("k", "s", b'{"answer":"refused","reason":"ended","explanation":"e"}', read_join_answer)
     assert isinstance(refused, Refused) and (refused.reason, str(refused)) == ("ended", "e")
-    with pytest.raises(Malformed, match="field bodies: not a list but missing"):
-        decode("k", "s", b'{"epoch":1,"tick":1}', read_percept)
 
 
 def test_text_is_cut_between_characters() -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import threading
 from typing import Any
 
 import pytest
-from stage import Stage, welcome
+from lab import EXAMPLES, eventually
+from stage import Stage, flag, welcome
 
 from cars_robot import stream
 
@@ -24,10 +24,14 @@ def begin(stage: Stage, *arguments: str) -> subprocess.Popen[str]:
     return process
 
 
-def order(stage: Stage, tick: int, text: str, seq: int = 1) -> Json:
+def says(text: str, sender: str = "B") -> Json:
+    """A command that arrives, as news."""
+    return {"from": sender, "performative": "achieve", "command": text}
+
+
+def order(stage: Stage, tick: int, text: str, epoch: int = 1) -> Json:
     """A's report of a tick in which B's command arrives."""
-    stage.command(seq, text)
-    return stage.tick(tick, A={"commands": [{"from": "B", "seq": seq}]})
+    return stage.tick(tick, epoch, A={"commands": [says(text)]})
 
 
 def test_it_listens_before_it_asks_and_shows_its_token_last(stage: Stage) -> None:
@@ -35,11 +39,19 @@ def test_it_listens_before_it_asks_and_shows_its_token_last(stage: Stage) -> Non
     stage.ready()
     assert len(stage.joins) == 1
     request = stage.joins[0]
-    assert (request["protocol"], request["run"], request["name"]) == (1, "r", "A")
+    assert (request["protocol"], request["run"], request["name"]) == (2, "r", "A")
     assert request["instance"] and request["sdk"].startswith("python/")
+    assert request["bodies"] is True
     assert request["listens"] and not request["alive"] and request["key"] == "cars/r/join/A"
     # It takes part at once: nothing that comes after the token is lost.
     assert stage.tick(0, A=NAMED)["generation"] == 1
+
+
+def test_who_does_without_bodies_asks_for_none(stage: Stage) -> None:
+    """[join.request]"""
+    stage.robot("--name", "A", script=EXAMPLES / "idle.py")
+    stage.until_alive("A")
+    assert stage.joins[0]["bodies"] is False
 
 
 def test_a_refusal_ends_it_with_the_reason(stage: Stage) -> None:
@@ -80,21 +92,27 @@ def test_a_tick_is_what_figure_5_says(stage: Stage) -> None:
 def test_the_same_clock_brings_the_same_bytes_and_the_commands_again(stage: Stage) -> None:
     """[clock.duplicate, command.sent]"""
     begin(stage)
-    stage.command(1, "tell C hello there")
-    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
-    first, sent = stage.heard_bytes("robot/A/report"), stage.heard_bytes("robot/C/command/A")
-    told = {"to": "C", "seq": 1, "performative": "achieve", "command": "hello there"}
-    assert json.loads(first)["sent"] == [told]
-    assert json.loads(sent) == {"epoch": 1, "tick": 1} | {name: told[name] for name in list(told)[1:]}
-    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
-    assert stage.heard_bytes("robot/A/report") == first
-    assert stage.all_heard("robot/C/command/A") == {sent}
-    # Commands are repeated for as many ticks as the welcome says, here for two; reports for one.
-    for tick, repeated in [(2, {sent}), (3, set())]:
-        second = stage.tick(tick)
-        stage.clock(tick)
-        assert stage.heard("robot/A/report") == second
-        assert stage.all_heard("robot/C/command/A") == repeated
+    stage.said.clear()
+    news = {"commands": [says("tell C hello there"), says("tell B hi")]}
+    keys = ["robot/C/command/A", "robot/B/command/A", "robot/A/report"]
+    for key in ["robot/A/state", keys[2]]:
+        stage.all_heard(key)
+    stage.clock(1, A=news)
+    first = [stage.heard_bytes(key) for key in keys]
+    assert json.loads(first[2])["commands"] == 2
+    told = {"epoch": 1, "tick": 1, "generation": 1, "number": 1, "performative": "achieve", "command": "hello there"}
+    assert json.loads(first[0]) == told
+    assert json.loads(first[1]) == told | {"number": 2, "command": "hi"}
+    put = [key for key in stage.said if key in [*keys, "robot/A/state"]]
+    assert put == [*keys[:2], "robot/A/state", keys[2]]
+    stage.clock(1, A=news)
+    assert [stage.heard_bytes(key) for key in keys] == first
+    assert [key for key in stage.said if key in keys] == keys * 2
+    # Commands of an earlier tick are not repeated.
+    second = stage.tick(2)
+    stage.clock(2)
+    assert stage.heard("robot/A/report") == second and "commands" not in second
+    assert [key for key in stage.said if key in keys] == keys * 2 + keys[2:] * 2
 
 
 def test_late_clocks_are_echoes(stage: Stage) -> None:
@@ -106,38 +124,51 @@ def test_late_clocks_are_echoes(stage: Stage) -> None:
     assert stage.tick(2)["tick"] == 2 and stage.nothing_more("robot/A/report")
 
 
-def test_commands_wait_for_the_clock_and_go_in_its_order(stage: Stage) -> None:
-    """[command.held, command.order, command.twice]"""
+def test_only_the_newest_clock_is_run(stage: Stage) -> None:
+    """[clock.late] A robot that is late still reports the tick that it was in."""
     begin(stage)
-    for seq, sender in [(2, "C"), (1, "B"), (1, "C")]:
-        stage.command(seq, f"note {sender}{seq}", sender=sender)
-    assert not any(line.startswith("command") for line in stage.tick(1)["log"])
-    ids = [("B", 1), ("C", 2), ("C", 2), ("C", 1)]
-    report = stage.tick(2, A={"commands": [{"from": sender, "seq": seq} for sender, seq in ids]})
+    stage.clock(1, A={"commands": [says("sleep 0.5")]})
+    stage.clock(2)
+    stage.clock(3)
+    assert [stage.heard("robot/A/report")["tick"] for _ in range(2)] == [1, 3]
+    assert stage.tick(4)["tick"] == 4 and stage.nothing_more("robot/A/report")
+
+
+def test_commands_come_with_the_news_in_their_order(stage: Stage) -> None:
+    """[command.order, command.twice]"""
+    begin(stage)
+    told = [("B", "one"), ("C", "two"), ("C", "two"), ("C", "three")]
+    report = stage.tick(1, A={"commands": [says(f"note {text}", sender) for sender, text in told]})
     obeyed = [line for line in report["log"] if line.startswith("command")]
-    assert obeyed == [f"command {sender} note {sender}{seq}" for sender, seq in ids]
-    assert "missing" not in report
+    assert obeyed == [f"command {sender} note {text}" for sender, text in told]
+    assert not any(line.startswith("command") for line in stage.tick(2)["log"])
 
 
-def test_a_command_that_is_named_first_is_waited_for_and_says_so(stage: Stage) -> None:
-    begin(stage)
-    stage.clock(1, A={"commands": [{"from": "B", "seq": 5}]})
-    assert stage.heard("robot/A/waiting") == {"epoch": 1, "tick": 1, "on": "B"}
-    stage.command(5, "note at last")
-    assert "command B note at last" in stage.heard("robot/A/report")["log"]
-
-
-def test_a_command_that_never_comes_is_missing(stage: Stage) -> None:
-    """[command.missing]"""
-    begin(stage)
-    stage.command(1, "note of another epoch", epoch=2)
-    report = stage.tick(1, A={"commands": [{"from": "B", "seq": 1}]})
-    assert report["missing"] == [{"from": "B", "seq": 1}]
-    assert not any(line.startswith("command") for line in report["log"])
+def test_news_that_are_flagged_are_waited_for(stage: Stage) -> None:
+    """[news.wait] They may be lost, and then come again with the clock; those of another tick do not count."""
+    robot = begin(stage)
+    assert robot.stderr is not None
+    lost = {"epoch": 1, "tick": 1, "news": flag("A")}
+    stage.news("A", 0, commands=[says("note of the tick before")])
+    stage.news("A", 2, commands=[says("note of the next tick")])
+    stage.put("clock", lost)
+    # When it complains about the next clock it is done with this one.
+    stage.put("clock", b"null")
+    assert "malformed message" in robot.stderr.readline()
+    assert stage.nothing_more("robot/A/report")
+    stage.put("clock", lost)
+    stage.news("A", 1, commands=[says("note at last")])
+    report = stage.heard("robot/A/report")
+    assert [line for line in report["log"] if line.startswith("command")] == ["command B note at last"]
+    # The next ones are here already; another robot's flag means nothing.
+    stage.put("clock", {"epoch": 1, "tick": 2, "news": flag("A")})
+    assert "command B note of the next tick" in stage.heard("robot/A/report")["log"]
+    stage.put("clock", {"epoch": 1, "tick": 3, "news": flag("B")})
+    assert stage.heard("robot/A/report")["tick"] == 3
 
 
 def test_questions_get_the_state_of_the_tick_before(stage: Stage) -> None:
-    """[query.tick, query.early, query.unknown, tick.state-first]"""
+    """[query.tick, query.at-once, query.unknown, tick.state-first]"""
     begin(stage)
     stage.tick(1)
     stage.tick(2)
@@ -150,16 +181,25 @@ def test_questions_get_the_state_of_the_tick_before(stage: Stage) -> None:
     for what, value in [("speed", 1.0), ("emotion_state", "CALM"), ("behavior_state", "WALK")]:
         assert stage.ask(what) == {"performative": "tell", "epoch": 1, "tick": 2, "value": value}
     assert stage.ask("speed", "tick=1") == "that tick is over"
-    assert stage.ask("speed", "tick=9") == "that tick is far away"
+    assert stage.ask("speed", "tick=9") == "that tick is out of range"
     assert stage.ask("speed", "tick=x") == "parameter tick: not a whole number"
-    assert stage.ask("speed", "tick=3;epoch=0") == "that epoch is over"
-    # One that comes a tick early is answered as soon as there is an answer.
-    early: list[Json | str] = []
-    asker = threading.Thread(target=lambda: early.append(stage.ask("location", "tick=4;epoch=1")))
-    asker.start()
+    assert stage.ask("speed", "tick=3;epoch=0") == "that tick is over"
+    # One that comes a tick early is to be asked again.
+    assert stage.ask("location", "tick=4;epoch=1") == "that tick has not been reported yet: ask again"
     stage.tick(3)
-    asker.join(20)
-    assert early[0]["tick"] == 3  # type: ignore[index]
+    assert stage.ask("location", "tick=4;epoch=1")["tick"] == 3  # type: ignore[index]
+
+
+def test_questions_are_answered_while_it_is_busy(stage: Stage) -> None:
+    """[query.at-once] While it computes, and while it waits for another robot's answer."""
+    robot = begin(stage)
+    stage.tick(1)
+    stage.clock(2, A={"commands": [says("ask B")]})
+    assert stage.heard("robot/A/waiting") == {"epoch": 1, "tick": 2, "on": "B"}
+    assert stage.ask("state", "tick=2;epoch=1")["tick"] == 1  # type: ignore[index]
+    stage.clock(3, A={"commands": [says("sleep 600")]})
+    assert robot.stdout is not None and robot.stdout.readline() == "sleeps\n"
+    assert stage.ask("state", "tick=2;epoch=1")["tick"] == 1  # type: ignore[index]
 
 
 def test_who_follows_has_the_state_before_the_report(stage: Stage) -> None:
@@ -172,7 +212,9 @@ def test_who_follows_has_the_state_before_the_report(stage: Stage) -> None:
 
 
 def test_it_asks_others_once_and_follows_them(stage: Stage) -> None:
+    """[query.asking]"""
     begin(stage)
+    refusals = ["that tick has not been reported yet: ask again"]
     state = {
         "epoch": 1,
         "tick": 0,
@@ -188,33 +230,36 @@ def test_it_asks_others_once_and_follows_them(stage: Stage) -> None:
     def answer(query: Any) -> None:
         with query:
             asked.append(str(query.parameters))
-            query.reply(query.key_expr, json.dumps(state))
+            if refusals:
+                query.reply_err(refusals.pop())
+            else:
+                query.reply(query.key_expr, json.dumps(state))
 
     stage._keep.append(stage.session.declare_queryable("cars/r/robot/B/state", answer))
+    # It is refused once, and asks again.
     assert "B is SAD" in order(stage, 1, "ask B")["log"]
-    assert asked == ["tick=1;epoch=1"]
+    assert asked == ["tick=1;epoch=1"] * 2
     # From now on it is told.
     stage.put("robot/B/state", state | {"tick": 1, "emotion_state": "GLAD"})
     stage.put("robot/B/state", b"{}")
-    assert "B is GLAD" in order(stage, 2, "ask B", seq=2)["log"]
-    assert asked == ["tick=1;epoch=1"]
+    assert "B is GLAD" in order(stage, 2, "ask B")["log"]
+    assert asked == ["tick=1;epoch=1"] * 2
 
 
 def test_calls_that_give_nothing_say_why(stage: Stage) -> None:
     begin(stage)
     assert any("UnknownRobot: no robot is called 'X'" in line for line in order(stage, 1, "ask X")["log"])
-    stage.command(2, "ask B")
-    report = stage.tick(2, A={"commands": [{"from": "B", "seq": 2}], "unreachable": ["B"]})
+    report = stage.tick(2, A={"commands": [says("ask B")], "unreachable": ["B"]})
     assert "Unreachable: B is unreachable" in report["log"]
-    assert "sees ['guest']" in order(stage, 3, "look", seq=3)["log"]
-    assert stage.percepts_asked == 1
+    bodies = [{"kind": "guest", "location": {"x": 1, "y": 2}, "unknown": None}]
+    assert "sees ['guest']" in stage.tick(3, A={"commands": [says("look")], "bodies": bodies})["log"]
+    assert "sees []" in order(stage, 4, "look")["log"]
 
 
 def test_a_wait_ends_with_the_epoch(stage: Stage) -> None:
     """[epoch.init]"""
     begin(stage)
-    stage.command(1, "ask B")
-    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    stage.clock(1, A={"commands": [says("ask B")]})
     assert stage.heard("robot/A/waiting")["on"] == "B"
     stage.welcome = lambda _: welcome(epoch=2, location={"x": 9, "y": 9})
     report = stage.tick(0, epoch=2, A=NAMED)
@@ -226,16 +271,42 @@ def test_an_epoch_begins_everything_anew(stage: Stage) -> None:
     """[epoch.init, determinism.seed]"""
     begin(stage)
     draws = [order(stage, 1, "draw")["log"][3]]
-    stage.command(2, "note of the old epoch")
     stage.welcome = lambda _: welcome(epoch=2)
     stage.tick(0, epoch=2, A=NAMED)
-    stage.command(1, "draw", epoch=2)
-    draws.append(stage.tick(1, epoch=2, A={"commands": [{"from": "B", "seq": 1}]})["log"][3])
+    draws.append(order(stage, 1, "draw", epoch=2)["log"][3])
     assert draws == [f"draws {stream(42, 'robot/A').next_u64()}"] * 2
+    assert stage.ask("state", "tick=2;epoch=1") == "that tick is over"
+
+
+def test_a_later_epoch_is_joined_at_any_tick_and_its_turn_waited_for(stage: Stage) -> None:
+    """[epoch.late] The clock of tick 0 was lost, or the link was cut for longer."""
+    begin(stage)
+    stage.tick(1)
+    stage.welcome = lambda _: welcome(epoch=2, generation=3, tick=5)
+    stage.clock(5, epoch=2)
+    eventually("it to join again", lambda: len(stage.joins) == 2 or None)
+    stage.clock(6, epoch=2, A={"sensed": []})
+    stage.clock(7, epoch=2, A={"joined": 3})
+    report = stage.heard("robot/A/report")
+    while report["epoch"] == 1:
+        report = stage.heard("robot/A/report")
+    assert (report["tick"], report["generation"], report["log"][0]) == (7, 3, "init")
+    assert stage.joins[0]["instance"] == stage.joins[1]["instance"]
+    # Who is named again goes on.
+    assert stage.tick(8, epoch=2, A={"joined": 3})["log"][0] == "location"
+
+
+def test_what_was_done_in_an_epoch_that_is_over_is_thrown_away(stage: Stage) -> None:
+    """[epoch.init]"""
+    begin(stage)
+    stage.clock(1, A={"commands": [says("sleep 0.3"), says("tell C late")]})
+    stage.welcome = lambda _: welcome(epoch=2)
+    assert stage.tick(0, epoch=2)["log"][0] == "init"
+    assert stage.nothing_more("robot/C/command/A") and stage.nothing_more("robot/A/report")
 
 
 def test_a_successor_waits_for_its_clock_and_takes_over(stage: Stage) -> None:
-    """[return.generation, return.numbers]"""
+    """[return.generation]"""
     last = {
         "epoch": 1,
         "tick": 6,
@@ -247,16 +318,15 @@ def test_a_successor_waits_for_its_clock_and_takes_over(stage: Stage) -> None:
         "behavior_state": "SIT",
     }
     before = last | {"tick": 5, "emotion_state": "GLAD"}
-    stage.welcome = lambda _: welcome(
-        generation=2, tick=7, stream="robot/A#2", last_seq=10**9, last_state=last, state_before=before
-    )
+    stage.welcome = lambda _: welcome(generation=2, tick=7, stream="robot/A#2", last_state=last, state_before=before)
     stage.ready()
     # Others may still ask what its predecessor has said.
     assert [stage.ask("emotion_state", f"tick={tick};epoch=1")["value"] for tick in (6, 7)] == ["GLAD", "SAD"]  # type: ignore[index]
     stage.clock(7)
-    stage.command(1, "tell C I am back")
-    report = stage.tick(8, A={"joined": 2, "commands": [{"from": "B", "seq": 1}]})
-    assert report["generation"] == 2 and report["sent"][0]["seq"] == 10**9 + 1
+    report = stage.tick(8, A={"joined": 2, "commands": [says("tell C I am back")]})
+    assert report["generation"] == 2 and report["commands"] == 1
+    sent = stage.heard("robot/C/command/A")
+    assert (sent["generation"], sent["number"], sent["command"]) == (2, 1, "I am back")
     assert report["log"][:2] == ["init", "resumes [('trips', 3.0)]"]
     assert stage.nothing_more("robot/A/report")
 
@@ -285,8 +355,7 @@ def test_a_signal_ends_it_cleanly(stage: Stage, number: signal.Signals, order_: 
     """[end.sigterm] Between two ticks, within one, and while it waits for an answer."""
     robot = begin(stage)
     if order_:
-        stage.command(1, order_)
-        stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+        stage.clock(1, A={"commands": [says(order_)]})
         if order_ == "ask B":
             stage.heard("robot/A/waiting")
     robot.send_signal(number)
@@ -298,24 +367,22 @@ def test_a_signal_ends_it_cleanly(stage: Stage, number: signal.Signals, order_: 
 def test_a_flood_holds_the_link_and_not_the_end(stage: Stage) -> None:
     """[end.sigterm] More than the queue takes has arrived, and the robot is busy."""
     robot = begin(stage)
-    stage.command(1, "sleep 600")
-    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
-    for seq in range(2, 12_000):
-        stage.command(seq, "note " + "x" * 100)
+    stage.clock(1, A={"commands": [says("sleep 600")]})
+    for tick in range(2, 12_000):
+        stage.news("A", tick, commands=[says("note " + "x" * 100)])
     robot.send_signal(signal.SIGTERM)
     assert robot.wait(20) == -signal.SIGTERM
 
 
 def test_a_flood_is_survived(stage: Stage) -> None:
-    """[command.held]"""
+    """News of ticks that never come."""
     begin(stage)
-    stage.command(1, "sleep 0.5")
-    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
-    for seq in range(2, 10_000):
-        stage.command(seq, "note " + "x" * 100)
+    stage.clock(1, A={"commands": [says("sleep 0.5")]})
+    for tick in range(100, 10_000):
+        stage.news("A", tick, commands=[says("note " + "x" * 100)])
     stage.heard("robot/A/report")
-    report = stage.tick(2, A={"commands": [{"from": "B", "seq": seq} for seq in (2, 9_999)]})
-    assert sum(line.startswith("command B note") for line in report["log"]) == 2
+    report = stage.tick(20_000, A={"commands": [says("note fine")]})
+    assert sum(line.startswith("command B note") for line in report["log"]) == 1
 
 
 DAMAGED = [
@@ -331,16 +398,29 @@ DAMAGED = [
     b'{"epoch":1,"tick":1,"end":"sometime"}',
     b'{"epoch":1,"tick":1,"end":{}}',
     b'{"epoch":1,"tick":1,"news":null}',
-    b'{"epoch":1,"tick":1,"news":{"A":{"correction":{"location":{"x":NaN,"y":0}}}}}',
-    b'{"epoch":1,"tick":1,"news":{"A":{"correction":{"location":{"x":1e999,"y":0}}}}}',
-    b'{"epoch":1,"tick":1,"news":{"A":{"commands":[{"from":"a/b","seq":1}]}}}',
-    b'{"epoch":1,"tick":1,"news":{"..":{}}}',
+    b'{"epoch":1,"tick":1,"news":-1}',
+    b'{"epoch":1,"tick":1,"news":4294967296}',
+    b'{"epoch":1,"tick":1,"news":{"A":{}}}',
     b'{"epoch":1,"tick":1}trailing',
     b"[" * 100_000,
     b'{"epoch":1,"tick":1,"x":"' + b"x" * (1 << 20) + b'"}',
 ]
 
-WRONG: list[Json] = [{"command": "x" * 5000}, {"command": None}, {"performative": []}, {"seq": -1}]
+WRONG = [
+    b"",
+    b"null",
+    b"{}",
+    b'{"epoch":1,"tick":-1}',
+    b'{"epoch":1,"tick":1}trailing',
+    b'{"epoch":1,"tick":1,"joined":-1}',
+    b'{"epoch":1,"tick":1,"correction":{"location":{"x":NaN,"y":0}}}',
+    b'{"epoch":1,"tick":1,"correction":{"location":{"x":1e999,"y":0}}}',
+    b'{"epoch":1,"tick":1,"commands":[{"from":"a/b","command":"note"}]}',
+    b'{"epoch":1,"tick":1,"commands":[{"from":"B","command":null}]}',
+    b'{"epoch":1,"tick":1,"commands":[{"from":"B","command":"' + b"x" * 5000 + b'"}]}',
+    b'{"epoch":1,"tick":1,"bodies":[{"kind":"ghost","location":{"x":0,"y":0}}]}',
+    b'{"epoch":1,"tick":1,"unreachable":[".."]}',
+]
 
 
 def test_what_is_damaged_changes_nothing(stage: Stage) -> None:
@@ -348,18 +428,16 @@ def test_what_is_damaged_changes_nothing(stage: Stage) -> None:
     robot = begin(stage)
     for data in DAMAGED:
         stage.put("clock", data)
-        stage.put("robot/A/command/B", data)
-    for seq, command in enumerate(WRONG):
-        stage.put("robot/A/command/B", {"epoch": 1, "tick": 0, "seq": seq, "command": "note"} | command)
-    stage.put("robot/A/command/\u00e9", {"epoch": 1, "tick": 0, "seq": 1, "command": "note"})
-    report = order(stage, 1, "note fine", seq=99)
+    for data in WRONG:
+        stage.put("robot/A/news", data)
+    report = order(stage, 1, "note fine")
     assert "command B note fine" in report["log"]
     assert robot.poll() is None
     stage.clock(2, end="finished")
     _, said = robot.communicate(timeout=20)
     assert robot.returncode == 0
     assert said.count("malformed message on cars/r/clock from simulator") == len(DAMAGED)
-    assert said.count("malformed message on cars/r/robot/A/command/B from B: field") == len(DAMAGED) + len(WRONG)
+    assert said.count("malformed message on cars/r/robot/A/news from simulator: field") == len(WRONG)
 
 
 def test_numbers_that_are_none_do_not_travel(stage: Stage) -> None:
@@ -378,8 +456,7 @@ def test_numbers_that_are_none_do_not_travel(stage: Stage) -> None:
 
 def test_a_robot_that_fails_ends_with_its_traceback(stage: Stage) -> None:
     robot = begin(stage)
-    stage.command(1, "fail")
-    stage.clock(1, A={"commands": [{"from": "B", "seq": 1}]})
+    stage.clock(1, A={"commands": [says("fail")]})
     _, said = robot.communicate(timeout=20)
     assert robot.returncode == 1 and "ZeroDivisionError: as it was told" in said and said.endswith("see above\n")
     stage.until_alive()
@@ -399,8 +476,7 @@ def test_several_robots_share_a_session(stage: Stage) -> None:
     stage.tick(0, A=NAMED, B=NAMED)
     assert stage.heard("robot/B/report")["tick"] == 0
     # What one asks the other needs no network.
-    stage.command(1, "ask B", sender="C")
-    report = stage.tick(1, A={"commands": [{"from": "C", "seq": 1}]})
+    report = stage.tick(1, A={"commands": [says("ask B", "C")]})
     assert "B is CALM" in report["log"]
     assert stage.heard("robot/B/report")["tick"] == 1
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from idle import Idle
@@ -14,14 +15,15 @@ from cars_robot.messages import (
     MAX_ENTRIES,
     MAX_MESSAGE_BYTES,
     MAX_TEXT_BYTES,
-    Clock,
-    Command,
-    CommandId,
+    NO_NEWS,
     Correction,
+    Delivery,
     News,
-    Percept,
     PublicState,
+    Report,
+    SensedBody,
     Welcome,
+    command_json,
     encode,
     report_json,
 )
@@ -31,24 +33,14 @@ from cars_robot.streams import stream
 WELCOME = Welcome("r", "A", 1, 1, 0, 1, "robot/A", 0.5, (9, 9), 0.6, 2, Point(1, 1), ("A", "B"), {"n": 1})
 
 
-class Wires:
-    """The network of a robot that is alone."""
+def nobody(target: str, epoch: int, tick: int) -> PublicState:
+    """The state of another robot, for a robot that is alone."""
+    raise cars_robot.Unreachable(target)
 
-    def __init__(self, *held: tuple[str, Command]) -> None:
-        self.held = {CommandId(sender, command.seq): command for sender, command in held}
-        self.sent: list[tuple[str, str, Command]] = []
 
-    def state_of(self, target: str, epoch: int, tick: int) -> PublicState:
-        raise cars_robot.cars.Lost
-
-    def percept(self, robot: str, epoch: int, tick: int) -> Percept:
-        return Percept(epoch, tick)
-
-    def send(self, sender: str, to: str, command: Command) -> None:
-        self.sent.append((sender, to, command))
-
-    def receive(self, to: str, epoch: int, command: CommandId) -> Command | None:
-        return self.held.pop(command, None)
+def run(seat: Seat, tick: int, news: News = NO_NEWS, is_first: bool = False) -> Report:
+    """A tick of a robot that is alone."""
+    return seat.run(tick, news, is_first or tick == 0, nobody)
 
 
 class Chatterbox(Idle):
@@ -75,7 +67,7 @@ class Chatterbox(Idle):
 
 
 def test_reports_stay_within_the_limits_of_a_message() -> None:
-    report = Seat(Chatterbox(), WELCOME).init(Clock(1), Wires())
+    report = run(Seat(Chatterbox(), WELCOME), 0)
     assert report.proposal == Point(1, 1) and report.state.speed_mps == 0.0
     assert len(report.log) <= MAX_ENTRIES and all(len(line.encode()) <= MAX_TEXT_BYTES for line in report.log)
     assert len(report.state.state_variables) == MAX_ENTRIES
@@ -92,22 +84,32 @@ class Parrot(Idle):
     def init_robot(self, cars: Cars) -> None:
         super().init_robot(cars)
         self.heard: list[str] = []
+        self.numbers: list[int] = []
 
     def set_command(self, cars: Cars, sender: str, command: str) -> None:
         self.heard.append(f"{sender} {command}")
-        cars.set_robot_command("B", command)
+        self.numbers.append(cars.set_robot_command("B", command))
 
 
-def test_a_doubled_command_is_executed_twice_and_a_missing_one_is_told() -> None:
+def test_a_doubled_command_is_executed_twice_and_commands_are_numbered_within_a_tick() -> None:
     robot = Parrot()
-    seat, wires = Seat(robot, WELCOME), Wires(("B", Command(1, 0, 3, "go")), ("C", Command(1, 0, 1, "no")))
-    seat.init(Clock(1), wires)
-    ids = [CommandId("B", 3), CommandId("B", 3), CommandId("C", 7), CommandId("C", 1)]
-    report = seat.tick(Clock(1, 1, {"A": News(commands=tuple(ids))}), wires)
-    assert robot.heard == ["B go", "B go", "C no"] and report.missing == [ids[2]]
-    assert [(to, sent.seq) for to, sent in report.sent] == [("B", 1), ("B", 2), ("B", 3)]
-    assert [command for *_, command in wires.sent] == [sent for _, sent in report.sent]
-    assert seat.tick(Clock(1, 2), wires).sent == []
+    seat = Seat(robot, WELCOME)
+    run(seat, 0)
+    commands = (Delivery("B", "go"), Delivery("B", "go"), Delivery("C", "no"))
+    report = run(seat, 1, News(commands=commands))
+    assert robot.heard == ["B go", "B go", "C no"] and robot.numbers == [1, 2, 3]
+    assert report.commands == [("B", "go"), ("B", "go"), ("B", "no")]
+    assert report_json(report)["commands"] == 3
+    assert command_json(report, 2, "go") == {
+        "epoch": 1,
+        "tick": 1,
+        "generation": 1,
+        "number": 2,
+        "performative": "achieve",
+        "command": "go",
+    }
+    assert run(seat, 2).commands == []
+    assert run(seat, 3, News(commands=commands[:1])).commands and robot.numbers[3:] == [1]
 
 
 def test_it_stands_where_it_is_told() -> None:
@@ -116,11 +118,44 @@ def test_it_stands_where_it_is_told() -> None:
             assert cars.was_blocked == (cars.tick == 2)
             return Point(self.at.x + 1, self.at.y)
 
-    seat, wires = Seat(Runner(), WELCOME), Wires()
-    assert seat.init(Clock(1), wires).proposal == Point(2, 1)
-    assert seat.tick(Clock(1, 1), wires).state.location == Point(2, 1)
+    seat = Seat(Runner(), WELCOME)
+    assert run(seat, 0).proposal == Point(2, 1)
+    assert run(seat, 1).state.location == Point(2, 1)
     blocked = News(correction=Correction(Point(2, 1), True))
-    assert seat.tick(Clock(1, 2, {"A": blocked}), wires).state.location == Point(2, 1)
+    assert run(seat, 2, blocked).state.location == Point(2, 1)
+
+
+def test_who_takes_over_is_reset_then_resumes_and_all_of_it_is_one_report() -> None:
+    class Heir(Parrot):
+        def init_robot(self, cars: Cars) -> None:
+            super().init_robot(cars)
+            cars.log("init")
+            cars.set_robot_command("B", "early")
+
+        def resume(self, cars: Cars, last: StateVariables) -> None:
+            cars.log(f"resumes {last['trips']}")
+
+    last = PublicState(1, 6, Point(5, 5), 0, 0, {"trips": 3}, "", "")
+    report = run(Seat(Heir(), replace(WELCOME, last_state=last)), 7, News(commands=(Delivery("B", "go"),)), True)
+    assert report.log == ["init", "resumes 3"] and report.commands == [("B", "early"), ("B", "go")]
+    # At tick 0 there is nothing to resume.
+    assert run(Seat(Heir(), replace(WELCOME, last_state=last)), 0).log == ["init"]
+
+
+def test_bodies_are_those_of_the_news_for_who_asked_for_them() -> None:
+    class Looker(Idle):
+        senses_bodies = True
+
+        def update_state_variables(self, cars: Cars) -> None:
+            self.seen = cars.percept()
+
+    news = News(bodies=(SensedBody("guest", Point(1, 2)),))
+    robot = Looker()
+    run(Seat(robot, WELCOME), 1, news, True)
+    assert (robot.seen.epoch, robot.seen.tick, robot.seen.bodies) == (1, 1, news.bodies)
+    robot.senses_bodies = False
+    with pytest.raises(RuntimeError, match="A calls percept"):
+        run(Seat(robot, WELCOME), 1, news, True)
 
 
 def test_a_location_that_is_none_does_not_travel() -> None:
@@ -128,11 +163,11 @@ def test_a_location_that_is_none_does_not_travel() -> None:
         def current_location(self) -> Point:
             return Point(math.nan, 10**400)
 
-    report = Seat(Nowhere(), WELCOME).init(Clock(1), Wires())
+    report = run(Seat(Nowhere(), WELCOME), 0)
     assert report.state.location == Point(1, 1)
 
 
-def test_its_chance_begins_anew_with_an_epoch_and_its_numbers_where_it_is_told() -> None:
+def test_its_chance_begins_anew_with_an_epoch() -> None:
     seen: list[int] = []
 
     class Gambler(Parrot):
@@ -140,11 +175,11 @@ def test_its_chance_begins_anew_with_an_epoch_and_its_numbers_where_it_is_told()
             seen.append(cars.random.next_u64())
             seen.append(cars.set_robot_command("B", "x"))
 
-    seat, wires = Seat(Gambler(), WELCOME), Wires()
+    seat = Seat(Gambler(), WELCOME)
     for _ in range(2):
         seat.start_over(WELCOME)
-        seat.init(Clock(1), wires)
-        seat.tick(Clock(1, 1), wires)
+        run(seat, 0)
+        run(seat, 1)
     first = stream(1, "robot/A").next_u64()
     assert seen == [first, 1, first, 1]
 
@@ -163,9 +198,9 @@ def test_commands_that_cannot_be_sent_are_refused() -> None:
             with pytest.raises(ValueError, match="1024 commands"):
                 cars.set_robot_command("B", "x")
 
-    seat, wires = Seat(Shouter(), WELCOME), Wires()
-    seat.init(Clock(1), wires)
-    assert len(seat.tick(Clock(1, 1), wires).sent) == 1024
+    seat = Seat(Shouter(), WELCOME)
+    run(seat, 0)
+    assert len(run(seat, 1).commands) == 1024
 
 
 def test_bad_parameters_name_the_robot() -> None:
@@ -174,4 +209,4 @@ def test_bad_parameters_name_the_robot() -> None:
             raise BadParameters(cars.name, "n must be above 1")
 
     with pytest.raises(BadParameters, match="parameters of A: n must be above 1"):
-        Seat(Picky(), WELCOME).init(Clock(1), Wires())
+        run(Seat(Picky(), WELCOME), 0)

@@ -32,9 +32,8 @@ class Replay:
             for line in self.lines
             if line["way"] == "ask" and "/join" not in line["key"]
         }
-        others = {key for key, _ in self.answers} - {f"cars/vectors/robot/{self.name}/percept"}
+        others = {key for key, _ in self.answers}
         self.queryables = [self.stage.session.declare_queryable(key, self.answer) for key in sorted(others)]
-        self.stage.percept = lambda query: self.answers[(str(query.key_expr), str(query.parameters))]
 
     def answer(self, query: zenoh.Query) -> None:
         """Answers what the robot asks another one, as it was answered then."""
@@ -51,7 +50,7 @@ class Replay:
                 key = line.get("key", "").removeprefix("cars/vectors/")
                 match line["way"]:
                     case "ask" if key.startswith("join"):
-                        self.stage.welcome = lambda _, welcome=line["answer"]: welcome  # type: ignore[misc]
+                        self.welcome_with(line["answer"])
                         if "generation" in line["answer"] and self.lines[number]["way"] == "token":
                             if process is not None:
                                 process.kill()
@@ -60,6 +59,10 @@ class Replay:
                     case "token":
                         self.stage.until_alive(self.name)
                     case "to":
+                        following = self.lines[number] if number < len(self.lines) else {}
+                        if following.get("key", "").startswith("cars/vectors/join"):
+                            # The clock of a new epoch makes it join again.
+                            self.welcome_with(following["answer"])
                         self.stage.put(key, line["message"])
                     case "from":
                         self.compare(number, key, line["message"])
@@ -70,6 +73,10 @@ class Replay:
             if self.lines[-1]["way"] == "to" and self.lines[-1]["message"].get("end"):
                 return process.wait(20)
             return 0
+
+    def welcome_with(self, answer: Json) -> None:
+        """What a request to join is answered from now on."""
+        self.stage.welcome = lambda _: answer
 
     def compare(self, number: int, key: str, expected: Json) -> None:
         """The robot says what it said then; a command may come more often."""

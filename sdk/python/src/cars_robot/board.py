@@ -1,4 +1,4 @@
-"""What the robots of a process show to askers: their last two reported states, and questions that came early."""
+"""What the robots of a process answer when they are queried: their last two reported states."""
 
 from __future__ import annotations
 
@@ -9,9 +9,6 @@ from typing import Protocol
 
 from .keys import STATE, last_chunk, robot_of
 from .messages import PublicState, answer_json, encode, state_json
-
-MAX_EARLY = 1024
-"""Questions that are kept until the state they ask for exists; more are refused."""
 
 _WHOLE_NUMBER = re.compile(r"\+?[0-9]{1,20}", re.ASCII)
 
@@ -31,8 +28,8 @@ class Question(Protocol):
         """Refuses, in words."""
 
 
-class _Never(Exception):
-    """There will never be an answer."""
+class _NoState(Exception):
+    """There is no state to answer with."""
 
 
 class Board:
@@ -43,69 +40,62 @@ class Board:
         # The last two states of each robot, newest last. During a tick the others must see the state before it, however
         # far the robot already is.
         self._states: dict[str, list[PublicState]] = {}
-        self._early: list[Question] = []
 
     def host(self, robot: str) -> None:
-        """A robot of this process; others are not asked about here."""
+        """A robot of this process begins an epoch; others are not asked about here."""
         with self._lock:
-            self._states.setdefault(robot, [])
+            self._states[robot] = []
 
     def show(self, robot: str, state: PublicState) -> None:
-        """Shows a new state, and answers who asked for it too early."""
+        """Shows a new state."""
         with self._lock:
-            states = self._states.setdefault(robot, [])
+            states = self._states[robot]
             states[:] = [old for old in states if old.epoch == state.epoch and old.tick < state.tick][-1:]
             states.append(state)
-            early, self._early = self._early, []
-            for question in early:
-                self._respond(question)
 
     def get(self, robot: str, epoch: int, tick: int) -> PublicState | None:
         """The state that ``robot``, one of this process, reported for ``tick``."""
         with self._lock:
-            return _find(self._states.get(robot, ()), epoch, tick)
+            return _find(self._states[robot], epoch, tick)
 
     def ask(self, question: Question) -> None:
-        """Answers a question now, or when there is something to answer."""
-        with self._lock:
-            self._respond(question)
-
-    def _respond(self, question: Question) -> None:
+        """Answers a question."""
         try:
-            state = self._judge(question)
-        except _Never as reason:
+            with self._lock:
+                state = self._judge(question)
+        except _NoState as reason:
             question.refuse(str(reason))
             return
-        if state is not None:
-            _reply(question, state)
-        elif len(self._early) < MAX_EARLY:
-            self._early.append(question)
+        what = last_chunk(question.key)
+        answer = state_json(state) if what == STATE else answer_json(state, what)
+        if answer is None:
+            question.refuse(f"there is no query called {what}")
         else:
-            question.refuse("too many questions are waiting already")
+            question.answer(encode(answer))
 
-    def _judge(self, question: Question) -> PublicState | None:
-        """The state that answers it; ``None`` if there will be one."""
+    def _judge(self, question: Question) -> PublicState:
+        """The state that answers it."""
         states = self._states.get(robot_of(question.key) or "")
         if states is None:
-            raise _Never("ask one robot by its name")
-        if not states:
-            return None
-        newest = states[-1]
+            raise _NoState("get one robot by its name")
         tick = _number(question, "tick")
+        epoch = _number(question, "epoch")
+        not_yet = _NoState("that tick has not been reported yet: ask again")
+        if not states:
+            raise not_yet
+        newest = states[-1]
+        if epoch is not None and epoch != newest.epoch:
+            raise not_yet if epoch > newest.epoch else _NoState("that tick is over")
         if tick is None:
             return newest
-        epoch = _number(question, "epoch")
-        if epoch is not None and epoch != newest.epoch:
-            if epoch > newest.epoch:
-                return None
-            raise _Never("that epoch is over")
-        # Asked during tick t, everybody answers with the state reported for t - 1.
+        # Asked during tick t, every robot answers with the state it reported for t - 1.
         found = _find(states, newest.epoch, tick - 1)
         if found is not None:
             return found
         if tick - 2 == newest.tick:
-            return None
-        raise _Never("that tick is far away" if tick > newest.tick else "that tick is over")
+            raise not_yet
+        is_over = 0 < tick <= newest.tick
+        raise _NoState("that tick is over" if is_over else "that tick is out of range")
 
 
 def _find(states: Iterable[PublicState], epoch: int, tick: int) -> PublicState | None:
@@ -117,14 +107,5 @@ def _number(question: Question, name: str) -> int | None:
     if text is None:
         return None
     if not _WHOLE_NUMBER.fullmatch(text):
-        raise _Never(f"parameter {name}: not a whole number")
+        raise _NoState(f"parameter {name}: not a whole number")
     return int(text)
-
-
-def _reply(question: Question, state: PublicState) -> None:
-    what = last_chunk(question.key)
-    answer = state_json(state) if what == STATE else answer_json(state, what)
-    if answer is None:
-        question.refuse(f"there is no query called {what}")
-    else:
-        question.answer(encode(answer))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol, TypeVar
+from collections.abc import Callable
+from typing import TypeVar
 
 from .messages import (
     MAX_ENTRIES,
     MAX_TEXT_BYTES,
-    Command,
-    CommandId,
     News,
     Percept,
     Point,
@@ -53,76 +52,48 @@ class TooEarly(CallError):
 
 
 class Interrupted(CallError):
-    """The epoch is over; whatever this tick comes to is thrown away. A robot may let it through."""
+    """The tick is over: a newer clock is here, or the run ends. A robot may let it through."""
 
     def __init__(self) -> None:
-        super().__init__("the epoch is over")
+        super().__init__("the tick is over")
 
 
-class Lost(Exception):
-    """The other side of a question is gone."""
-
-
-class Network(Protocol):
-    """What a seat needs from outside during a tick."""
-
-    def state_of(self, target: str, epoch: int, tick: int) -> PublicState:
-        """The state that ``target`` reported for ``tick``.
-
-        :raises Lost: it is gone.
-        :raises Interrupted: the epoch is over.
-        """
-
-    def percept(self, robot: str, epoch: int, tick: int) -> Percept:
-        """What ``robot`` senses around itself as of ``tick``.
-
-        :raises Interrupted: the epoch is over.
-        """
-
-    def send(self, sender: str, to: str, command: Command) -> None:
-        """Sends a command from one robot to another."""
-
-    def receive(self, to: str, epoch: int, command: CommandId) -> Command | None:
-        """The command that a clock named; ``None`` if it never came."""
-
-
-class Outbox:
-    """Commands that a robot sent in this tick, and the number that was used last."""
-
-    __slots__ = ("last_seq", "sent")
-
-    def __init__(self, last_seq: int) -> None:
-        self.last_seq = last_seq
-        self.sent: list[tuple[str, Command]] = []
+StateOf = Callable[[str, int, int], PublicState]
+"""``state_of(robot, epoch, tick)``: the state that another robot reported for a tick. It raises :class:`Unreachable` or
+:class:`Interrupted`."""
 
 
 class Cars:
     """The simulation, as one robot sees it during one tick."""
 
-    __slots__ = ("_log", "_logged_bytes", "_network", "_outbox", "news", "random", "tick", "welcome")
+    __slots__ = (
+        "_has_bodies",
+        "_log",
+        "_logged_bytes",
+        "_sent",
+        "_state_of",
+        "news",
+        "random",
+        "tick",
+        "welcome",
+    )
 
     def __init__(
-        self,
-        welcome: Welcome,
-        tick: int,
-        news: News,
-        random: Stream,
-        outbox: Outbox,
-        log: list[str],
-        network: Network,
+        self, welcome: Welcome, tick: int, news: News, random: Stream, has_bodies: bool, state_of: StateOf
     ) -> None:
         self.welcome = welcome
         """What it was told when it joined: field, roster, ranges, where it started."""
         self.tick = tick
         """The current tick; 0 is the initial state."""
         self.news = news
-        """What the clock told it besides."""
+        """What is new for it in this tick."""
         self.random = random
         """Its own random stream, derived from the seed and its name: the only chance it may use."""
-        self._outbox = outbox
-        self._log = log
+        self._has_bodies = has_bodies
+        self._state_of = state_of
+        self._sent: list[tuple[str, str]] = []
+        self._log: list[str] = []
         self._logged_bytes = 0
-        self._network = network
 
     @property
     def name(self) -> str:
@@ -161,11 +132,13 @@ class Cars:
             raise BadParameters(self.name, str(error)) from None
 
     def percept(self) -> Percept:
-        """All bodies within its sensing range now: obstacles, guests, robots. Costs a round trip to the simulator.
+        """All bodies within its sensing range now: obstacles, guests, robots.
 
-        :raises Interrupted: if the epoch is over.
+        :raises RuntimeError: if the robot's ``senses_bodies`` is false.
         """
-        return self._network.percept(self.name, self.welcome.epoch, self.tick)
+        if not self._has_bodies:
+            raise RuntimeError(f"{self.name} calls percept() and its senses_bodies is False")
+        return Percept(self.welcome.epoch, self.tick, self.news.bodies)
 
     def log(self, line: str) -> None:
         """Writes a line to the log of the run. It is cut to what a message may hold, and so is their number in a tick."""
@@ -176,7 +149,7 @@ class Cars:
             self._log.append(line)
 
     def set_robot_command(self, to: str, command: str) -> int:
-        """Sends a command to another robot (``setRobotCommand``) and returns its number.
+        """Sends a command to another robot (``setRobotCommand``) and returns its number in this tick, from 1.
 
         It arrives at a later tick, if the network lets it.
 
@@ -186,13 +159,10 @@ class Cars:
         to = self._known(to)
         if len(command.encode()) > MAX_TEXT_BYTES:
             raise ValueError(f"a command may be {MAX_TEXT_BYTES} bytes long; shorten {shortened(command, 60)!r}...")
-        if len(self._outbox.sent) >= MAX_ENTRIES:
+        if len(self._sent) >= MAX_ENTRIES:
             raise ValueError(f"{self.name} sends more than {MAX_ENTRIES} commands in a tick; send fewer")
-        self._outbox.last_seq += 1
-        message = Command(self.welcome.epoch, self.tick, self._outbox.last_seq, command)
-        self._network.send(self.name, to, message)
-        self._outbox.sent.append((to, message))
-        return message.seq
+        self._sent.append((to, command))
+        return len(self._sent)
 
     def get_robot_location(self, of: str) -> Point:
         """Where another robot stood at the last tick, meters (``getRobotLocation``); raises as
@@ -225,17 +195,14 @@ class Cars:
         :raises UnknownRobot: if nobody has this name.
         :raises Unreachable: if the network is cut, or the other one is lost.
         :raises TooEarly: in tick 0.
-        :raises Interrupted: if the epoch is over.
+        :raises Interrupted: if the tick is over.
         """
         of = self._known(of)
         if self.tick == 0:
             raise TooEarly
         if of in self.news.unreachable:
             raise Unreachable(of)
-        try:
-            return self._network.state_of(of, self.welcome.epoch, self.tick - 1)
-        except Lost:
-            raise Unreachable(of) from None
+        return self._state_of(of, self.welcome.epoch, self.tick - 1)
 
     def _known(self, name: str) -> str:
         if name not in self.welcome.roster:

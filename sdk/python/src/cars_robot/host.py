@@ -3,7 +3,7 @@ in a tick leaves in one batch."""
 
 from __future__ import annotations
 
-import logging
+import math
 import os
 import time
 from collections.abc import Callable, Mapping
@@ -13,18 +13,23 @@ from pathlib import Path
 from .bus import DEFAULT_ENDPOINT, Bus, BusError, Publisher
 from .cars import Interrupted
 from .keys import QUERIES, STATE, Keys
-from .link import Link
+from .link import LOOK_FOR_SIMULATOR_S, Link
 from .messages import (
     MAX_MESSAGE_BYTES,
+    NO_NEWS,
     PROTOCOL_VERSION,
     Clock,
+    News,
     Refused,
     Report,
     Welcome,
+    command_json,
     decode,
     encode,
     is_name,
+    read_clock,
     read_join_answer,
+    read_news,
     report_json,
     state_json,
 )
@@ -37,8 +42,8 @@ PANEL_INTERVAL_S = 0.05
 """A panel is for eyes: no more often than this."""
 JOIN_AGAIN_S = 0.1
 """Between two attempts to join."""
-
-_log = logging.getLogger(__name__)
+MAX_NEWS = 4
+"""Most news that are kept while their clock is not here. Only the newest clock is ever run."""
 
 
 class HostError(Exception):
@@ -95,50 +100,61 @@ class Host:
                     f"{name!r} is not a usable name: 1 to 64 letters, digits, '_', '-' or '.', not beginning with '.'"
                 )
         self._options = options
-        names = sorted(robots)
+        self._robots = robots
         self._bus = Bus(options.connect, options.patience_s, options.zenoh_config)
         self._keys = Keys(options.run)
-        self.link = Link(self._bus, self._keys, options.gone_patience_s)
-        self._members: list[_Member] = []
+        self._members: dict[str, _Member] = {}
+        self._left: str | HostError | None = None
+        """How the run ended, or why these robots leave it."""
+        names = sorted(robots)
+        self.link = Link(self._bus, self._keys, names, options.gone_patience_s, self._is_interrupted)
         try:
             on_open()
-            self._take_part(names, robots)
+            self._take_part(names)
         except BaseException:
             self._close()
             raise
 
-    def _take_part(self, names: list[str], robots: Mapping[str, Robot]) -> None:
-        self.link.listen()
+    def _take_part(self, names: list[str]) -> None:
+        # What was put before a clock is still handed over before it: only the clock has a thread of its own.
+        self.link.subscribe(self._keys.clock(), "simulator", read_clock, self._on_clock, has_thread=True)
         for name in names:
-            self.link.host(name)
-            for what in (*QUERIES, STATE):
-                self._bus.serve(self._keys.query(name, what), self.link.board.ask)
+            self._listen(name)
         for name in names:
-            welcome = self._join(name)
-            # Others may still ask for what the previous incarnation reported last.
-            for last in (welcome.state_before, welcome.last_state):
-                if last is not None:
-                    self.link.board.show(name, last)
-            self._members.append(_Member(self._bus, self._keys, Seat(robots[name], welcome)))
+            welcome = self._join(name, self._options.patience_s)
+            if welcome is None:
+                return
+            seat = Seat(self._robots[name], welcome)
+            self._members[name] = _Member(self.link, seat)
         # Last, so that who sees the token knows that everything above is in effect.
         for name in names:
             self._bus.token(self._keys.alive_robot(name))
 
-    def _join(self, name: str) -> Welcome:
-        options = self._options
+    def _listen(self, name: str) -> None:
+        def on_news(news: News) -> None:
+            member = self._members.get(name)
+            if member is not None and not member.on_news(news):
+                self._left = self._left or HostError(f"another process is {name} now")
+
+        self.link.subscribe(self._keys.news(name), "simulator", read_news, on_news)
+        for what in (*QUERIES, STATE):
+            self._bus.serve(self._keys.query(name, what), self.link.board.ask)
+
+    def _join(self, name: str, patience_s: float) -> Welcome | None:
+        """Asks until the simulator answers; ``None`` if the run ends meanwhile."""
         request = {
             "protocol": PROTOCOL_VERSION,
-            "run": options.run,
+            "run": self._options.run,
             "name": name,
             "instance": self._bus.id,
+            "bodies": self._robots[name].senses_bodies,
             "sdk": f"python/{__version__}",
         }
         begun = time.monotonic()
-        while True:
-            is_last_try = time.monotonic() - begun > options.patience_s
+        while self._left is None:
+            is_last_try = time.monotonic() - begun > patience_s
             answer = self._ask_to_join(name, encode(request))
             if isinstance(answer, Welcome):
-                self.link.keep_commands(answer.repeat_ticks)
                 return answer
             if isinstance(answer, Refused):
                 # A predecessor that was killed is noticed within its lease.
@@ -146,10 +162,13 @@ class Host:
                     raise HostError(f"{name} may not join: {answer}") from answer
             elif is_last_try:
                 raise HostError(
-                    f"no simulator of run {options.run} answers at {options.connect}; is it running, and is the run's "
-                    "name right? (--run, or CARS_RUN)"
+                    f"no simulator of run {self._options.run} answers at {self._options.connect}; is it running, and "
+                    "is the run's name right? (--run, or CARS_RUN)"
                 )
-            time.sleep(JOIN_AGAIN_S)
+            again_at = time.monotonic() + JOIN_AGAIN_S
+            while (left_s := again_at - time.monotonic()) > 0.0:
+                self._pump(left_s)
+        return None
 
     def _ask_to_join(self, name: str, request: bytes) -> Welcome | Refused | None:
         key = self._keys.join(name)
@@ -162,13 +181,12 @@ class Host:
         :raises HostError: it cannot go on.
         """
         try:
-            while True:
-                clock = self.link.next_clock()
-                if clock is None:
-                    raise HostError(f"the simulator has been gone for {self._options.gone_patience_s:g} s")
-                if clock.end is not None:
-                    return clock.end
-                self._on_clock(clock)
+            while self._left is None:
+                if not any([self._advance(member) for member in self._members.values()]):
+                    self._pump()
+            if isinstance(self._left, HostError):
+                raise self._left
+            return self._left
         finally:
             self._close()
 
@@ -176,98 +194,175 @@ class Host:
         self.link.close()
         self._bus.close()
 
-    def _on_clock(self, clock: Clock) -> None:
-        """One tick of every robot of the process, in the order of their names."""
-        asked = (clock.epoch, clock.tick)
-        if asked < self.link.current:
-            return  # An echo: the clock has gone on since.
-        if asked > self.link.current:
-            self.link.begin(clock.epoch, clock.tick)
-        for member in self._members:
-            if clock.tick == 0 and member.seat.welcome.epoch < clock.epoch:
-                self._rejoin(member, clock)
-            member.answer(clock, self.link)
+    def _pump(self, patience_s: float = LOOK_FOR_SIMULATOR_S) -> None:
+        if self.link.patience_left_s() == 0.0:
+            raise HostError(f"the simulator has been gone for {self._options.gone_patience_s:g} s")
+        self.link.pump(patience_s)
 
-    def _rejoin(self, member: _Member, clock: Clock) -> None:
-        """``init``: the same robot, with what holds for the new epoch."""
-        welcome = self._join(member.name)
-        if welcome.epoch == clock.epoch:
-            member.start_over(welcome)
+    def _on_clock(self, clock: Clock) -> None:
+        if clock.end is not None:
+            self._left = self._left or clock.end
+            return
+        for member in self._members.values():
+            member.on_clock(clock)
+
+    def _is_interrupted(self) -> bool:
+        return self._left is not None or any(member.is_interrupted for member in self._members.values())
+
+    def _advance(self, member: _Member) -> bool:
+        """Runs a robot's tick if it is its turn. Returns whether it was."""
+        if self._left is None and member.must_join:
+            # `init`: the same process, in the next epoch.
+            welcome = self._join(member.name, math.inf)
+            if welcome is not None:
+                member.admit(welcome)
+        return self._left is None and member.advance()
 
 
 class _Member:
-    """One robot of the process."""
+    """One robot of the process: what arrived for it, and what it has answered. It follows the rules of the ``Participant``
+    of the Rust crate ``lockstep``."""
 
-    def __init__(self, bus: Bus, keys: Keys, seat: Seat) -> None:
+    def __init__(self, link: Link, seat: Seat) -> None:
         self.name = name = seat.welcome.name
-        self.seat = seat
+        self.must_join = False
+        """Whether a clock of a later epoch than its own has arrived."""
+        self._seat = seat
+        self._link = link
         self._is_seated = False
-        """Whether the clock that names it has come, and it takes part."""
-        self._report: Publisher = bus.publisher(keys.report(name))
-        self._state: Publisher = bus.publisher(keys.query(name, STATE))
-        self._panel: Publisher = bus.publisher(keys.panel(name), may_drop=True)
+        """Whether it has run a tick of its epoch."""
+        self._pending: Clock | None = None
+        """The newest clock that has not been run."""
+        self._news: dict[tuple[int, int], News] = {}
+        """News of ticks that have not been run."""
+        self._running: tuple[int, int] | None = None
+        self._answered = (0, -1)
+        """Epoch and tick of the last answer."""
+        self._commands: list[tuple[str, bytes]] = []
+        self._own_state = self._own_report = b""
+        """What came of the last tick, for the case that something got lost; no state where no robot follows it."""
+        keys = link.keys
+        self._report: Publisher = link.bus.publisher(keys.report(name))
+        self._state: Publisher = link.bus.publisher(keys.query(name, STATE))
+        self._panel: Publisher = link.bus.publisher(keys.panel(name), may_drop=True)
         self._painted_at = float("-inf")
-        self._last: tuple[tuple[int, int], bytes] | None = None
-        """Epoch and tick of the last report, and the report, for the case that it got lost."""
+        self._show_predecessor()
 
-    def start_over(self, welcome: Welcome) -> None:
-        """The same robot in a new epoch."""
-        self.seat.start_over(welcome)
-        self._is_seated = False
-        self._last = None
+    def _show_predecessor(self) -> None:
+        """Others may still ask for what the previous incarnation reported last."""
+        for last in (self._seat.welcome.state_before, self._seat.welcome.last_state):
+            if last is not None:
+                self._link.board.show(self.name, last)
 
-    def answer(self, clock: Clock, link: Link) -> None:
-        """Answers a clock, if it is this robot's turn."""
-        welcome = self.seat.welcome
-        if clock.epoch != welcome.epoch:
-            return  # An echo of an earlier epoch.
-        news = clock.news.get(self.name)
-        joined = None if news is None else news.joined
-        if joined is not None and joined > welcome.generation:
-            raise HostError(f"another process is {self.name} now")
-        asked = (clock.epoch, clock.tick)
-        if self._last is not None and self._last[0] >= asked:
-            if self._last[0] == asked:
-                link.repeat_commands()
-                self._report.put(self._last[1])
+    def admit(self, welcome: Welcome) -> None:
+        """It has joined again. A simulator that is not in a later epoch, either, will repeat the clock."""
+        self.must_join = False
+        if welcome.epoch > self._seat.welcome.epoch:
+            self._seat.start_over(welcome)
+            self._is_seated = False
+            self._link.board.host(self.name)
+            self._show_predecessor()
+
+    def on_clock(self, clock: Clock) -> None:
+        """A clock arrived."""
+        at = (clock.epoch, clock.tick)
+        epoch = self._seat.welcome.epoch
+        if clock.epoch < epoch or at == self._running:
             return
+        self.must_join = self.must_join or clock.epoch > epoch
+        if at <= self._answered:
+            if at == self._answered and self._running is None:
+                self._put()
+            return
+        newest = self._running or (0, -1)
+        if self._pending is not None:
+            newest = max(newest, (self._pending.epoch, self._pending.tick))
+        if at >= newest:
+            self._pending = clock
+
+    def on_news(self, news: News) -> bool:
+        """News arrived. Returns whether it is still this process that takes part."""
+        at = (news.epoch, news.tick)
+        welcome = self._seat.welcome
+        if news.epoch == welcome.epoch and news.joined is not None and news.joined > welcome.generation:
+            return False
+        if news.epoch >= welcome.epoch and at > max(self._answered, self._running or (0, -1)):
+            self._news[at] = news
+            if len(self._news) > MAX_NEWS:
+                del self._news[min(self._news)]
+        return True
+
+    @property
+    def is_interrupted(self) -> bool:
+        """Whether a newer clock than the one that it runs has arrived."""
+        return self._running is not None and self._pending is not None
+
+    def advance(self) -> bool:
+        """Runs the pending clock if all that belongs to it is here and it is this robot's turn. Returns whether it was."""
+        clock, welcome = self._pending, self._seat.welcome
+        if clock is None or clock.epoch > welcome.epoch:
+            return False
+        at = (clock.epoch, clock.tick)
+        news = self._news.get(at)
+        if clock.news & welcome.news_flag and news is None:
+            return False  # They were lost: both are repeated.
+
+        self._pending = None
+        self._news = {of: one for of, one in self._news.items() if of > at}
+        is_named = news is not None and news.joined == welcome.generation
+        if clock.epoch < welcome.epoch or not (self._is_seated or clock.tick == 0 or is_named):
+            return False
+        is_first = not self._is_seated
+        self._is_seated = True
+        self._running = at
+        self._link.begin(*at)
         try:
-            report = self._tick(clock, joined == welcome.generation, link)
+            report = self._seat.run(clock.tick, news or NO_NEWS, is_first, self._link.state_of)
         except Interrupted:
-            self.seat.abandon()
-            return
-        if report is None:
-            return
-        # First what others may ask for, then the report: after it the clock may go on and they will ask. Who follows has
-        # the state before the next clock, because both come the same way.
-        if self._state.is_watched:
-            self._state.put(encode(state_json(report.state)))
-        link.board.show(self.name, report.state)
+            return True
+        finally:
+            self._running = None
+        # What was run in an epoch that is over is thrown away.
+        self._link.drain()
+        if not self.must_join:
+            self._answer_with(report)
+        return True
+
+    def _answer_with(self, report: Report) -> None:
         data = encode(report_json(report))
         if len(data) > MAX_MESSAGE_BYTES:
             # The simulator would refuse it and wait for another one for ever.
             raise HostError(
                 f"the report of {self.name} is {len(data)} bytes long, more than {MAX_MESSAGE_BYTES}: publish fewer or "
-                "shorter state variables, or send shorter commands"
+                "shorter state variables"
             )
-        self._report.put(data)
-        self._last = (asked, data)
+        self._answered = (report.state.epoch, report.state.tick)
+        self._commands = [
+            (self._link.keys.command(to, self.name), encode(command_json(report, number, text)))
+            for number, (to, text) in enumerate(report.commands, start=1)
+        ]
+        self._own_state = encode(state_json(report.state)) if self._state.is_watched else b""
+        self._own_report = data
+        # First what others may ask for, then the report: after it the clock may go on and they will ask.
+        self._link.board.show(self.name, report.state)
+        self._put()
         if self._panel.is_watched:
             self._paint()
 
-    def _tick(self, clock: Clock, joins: bool, link: Link) -> Report | None:
-        if self._is_seated:
-            return self.seat.tick(clock, link)
-        if clock.tick > 0 and not joins:
-            return None  # Its turn has not come: the clock that names it is still to be granted.
-        self._is_seated = True
-        return self.seat.init(clock, link) if clock.tick == 0 else self.seat.resume(clock, link)
+    def _put(self) -> None:
+        """Puts what came of the last tick. Who follows has the state before the next clock, because both come the same
+        way."""
+        for key, command in self._commands:
+            self._link.put(key, command)
+        if self._own_state:
+            self._state.put(self._own_state)
+        self._report.put(self._own_report)
 
     def _paint(self) -> None:
         now = time.monotonic()
         if now - self._painted_at >= PANEL_INTERVAL_S:
             self._painted_at = now
-            self._panel.put(encode(panel_json(self.seat.panel())))
+            self._panel.put(encode(panel_json(self._seat.panel())))
 
 
 __all__ = ["BusError", "Host", "HostError", "HostOptions"]

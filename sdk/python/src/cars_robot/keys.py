@@ -36,20 +36,16 @@ class Keys:
         return self.query(robot, "waiting")
 
     def command(self, to: str, sender: str) -> str:
-        """Robot to robot: a command; the sender is in the key, so that access control can pin it."""
+        """Robot to simulator: a command; target and sender are in the key, so that access control can pin the sender."""
         return f"{self._root}/robot/{to}/command/{sender}"
 
-    def commands_to(self, to: str) -> str:
-        """All commands to one robot."""
-        return self.command(to, "*")
+    def news(self, robot: str) -> str:
+        """Simulator to robot: what is new for it in a tick."""
+        return self.query(robot, "news")
 
     def query(self, robot: str, what: str) -> str:
         """Queryable at the robot: ``what`` is one of :data:`QUERIES` or :data:`STATE`."""
         return f"{self._root}/robot/{robot}/{what}"
-
-    def percept(self, robot: str) -> str:
-        """Queryable at the simulator: the bodies within the robot's sensing range."""
-        return self.query(robot, "percept")
 
     def panel(self, robot: str) -> str:
         """Robot to observers: what it chooses to display."""
@@ -71,5 +67,5 @@ def robot_of(key: str) -> str | None:
 
 
 def last_chunk(key: str) -> str:
-    """The last chunk of a key: the sender of a command, or what a query asks for."""
+    """The last chunk of a key: what a query asks for."""
     return key.rsplit("/", 1)[-1]

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 """Version of the contract that this package speaks."""
 
 MAX_MESSAGE_BYTES = 1 << 20
@@ -97,14 +97,12 @@ class Welcome:
     """Names of all robots of the scenario, itself included."""
     parameters: Mapping[str, Any]
     """Its parameters, as the scenario says, lengths and times in SI units."""
+    news_flag: int = 0
+    """Its flag in :attr:`Clock.news`."""
     last_state: PublicState | None = None
     """What its previous incarnation reported last in this epoch."""
     state_before: PublicState | None = None
     """What that one reported for the tick before, where others may still ask for it."""
-    last_seq: int = 0
-    """Its commands are numbered from the next one on."""
-    repeat_ticks: int = 2
-    """For how many ticks it must be able to repeat its commands."""
 
 
 class Refused(Exception):
@@ -124,11 +122,11 @@ class Correction:
     """Whether its move was refused; else it was placed there."""
 
 
-class CommandId(NamedTuple):
-    """A command, named by its sender and its number."""
+class Delivery(NamedTuple):
+    """A command that arrives."""
 
     sender: str
-    seq: int
+    command: str
 
 
 class SensedRobot(NamedTuple):
@@ -136,46 +134,6 @@ class SensedRobot(NamedTuple):
 
     name: str
     location: Point
-
-
-@dataclass(frozen=True, slots=True)
-class News:
-    """What one robot is told with a clock."""
-
-    correction: Correction | None = None
-    commands: tuple[CommandId, ...] = ()
-    """Commands that arrive now, in this order. One that is named twice in a row counts as two."""
-    unreachable: tuple[str, ...] = ()
-    """Robots that it cannot query in this tick."""
-    sensed: tuple[SensedRobot, ...] = ()
-    """Other robots within its sensing range."""
-    joined: int | None = None
-    """The incarnation of this generation takes part from this tick on."""
-
-
-NO_NEWS = News()
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """The simulator grants a tick. It carries exceptions only."""
-
-    epoch: int = 0
-    tick: int = 0
-    news: Mapping[str, News] = field(default_factory=dict)
-    end: str | None = None
-    """``finished``, ``stopped`` or ``aborted``: the run is over."""
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A command on its way from robot to robot."""
-
-    epoch: int
-    tick: int
-    seq: int
-    command: str
-    performative: str = "achieve"
 
 
 class SensedBody(NamedTuple):
@@ -194,6 +152,40 @@ class Percept:
     bodies: tuple[SensedBody, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class News:
+    """What is new for one robot in a tick; put before the tick's clock."""
+
+    epoch: int = 0
+    tick: int = 0
+    joined: int | None = None
+    """The incarnation of this generation takes part from this tick on."""
+    correction: Correction | None = None
+    commands: tuple[Delivery, ...] = ()
+    """Commands that arrive now, in this order. One that is listed twice counts as two."""
+    unreachable: tuple[str, ...] = ()
+    """Robots that it cannot query in this tick."""
+    sensed: tuple[SensedRobot, ...] = ()
+    """Other robots within its sensing range."""
+    bodies: tuple[SensedBody, ...] = ()
+    """All bodies within its sensing range, if it asked for them when it joined."""
+
+
+NO_NEWS = News()
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The simulator grants a tick."""
+
+    epoch: int = 0
+    tick: int = 0
+    news: int = 0
+    """Flags of the robots that have news in this tick."""
+    end: str | None = None
+    """``finished``, ``stopped`` or ``aborted``: the run is over."""
+
+
 @dataclass(slots=True)
 class Report:
     """A robot has done its tick."""
@@ -201,10 +193,8 @@ class Report:
     state: PublicState
     generation: int
     proposal: Point
-    sent: Sequence[tuple[str, Command]] = ()
-    """Commands it sent in this tick, with their targets, in order."""
-    missing: Sequence[CommandId] = ()
-    """Commands that the clock named and that never came."""
+    commands: Sequence[tuple[str, str]] = ()
+    """Targets and texts of the commands it sent in this tick, in order."""
     log: list[str] = field(default_factory=list)
 
 
@@ -260,14 +250,15 @@ def answer_json(state: PublicState, what: str) -> Json | None:
     return {"performative": "tell", "epoch": state.epoch, "tick": state.tick, "value": value}
 
 
-def command_json(command: Command) -> Json:
-    """A command as JSON, as its target reads it."""
+def command_json(report: Report, number: int, text: str) -> Json:
+    """The command of this number, from 1, among those of a tick as JSON."""
     return {
-        "epoch": command.epoch,
-        "tick": command.tick,
-        "seq": command.seq,
-        "performative": command.performative,
-        "command": command.command,
+        "epoch": report.state.epoch,
+        "tick": report.state.tick,
+        "generation": report.generation,
+        "number": number,
+        "performative": "achieve",
+        "command": text,
     }
 
 
@@ -277,13 +268,8 @@ def report_json(report: Report) -> Json:
     del message["location"]
     message["generation"] = report.generation
     message["proposal"] = _point_json(report.proposal)
-    if report.sent:
-        message["sent"] = [
-            {"to": to, "seq": sent.seq, "performative": sent.performative, "command": sent.command}
-            for to, sent in report.sent
-        ]
-    if report.missing:
-        message["missing"] = [{"from": sender, "seq": seq} for sender, seq in report.missing]
+    if report.commands:
+        message["commands"] = len(report.commands)
     if report.log:
         message["log"] = report.log
     return message
@@ -483,54 +469,14 @@ def _read_correction(value: object) -> Correction:
     return Correction(_point(of, "location"), _flag(of, "blocked"))
 
 
-def _read_command_id(value: object) -> CommandId:
+def _read_delivery(value: object) -> Delivery:
     of = _object(value)
-    return CommandId(_name(of, "from"), _integer(of, "seq"))
+    return Delivery(_name(of, "from"), _text(of, "command"))
 
 
 def _read_sensed_robot(value: object) -> SensedRobot:
     of = _object(value)
     return SensedRobot(_name(of, "name"), _point(of, "location"))
-
-
-def _read_news(value: object) -> News:
-    of = _object(value)
-    return News(
-        correction=_optional(of, "correction", _read_correction),
-        commands=_all(of, "commands", _read_command_id),
-        unreachable=_all(of, "unreachable", lambda name: _as_name(name, ".")),
-        sensed=_all(of, "sensed", _read_sensed_robot),
-        joined=None if of.get("joined") is None else _integer(of, "joined", 1 << 32),
-    )
-
-
-_ENDS = ("aborted", "finished", "stopped")
-
-
-def read_clock(value: object) -> Clock:
-    """Reads a clock."""
-    of = _object(value)
-    news = of.get("news")
-    end = of.get("end")
-    if end is not None and end not in _ENDS:
-        raise _Wrong("end", f"none of {', '.join(_ENDS)}")
-    told: dict[str, News] = {}
-    if news is not None or "news" in of:
-        for name, what in _object(news, "news").items():
-            told[_as_name(name, "news")] = _within(f"news.{name}", _read_news, what)
-    return Clock(_epoch(of), _tick(of), told, end)
-
-
-_PERFORMATIVES = ("achieve", "ask-one", "tell")
-
-
-def read_command(value: object) -> Command:
-    """Reads a command."""
-    of = _object(value)
-    performative = of.get("performative", "achieve")
-    if performative not in _PERFORMATIVES:
-        raise _Wrong("performative", f"none of {', '.join(_PERFORMATIVES)}")
-    return Command(_epoch(of), _tick(of), _integer(of, "seq"), _text(of, "command"), performative)
 
 
 def _read_body(value: object) -> SensedBody:
@@ -541,11 +487,31 @@ def _read_body(value: object) -> SensedBody:
     return SensedBody(kind, _point(of, "location"))
 
 
-def read_percept(value: object) -> Percept:
-    """Reads a percept."""
+def read_news(value: object) -> News:
+    """Reads a robot's news."""
     of = _object(value)
-    _list(of, "bodies")
-    return Percept(_epoch(of), _tick(of), _all(of, "bodies", _read_body))
+    return News(
+        epoch=_epoch(of),
+        tick=_tick(of),
+        joined=None if of.get("joined") is None else _integer(of, "joined", 1 << 32),
+        correction=_optional(of, "correction", _read_correction),
+        commands=_all(of, "commands", _read_delivery),
+        unreachable=_all(of, "unreachable", lambda name: _as_name(name, ".")),
+        sensed=_all(of, "sensed", _read_sensed_robot),
+        bodies=_all(of, "bodies", _read_body),
+    )
+
+
+_ENDS = ("aborted", "finished", "stopped")
+
+
+def read_clock(value: object) -> Clock:
+    """Reads a clock."""
+    of = _object(value)
+    end = of.get("end")
+    if end is not None and end not in _ENDS:
+        raise _Wrong("end", f"none of {', '.join(_ENDS)}")
+    return Clock(_epoch(of), _tick(of), _integer(of, "news", 1 << 32, default=0), end)
 
 
 def _read_welcome(of: Json) -> Welcome:
@@ -568,10 +534,9 @@ def _read_welcome(of: Json) -> Welcome:
         location=_point(of, "location"),
         roster=_all(of, "roster", lambda name: _as_name(name, ".")),
         parameters=_object(of.get("parameters", _ABSENT), "parameters"),
+        news_flag=_integer(of, "news_flag", 1 << 32, default=0),
         last_state=_optional(of, "last_state", read_state),
         state_before=_optional(of, "state_before", read_state),
-        last_seq=_integer(of, "last_seq", default=0),
-        repeat_ticks=_integer(of, "repeat_ticks", default=2),
     )
 
 

@@ -24,6 +24,9 @@ class Robot(ABC):
     process; only :class:`Interrupted` may be let through.
     """
 
+    senses_bodies = True
+    """Whether :meth:`Cars.percept` is used; a robot that does without it costs less."""
+
     @abstractmethod
     def init_robot(self, cars: Cars) -> None:
         """Back to the initial state, before tick 0 and after every ``init`` (``initRobot``).

@@ -1,18 +1,15 @@
-"""One robot's place in the lock-step: from a clock to a report. Synchronous and without a network of its own."""
+"""One robot's place in the lock-step: from the tick it is to run to a report. Synchronous and without a network."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 
-from .cars import Cars, Network, Outbox
+from .cars import Cars, StateOf
 from .messages import (
     MAX_ENTRIES,
     MAX_TEXT_BYTES,
-    NO_NEWS,
-    Clock,
-    Command,
-    CommandId,
+    News,
     Point,
     PublicState,
     Report,
@@ -46,81 +43,40 @@ class Seat:
         """The same robot in a new epoch."""
         self.welcome = welcome
         self._random = stream(welcome.seed, welcome.stream)
-        self._outbox = Outbox(welcome.last_seq)
-        self._proposal = self._stands = welcome.location
+        self._proposal = welcome.location
 
     def panel(self) -> Panel:
         """What the robot chooses to display."""
         return self._robot.panel()
 
-    def init(self, clock: Clock, network: Network) -> Report:
-        """The first tick of the epoch: initialize, and propose where to go. Nobody has said anything yet.
+    def run(self, tick: int, news: News, is_first: bool, state_of: StateOf) -> Report:
+        """One tick, in the order of the paper's Figure 5. The first one of an incarnation begins with ``init_robot``.
 
         :raises BadParameters: if the robot refuses its parameters.
+        :raises Interrupted: the tick is of no use any more, and the robot let it through.
         """
-        self._proposal = self._stands = self.welcome.location
-        cars = self._enter(clock, network, [])
-        self._robot.init_robot(cars)
-        self._robot.set_current_location(cars, self.welcome.location)
-        return self._leave(cars, [])
+        robot, welcome = self._robot, self.welcome
+        cars = Cars(welcome, tick, news, self._random, robot.senses_bodies, state_of)
 
-    def resume(self, clock: Clock, network: Network) -> Report:
-        """The first tick of an incarnation that takes over in the middle of an epoch.
+        if is_first:
+            robot.init_robot(cars)
+            if tick > 0 and welcome.last_state is not None:
+                robot.resume(cars, welcome.last_state.state_variables)
 
-        :raises BadParameters: if the robot refuses its parameters.
-        """
-        log: list[str] = []
-        cars = self._enter(clock, network, log)
-        self._robot.init_robot(cars)
-        if self.welcome.last_state is not None:
-            self._robot.resume(cars, self.welcome.last_state.state_variables)
-        report = self.tick(clock, network)
-        report.log[:0] = log
-        return report
+        stands = self._proposal if news.correction is None else news.correction.location
+        robot.set_current_location(cars, stands)
+        for sender, command in news.commands:
+            robot.set_command(cars, sender, command)
+        if tick > 0:
+            robot.update_state_variables(cars)
+            robot.update_emotion_state(cars)
+            robot.update_behavior_state(cars)
+        return self._report(cars, stands)
 
-    def tick(self, clock: Clock, network: Network) -> Report:
-        """One tick, in the order of the paper's Figure 5.
-
-        :raises Interrupted: the epoch is over, and the robot let it through.
-        """
-        robot = self._robot
-        cars = self._enter(clock, network, [])
-        correction = cars.news.correction
-        self._stands = self._proposal if correction is None else correction.location
-        robot.set_current_location(cars, self._stands)
-        missing: list[CommandId] = []
-        if cars.news.commands:
-            self._obey(cars, clock.epoch, network, missing)
-        robot.update_state_variables(cars)
-        robot.update_emotion_state(cars)
-        robot.update_behavior_state(cars)
-        return self._leave(cars, missing)
-
-    def abandon(self) -> None:
-        """A tick was interrupted: what it has sent is nobody's business any more."""
-        self._outbox.sent = []
-
-    def _obey(self, cars: Cars, epoch: int, network: Network, missing: list[CommandId]) -> None:
-        named: CommandId | None = None
-        command: Command | None = None
-        for one in cars.news.commands:
-            # One that the medium has doubled is named twice in a row, and is here once.
-            if command is None or one != named:
-                named, command = one, network.receive(self.welcome.name, epoch, one)
-            if command is None:
-                missing.append(one)
-            else:
-                self._robot.set_command(cars, one.sender, command.command)
-
-    def _enter(self, clock: Clock, network: Network, log: list[str]) -> Cars:
-        """The simulation as the robot sees it in this tick."""
-        news = clock.news.get(self.welcome.name, NO_NEWS)
-        return Cars(self.welcome, clock.tick, news, self._random, self._outbox, log, network)
-
-    def _leave(self, cars: Cars, missing: list[CommandId]) -> Report:
-        """The end of every tick: where to go next, and what to tell."""
+    def _report(self, cars: Cars, stands: Point) -> Report:
+        """The end of every tick: where to go next, and what others may learn."""
         robot, log = self._robot, cars._log
-        location = _finite_point(robot.current_location(), self._stands)
+        location = _finite_point(robot.current_location(), stands)
         projected = robot.project_location(cars)
         # A number that is none cannot travel. The run goes on, and its log says whose fault it is.
         self._proposal = _finite_point(projected, location)
@@ -136,8 +92,7 @@ class Seat:
             emotion_state=shortened(robot.emotion_state(), MAX_TEXT_BYTES),
             behavior_state=shortened(robot.behavior_state(), MAX_TEXT_BYTES),
         )
-        sent, self._outbox.sent = self._outbox.sent, []
-        return Report(state, self.welcome.generation, self._proposal, sent, missing, log)
+        return Report(state, self.welcome.generation, self._proposal, cars._sent, log)
 
 
 def _is_finite(value: float) -> bool:
