@@ -316,7 +316,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
 
 /// What may be told to Leguin; every query of hers has an answer here.
 const TOLD: &[&str] = &[
-    r#"{"type":"init","protocol":1,"run":"r","name":"Leguin","generation":1,"epoch":1,"tick":0,"seed":42,"stream":"robot/Leguin","tick_s":0.5,"field_m":[15.24,15.24],"body_m":0.6096,"sensing_range_m":1.8288,"location":{"x":1.2192,"y":1.2192},"roster":["Butler","Leguin"],"parameters":{"waiter":"Butler","affect":"on","dynamics":{"label_cuts":[0.2,0.4,0.6,0.8]}}}"#,
+    r#"{"type":"init","protocol":2,"run":"r","name":"Leguin","generation":1,"epoch":1,"tick":0,"seed":42,"stream":"robot/Leguin","tick_s":0.5,"field_m":[15.24,15.24],"body_m":0.6096,"sensing_range_m":1.8288,"location":{"x":1.2192,"y":1.2192},"roster":["Butler","Leguin"],"parameters":{"waiter":"Butler","affect":"on","dynamics":{"label_cuts":[0.2,0.4,0.6,0.8]}}}"#,
     r#"{"type":"tick","tick":1,"location":{"x":1.2192,"y":1.2192},"commands":[{"from":"Butler","performative":"achieve","command":"refill"},{"from":"Bot","performative":"achieve","command":"\u00e9\ud83d\ude00 \"\\\u0007\u0000\n 0123456789012345678901234567890123456789012345678901234567890"}],"sensed":[{"name":"Vonda","location":{"x":1.0,"y":2e0}}]}"#,
     r#"{"type":"answer","value":{"epoch":1,"tick":0,"location":{"x":7.62,"y":7.62},"state_variables":{"need":true,"refiller":"Leguin"}}}"#,
     r#"{"type":"tick","tick":2,"location":{"x":1.2192,"y":1.2192}}"#,

@@ -292,7 +292,7 @@ fn a_participant_says_nothing_in_anothers_name() {
     // Witnesses, each with what its certificate lets it hear.
     let heard = Heard::default();
     let witness = castle.enter("Butler");
-    let _at_butler = heard.on(&witness, &keys.commands_to(&butler));
+    let _at_butler = heard.on(&witness, &keys.news(&butler));
     let at_operator = [
         keys.clock(),
         keys.query(&butler, "panel"),
@@ -304,7 +304,7 @@ fn a_participant_says_nothing_in_anothers_name() {
     // An answer on the same link comes after what was declared there: from here on they hear.
     assert!(
         witness
-            .get(&keys.percept(&butler), "", None)
+            .get(&keys.query(&leguin, STATE), "", None)
             .unwrap()
             .is_some()
     );
@@ -325,17 +325,24 @@ fn a_participant_says_nothing_in_anothers_name() {
         ("cars/secure-pose/**".to_owned(), rubbish()),
         (keys.query(&butler, STATE), rubbish()),
         (keys.panel(&butler), rubbish()),
-        (keys.percept(&butler), rubbish()),
+        (keys.news(&butler), rubbish()),
+        (keys.news(&leguin), rubbish()),
         (keys.world(), rubbish()),
         (keys.log(), rubbish()),
         (keys.command(&butler, &vonda), rubbish()),
-        (keys.command(&butler, &RobotName::operator()), rubbish()),
         (keys.command(&leguin, &butler), rubbish()),
     ] {
         for intruder in [&thief, &operator] {
             intruder.put(&key, message.clone()).unwrap();
         }
     }
+    for message in [rubbish(), br#"{"command":"refill"}"#.to_vec()] {
+        let as_operator = keys.command(&leguin, &RobotName::operator());
+        thief.put(&as_operator, message).unwrap();
+    }
+    operator
+        .put(&keys.command(&butler, &leguin), rubbish())
+        .unwrap();
     let forged_tokens =
         [&butler, &vonda].map(|robot| thief.token(&keys.alive_robot(robot)).unwrap());
     drop(forged_tokens);
@@ -346,19 +353,19 @@ fn a_participant_says_nothing_in_anothers_name() {
     thief
         .put(&keys.command(&butler, &leguin), rubbish())
         .unwrap();
-    let status = castle.ignored("malformed", 1);
+    operator
+        .put(&keys.command(&leguin, &RobotName::operator()), rubbish())
+        .unwrap();
+    let status = castle.ignored("malformed", 3);
     assert_eq!(status.ignored.len(), 1, "{:?}", status.ignored);
-    let expected = [keys.query(&leguin, "panel"), keys.command(&butler, &leguin)];
+    let expected = keys.query(&leguin, "panel");
     eventually("what is allowed", || {
-        expected
-            .iter()
-            .all(|key| heard.keys().contains(key))
-            .then_some(())
+        heard.keys().contains(&expected).then_some(())
     });
     let unexpected: Vec<String> = heard
         .keys()
         .into_iter()
-        .filter(|key| !expected.contains(key))
+        .filter(|key| *key != expected)
         .collect();
     assert!(unexpected.is_empty(), "forged: {unexpected:?}");
     drop(at_operator);
@@ -380,8 +387,6 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     };
     for (key, body) in [
         (keys.control(), stop),
-        (keys.percept(&butler), Vec::new()),
-        (keys.percepts(), Vec::new()),
         (keys.join(), join("Butler")),
         (keys.join_as(&butler), join("Butler")),
         (keys.all(), Vec::new()),
@@ -404,12 +409,6 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     );
     assert!(
         thief
-            .get(&keys.percept(&leguin), "", None)
-            .unwrap()
-            .is_some()
-    );
-    assert!(
-        thief
             .get(&keys.query(&butler, STATE), "", None)
             .unwrap()
             .is_some()
@@ -420,9 +419,10 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     let listening = [
         keys.all(),
         keys.reports(),
-        keys.commands_to(&butler),
-        keys.percept(&butler),
-        keys.percepts(),
+        keys.commands(),
+        keys.command(&leguin, &butler),
+        keys.news(&butler),
+        "cars/secure-ask/robot/*/news".to_owned(),
         "**".to_owned(),
         "cars/*/robot/Butler/**".to_owned(),
         keys.world(),
@@ -431,16 +431,12 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     .map(|key| secrets.on(&thief, &key));
     // What a session may hear, all its subscriptions hear that match: this is another one.
     let listener = castle.enter("Leguin");
+    let own_news = Heard::default();
     let _clock = clocks.on(&listener, &keys.clock());
+    let _news = own_news.on(&listener, &keys.news(&leguin));
     // It answers for others.
     let queries = Arc::new(AtomicUsize::new(0));
-    let answering = [
-        keys.query(&butler, STATE),
-        keys.control(),
-        keys.joins(),
-        keys.percepts(),
-    ]
-    .map(|key| {
+    let answering = [keys.query(&butler, STATE), keys.control(), keys.joins()].map(|key| {
         let queries = queries.clone();
         thief
             .queryable(&key, move |_| {
@@ -450,12 +446,13 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
     });
     assert!(
         listener
-            .get(&keys.percept(&leguin), "", None)
+            .get(&keys.query(&butler, STATE), "", None)
             .unwrap()
             .is_some()
     );
     castle.control(&Control::Step { n: 80 });
     eventually("clocks", || (clocks.keys().len() >= 80).then_some(()));
+    assert!(!own_news.keys().is_empty(), "it gets its own news");
     let state = castle
         .operator
         .get(&keys.query(&butler, STATE), "", None)

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use lockstep::{Begin, Sent, Turn};
-use protocol::messages::{CommandText, News, Panel, Point, PublicState, Report, Welcome};
+use protocol::messages::{Command, CommandText, News, Panel, Point, PublicState, Report, Welcome};
 use protocol::random::{Stream, stream};
 use protocol::{FieldError, Message, Tick};
 
@@ -177,8 +177,11 @@ impl Seat {
             log,
         };
 
-        // The simulator would refuse a report beyond the limits, and wait for another one.
-        if let Err(FieldError { field, reason }) = report.check() {
+        // The simulator would refuse a message beyond the limits, and wait for another one.
+        let is_fit = report
+            .check()
+            .and_then(|()| commands.iter().try_for_each(check_command));
+        if let Err(FieldError { field, reason }) = is_fit {
             return Err(RobotError::TooMuch {
                 robot: self.welcome.name.clone(),
                 field,
@@ -191,6 +194,16 @@ impl Seat {
             report: Arc::new(report),
         })
     }
+}
+
+/// Whether a command stays within the limits of a message.
+fn check_command(sent: &Sent<CommandText>) -> Result<(), FieldError> {
+    let command = Command {
+        command: sent.command.command.clone(),
+        ..Command::default()
+    };
+
+    command.check()
 }
 
 /// The commands that arrived.

@@ -3,9 +3,12 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
-use protocol::Message;
-use protocol::messages::{Clock, JoinAnswer};
-use robot::{Action, BadParameters, Cars, LocalHost, Percept, Point, Robot};
+use std::collections::{BTreeMap, BTreeSet};
+
+use lockstep::Exchange;
+use protocol::messages::{Correction, JoinAnswer, News, Welcome};
+use protocol::{Message, RobotName};
+use robot::{Action, BadParameters, Cars, LocalHost, Point, Robot};
 
 /// Whether it has a variable that is too long.
 struct Chatterbox(bool);
@@ -39,37 +42,32 @@ impl Robot for Chatterbox {
     }
 }
 
-/// One of them, in a run of its own.
-fn chatterbox(is_endless: bool) -> LocalHost {
-    let welcome = br#"{"answer":"welcome","protocol":1,"run":"r","name":"A","generation":1,"epoch":1,"tick":0,"seed":1,
-        "stream":"robot/A","tick_s":0.5,"field_m":[9,9],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":1},
-        "roster":["A"],"parameters":{}}"#;
-    let JoinAnswer::Welcome(welcome) = protocol::decode("join", "simulator", welcome).unwrap()
-    else {
+/// What a robot with this name is told when it joins.
+fn welcome(name: &str) -> Welcome {
+    let text = r#"{"answer":"welcome","protocol":2,"run":"r","name":"NAME","generation":1,"epoch":1,"tick":0,"seed":1,
+        "stream":"robot/NAME","tick_s":0.5,"field_m":[9,9],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":1},
+        "roster":["NAME"],"parameters":{},"news_flag":1}"#;
+    let text = text.replace("NAME", name);
+    let answer = protocol::decode("join", "simulator", text.as_bytes()).unwrap();
+    let JoinAnswer::Welcome(welcome) = answer else {
         unreachable!("it is a welcome")
     };
-    LocalHost::new(vec![(Box::new(Chatterbox(is_endless)), *welcome)])
+
+    *welcome
+}
+
+/// One of them, in a run of its own.
+fn chatterbox(is_endless: bool) -> LocalHost {
+    LocalHost::new(vec![(Box::new(Chatterbox(is_endless)), welcome("A"))])
 }
 
 #[test]
 fn a_robot_that_gives_up_says_why_and_reports_nothing() {
     let mut host = chatterbox(false);
     for tick in 0..SILENT_AT {
-        let clock = Clock {
-            epoch: 1,
-            tick,
-            ..Clock::default()
-        };
-        host.exchange(&clock, &mut |_| Percept::default()).unwrap();
+        host.exchange(tick, BTreeMap::new()).unwrap();
     }
-    let clock = Clock {
-        epoch: 1,
-        tick: SILENT_AT,
-        ..Clock::default()
-    };
-    let error = host
-        .exchange(&clock, &mut |_| Percept::default())
-        .unwrap_err();
+    let error = host.exchange(SILENT_AT, BTreeMap::new()).unwrap_err();
     assert_eq!(
         error.to_string(),
         "A gives up: there is nothing left to say"
@@ -79,14 +77,10 @@ fn a_robot_that_gives_up_says_why_and_reports_nothing() {
 #[test]
 fn reports_stay_within_the_limits_of_a_message() {
     let mut host = chatterbox(false);
-    let clock = Clock {
-        epoch: 1,
-        ..Clock::default()
-    };
-    let reports = host.exchange(&clock, &mut |_| Percept::default()).unwrap();
-    let report = reports.values().next().unwrap();
+    let outcome = host.exchange(0, BTreeMap::new()).unwrap();
+    let (report, _) = outcome.reports.values().next().unwrap();
     assert_eq!(report.check(), Ok(()));
-    assert!(protocol::encode(report).len() < protocol::codec::MAX_MESSAGE_BYTES / 2);
+    assert!(protocol::encode(report.as_ref()).len() < protocol::codec::MAX_MESSAGE_BYTES / 2);
     assert!(
         report
             .log
@@ -99,15 +93,111 @@ fn reports_stay_within_the_limits_of_a_message() {
 
 #[test]
 fn what_cannot_be_sent_ends_the_robot_with_the_reason() {
-    let clock = Clock {
-        epoch: 1,
-        ..Clock::default()
-    };
-    let error = chatterbox(true)
-        .exchange(&clock, &mut |_| Percept::default())
-        .unwrap_err();
+    let error = chatterbox(true).exchange(0, BTreeMap::new()).unwrap_err();
     assert_eq!(
         error.to_string(),
         "A says too much: state_variables.secret: 5000 bytes of text, more than the 4096 allowed"
     );
+}
+
+/// Sends so many commands of so many bytes to itself.
+struct Commander {
+    count: usize,
+    bytes: usize,
+}
+
+impl Robot for Commander {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        for _ in 0..self.count {
+            cars.set_robot_command("A", "c".repeat(self.bytes)).unwrap();
+        }
+        Action::stay(cars)
+    }
+}
+
+#[test]
+fn commands_beyond_the_limits_end_the_robot_with_the_reason() {
+    for (count, bytes, reason) in [
+        (
+            1,
+            4097,
+            Some("4097 bytes of text, more than the 4096 allowed"),
+        ),
+        (1025, 1, Some("1025 entries, more than the 1024 allowed")),
+        (1024, 4096, None),
+    ] {
+        let commander = Commander { count, bytes };
+        let mut host = LocalHost::new(vec![(Box::new(commander), welcome("A"))]);
+        let outcome = host.exchange(0, BTreeMap::new());
+        match reason {
+            Some(reason) => {
+                let error = outcome.unwrap_err().to_string();
+                assert!(
+                    error.starts_with("A says too much: command") && error.ends_with(reason),
+                    "{error}"
+                );
+            }
+            None => assert_eq!(outcome.unwrap().reports["A"].1.len(), count),
+        }
+    }
+}
+
+/// Stays where it is.
+struct Idle;
+
+impl Robot for Idle {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        Action::stay(cars)
+    }
+}
+
+#[test]
+fn robots_that_share_a_news_flag_all_run_also_if_only_one_has_news() {
+    let names: BTreeSet<String> = (0..70).map(|index| format!("R{index:02}")).collect();
+    let robots = names
+        .iter()
+        .map(|name| (Box::new(Idle) as Box<dyn Robot>, welcome(name)));
+    let mut host = LocalHost::new(robots.collect());
+    host.exchange(0, BTreeMap::new()).unwrap();
+
+    let moved = RobotName::new("R33").unwrap();
+    let place = Point::new(5.0, 6.0);
+    let news = News {
+        epoch: 1,
+        tick: 1,
+        correction: Some(Correction {
+            location: place,
+            blocked: false,
+        }),
+        ..News::default()
+    };
+    let outcome = host
+        .exchange(1, BTreeMap::from([(moved.clone(), news)]))
+        .unwrap();
+    let proposals: Vec<(String, Point)> = outcome
+        .reports
+        .iter()
+        .map(|(name, (report, _))| (name.to_string(), report.proposal))
+        .collect();
+    let expected: Vec<(String, Point)> = names
+        .into_iter()
+        .map(|name| {
+            let is_moved = name == moved.as_str();
+            let at = if is_moved {
+                place
+            } else {
+                Point::new(1.0, 1.0)
+            };
+            (name, at)
+        })
+        .collect();
+    assert_eq!(proposals, expected);
 }

@@ -56,7 +56,7 @@ impl Robot for Vera {
     }
 
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
-        self.near = cars.percept().unwrap_or_default().bodies.len() as f64;
+        self.near = cars.bodies().len() as f64;
         let crowding = self.near / self.parameters.bearable;
         self.emotion = feel(self.emotion, self.behavior, crowding);
         self.behavior = behave(self.emotion);
@@ -71,6 +71,10 @@ impl Robot for Vera {
             .emotion(self.emotion)
             .behavior(self.behavior)
             .variable("near", self.near)
+    }
+
+    fn senses_bodies(&self) -> bool {
+        true
     }
 
     fn panel(&self) -> Panel {

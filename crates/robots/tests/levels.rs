@@ -32,10 +32,14 @@ fn deeds(mut stage: Stage) -> Vec<String> {
         stage.step();
         for (robot, report) in &stage.reports {
             deeds.push(format!(
-                "{robot} {:?} {} {:?}",
-                report.proposal, report.behavior_state, report.sent
+                "{robot} {:?} {}",
+                report.proposal, report.behavior_state
             ));
         }
+    }
+
+    for sent in &stage.sent {
+        deeds.push(format!("{sent:?}"));
     }
     deeds
 }

@@ -12,9 +12,9 @@ mod vera;
 
 use std::sync::Arc;
 
+use lockstep::{Begin, Turn};
 use robot::{
-    Clock, Command, CommandId, Network, Percept, PublicState, RobotName, Seat, SensedBody,
-    SensedKind, Tick, Undelivered, Widget,
+    Network, News, PublicState, RobotName, Seat, SensedBody, SensedKind, Tick, Undelivered, Widget,
 };
 use stage::{Role, Stage, feet};
 
@@ -132,32 +132,33 @@ fn a_misspelled_parameter_of_vera_is_refused() {
     party("bearable = 4\nbareable = 5");
 }
 
-/// Nothing but so many guests.
-struct Crowd(usize);
+/// No robot but her.
+struct Alone;
 
-impl Network for Crowd {
-    fn state_of(
-        &mut self,
-        _: &RobotName,
-        _: u32,
-        _: Tick,
-    ) -> Result<Arc<PublicState>, Undelivered> {
+impl Network for Alone {
+    fn state_of(&mut self, _: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         Err(Undelivered::Lost)
     }
-    fn percept(&mut self, _: &RobotName, epoch: u32, tick: Tick) -> Result<Percept, Undelivered> {
-        let guest = SensedBody {
-            kind: SensedKind::Guest,
-            location: feet(30.0, 30.0),
-        };
-        Ok(Percept {
-            epoch,
-            tick,
-            bodies: vec![guest; self.0],
-        })
-    }
-    fn send(&mut self, _: &RobotName, _: &RobotName, _: &Command) {}
-    fn receive(&mut self, _: &RobotName, _: u32, _: &CommandId) -> Option<Command> {
-        None
+}
+
+/// A tick with so many guests around her.
+fn turn(tick: Tick, near: usize) -> Turn<News> {
+    let guest = SensedBody {
+        kind: SensedKind::Guest,
+        location: feet(30.0, 30.0),
+    };
+    let news = News {
+        epoch: 1,
+        tick,
+        bodies: vec![guest; near],
+        ..News::default()
+    };
+
+    Turn {
+        epoch: 1,
+        tick,
+        begin: if tick == 0 { Begin::Init } else { Begin::GoOn },
+        news: Some(news),
     }
 }
 
@@ -172,12 +173,9 @@ fn vera_accounts_for_what_she_feels() {
         stage::parameters(text),
     );
     let mut seat = Seat::new(Box::new(vera::Vera::default()), welcome);
-    let clock = |tick| -> Clock {
-        serde_json::from_value(serde_json::json!({ "epoch": 1, "tick": tick, "news": {} })).unwrap()
-    };
-    seat.init(&clock(0), &mut Crowd(0)).unwrap();
+    seat.run(&turn(0, 0), &mut Alone).unwrap();
     let mut why = |tick, near| {
-        seat.tick(&clock(tick), &mut Crowd(near)).unwrap();
+        seat.run(&turn(tick, near), &mut Alone).unwrap();
         match seat.panel().widgets.as_slice() {
             [Widget::Text { text, .. }] => text.clone(),
             widgets => panic!("{widgets:?}"),

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use protocol::event::Cause;
+use protocol::messages::{CommandText, Performative};
 use protocol::{Event, RobotName};
 use simulator::Scenario;
 use simulator::diagnostic::{FileError, Source};
@@ -40,6 +41,10 @@ fn command(from: &str, to: &str, seq: u64) -> Underway {
         to: name(to),
         from: name(from),
         seq,
+        text: CommandText {
+            performative: Performative::Achieve,
+            command: "refill".into(),
+        },
     }
 }
 
@@ -71,15 +76,16 @@ fn lost(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, Cause)> {
 /// When the commands from A to B arrived: tick and number.
 fn arrived(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, u64)> {
     let at_b = |(tick, decision): (&u64, &Decision)| {
-        let ids = decision
+        let arrivals = decision
             .delivered
             .get(&name("B"))
             .cloned()
             .unwrap_or_default();
         let tick = *tick;
-        ids.into_iter()
-            .filter(|id| id.from.as_str() == "A")
-            .map(move |id| (tick, id.seq))
+        arrivals
+            .into_iter()
+            .filter(|arrival| arrival.delivery.from.as_str() == "A")
+            .map(move |arrival| (tick, arrival.seq))
     };
     decisions.iter().flat_map(at_b).collect()
 }
@@ -344,11 +350,7 @@ fn lost_queries_are_one_verdict_for_asker_target_and_tick() {
 #[test]
 fn a_person_at_the_console_is_not_on_the_robots_network() {
     let mut medium = medium("network.commands = { loss = 1.0, delay = \"5 s\" }");
-    medium.accept(Underway {
-        to: name("A"),
-        from: RobotName::operator(),
-        seq: 1,
-    });
+    medium.accept(command("operator", "A", 1));
     let decision = medium.decide(2);
     assert!(decision.events.is_empty() && decision.delivered[&name("A")].len() == 1);
 }

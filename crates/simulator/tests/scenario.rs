@@ -130,6 +130,29 @@ fn errors_show_line_place_and_reason() {
     }
 }
 
+/// The end of a fault by the wall clock would fall into another tick every time where the clock goes on.
+#[test]
+fn a_fault_ends_by_the_wall_clock_only_where_the_clock_waits() {
+    let with = |more: &str, kind: &str, end: &str| {
+        parse(&format!(
+            "{more}\n[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\n[[fault]]\nrobot = \"A\"\ndo = \"{kind}\"\n\
+             at = \"4 s\"\n{end}\n"
+        ))
+    };
+    for kind in ["hang", "crash", "slow"] {
+        let waiting = with("", kind, "for = \"1 s\"");
+        assert!(waiting.is_ok(), "{kind}: {waiting:?}");
+        let by_tick = with("on_late = \"continue\"", kind, "until = \"9 s\"");
+        assert!(by_tick.is_ok(), "{kind}: {by_tick:?}");
+        let by_wall = with("on_late = \"continue\"", kind, "for = \"1 s\"");
+        let error = shown(&by_wall.unwrap_err());
+        assert!(
+            error.contains("goes on without A") && error.contains("say `until`"),
+            "{kind}: {error}"
+        );
+    }
+}
+
 #[test]
 fn the_command_line_changes_a_scenario() {
     let folder = tempfile::tempdir().unwrap();

@@ -51,7 +51,7 @@ fn a_script_takes_part_and_two_launches_are_the_same() {
     // What it writes as errors is in the log of its process, and is no part of the run.
     let process = stage.log("exec-first");
     for part in [
-        "Leguin: heard {\"type\":\"init\",\"protocol\":1,\"run\":\"exec-first\",\"name\":\"Leguin\",\"generation\":1,",
+        "Leguin: heard {\"type\":\"init\",\"protocol\":2,\"run\":\"exec-first\",\"name\":\"Leguin\",\"generation\":1,",
         "with an argument",
         "Leguin: heard {\"type\":\"end\",\"reason\":\"finished\"}",
     ] {

@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 use protocol::random::{Stream, stream, unit};
-use system_tests::processes::{find, named, send};
+use serde_json::Value;
+use system_tests::processes::{Running, find, named, send};
 use system_tests::{Lab, eventually, programs};
 
 /// Events of the short version.
@@ -116,6 +117,43 @@ fn launch_file(lab: &Lab, n: usize) -> String {
         .to_owned()
 }
 
+/// A launch of `n` robots whose clock runs, each with a link of its own.
+fn start(lab: &Lab, run: &str, n: usize) -> (Running, Vec<Cable>) {
+    let port = TcpListener::bind(("127.0.0.1", 0))
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
+    let cables: Vec<Cable> = (0..n).map(|_| Cable::new(port)).collect();
+    let mut args = vec![
+        "launch".to_owned(),
+        launch_file(lab, n),
+        format!("--connect-port={port}"),
+    ];
+    for (i, cable) in cables.iter().enumerate() {
+        args.push(format!("--link=R{i}={}", cable.endpoint));
+    }
+
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let launch = lab.start(run, &args);
+    // Its first lines may have been said before the launcher listened: whether it runs is asked.
+    eventually("the clock to run", || {
+        let status = status(lab, run)?;
+        (status["phase"] == "running").then_some(())
+    });
+    (launch, cables)
+}
+
+/// How a run stands, if it answers.
+fn status(lab: &Lab, run: &str) -> Option<Value> {
+    let output = lab
+        .cars(&["ctl", "status", "--json", "--run", run])
+        .output()
+        .unwrap();
+
+    serde_json::from_slice(&output.stdout).ok()
+}
+
 /// Strikes robots of a launch `count` times; returns whom. In the end all links are whole.
 fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) -> BTreeSet<String> {
     let mut kills = vec![0; cables.len()];
@@ -179,43 +217,13 @@ fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
     let lab = Lab::new();
     for (index, n) in ROBOTS.iter().take(launches).enumerate() {
         let run = format!("chaos-{index}");
-        let file = launch_file(&lab, *n);
-        let port = TcpListener::bind(("127.0.0.1", 0))
-            .unwrap()
-            .local_addr()
-            .unwrap()
-            .port();
-        let mut cables: Vec<Cable> = (0..*n).map(|_| Cable::new(port)).collect();
-        let links = cables
-            .iter()
-            .enumerate()
-            .map(|(i, cable)| format!("--link=R{i}={}", cable.endpoint));
-        let args = ["launch".to_owned(), file, format!("--connect-port={port}")]
-            .into_iter()
-            .chain(links);
-        let args: Vec<String> = args.collect();
-        let mut launch = lab.start(&run, &args.iter().map(String::as_str).collect::<Vec<_>>());
-        // Its first lines may have been said before the launcher listened: whether it runs is asked.
-        eventually("the clock to run", || {
-            let output = lab
-                .cars(&["ctl", "status", "--json", "--run", &run])
-                .output()
-                .ok()?;
-            String::from_utf8_lossy(&output.stdout)
-                .contains("\"phase\":\"running\"")
-                .then_some(())
-        });
+        let (mut launch, mut cables) = start(&lab, &run, *n);
         let mut chance = stream(seed, &run);
         let struck = strike(&run, &mut cables, events / launches, &mut chance);
         // The clock still goes, whoever is missing.
-        let status = || -> u64 {
-            let text = lab.ok(&["ctl", "status", "--json", "--run", &run]);
-            serde_json::from_str::<serde_json::Value>(&text).unwrap()["tick"]
-                .as_u64()
-                .unwrap()
-        };
-        let reached = status();
-        eventually("further ticks", || (status() > reached + 10).then_some(()));
+        let tick = || status(&lab, &run).unwrap()["tick"].as_u64().unwrap();
+        let reached = tick();
+        eventually("further ticks", || (tick() > reached + 10).then_some(()));
         lab.ok(&["ctl", "stop", "--run", &run]);
         launch.finish();
         eventually("the last process to be gone", || {
@@ -223,6 +231,65 @@ fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
         });
         check_record(&lab, &run, &struck);
     }
+}
+
+/// Its link is cut when the next epoch begins: it misses tick 0 of it, and joins it later.
+#[test]
+fn a_robot_that_is_cut_off_while_the_run_is_initialized_returns() {
+    let lab = Lab::new();
+    let run = "chaos-init";
+    let (mut launch, mut cables) = start(&lab, run, 2);
+    cables[0].say("cut");
+    lab.ok(&["ctl", "init", "--run", run]);
+    let status = || status(&lab, run).unwrap();
+    eventually("tick 0 of the next epoch", || {
+        let status = status();
+        (status["epoch"] == 2 && status["phase"] == "ready").then_some(())
+    });
+    lab.ok(&["ctl", "start", "--run", run]);
+    let presence = |expected: &str| {
+        eventually(expected, || {
+            let status = status();
+            let robot = &status["robots"][0];
+            assert_eq!(
+                (&robot["name"], &status["epoch"]),
+                (&"R0".into(), &2.into())
+            );
+            (robot["presence"] == expected).then_some(())
+        });
+    };
+    presence("lost");
+    cables[0].say("heal");
+    presence("here");
+
+    let reached = status()["tick"].as_u64().unwrap();
+    eventually("further ticks", || {
+        (status()["tick"].as_u64().unwrap() > reached + 10).then_some(())
+    });
+    lab.ok(&["ctl", "stop", "--run", run]);
+    launch.finish();
+    eventually("the last process to be gone", || {
+        find(run).is_empty().then_some(())
+    });
+    let events = lab.events(run);
+    let of = |kind: &str| -> Vec<u64> {
+        events
+            .iter()
+            .filter(|event| event["event"] == kind && event["robot"] == "R0")
+            .map(|event| event["tick"].as_u64().unwrap())
+            .collect()
+    };
+    let missed = of("missed");
+    assert_eq!(missed[0], 0, "it was not there when the epoch began");
+    let joined = of("joined");
+    assert!(joined.len() > 1 && joined[1] > 0, "it returned: {joined:?}");
+    assert_eq!(
+        missed[..joined[1] as usize],
+        (0..joined[1]).collect::<Vec<_>>()
+    );
+    // An emotion is recorded when it changes: the first one is that of the first report.
+    let acted = of("emotion");
+    assert!(acted[0] >= joined[1], "it acted: {acted:?}");
 }
 
 /// Every line is whole, every tick is there once and in order, and everybody who was struck is named.

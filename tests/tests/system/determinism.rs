@@ -305,9 +305,5 @@ fn delays_and_doubles_are_the_same_as_processes_and_in_one() {
     ] {
         assert!(events.iter().any(|event| event["event"] == kind), "{kind}");
     }
-    assert!(
-        events
-            .iter()
-            .all(|event| event["event"] != "command_missing")
-    );
+    assert!(events.iter().all(|event| event["because"] != "missed"));
 }

@@ -7,9 +7,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use protocol::RunName;
-use protocol::messages::{Clock, Point};
-use robot::{LocalHost, RobotError};
-use simulator::{Barrier, Event, Exchange, Simulation};
+use protocol::messages::Point;
+use robot::LocalHost;
+use simulator::{Event, Simulation};
 use system_tests::hall::{Hall, scenario};
 use system_tests::{Lab, programs, root};
 
@@ -535,35 +535,19 @@ fn t21_with_a_quarter_of_commands_lost_emotions_do_better_than_a_timer() {
     );
 }
 
-/// Robots that act in another order than that of their names.
-struct Reordered(LocalHost);
-
-impl Barrier for Reordered {
-    type Interrupt = RobotError;
-    fn exchange(&mut self, clock: Clock, simulation: &Simulation) -> Result<Exchange, RobotError> {
-        let reports = self
-            .0
-            .exchange(&clock, &mut |name| simulation.percept(name))?;
-        Ok(Exchange {
-            reports,
-            membership: Vec::new(),
-        })
-    }
-}
-
 /// Every event of a run in which the robots act in this order.
 fn events_in_order(order: [&str; 3]) -> Vec<Event> {
     let run = RunName::new("order").unwrap();
     let mut simulation =
         Simulation::new(scenario(THREE, 5, &["network.commands={ loss = 0.1 }"]), 1).unwrap();
-    let seats = order.map(|robot| {
-        let name = robot.parse().unwrap();
-        (
-            robots::make(robot).unwrap(),
-            simulation.welcome(&run, &name, 1).unwrap(),
-        )
+    let seats = order.map(|class| {
+        let name = class.parse().unwrap();
+        let robot = robots::make(class).unwrap();
+        simulation.list_bodies(&name, robot.senses_bodies());
+        let welcome = simulation.welcome(&run, &name, 1, None).unwrap();
+        (robot, welcome)
     });
-    let mut robots = Reordered(LocalHost::new(seats.into()));
+    let mut robots = LocalHost::new(seats.into());
     let mut events = simulation.init(&mut robots).unwrap().events;
     for _ in 0..simulation.scenario().ticks {
         events.extend(simulation.step(&mut robots).unwrap().events);

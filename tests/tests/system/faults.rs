@@ -339,6 +339,59 @@ fn a_crash_of_the_scenario_happens_at_its_tick_and_is_the_same_every_time() {
     assert_eq!(lab.summary("fault-crash")["robots"]["Leguin"]["returns"], 1);
 }
 
+/// Robots whose process the scenario stops are lost by their count of missed ticks. The lease of their token, which ends
+/// in the middle of the hang, is wall clock and decides nothing; nor does the deadline, which is as long as the lease.
+#[test]
+fn a_hang_of_the_scenario_is_the_same_every_time_whatever_the_lease_does() {
+    const REPETITIONS: usize = 8;
+    let lab = Lab::new();
+    let fault = "fault=[{ robot = \"Leguin\", do = \"hang\", at = \"10 s\", until = \"50 s\" }]";
+    let play = |run: &str| {
+        let args = [
+            "launch",
+            FILE,
+            "--speed",
+            "10",
+            "--duration",
+            "60 s",
+            "--set",
+            fault,
+            "--set",
+            "on_late=continue",
+            "--set",
+            "deadline=2 s",
+            "--set",
+            "lose_after=70",
+        ];
+        lab.start(run, &args).finish();
+        nobody_is_left(run);
+    };
+    let runs: Vec<String> = (1..=REPETITIONS)
+        .map(|repetition| format!("fault-lease-{repetition}"))
+        .collect();
+    std::thread::scope(|scope| {
+        for run in &runs {
+            scope.spawn(|| play(run));
+        }
+    });
+
+    for run in &runs[1..] {
+        assert_same((&runs[0], &lab.bytes(&runs[0])), (run, &lab.bytes(run)));
+    }
+    let events = lab.events(&runs[0]);
+    let of = |kind: &str| -> Vec<u64> {
+        let own = events
+            .iter()
+            .filter(|event| event["event"] == kind && event["robot"] == "Leguin");
+        own.map(|event| event["tick"].as_u64().unwrap()).collect()
+    };
+    assert_eq!(
+        (of("fault"), of("lost"), of("joined")),
+        (vec![20, 100], vec![89], vec![0, 100])
+    );
+    assert_eq!(of("missed"), (20..100).collect::<Vec<_>>());
+}
+
 #[test]
 fn where_the_clock_waits_hanging_and_slow_processes_change_nothing_in_the_record() {
     let lab = Lab::new();
@@ -416,4 +469,7 @@ fn impossible_faults_are_refused_where_they_stand() {
     let fault = "fault=[{ robot = \"Leguin\", do = \"hang\", at = \"4 s\", for = \"1 s\" }]";
     let (_, text) = lab.fails(&["run", FILE, "--set", fault]);
     assert!(text.contains("cars launch"), "{text}");
+    let goes_on = "robot.Leguin.on_late=continue";
+    let (_, text) = lab.fails(&["launch", FILE, "--set", fault, "--set", goes_on]);
+    assert!(text.contains("say `until`"), "{text}");
 }

@@ -1,13 +1,14 @@
 //! The contract on the wire, spoken by hand: what is refused and how, and that nothing breaks.
 
-use std::process::Command;
+use std::process;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{
-    Clock, Control, ControlAnswer, JoinAnswer, Point, PublicState, Refusal, Report, Status, Welcome,
+    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, News, Performative, Point,
+    PublicState, Refusal, Report, Status, Welcome,
 };
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
@@ -33,15 +34,20 @@ fn name(name: &str) -> RobotName {
 
 impl Wire {
     fn new(run: &str) -> Self {
+        Self::with(run, "")
+    }
+
+    /// The same with more at the top of its scenario.
+    fn with(run: &str, more: &str) -> Self {
         let lab = Lab::new();
-        let scenario = lab.write("two.toml", SCENARIO);
+        let scenario = lab.write("two.toml", &format!("{more}\n{SCENARIO}"));
         let port = std::net::TcpListener::bind("127.0.0.1:0")
             .unwrap()
             .local_addr()
             .unwrap()
             .port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
-        let mut command = Command::new(programs().join("cars-sim"));
+        let mut command = process::Command::new(programs().join("cars-sim"));
         command
             .arg(scenario)
             .args(["--run", run, "--listen", &endpoint, "--paused", "--out"])
@@ -106,15 +112,47 @@ impl Wire {
     fn status(&self) -> Status {
         self.control(&Control::Status).unwrap()
     }
+
+    /// Lets the clock run.
+    fn start(&self) {
+        self.control(&Control::Start).unwrap();
+    }
+
+    /// The counts of ignored messages, once they are so many.
+    fn ignored(&self, expected: u64) -> Status {
+        eventually("the counts", || {
+            let status = self.status();
+            (status.ignored.values().sum::<u64>() == expected).then_some(status)
+        })
+    }
+
+    /// The events of this kind, once the record has a tick.
+    fn recorded(&self, tick: u64, kind: &str) -> Vec<Value> {
+        let run = self.run.as_str();
+        let is_over = |event: &Value| event["event"] == "tick" && event["tick"] == tick;
+        eventually("the record", || {
+            let bytes = self.lab.bytes(run);
+            let is_whole = bytes.ends_with(b"\n");
+            let mut events = if is_whole {
+                self.lab.events(run)
+            } else {
+                vec![]
+            };
+            let has_tick = events.iter().any(is_over);
+            events.retain(|event| event["event"] == kind);
+            has_tick.then_some(events)
+        })
+    }
 }
 
-/// A robot by hand: a session, a token, and the clocks it gets.
+/// A robot by hand: a session, a token, and the clocks and news it gets.
 struct Hand {
     bus: Bus,
     keys: Keys,
     name: RobotName,
     welcome: Welcome,
     clocks: Receiver<Clock>,
+    news: Receiver<News>,
     _declared: Vec<Declared>,
 }
 
@@ -125,28 +163,78 @@ impl Hand {
             patience: Duration::from_secs(20),
         };
         let bus = Bus::open(&role, None).unwrap();
+        let own = name(robot);
         let (sender, clocks) = channel();
-        let subscribed = bus.subscribe(&wire.keys.clock(), move |key, bytes| {
+        let clock = bus.subscribe(&wire.keys.clock(), move |key, bytes| {
+            let _ = sender.send(decode(key, "simulator", bytes).unwrap());
+        });
+        let (sender, news) = channel();
+        let subscribed = bus.subscribe(&wire.keys.news(&own), move |key, bytes| {
             let _ = sender.send(decode(key, "simulator", bytes).unwrap());
         });
         let JoinAnswer::Welcome(welcome) = wire.join(&wire.request(robot, &bus.id())) else {
             panic!("refused")
         };
-        let name = name(robot);
-        let token = bus.token(&wire.keys.alive_robot(&name)).unwrap();
-        let declared = vec![subscribed.unwrap(), token];
+        let token = bus.token(&wire.keys.alive_robot(&own)).unwrap();
+        let declared = vec![clock.unwrap(), subscribed.unwrap(), token];
         Self {
             bus,
             keys: wire.keys.clone(),
-            name,
+            name: own,
             welcome: *welcome,
             clocks,
+            news,
             _declared: declared,
         }
     }
 
     fn clock(&self) -> Clock {
         self.clocks.recv_timeout(PATIENCE).expect("a clock")
+    }
+
+    /// The next clock of another tick than this one.
+    fn clock_after(&self, tick: u64) -> Clock {
+        loop {
+            let clock = self.clock();
+            if clock.tick > tick {
+                return clock;
+            }
+        }
+    }
+
+    /// The news that belong to a clock, if the clock says that there are some.
+    fn news_of(&self, clock: &Clock) -> Option<News> {
+        if clock.news & self.welcome.news_flag == 0 {
+            return None;
+        }
+        // They were put before the clock, and on the same session.
+        let is_of_clock = |news: &News| (news.epoch, news.tick) == (clock.epoch, clock.tick);
+        let found = self.news.try_iter().find(is_of_clock);
+
+        Some(found.expect("news come before their clock"))
+    }
+
+    /// The commands that come with a clock.
+    fn commands_of(&self, clock: &Clock) -> Vec<Delivery> {
+        self.news_of(clock)
+            .map(|news| news.commands)
+            .unwrap_or_default()
+    }
+
+    fn command(&self, tick: u64, number: u32, text: &str) -> Command {
+        Command {
+            epoch: self.welcome.epoch,
+            tick,
+            generation: self.welcome.generation,
+            number,
+            performative: Performative::Achieve,
+            command: text.into(),
+        }
+    }
+
+    fn put_command(&self, to: &str, command: &Command) {
+        let key = self.keys.command(&name(to), &self.name);
+        self.bus.put(&key, encode(command)).unwrap();
     }
 
     fn report(&self, tick: u64) -> Report {
@@ -160,8 +248,7 @@ impl Hand {
             emotion_state: "CALM".into(),
             behavior_state: "IDLE".into(),
             state_variables: [].into(),
-            sent: vec![],
-            missing: vec![],
+            commands: 0,
             log: vec![],
         }
     }
@@ -175,7 +262,12 @@ impl Hand {
 
 /// Both robots by hand, tick 0 done.
 fn ready(run: &str) -> (Wire, Hand, Hand) {
-    let wire = Wire::new(run);
+    ready_with(run, "")
+}
+
+/// The same with more at the top of the scenario.
+fn ready_with(run: &str, more: &str) -> (Wire, Hand, Hand) {
+    let wire = Wire::with(run, more);
     let (a, b) = (Hand::join(&wire, "A"), Hand::join(&wire, "B"));
     for hand in [&a, &b] {
         assert_eq!(hand.clock().tick, 0);
@@ -242,7 +334,7 @@ fn unknown_fields_of_a_join_are_ignored() {
 #[test]
 fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
     let (wire, a, b) = ready("wire-malformed");
-    wire.control(&Control::Start).unwrap();
+    wire.start();
     for hand in [&a, &b] {
         assert_eq!(hand.clock().tick, 1);
     }
@@ -263,10 +355,7 @@ fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
     a.bus
         .put(&a.keys.report(&name("Nobody")), encode(&a.report(1)))
         .unwrap();
-    let status = eventually("the counts", || {
-        let status = wire.status();
-        (status.ignored.values().sum::<u64>() == 6).then_some(status)
-    });
+    let status = wire.ignored(6);
     assert_eq!(status.tick, 0, "the tick is still open");
     assert_eq!(
         status.ignored,
@@ -280,14 +369,14 @@ fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
     // The tick goes on as if nothing had happened.
     a.put(&a.report(1));
     b.put(&b.report(1));
-    assert_eq!(a.clock().tick, 2);
+    assert_eq!(a.clock_after(1).tick, 2);
 }
 
 #[test]
 fn a_second_report_for_the_same_tick_changes_nothing() {
     let (_wire, a, b) = ready("wire-twice");
     let wire = _wire;
-    wire.control(&Control::Start).unwrap();
+    wire.start();
     a.clock();
     a.put(&a.report(1));
     a.put(&Report {
@@ -295,17 +384,243 @@ fn a_second_report_for_the_same_tick_changes_nothing() {
         ..a.report(1)
     });
     b.put(&b.report(1));
-    assert!(
-        a.clock()
-            .news
-            .get(&a.name)
-            .is_none_or(|news| news.correction.is_none())
-    );
+    let news = a.news_of(&a.clock_after(1));
+    assert!(news.is_none_or(|news| news.correction.is_none()));
     let lines = eventually("tick 1", || {
         let text = std::fs::read_to_string(wire.lab.file("wire-twice", "events.jsonl")).unwrap();
         text.contains("\"tick\":1,").then_some(text)
     });
     assert!(!lines.contains("blocked"));
+}
+
+#[test]
+fn malformed_stale_and_foreign_commands_are_counted_and_change_nothing() {
+    let (wire, a, b) = ready("wire-commands");
+    wire.start();
+    for hand in [&a, &b] {
+        assert_eq!(hand.clock().tick, 1);
+    }
+    let key = a.keys.command(&b.name, &a.name);
+    a.bus.put(&key, b"not json".to_vec()).unwrap();
+    a.put_command("B", &a.command(1, 1, &"c".repeat(5000)));
+    for (tick, number) in [(0, 1), (2, 1), (1, 0), (1, 1025)] {
+        a.put_command("B", &a.command(tick, number, "stale"));
+    }
+    a.put_command(
+        "B",
+        &Command {
+            generation: 9,
+            ..a.command(1, 1, "stale")
+        },
+    );
+    a.put_command(
+        "B",
+        &Command {
+            epoch: 5,
+            ..a.command(1, 1, "stale")
+        },
+    );
+    let foreign = a.keys.command(&b.name, &name("Zed"));
+    a.bus
+        .put(&foreign, encode(&a.command(1, 1, "foreign")))
+        .unwrap();
+    let status = wire.ignored(9);
+    assert_eq!(status.tick, 0, "the tick is still open");
+    assert_eq!(
+        status.ignored,
+        [
+            ("malformed".into(), 2),
+            ("stale".into(), 4),
+            ("too many commands".into(), 2),
+            ("unknown robot".into(), 1)
+        ]
+        .into()
+    );
+
+    a.put(&a.report(1));
+    b.put(&b.report(1));
+    let clock = b.clock_after(1);
+    assert_eq!(clock.tick, 2);
+    assert_eq!(b.commands_of(&clock), []);
+    assert_eq!(wire.recorded(1, "command_sent"), Vec::<Value>::new());
+}
+
+#[test]
+fn a_report_counts_when_all_its_commands_are_here_and_they_count_in_the_order_of_their_numbers() {
+    let (wire, a, b) = ready("wire-numbers");
+    wire.start();
+    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    b.put(&b.report(1));
+    a.put_command("B", &a.command(1, 3, "third"));
+    a.put_command("B", &a.command(1, 1, "first"));
+    let report = Report {
+        commands: 3,
+        ..a.report(1)
+    };
+    a.put(&report);
+
+    // The second command is lost. The same clock comes again at once, and a repetition is the same message.
+    assert_eq!(a.clock().tick, 1);
+    assert_eq!(wire.status().tick, 0, "the tick is still open");
+    for (number, text) in [(1, "changed"), (2, "second"), (3, "third")] {
+        a.put_command("B", &a.command(1, number, text));
+    }
+    a.put(&report);
+    let clock = b.clock_after(1);
+    let commands = b.commands_of(&clock);
+    assert_eq!(
+        commands,
+        ["first", "second", "third"].map(|text| Delivery {
+            from: name("A"),
+            performative: Performative::Achieve,
+            command: text.into(),
+        })
+    );
+    let sent = wire.recorded(1, "command_sent");
+    let numbers: Vec<_> = sent
+        .iter()
+        .map(|event| (&event["seq"], &event["command"]))
+        .collect();
+    assert_eq!(
+        numbers,
+        [
+            (&json!(1), &json!("first")),
+            (&json!(2), &json!("second")),
+            (&json!(3), &json!("third"))
+        ]
+    );
+}
+
+#[test]
+fn an_operators_put_from_any_client_is_executed_and_recorded() {
+    let (wire, a, b) = ready("wire-operator");
+    let put = |to: &str, bytes: &[u8]| {
+        let key = wire.keys.command(&name(to), &RobotName::operator());
+        wire.bus.put(&key, bytes.to_vec()).unwrap();
+    };
+    put("B", br#"{"command":"refill"}"#);
+    put("Zed", br#"{"command":"refill"}"#);
+    put("B", br#"{"order":"refill"}"#);
+    wire.start();
+    assert_eq!(
+        wire.ignored(2).ignored,
+        [("malformed".into(), 1), ("unknown robot".into(), 1)].into()
+    );
+    let clocks = [a.clock(), b.clock()];
+    let delivery = Delivery {
+        from: RobotName::operator(),
+        performative: Performative::Achieve,
+        command: "refill".into(),
+    };
+    assert_eq!(a.commands_of(&clocks[0]), []);
+    assert_eq!(b.commands_of(&clocks[1]), [delivery]);
+
+    a.put(&a.report(1));
+    b.put(&b.report(1));
+    for (kind, rest) in [
+        (
+            "command_sent",
+            json!({ "seq": 1, "performative": "achieve", "command": "refill" }),
+        ),
+        ("command_delivered", json!({ "seq": 1 })),
+    ] {
+        let mut expected = json!({ "tick": 1, "event": kind, "from": "operator", "to": "B" });
+        expected
+            .as_object_mut()
+            .unwrap()
+            .extend(rest.as_object().unwrap().clone());
+        assert_eq!(wire.recorded(1, kind), [expected]);
+    }
+}
+
+#[test]
+fn a_command_to_a_robot_outside_the_roster_is_recorded_as_dropped() {
+    let (wire, a, b) = ready("wire-unknown-target");
+    wire.start();
+    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.put_command("Zed", &a.command(1, 1, "come"));
+    a.put(&Report {
+        commands: 1,
+        ..a.report(1)
+    });
+    b.put(&b.report(1));
+    for hand in [&a, &b] {
+        assert_eq!(hand.clock_after(1).tick, 2);
+        hand.put(&hand.report(2));
+    }
+    assert_eq!(
+        wire.recorded(2, "command_dropped"),
+        [
+            json!({ "tick": 2, "event": "command_dropped", "from": "A", "to": "Zed", "seq": 1,
+            "because": "unknown" })
+        ]
+    );
+    assert_eq!(wire.recorded(2, "command_sent").len(), 1);
+}
+
+#[test]
+fn a_command_to_a_robot_that_misses_the_tick_is_recorded_as_dropped() {
+    let more = "on_late = \"continue\"\ndeadline = \"1 s\"\nlose_after = 100";
+    let (wire, a, b) = ready_with("wire-missed", more);
+    wire.start();
+    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.put_command("B", &a.command(1, 1, "late"));
+    a.put(&Report {
+        commands: 1,
+        ..a.report(1)
+    });
+    b.put(&b.report(1));
+
+    // B gets it in time, and does not answer.
+    let clock = b.clock_after(1);
+    assert_eq!(b.commands_of(&clock).len(), 1);
+    assert_eq!(a.clock_after(1).tick, 2);
+    a.put(&a.report(2));
+    assert_eq!(a.clock_after(2).tick, 3);
+    assert_eq!(
+        wire.recorded(2, "command_dropped"),
+        [
+            json!({ "tick": 2, "event": "command_dropped", "from": "A", "to": "B", "seq": 1,
+            "because": "missed" })
+        ]
+    );
+    assert_eq!(wire.recorded(2, "command_delivered"), Vec::<Value>::new());
+    let missed = wire.recorded(2, "missed");
+    assert_eq!(
+        missed,
+        [json!({ "tick": 2, "event": "missed", "robot": "B" })]
+    );
+}
+
+#[test]
+fn more_commands_than_news_hold_are_recorded_as_dropped_and_the_run_goes_on() {
+    const COUNT: u32 = 200;
+    let (wire, a, b) = ready("wire-overflow");
+    wire.start();
+    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    let long = "c".repeat(4096);
+    for number in 1..=COUNT {
+        a.put_command("B", &a.command(1, number, &long));
+    }
+    a.put(&Report {
+        commands: COUNT,
+        ..a.report(1)
+    });
+    b.put(&b.report(1));
+
+    let clock = b.clock_after(1);
+    let arrived = b.commands_of(&clock).len();
+    assert!((100..COUNT as usize).contains(&arrived), "{arrived}");
+    a.put(&a.report(2));
+    b.put(&b.report(2));
+    assert_eq!(b.clock_after(2).tick, 3);
+    let dropped = wire.recorded(2, "command_dropped");
+    assert_eq!(dropped.len() + arrived, COUNT as usize);
+    assert!(
+        dropped.iter().all(|event| event["because"] == "overflow"),
+        "{dropped:?}"
+    );
+    assert_eq!(wire.recorded(2, "command_delivered").len(), arrived);
 }
 
 #[test]
@@ -330,8 +645,8 @@ fn malformed_and_impossible_controls_are_refused_with_a_reason() {
             "a seed is at most",
         ),
         (
-            "{\"do\":\"command\",\"to\":\"Zed\",\"command\":\"x\"}",
-            "no robot of this run is called Zed",
+            "{\"do\":\"command\",\"to\":\"A\",\"command\":\"x\"}",
+            "unknown variant `command`",
         ),
     ] {
         let explanation = raw(text);
@@ -343,7 +658,7 @@ fn malformed_and_impossible_controls_are_refused_with_a_reason() {
 #[test]
 fn a_lost_report_is_asked_for_again_by_repeating_the_clock() {
     let (wire, a, b) = ready("wire-lost");
-    wire.control(&Control::Start).unwrap();
+    wire.start();
     assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
     b.put(&b.report(1));
     // A's report is lost. The same clock comes again, and the tick is done when A repeats.
@@ -355,7 +670,7 @@ fn a_lost_report_is_asked_for_again_by_repeating_the_clock() {
 #[test]
 fn a_newcomer_is_told_all_that_others_may_still_ask_for() {
     let (wire, a, b) = ready("wire-return");
-    wire.control(&Control::Start).unwrap();
+    wire.start();
     assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
     // A does tick 1 and is gone; B is still in it, and may ask for what A reported for tick 0.
     a.put(&a.report(1));
@@ -417,6 +732,13 @@ fn queries_answer_with_the_tick_before() {
     assert_eq!(state("tick=8;epoch=1").tick, 7);
     assert_eq!(state("tick=7;epoch=1").tick, 6);
     assert!(ask("state", "tick=3;epoch=1").unwrap_err().contains("over"));
+    // At once, and not when the tick has come: the one who asks asks again.
+    for early in ["tick=9;epoch=1", "tick=8;epoch=2"] {
+        let refused = ask("state", early).unwrap_err();
+        assert!(refused.contains("not been reported yet"), "{refused}");
+    }
+    let refused = ask("state", "tick=10;epoch=1").unwrap_err();
+    assert!(refused.contains("out of range"), "{refused}");
     assert!(
         ask("state", "tick=x")
             .unwrap_err()
@@ -442,7 +764,7 @@ fn the_simulator_survives_rubbish_on_its_port() {
         let mut stream = std::net::TcpStream::connect(&address).unwrap();
         let _ = std::io::Write::write_all(&mut stream, rubbish);
     }
-    wire.control(&Control::Start).unwrap();
+    wire.start();
     for tick in 1..=40 {
         for hand in [&a, &b] {
             assert_eq!(hand.clock().tick, tick);

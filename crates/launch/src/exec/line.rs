@@ -312,14 +312,14 @@ mod tests {
     /// Programs without a JSON reader search these lines: the order of the fields is part of the contract.
     #[test]
     fn lines_are_as_the_contract_has_them() {
-        let welcome = r#"{"answer":"welcome","protocol":1,"run":"r","name":"A","generation":2,"epoch":3,"tick":4,"seed":5,
+        let welcome = r#"{"answer":"welcome","protocol":2,"run":"r","name":"A","generation":2,"epoch":3,"tick":4,"seed":5,
             "stream":"robot/A#2","tick_s":0.5,"field_m":[9,8.5],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":2},
             "roster":["A","B"],"parameters":{"v_mps":1e-7}}"#;
         let welcome: Welcome = serde_json::from_str(welcome).unwrap();
         let line = |told: &Told<'_>| String::from_utf8(told.line()).unwrap();
         assert_eq!(
             line(&Told::init(&welcome, 6, &[])),
-            "{\"type\":\"init\",\"protocol\":1,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
+            "{\"type\":\"init\",\"protocol\":2,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
              \"stream\":\"robot/A#2\",\"tick_s\":0.5,\"field_m\":[9.0,8.5],\"body_m\":0.6,\"sensing_range_m\":2.0,\
              \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
         );

@@ -11,13 +11,16 @@
 pub(crate) mod asker;
 pub(crate) mod reborn;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
+use lockstep::Exchange;
+use protocol::PROTOCOL_VERSION;
+use protocol::messages::{CommandText, Delivery, NEWS_FLAGS, Performative};
 use robot::{
-    Clock, LocalHost, Parameters, Percept, Point, Report, Robot, RobotName, RunName, SensedBody,
+    Correction, LocalHost, News, Parameters, Point, Report, Robot, RobotName, RunName, SensedBody,
     SensedKind, SensedRobot, Variable, Welcome,
 };
-use serde_json::{Value, json};
 
 pub(crate) const FT_M: f64 = 0.3048;
 pub(crate) const TICK_S: f64 = 0.5;
@@ -80,6 +83,8 @@ pub(crate) struct Sent {
     pub(crate) command: String,
 }
 
+/// A command as the robots' host hands it over.
+type Command = lockstep::Sent<CommandText>;
 type Drops = Box<dyn Fn(&Sent) -> bool>;
 type Cuts = Box<dyn Fn(u64, &str, &str) -> bool>;
 
@@ -91,15 +96,16 @@ pub(crate) struct Stage {
     pub(crate) obstacles: Vec<Point>,
     /// Guests, who stand still.
     pub(crate) guests: Vec<Point>,
-    pub(crate) reports: BTreeMap<RobotName, Report>,
+    pub(crate) reports: BTreeMap<RobotName, Arc<Report>>,
     /// Every command, also a lost one.
     pub(crate) sent: Vec<Sent>,
     /// Whether a command is lost.
     pub(crate) drops: Drops,
     /// Whether, at this tick, the first robot cannot query the second.
     pub(crate) cuts: Cuts,
-    operator_seq: u64,
-    underway: BTreeMap<RobotName, Vec<Value>>,
+    /// Robots whose news list the bodies around them.
+    with_bodies: BTreeSet<RobotName>,
+    underway: BTreeMap<RobotName, Vec<Delivery>>,
 }
 
 impl Stage {
@@ -107,10 +113,16 @@ impl Stage {
     pub(crate) fn new(seed: u64, cast: Vec<Role>) -> Self {
         let roster: Vec<RobotName> = cast.iter().map(|role| name(role.name)).collect();
         let places = cast.iter().map(|role| (name(role.name), role.at)).collect();
+        let with_bodies = cast
+            .iter()
+            .filter(|role| role.robot.senses_bodies())
+            .map(|role| name(role.name))
+            .collect();
         let seats = cast.into_iter().map(|role| {
             let welcome = welcome(role.name, role.at, seed, &roster, role.parameters);
             (role.robot, welcome)
         });
+
         Self {
             host: LocalHost::new(seats.collect()),
             tick: 0,
@@ -121,7 +133,7 @@ impl Stage {
             sent: Vec::new(),
             drops: Box::new(|_| false),
             cuts: Box::new(|_, _, _| false),
-            operator_seq: 0,
+            with_bodies,
             underway: BTreeMap::new(),
         }
     }
@@ -169,16 +181,8 @@ impl Stage {
 
     /// A command from outside the roster; arrives at the next tick.
     pub(crate) fn command(&mut self, to: &str, command: &str) {
-        self.operator_seq += 1;
-        let seq = self.operator_seq;
-        let message = json!({ "epoch": 1, "tick": self.tick, "seq": seq, "command": command });
-        let from = name("operator");
-        self.host
-            .inject(&name(to), &from, serde_json::from_value(message).unwrap());
-        self.underway
-            .entry(name(to))
-            .or_default()
-            .push(json!({ "from": from, "seq": seq }));
+        let delivery = delivery(name("operator"), command);
+        self.underway.entry(name(to)).or_default().push(delivery);
     }
 
     pub(crate) fn report(&self, robot: &str) -> &Report {
@@ -248,27 +252,22 @@ impl Stage {
     }
 
     fn exchange(&mut self, blocked: &BTreeMap<RobotName, bool>) {
-        let mut news = serde_json::Map::new();
+        let mut news = BTreeMap::new();
         for robot in self.places.keys() {
             let commands = self.underway.remove(robot).unwrap_or_default();
-            let own = self.news(robot, blocked.get(robot) == Some(&true), &commands);
-            news.insert(robot.as_str().to_owned(), own);
+            let is_blocked = blocked.get(robot) == Some(&true);
+            news.insert(robot.clone(), self.news(robot, is_blocked, commands));
         }
-        let clock = json!({ "epoch": 1, "tick": self.tick, "news": news });
-        let clock: Clock = serde_json::from_value(clock).unwrap();
-        let percepts: BTreeMap<RobotName, Percept> = self
-            .places
-            .keys()
-            .map(|robot| (robot.clone(), self.percept(robot)))
-            .collect();
-        self.reports = self
-            .host
-            .exchange(&clock, &mut |robot| percepts[robot].clone())
-            .unwrap();
-        self.note_commands();
+
+        let outcome = self.host.exchange(self.tick, news).unwrap();
+        self.reports.clear();
+        for (robot, (report, commands)) in outcome.reports {
+            self.reports.insert(robot.clone(), report);
+            self.note_commands(&robot, commands);
+        }
     }
 
-    fn news(&self, robot: &RobotName, is_blocked: bool, commands: &[Value]) -> Value {
+    fn news(&self, robot: &RobotName, is_blocked: bool, commands: Vec<Delivery>) -> News {
         let at = self.places[robot];
         let others = || self.places.iter().filter(|(other, _)| *other != robot);
         let sensed: Vec<SensedRobot> = others()
@@ -278,51 +277,62 @@ impl Stage {
                 location: *place,
             })
             .collect();
-        let unreachable: Vec<&RobotName> = others()
-            .map(|(other, _)| other)
+        let unreachable: Vec<RobotName> = others()
+            .map(|(other, _)| other.clone())
             .filter(|other| (self.cuts)(self.tick, robot.as_str(), other.as_str()))
             .collect();
-        json!({
-            "correction": { "location": at, "blocked": is_blocked },
-            "commands": commands,
-            "unreachable": unreachable,
-            "sensed": sensed,
-        })
-    }
 
-    fn percept(&self, robot: &RobotName) -> Percept {
-        let at = self.places[robot];
-        let near = self
-            .bodies_but(robot)
-            .into_iter()
-            .filter(|(_, place)| at.distance_m(*place) <= SENSING_M);
-        let bodies = near
-            .map(|(kind, location)| SensedBody { kind, location })
-            .collect();
-        Percept {
+        News {
             epoch: 1,
             tick: self.tick,
-            bodies,
+            joined: None,
+            correction: Some(Correction {
+                location: at,
+                blocked: is_blocked,
+            }),
+            commands,
+            unreachable,
+            sensed,
+            bodies: self.bodies(robot),
         }
     }
 
-    fn note_commands(&mut self) {
-        for (from, report) in &self.reports {
-            for sent in &report.sent {
-                let (to, command) = (sent.to.to_string(), sent.command.clone());
-                let note = Sent {
-                    tick: self.tick,
-                    from: from.to_string(),
-                    to,
-                    command,
-                };
-                if !(self.drops)(&note) {
-                    let id = json!({ "from": from, "seq": sent.seq });
-                    self.underway.entry(sent.to.clone()).or_default().push(id);
-                }
-                self.sent.push(note);
-            }
+    /// The bodies around a robot, if it asks for them.
+    fn bodies(&self, robot: &RobotName) -> Vec<SensedBody> {
+        if !self.with_bodies.contains(robot) {
+            return Vec::new();
         }
+
+        let at = self.places[robot];
+        self.bodies_but(robot)
+            .into_iter()
+            .filter(|(_, place)| at.distance_m(*place) <= SENSING_M)
+            .map(|(kind, location)| SensedBody { kind, location })
+            .collect()
+    }
+
+    fn note_commands(&mut self, from: &RobotName, commands: Vec<Command>) {
+        for sent in commands {
+            let note = Sent {
+                tick: self.tick,
+                from: from.to_string(),
+                to: sent.to.to_string(),
+                command: sent.command.command,
+            };
+            if !(self.drops)(&note) {
+                let delivery = delivery(from.clone(), &note.command);
+                self.underway.entry(sent.to).or_default().push(delivery);
+            }
+            self.sent.push(note);
+        }
+    }
+}
+
+fn delivery(from: RobotName, command: &str) -> Delivery {
+    Delivery {
+        from,
+        performative: Performative::Achieve,
+        command: command.to_owned(),
     }
 }
 
@@ -334,7 +344,7 @@ pub(crate) fn welcome(
     parameters: Parameters,
 ) -> Welcome {
     Welcome {
-        protocol: 1,
+        protocol: PROTOCOL_VERSION,
         run: RunName::new("stage").unwrap(),
         name: name(robot),
         generation: 1,
@@ -349,11 +359,19 @@ pub(crate) fn welcome(
         location: at,
         roster: roster.to_vec(),
         parameters,
+        news_flag: news_flag(robot, roster),
         last_state: None,
         state_before: None,
-        last_seq: 0,
-        repeat_ticks: 2,
     }
+}
+
+/// The flag of the robot in clocks.
+fn news_flag(robot: &str, roster: &[RobotName]) -> u32 {
+    let mut names: Vec<&str> = roster.iter().map(RobotName::as_str).collect();
+    names.sort_unstable();
+    let index = names.iter().position(|name| *name == robot);
+
+    1 << (index.unwrap_or_default() % NEWS_FLAGS)
 }
 
 fn is_on_field(place: Point) -> bool {

@@ -61,6 +61,10 @@ macro_rules! reborn {
                 action
             }
 
+            fn senses_bodies(&self) -> bool {
+                self.inner.senses_bodies()
+            }
+
             fn panel(&self) -> Panel {
                 self.inner.panel()
             }

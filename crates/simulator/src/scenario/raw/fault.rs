@@ -94,6 +94,14 @@ fn one(
             "the clock waits for {robot} for ever: say `for` (wall clock), or on_late = \"continue\""
         ));
     }
+    // Where the clock goes on without a robot, the wall clock would decide in which tick it is back.
+    let goes_on = lateness.of(&robot) == OnLate::Continue;
+    if goes_on && matches!(end, FaultEnd::After(_)) {
+        return Err(format!(
+            "`for` is wall clock, and with on_late = \"continue\" the clock goes on without {robot}: the same seed would \
+             not give the same run; say `until` (simulated time)"
+        ));
+    }
     Ok(Fault {
         robot,
         kind: raw.kind,
