@@ -34,6 +34,12 @@ def order(stage: Stage, tick: int, text: str, epoch: int = 1) -> Json:
     return stage.tick(tick, epoch, A={"commands": [says(text)]})
 
 
+def send_to_sleep(stage: Stage, robot: subprocess.Popen[str], tick: int, seconds: float, *more: Json) -> None:
+    """Grants a tick in which A sleeps, and waits until it does; then it is told more."""
+    stage.clock(tick, A={"commands": [says(f"sleep {seconds}"), *more]})
+    assert robot.stdout is not None and robot.stdout.readline() == "sleeps\n"
+
+
 def test_it_listens_before_it_asks_and_shows_its_token_last(stage: Stage) -> None:
     """[join.request, join.ready-last]"""
     stage.ready()
@@ -126,8 +132,7 @@ def test_late_clocks_are_echoes(stage: Stage) -> None:
 
 def test_only_the_newest_clock_is_run(stage: Stage) -> None:
     """[clock.late] A robot that is late still reports the tick that it was in."""
-    begin(stage)
-    stage.clock(1, A={"commands": [says("sleep 0.5")]})
+    send_to_sleep(stage, begin(stage), 1, 1.0)
     stage.clock(2)
     stage.clock(3)
     assert [stage.heard("robot/A/report")["tick"] for _ in range(2)] == [1, 3]
@@ -197,8 +202,7 @@ def test_questions_are_answered_while_it_is_busy(stage: Stage) -> None:
     stage.clock(2, A={"commands": [says("ask B")]})
     assert stage.heard("robot/A/waiting") == {"epoch": 1, "tick": 2, "on": "B"}
     assert stage.ask("state", "tick=2;epoch=1")["tick"] == 1  # type: ignore[index]
-    stage.clock(3, A={"commands": [says("sleep 600")]})
-    assert robot.stdout is not None and robot.stdout.readline() == "sleeps\n"
+    send_to_sleep(stage, robot, 3, 600)
     assert stage.ask("state", "tick=2;epoch=1")["tick"] == 1  # type: ignore[index]
 
 
@@ -298,8 +302,7 @@ def test_a_later_epoch_is_joined_at_any_tick_and_its_turn_waited_for(stage: Stag
 
 def test_what_was_done_in_an_epoch_that_is_over_is_thrown_away(stage: Stage) -> None:
     """[epoch.init]"""
-    begin(stage)
-    stage.clock(1, A={"commands": [says("sleep 0.3"), says("tell C late")]})
+    send_to_sleep(stage, begin(stage), 1, 1.0, says("tell C late"))
     stage.welcome = lambda _: welcome(epoch=2)
     assert stage.tick(0, epoch=2)["log"][0] == "init"
     assert stage.nothing_more("robot/C/command/A") and stage.nothing_more("robot/A/report")
@@ -367,7 +370,7 @@ def test_a_signal_ends_it_cleanly(stage: Stage, number: signal.Signals, order_: 
 def test_a_flood_holds_the_link_and_not_the_end(stage: Stage) -> None:
     """[end.sigterm] More than the queue takes has arrived, and the robot is busy."""
     robot = begin(stage)
-    stage.clock(1, A={"commands": [says("sleep 600")]})
+    send_to_sleep(stage, robot, 1, 600)
     for tick in range(2, 12_000):
         stage.news("A", tick, commands=[says("note " + "x" * 100)])
     robot.send_signal(signal.SIGTERM)
@@ -376,8 +379,7 @@ def test_a_flood_holds_the_link_and_not_the_end(stage: Stage) -> None:
 
 def test_a_flood_is_survived(stage: Stage) -> None:
     """News of ticks that never come."""
-    begin(stage)
-    stage.clock(1, A={"commands": [says("sleep 0.5")]})
+    send_to_sleep(stage, begin(stage), 1, 1.0)
     for tick in range(100, 10_000):
         stage.news("A", tick, commands=[says("note " + "x" * 100)])
     stage.heard("robot/A/report")
