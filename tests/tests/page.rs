@@ -263,7 +263,7 @@ fn limits_times_and_version_are_those_of_the_code() {
             "within 2 s of its welcome",
         ),
         (
-            "bus/src/lib.rs",
+            "bus/src/reply.rs",
             "QUERY_TIMEOUT: Duration = Duration::from_secs(2)",
             "timeout 2 s",
         ),

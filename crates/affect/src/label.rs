@@ -3,7 +3,7 @@
 //! Dynamics and generators work with any set of emotions. A robot with emotions of its own declares an enum and
 //! implements [`EmotionLabel`]; other robots use [`StandardEmotion`].
 
-use crate::akr::{Affect, Valence};
+use crate::affect::{Affect, Valence};
 use crate::scalar::Intensity;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;

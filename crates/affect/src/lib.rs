@@ -145,6 +145,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod affect;
 pub mod akr;
 pub mod behavior;
 mod dynamics;

@@ -13,9 +13,12 @@ use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
 
-use super::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
-use super::{BusError, Declared, Pending, QUERY_TIMEOUT, Reply, Role};
+use crate::declared::Declared;
 use crate::endpoint::{is_local, is_tls};
+use crate::error::BusError;
+use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
+use crate::role::Role;
+use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
 
 /// What else may be the matter with an encrypted endpoint.
 const TLS_HINT: &str = " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
@@ -139,28 +142,22 @@ impl Session {
                 handle(sample.key_expr().as_str(), &sample.payload().to_bytes())
             })
             .wait();
-        Ok(Declared {
-            _inner: Box::new(used("subscribe to", keys, declared)?),
-        })
+        let declared = used("subscribe to", keys, declared)?;
+        Ok(Declared::new(declared))
     }
 
     pub(super) fn queryable(
         &self,
         keys: &str,
-        handle: impl Fn(super::Query) + Send + Sync + 'static,
+        handle: impl Fn(Query) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
         let declared = self
             .session
             .declare_queryable(keys)
-            .callback(move |query: zenoh::query::Query| {
-                handle(super::Query {
-                    inner: super::AnyQuery::Middleware(Query { query }),
-                });
-            })
+            .callback(move |query: zenoh::query::Query| handle(Query { query }))
             .wait();
-        Ok(Declared {
-            _inner: Box::new(used("serve", keys, declared)?),
-        })
+        let declared = used("serve", keys, declared)?;
+        Ok(Declared::new(declared))
     }
 
     pub(super) fn get_within(
@@ -233,9 +230,8 @@ impl Session {
             .liveliness()
             .declare_token(key.to_owned())
             .wait();
-        Ok(Declared {
-            _inner: Box::new(used("declare", key, declared)?),
-        })
+        let declared = used("declare", key, declared)?;
+        Ok(Declared::new(declared))
     }
 
     pub(super) fn liveliness(
@@ -252,9 +248,8 @@ impl Session {
                 handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put);
             })
             .wait();
-        Ok(Declared {
-            _inner: Box::new(used("watch", keys, declared)?),
-        })
+        let declared = used("watch", keys, declared)?;
+        Ok(Declared::new(declared))
     }
 
     pub(super) fn close(&self) {

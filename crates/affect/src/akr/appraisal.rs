@@ -1,6 +1,6 @@
 //! The appraisal components that distinguish one emotion from another.
 
-use super::affect::Valence;
+use crate::affect::Valence;
 use serde::{Deserialize, Serialize};
 
 /// The facial expression of an emotion [D: S].

@@ -1,9 +1,9 @@
 //! Emotion: the most specific affective state, described by a set of components.
 
-use super::Refusal;
-use super::affect::{Affect, Duration, Focality, Valence};
 use super::appraisal::{Agency, Certainty, Compatibility, Degree, FacialExpression, Novelty};
+use super::refusal::Refusal;
 use super::tendency::ActionTendency;
+use crate::affect::{Affect, Duration, Focality, Valence};
 use crate::scalar::Intensity;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! Mood: affect that is not about anything in particular.
 
-use super::Refusal;
-use super::affect::{Affect, Duration, Focality, Valence};
 use super::appraisal::Agency;
+use super::refusal::Refusal;
+use crate::affect::{Affect, Duration, Focality, Valence};
 use crate::scalar::Intensity;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Personality: the dispositions that last a lifetime.
 
-use super::Refusal;
-use super::affect::{Duration, Focality, Valence};
+use super::refusal::Refusal;
+use crate::affect::{Duration, Focality, Valence};
 use crate::scalar::Caution;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;

@@ -15,83 +15,26 @@
 //! The seed chooses; when threads get to send is the machine's. So a seed repeats the faults of each link exactly (they
 //! are drawn by the number of the message on it) and the schedule nearly.
 
+mod faults;
+mod overheard;
+mod query;
 mod star;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::{Bus, BusError, Declared, Pending, QUERY_TIMEOUT, Reply};
-use star::{Calls, Declaration, Message, PeerId, Star};
+pub use faults::{Faults, Traffic};
+pub use overheard::Overheard;
+pub(crate) use query::Query;
 
-/// How bad the network is. The default delivers everything, in an order that the seed chooses.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Faults {
-    /// Pause between two deliveries: the longer, the more messages are under way to choose from.
-    pub pause: Duration,
-    /// Chance that a link naps before it delivers a message.
-    pub nap: f64,
-    /// Chance that the link of a client breaks instead of delivering a message.
-    pub cut: f64,
-    /// Chance that a client's link loses a message that was put, and up to three after it.
-    pub loss: f64,
-    /// Chance that a message that was put comes again, after all that is on the link now.
-    pub duplicate: f64,
-    /// Longest nap, and longest time for which a link is cut.
-    pub longest: Duration,
-}
-
-/// What a network has done.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Traffic {
-    /// Messages delivered at the end of a link.
-    pub delivered: u64,
-    /// Messages lost.
-    pub lost: u64,
-    /// Messages that came twice.
-    pub duplicated: u64,
-    /// Links that broke.
-    pub cuts: u64,
-    /// Naps.
-    pub naps: u64,
-}
-
-/// What somebody hears who listens in at the router, in the order in which it came there.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Overheard {
-    /// A message was put.
-    Put {
-        /// Where.
-        key: String,
-        /// The message.
-        message: Vec<u8>,
-    },
-    /// A query was asked.
-    Asked {
-        /// Its number.
-        query: u64,
-        /// The key that was asked.
-        key: String,
-        /// As in `tick=12;epoch=1`.
-        parameters: String,
-        /// What came with it.
-        body: Vec<u8>,
-    },
-    /// It was answered.
-    Answered {
-        /// Its number.
-        query: u64,
-        /// The message, or the refusal in words.
-        result: Result<Vec<u8>, String>,
-    },
-    /// A token was shown.
-    Token {
-        /// Where.
-        key: String,
-    },
-}
+use crate::declared::Declared;
+use crate::error::BusError;
+use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
+use query::{Asked, PeerId, ReplyLink};
+use star::{Calls, Declaration, Message, Star};
 
 /// A network inside this process. Its sessions work until it is dropped.
 #[derive(Debug)]
@@ -125,11 +68,21 @@ impl Shared {
     }
 }
 
+impl ReplyLink for Shared {
+    fn reply(&self, from: PeerId, query: u64, answer: Reply) -> Result<(), &'static str> {
+        self.send(from, Message::Reply(query, answer))
+    }
+
+    fn done(&self, from: PeerId, query: u64) -> Result<(), &'static str> {
+        self.send(from, Message::Done(query))
+    }
+}
+
 impl MemoryNetwork {
     /// A network whose choices come from `seed`.
     #[must_use]
     pub fn new(seed: u64, faults: Faults) -> Self {
-        let shared = Arc::new_cyclic(|shared| Shared {
+        let shared = Arc::new_cyclic(|shared: &Weak<Shared>| Shared {
             star: Mutex::new(Star::new(seed, faults, shared.clone())),
             changed: Condvar::new(),
         });
@@ -141,37 +94,22 @@ impl MemoryNetwork {
         }
     }
 
-    /// A session whose link never breaks: the simulator's, which is one process with the router.
-    #[must_use]
-    pub fn router(&self) -> Bus {
-        self.session(false)
-    }
-
-    /// A session of somebody else.
-    #[must_use]
-    pub fn client(&self) -> Bus {
-        self.session(true)
-    }
-
-    fn session(&self, can_break: bool) -> Bus {
+    /// A new session; `can_break` for one whose link may break.
+    pub(super) fn session(&self, can_break: bool) -> Session {
         let peer = self.shared.lock().join(can_break);
         let open = Arc::new(Open {
             shared: self.shared.clone(),
             peer,
         });
-        Bus {
-            session: super::Session::Memory(Session { open }),
-        }
+        Session { open }
     }
 
-    /// Kills the process behind a session: of what it has sent last, some is lost, and it says no more.
-    pub fn kill(&self, bus: &Bus) {
-        if let super::Session::Memory(session) = &bus.session {
-            let mut calls = Calls::new();
-            self.shared.lock().kill(session.open.peer, &mut calls);
-            self.shared.changed.notify_one();
-            calls.into_iter().for_each(|call| call());
-        }
+    /// Kills the process behind a session.
+    pub(super) fn kill_session(&self, session: &Session) {
+        let mut calls = Calls::new();
+        self.shared.lock().kill(session.open.peer, &mut calls);
+        self.shared.changed.notify_one();
+        calls.into_iter().for_each(|call| call());
     }
 
     /// Everything that came to the router since this was called last; the first call begins to listen in.
@@ -324,13 +262,11 @@ impl Session {
             reason: reason.to_owned(),
         };
         let id = declared.map_err(failed)?;
-        Ok(Declared {
-            _inner: Box::new(Guard {
-                shared: shared.clone(),
-                peer: *peer,
-                id,
-            }),
-        })
+        Ok(Declared::new(Guard {
+            shared: shared.clone(),
+            peer: *peer,
+            id,
+        }))
     }
 
     pub(super) fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
@@ -367,13 +303,8 @@ impl Session {
     pub(super) fn queryable(
         &self,
         keys: &str,
-        handle: impl Fn(super::Query) + Send + Sync + 'static,
+        handle: impl Fn(Query) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        let handle = move |inner| {
-            handle(super::Query {
-                inner: super::AnyQuery::Memory(inner),
-            })
-        };
         self.declare(
             "serve",
             keys,
@@ -471,80 +402,5 @@ impl Publisher {
 
     pub(super) fn has_subscribers(&self) -> bool {
         self.watched.load(Ordering::Relaxed)
-    }
-}
-
-/// What a query says.
-#[derive(Debug)]
-struct Asked {
-    key: String,
-    parameters: String,
-    body: Vec<u8>,
-}
-
-/// A query at one who may answer it.
-#[derive(Debug)]
-pub(super) struct Query {
-    asked: Arc<Asked>,
-    ending: Arc<Ending>,
-}
-
-/// Tells the router that a session has nothing more to say to a query, when the last handler drops it.
-#[derive(Debug)]
-struct Ending {
-    shared: Arc<Shared>,
-    peer: PeerId,
-    query: u64,
-}
-
-impl Ending {
-    fn send(&self, message: Message) {
-        if let Err(reason) = self.shared.send(self.peer, message) {
-            tracing::debug!(reason, "an answer could not be sent");
-        }
-    }
-}
-
-impl Drop for Ending {
-    fn drop(&mut self) {
-        self.send(Message::Done(self.query));
-    }
-}
-
-impl Query {
-    pub(super) fn key(&self) -> &str {
-        &self.asked.key
-    }
-
-    pub(super) fn parameter(&self, name: &str) -> Option<&str> {
-        let pairs = self
-            .asked
-            .parameters
-            .split(';')
-            .filter_map(|pair| pair.split_once('='));
-        pairs
-            .into_iter()
-            .find(|(key, _)| *key == name)
-            .map(|(_, value)| value)
-    }
-
-    pub(super) fn body(&self) -> Vec<u8> {
-        self.asked.body.clone()
-    }
-
-    pub(super) fn reply(&self, key: &str, message: Vec<u8>) {
-        let answer = Reply {
-            key: key.to_owned(),
-            result: Ok(message),
-        };
-        self.ending.send(Message::Reply(self.ending.query, answer));
-    }
-
-    pub(super) fn reply_err(&self, reason: &str) {
-        let answer = Reply {
-            key: String::new(),
-            result: Err(reason.to_owned()),
-        };
-        self.ending.send(Message::Reply(self.ending.query, answer));
     }
 }

@@ -7,12 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 
-use super::super::{Pending, Reply};
-use super::{Asked, Ending, Faults, Overheard, Query, Shared, Traffic};
+use super::faults::{Faults, Traffic};
+use super::overheard::Overheard;
+use super::query::{Asked, Ending, PeerId, Query, ReplyLink};
+use crate::reply::{Pending, Reply};
 use protocol::random::{Stream, stream, unit};
 
-/// Number of a session.
-pub(super) type PeerId = u64;
 /// What is to be called once the lock is free.
 pub(super) type Calls = Vec<Box<dyn FnOnce() + Send>>;
 
@@ -94,8 +94,8 @@ pub(super) struct Star {
     next_id: u64,
     /// Sessions so far: a number is never given twice.
     joined: PeerId,
-    /// Questions answer through what the sessions share.
-    shared: Weak<Shared>,
+    /// Queries are answered through it.
+    replies: Weak<dyn ReplyLink>,
     /// What is to be dropped without the lock: a callback may own queries, and a query that is dropped sends.
     rubbish: Vec<Box<dyn Any + Send>>,
     pub(super) traffic: Traffic,
@@ -178,7 +178,7 @@ impl Overheard {
 }
 
 impl Star {
-    pub(super) fn new(seed: u64, faults: Faults, shared: Weak<Shared>) -> Self {
+    pub(super) fn new(seed: u64, faults: Faults, replies: Weak<dyn ReplyLink>) -> Self {
         Self {
             seed,
             faults,
@@ -187,7 +187,7 @@ impl Star {
             queries: BTreeMap::new(),
             next_id: 0,
             joined: 0,
-            shared,
+            replies,
             rubbish: Vec::new(),
             traffic: Traffic::default(),
             overheard: None,
@@ -655,11 +655,11 @@ impl Star {
                 }
             }
             Message::Ask(query, asked) => {
-                let Some(shared) = self.shared.upgrade() else {
+                let Some(link) = self.replies.upgrade() else {
                     return;
                 };
                 let ending = Arc::new(Ending {
-                    shared,
+                    link,
                     peer: number,
                     query,
                 });

@@ -3,8 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::observe::Presence;
-use super::{Epoch, Generation, Point, Tick, finite, short};
+use super::limits::{few, finite, short};
+use super::numbers::{Epoch, Generation, Tick};
+use super::point::Point;
 use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 
@@ -237,7 +238,7 @@ pub struct FaultOrder {
 
 impl Message for FaultOrder {
     fn check(&self) -> Result<(), FieldError> {
-        super::few(self.orders.len(), "orders")
+        few(self.orders.len(), "orders")
     }
 }
 
@@ -347,4 +348,16 @@ pub struct RobotStatus {
     pub on_late: OnLate,
     /// Whether its process is there.
     pub presence: Presence,
+}
+
+/// Whether a robot is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Presence {
+    /// Its process is there.
+    Here,
+    /// Its process or its link is down, and the run has not given it up.
+    Gone,
+    /// The run goes on without it.
+    Lost,
 }

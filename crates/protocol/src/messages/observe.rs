@@ -3,9 +3,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Awaited, Epoch, Generation, Phase, Point, Seq, StateVariables, Tick, finite, is_false, short,
-};
+use super::control::{Awaited, Phase, Presence};
+use super::limits::{few, finite, is_false, short};
+use super::numbers::{Epoch, Generation, Seq, Tick};
+use super::point::Point;
+use super::state::StateVariables;
 use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 
@@ -121,18 +123,6 @@ pub struct RobotFrame {
     pub generation: Generation,
     /// Whether it is there.
     pub presence: Presence,
-}
-
-/// Whether a robot is there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Presence {
-    /// Its process is there.
-    Here,
-    /// Its process or its link is down, and the run has not given it up.
-    Gone,
-    /// The run goes on without it.
-    Lost,
 }
 
 /// The recording of an epoch begins with this line: what does not change during it.
@@ -356,14 +346,14 @@ impl Widget {
             }
             Self::Face { intensity, .. } => finite(*intensity, &format!("{field}.intensity")),
             Self::Sparkline { label, values } => {
-                super::few(values.len(), &format!("{field}.values"))?;
+                few(values.len(), &format!("{field}.values"))?;
                 short(label, &format!("{field}.label"))?;
                 values
                     .iter()
                     .try_for_each(|value| finite(*value, &format!("{field}.values")))
             }
             Self::Table { rows } => {
-                super::few(rows.iter().map(Vec::len).sum(), &format!("{field}.rows"))?;
+                few(rows.iter().map(Vec::len).sum(), &format!("{field}.rows"))?;
                 rows.iter()
                     .flatten()
                     .try_for_each(|cell| short(cell, &format!("{field}.rows")))

@@ -6,10 +6,11 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Epoch, FieldError, MAX_TEXT_BYTES, Performative, Point, Tick, counted, few, finite, short,
-};
-use crate::codec::Message;
+use super::limits::{MAX_TEXT_BYTES, counted, few, finite, short};
+use super::numbers::{Epoch, Tick};
+use super::performative::Performative;
+use super::point::Point;
+use crate::codec::{FieldError, Message};
 
 /// A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
 /// languages that do not tell them apart give the same run.

@@ -1,13 +1,15 @@
 //! Simulator and robots: joining, and the messages of one tick.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::state::check_variables;
-use super::{
-    Epoch, Generation, Parameters, Point, PublicState, StateVariables, Tick, counted, few, finite,
-    is_false, is_zero, short,
-};
+use super::limits::{counted, few, finite, is_false, is_zero, short};
+use super::numbers::{Epoch, Generation, Tick};
+use super::performative::Performative;
+use super::point::Point;
+use super::state::{PublicState, StateVariables, check_variables};
 use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 
@@ -71,6 +73,9 @@ pub enum Refusal {
     /// The run is over.
     Ended,
 }
+
+/// Parameters of a robot: all that the scenario has for it, lengths and times in SI units.
+pub type Parameters = BTreeMap<String, serde_json::Value>;
 
 /// What a robot needs to know to take part in an epoch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -326,52 +331,6 @@ pub struct CommandText {
     pub performative: Performative,
     /// Its text.
     pub command: String,
-}
-
-/// What a message between robots is meant to do: the part of KQML that the robots of the paper need (Finin et al. 1994;
-/// the paper's robots spoke KQML, Murphy et al. 2002, abstract). A query of the common robot interface is an `ask-one`
-/// by being a query, and its answer says that it is a `tell`.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Default,
-    Serialize,
-    Deserialize,
-    JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Performative {
-    /// The sender wants the receiver to make something true of its environment: every `setRobotCommand`.
-    #[default]
-    Achieve,
-    /// The sender wants one answer from what the receiver knows: every `getRobot...`.
-    AskOne,
-    /// The content is true as far as the sender knows: every answer to a query.
-    Tell,
-}
-
-impl Performative {
-    /// Its name in KQML.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Achieve => "achieve",
-            Self::AskOne => "ask-one",
-            Self::Tell => "tell",
-        }
-    }
-}
-
-impl std::fmt::Display for Performative {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
 }
 
 impl Message for Command {

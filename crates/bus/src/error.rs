@@ -1,0 +1,44 @@
+//! Errors of the bus.
+
+/// A failure of the bus itself.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// No session could be opened.
+    #[error("cannot {doing} {endpoint}: {reason}")]
+    Open {
+        /// What was tried.
+        doing: &'static str,
+        /// The address tried.
+        endpoint: String,
+        /// The reason, from the middleware.
+        reason: String,
+    },
+    /// A simulator would be open to a network.
+    #[error(
+        "{0} can be reached from other machines, and whoever reaches it may control the run and pose as any robot; \
+         either secure the run (`cars secure init` says how) and listen at tls/…, or say --insecure if you trust \
+         everybody who can reach it"
+    )]
+    Exposed(String),
+    /// A client would connect to a secured run without a certificate.
+    #[error(
+        "{0} wants a certificate: name a file zenoh.json5 that `cars secure init` made, by --zenoh-config or \
+         CARS_ZENOH_CONFIG"
+    )]
+    NoCertificate(String),
+    /// A configuration with access control does not fit a listener without certificates.
+    #[error(
+        "{0} is not encrypted, so nobody could show a certificate there: a secured run listens at tls/…"
+    )]
+    Unencrypted(String),
+    /// A session that was open cannot do what was asked.
+    #[error("bus: cannot {doing} {key}: {reason}")]
+    Use {
+        /// What was tried.
+        doing: &'static str,
+        /// The key concerned.
+        key: String,
+        /// The reason, from the middleware.
+        reason: String,
+    },
+}
