@@ -108,6 +108,26 @@ enum Session {
     Memory(memory::Session),
 }
 
+/// The quality of service of a put, as zenoh calls it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Qos {
+    /// Whether its congestion control is block; the other one, drop, loses messages.
+    pub is_blocking: bool,
+    /// Whether it is express: it may overtake what was put before.
+    pub is_express: bool,
+    /// Whether it has the default priority; messages of different priorities overtake each other.
+    pub has_default_priority: bool,
+}
+
+impl Qos {
+    /// What a message needs that takes part in a tick.
+    pub const IN_ORDER: Self = Self {
+        is_blocking: true,
+        is_express: false,
+        has_default_priority: true,
+    };
+}
+
 /// A declaration, alive until dropped.
 pub struct Declared {
     _inner: Box<dyn Send + Sync>,
@@ -198,6 +218,18 @@ impl Bus {
         on!(Session, &self.session, session => session.subscribe(keys, handle))
     }
 
+    /// The same with the quality of service that each message was put with.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn subscribe_with_qos(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, &[u8], Qos) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        on!(Session, &self.session, session => session.subscribe_with_qos(keys, handle))
+    }
+
     /// Calls `handle` for each query asked on `keys`. It must hand over and return.
     ///
     /// # Errors
@@ -235,6 +267,20 @@ impl Bus {
         timeout: Duration,
     ) -> Result<Option<Reply>, BusError> {
         on!(Session, &self.session, session => session.get_within(key, parameters, body, timeout))
+    }
+
+    /// Gets all replies of all queryables: returns when the last of them has let go of the query, at the latest after
+    /// `timeout`.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn get_all(
+        &self,
+        key: &str,
+        parameters: &str,
+        timeout: Duration,
+    ) -> Result<Vec<Reply>, BusError> {
+        on!(Session, &self.session, session => session.get_all(key, parameters, timeout))
     }
 
     /// Asks, and hands the one answer to `then`, or `None` if nobody answers within [`QUERY_TIMEOUT`]. `then` runs on

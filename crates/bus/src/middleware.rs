@@ -8,13 +8,13 @@ use std::time::Duration;
 use zenoh::bytes::ZBytes;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::key_expr::KeyExpr;
-use zenoh::qos::CongestionControl;
+use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
 
 use super::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
-use super::{BusError, Declared, Pending, QUERY_TIMEOUT, Reply, Role};
+use super::{BusError, Declared, Pending, QUERY_TIMEOUT, Qos, Reply, Role};
 use crate::endpoint::{is_local, is_tls};
 
 /// What else may be the matter with an encrypted endpoint.
@@ -144,6 +144,32 @@ impl Session {
         })
     }
 
+    pub(super) fn subscribe_with_qos(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, &[u8], Qos) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        let declared = self
+            .session
+            .declare_subscriber(keys)
+            .callback(move |sample: Sample| {
+                let qos = Qos {
+                    is_blocking: sample.congestion_control() == CongestionControl::Block,
+                    is_express: sample.express(),
+                    has_default_priority: sample.priority() == Priority::default(),
+                };
+                handle(
+                    sample.key_expr().as_str(),
+                    &sample.payload().to_bytes(),
+                    qos,
+                );
+            })
+            .wait();
+        Ok(Declared {
+            _inner: Box::new(used("subscribe to", keys, declared)?),
+        })
+    }
+
     pub(super) fn queryable(
         &self,
         keys: &str,
@@ -183,6 +209,27 @@ impl Session {
             }
         }
         Ok(None)
+    }
+
+    pub(super) fn get_all(
+        &self,
+        key: &str,
+        parameters: &str,
+        timeout: Duration,
+    ) -> Result<Vec<Reply>, BusError> {
+        let replies: FifoChannelHandler<zenoh::query::Reply> = used(
+            "ask",
+            key,
+            self.get(key, parameters, None, timeout)?
+                .with(zenoh::handlers::FifoChannel::new(64))
+                .wait(),
+        )?;
+        let mut all = Vec::new();
+        while let Ok(reply) = replies.recv() {
+            all.extend(Reply::read(reply));
+        }
+
+        Ok(all)
     }
 
     pub(super) fn get_then(

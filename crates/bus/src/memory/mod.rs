@@ -23,7 +23,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::{Bus, BusError, Declared, Pending, QUERY_TIMEOUT, Reply};
+use super::{Bus, BusError, Declared, Pending, QUERY_TIMEOUT, Qos, Reply};
 use star::{Calls, Declaration, Message, PeerId, Star};
 
 /// How bad the network is. The default delivers everything, in an order that the seed chooses.
@@ -364,6 +364,14 @@ impl Session {
         )
     }
 
+    pub(super) fn subscribe_with_qos(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, &[u8], Qos) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        self.subscribe(keys, move |key, bytes| handle(key, bytes, Qos::IN_ORDER))
+    }
+
     pub(super) fn queryable(
         &self,
         keys: &str,
@@ -398,6 +406,18 @@ impl Session {
             Pending::new(move |answer| drop(sender.send(answer))),
         )?;
         Ok(answers.recv().ok().flatten())
+    }
+
+    /// The one reply that this network passes on.
+    pub(super) fn get_all(
+        &self,
+        key: &str,
+        parameters: &str,
+        timeout: Duration,
+    ) -> Result<Vec<Reply>, BusError> {
+        let reply = self.get_within(key, parameters, None, timeout)?;
+
+        Ok(reply.into_iter().collect())
     }
 
     pub(super) fn get_then(
