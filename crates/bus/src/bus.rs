@@ -7,6 +7,7 @@ use crate::declared::Declared;
 use crate::error::BusError;
 use crate::memory::{self, MemoryNetwork};
 use crate::middleware;
+use crate::qos::Qos;
 use crate::reply::{QUERY_TIMEOUT, Reply};
 use crate::role::Role;
 
@@ -101,6 +102,18 @@ impl Bus {
         on!(Session, &self.session, session => session.subscribe(keys, handle))
     }
 
+    /// The same with the quality of service that each message was put with.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn subscribe_with_qos(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, &[u8], Qos) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        on!(Session, &self.session, session => session.subscribe_with_qos(keys, handle))
+    }
+
     /// Calls `handle` for each query on `keys`. It must hand over and return.
     ///
     /// # Errors
@@ -149,6 +162,20 @@ impl Bus {
         timeout: Duration,
     ) -> Result<Option<Reply>, BusError> {
         on!(Session, &self.session, session => session.get_within(key, parameters, body, timeout))
+    }
+
+    /// Gets all replies of all queryables: returns when the last of them has let go of the query, at the latest after
+    /// `timeout`.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn get_all(
+        &self,
+        key: &str,
+        parameters: &str,
+        timeout: Duration,
+    ) -> Result<Vec<Reply>, BusError> {
+        on!(Session, &self.session, session => session.get_all(key, parameters, timeout))
     }
 
     /// Sends a query and hands the one answer to `then`, or `None` if none arrives within [`QUERY_TIMEOUT`]. `then`

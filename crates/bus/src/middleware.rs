@@ -8,7 +8,7 @@ use std::time::Duration;
 use zenoh::bytes::ZBytes;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::key_expr::KeyExpr;
-use zenoh::qos::CongestionControl;
+use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
@@ -16,6 +16,7 @@ use zenoh::{Config, Wait};
 use crate::declared::Declared;
 use crate::endpoint::{is_local, is_tls};
 use crate::error::BusError;
+use crate::qos::Qos;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
 use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
@@ -146,6 +147,32 @@ impl Session {
         Ok(Declared::new(declared))
     }
 
+    pub(super) fn subscribe_with_qos(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, &[u8], Qos) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        let declared = self
+            .session
+            .declare_subscriber(keys)
+            .callback(move |sample: Sample| {
+                let qos = Qos {
+                    is_blocking: sample.congestion_control() == CongestionControl::Block,
+                    is_express: sample.express(),
+                    has_default_priority: sample.priority() == Priority::default(),
+                };
+                handle(
+                    sample.key_expr().as_str(),
+                    &sample.payload().to_bytes(),
+                    qos,
+                );
+            })
+            .wait();
+
+        let declared = used("subscribe to", keys, declared)?;
+        Ok(Declared::new(declared))
+    }
+
     pub(super) fn queryable(
         &self,
         keys: &str,
@@ -180,6 +207,27 @@ impl Session {
             }
         }
         Ok(None)
+    }
+
+    pub(super) fn get_all(
+        &self,
+        key: &str,
+        parameters: &str,
+        timeout: Duration,
+    ) -> Result<Vec<Reply>, BusError> {
+        let replies: FifoChannelHandler<zenoh::query::Reply> = used(
+            "ask",
+            key,
+            self.get(key, parameters, None, timeout)?
+                .with(zenoh::handlers::FifoChannel::new(64))
+                .wait(),
+        )?;
+        let mut all = Vec::new();
+        while let Ok(reply) = replies.recv() {
+            all.extend(Reply::read(reply));
+        }
+
+        Ok(all)
     }
 
     pub(super) fn get_then(

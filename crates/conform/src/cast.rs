@@ -1,22 +1,42 @@
-//! The other robots of the roster, played: they answer at once, for any tick, and stand where they are told to.
+//! The other robots of the roster, played: they answer at once, for any tick, and stand where their roles place them.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bus::{Bus, BusError, Declared, Query};
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Percept, PublicState, SensedBody, SensedKind, SensedRobot};
+use protocol::messages::{PublicState, SensedBody, SensedKind, SensedRobot, Variable};
 use protocol::{Epoch, Message, RobotName, Tick, encode};
 use serde_json::{Value, json};
 
 use crate::setting::Role;
 
-/// The others, and the tick that they are in.
+/// A query that one of them received.
 #[derive(Debug, Clone)]
+pub(crate) struct Asked {
+    /// The robot that was asked.
+    pub(crate) of: RobotName,
+    /// Its parameters, as they came.
+    pub(crate) tick: Option<String>,
+    pub(crate) epoch: Option<String>,
+    /// The tick under way.
+    pub(crate) now: (Epoch, Tick),
+}
+
+#[derive(Default)]
+struct State {
+    now: (Epoch, Tick),
+    asked: Vec<Asked>,
+    is_holding: bool,
+    held: Vec<(RobotName, String, Query)>,
+}
+
+/// The others, and the tick that they are in.
+#[derive(Clone)]
 pub(crate) struct Cast {
     others: Arc<BTreeMap<RobotName, Role>>,
-    now: Arc<Mutex<(Epoch, Tick)>>,
-    /// Whether everything said carries fields that nobody knows.
+    state: Arc<Mutex<State>>,
+    /// Whether everything that is put carries unknown fields.
     has_extras: bool,
 }
 
@@ -24,7 +44,7 @@ impl Cast {
     pub(crate) fn new(others: BTreeMap<RobotName, Role>, has_extras: bool) -> Self {
         Self {
             others: Arc::new(others),
-            now: Arc::default(),
+            state: Arc::default(),
             has_extras,
         }
     }
@@ -34,17 +54,45 @@ impl Cast {
         self.others.keys()
     }
 
-    /// Where the tick under way is told.
-    pub(crate) fn begin(&self, epoch: Epoch, tick: Tick) {
-        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = (epoch, tick);
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn now(&self) -> (Epoch, Tick) {
-        *self.now.lock().unwrap_or_else(PoisonError::into_inner)
+    /// A tick begins.
+    pub(crate) fn begin(&self, epoch: Epoch, tick: Tick) {
+        self.state().now = (epoch, tick);
+    }
+
+    /// The queries that they received so far.
+    pub(crate) fn asked(&self) -> Vec<Asked> {
+        self.state().asked.clone()
+    }
+
+    /// From now on they hold queries back.
+    pub(crate) fn hold(&self) {
+        self.state().is_holding = true;
+    }
+
+    /// Whether they hold a query back.
+    pub(crate) fn has_held(&self) -> bool {
+        !self.state().held.is_empty()
+    }
+
+    /// They answer what they held back, and everything from now on.
+    pub(crate) fn release(&self) {
+        let held = {
+            let mut state = self.state();
+            state.is_holding = false;
+            std::mem::take(&mut state.held)
+        };
+
+        for (name, what, query) in held {
+            self.answer(&name, &what, &query);
+        }
     }
 
     /// What `robot` reported for a tick.
-    fn state(&self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Option<PublicState> {
+    fn state_of(&self, robot: &RobotName, epoch: Epoch, tick: Tick) -> Option<PublicState> {
         let role = self.others.get(robot)?;
         let index = usize::try_from(tick)
             .unwrap_or(usize::MAX)
@@ -56,14 +104,11 @@ impl Cast {
             location: role.location,
             speed_mps: 0.0,
             direction_rad: 0.0,
-            state_variables: [(
-                "ticks".to_owned(),
-                protocol::messages::Variable::Number(tick as f64),
-            )]
-            .into(),
+            state_variables: [("ticks".to_owned(), Variable::Number(tick as f64))].into(),
             emotion_state: "CALM".to_owned(),
             behavior_state: "STAND".to_owned(),
         });
+
         Some(PublicState {
             epoch,
             tick,
@@ -74,24 +119,19 @@ impl Cast {
     /// The first of them, as it is sensed in a tick.
     pub(crate) fn sensed(&self, epoch: Epoch, tick: Tick) -> Option<SensedRobot> {
         let name = self.names().next()?.clone();
-        let location = self.state(&name, epoch, tick)?.location;
+        let location = self.state_of(&name, epoch, tick)?.location;
         Some(SensedRobot { name, location })
     }
 
-    fn percept(&self) -> Percept {
-        let (epoch, tick) = self.now();
+    /// The same as a body.
+    pub(crate) fn bodies(&self, epoch: Epoch, tick: Tick) -> Vec<SensedBody> {
         let sensed = self.sensed(epoch, tick);
-        let bodies = sensed
-            .map(|robot| SensedBody {
-                kind: SensedKind::Robot,
-                location: robot.location,
-            })
-            .into_iter();
-        Percept {
-            epoch,
-            tick,
-            bodies: bodies.collect(),
-        }
+        let body = sensed.map(|robot| SensedBody {
+            kind: SensedKind::Robot,
+            location: robot.location,
+        });
+
+        body.into_iter().collect()
     }
 
     /// A message as it is put on the wire.
@@ -100,74 +140,85 @@ impl Cast {
         if !self.has_extras {
             return bytes;
         }
+
         let mut value = serde_json::from_slice(&bytes).unwrap_or(Value::Null);
         add_extras(&mut value);
         value.to_string().into_bytes()
     }
 
-    /// Serves what others may ask them, and what `subject` may ask of its surroundings.
-    pub(crate) fn serve(
-        &self,
-        bus: &Bus,
-        keys: &Keys,
-        subject: &RobotName,
-    ) -> Result<Vec<Declared>, BusError> {
+    /// Declares their queryables and tokens.
+    pub(crate) fn serve(&self, bus: &Bus, keys: &Keys) -> Result<Vec<Declared>, BusError> {
         let mut declared = Vec::new();
-        for (name, what) in self
-            .names()
-            .flat_map(|name| QUERIES.iter().chain([&STATE]).map(move |what| (name, what)))
-        {
-            let (cast, name, key) = (self.clone(), name.clone(), keys.query(name, what));
-            declared.push(bus.queryable(&key, move |query| cast.answer(&name, what, &query))?);
+        for name in self.names() {
+            for what in QUERIES.iter().chain([&STATE]) {
+                let cast = self.clone();
+                let name = name.clone();
+                let key = keys.query(&name, what);
+                declared.push(bus.queryable(&key, move |query| cast.receive(&name, what, query))?);
+            }
         }
-        let cast = self.clone();
-        declared.push(bus.queryable(&keys.percept(subject), move |query| {
-            query.reply(query.key(), cast.dress(&cast.percept()));
-        })?);
         for name in self.names() {
             declared.push(bus.token(&keys.alive_robot(name))?);
         }
+
         Ok(declared)
     }
 
-    /// Asked during a tick, everybody answers with the state reported for the tick before.
+    fn receive(&self, name: &RobotName, what: &str, query: Query) {
+        let mut state = self.state();
+        let now = state.now;
+        state.asked.push(Asked {
+            of: name.clone(),
+            tick: query.parameter("tick").map(str::to_owned),
+            epoch: query.parameter("epoch").map(str::to_owned),
+            now,
+        });
+        if state.is_holding {
+            state.held.push((name.clone(), what.to_owned(), query));
+            return;
+        }
+
+        drop(state);
+        self.answer(name, what, &query);
+    }
+
+    /// During a tick all of them answer with the state reported for the tick before.
     fn answer(&self, name: &RobotName, what: &str, query: &Query) {
-        let number = |parameter: &str| query.parameter(parameter)?.parse::<Tick>().ok();
-        let (epoch, now) = self.now();
-        let tick = number("tick").unwrap_or(now);
+        let (epoch, now) = self.state().now;
+        let tick = query
+            .parameter("tick")
+            .and_then(|tick| tick.parse::<Tick>().ok())
+            .unwrap_or(now);
         let Some(state) = tick
             .checked_sub(1)
-            .and_then(|tick| self.state(name, epoch, tick))
+            .and_then(|tick| self.state_of(name, epoch, tick))
         else {
             return query.reply_err("nothing is known before tick 1");
         };
+
         match state.answer(what) {
             Some(answer) => query.reply(query.key(), self.dress(&answer)),
             None => query.reply(query.key(), self.dress(&state)),
         }
     }
 
-    /// Sends what followers have without asking, before the clock of the tick.
-    pub(crate) fn tell_followers(
-        &self,
-        bus: &Bus,
-        keys: &Keys,
-        subject: &RobotName,
-    ) -> Result<(), BusError> {
-        let (epoch, tick) = self.now();
+    /// Puts their states of the tick before, for robots that subscribe to them, before the clock of the tick.
+    pub(crate) fn put_states(&self, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
+        let (epoch, tick) = self.state().now;
+        let Some(before) = tick.checked_sub(1) else {
+            return Ok(());
+        };
         for name in self.names() {
-            if let Some(state) = tick
-                .checked_sub(1)
-                .and_then(|tick| self.state(name, epoch, tick))
-            {
+            if let Some(state) = self.state_of(name, epoch, before) {
                 bus.put(&keys.query(name, STATE), self.dress(&state))?;
             }
         }
-        bus.put(&keys.percept(subject), self.dress(&self.percept()))
+
+        Ok(())
     }
 }
 
-/// Adds fields that nobody knows wherever a message has fields. Maps with names as keys have none.
+/// Adds unknown fields wherever a message has fields. Maps with names as keys have none.
 fn add_extras(value: &mut Value) {
     match value {
         Value::Array(values) => values.iter_mut().for_each(add_extras),
@@ -175,19 +226,12 @@ fn add_extras(value: &mut Value) {
             for (name, field) in fields.iter_mut() {
                 match name.as_str() {
                     "parameters" | "state_variables" | "value" => {}
-                    "news" => {
-                        field
-                            .as_object_mut()
-                            .into_iter()
-                            .flatten()
-                            .for_each(|(_, news)| add_extras(news));
-                    }
                     _ => add_extras(field),
                 }
             }
             fields.insert(
                 "added_later".to_owned(),
-                json!({ "by": ["somebody", 1, null] }),
+                json!({ "by": ["a later version", 1, null] }),
             );
         }
         _ => {}
@@ -200,26 +244,22 @@ mod tests {
 
     #[test]
     fn extras_are_added_to_messages_and_not_to_maps() {
-        let mut clock = json!({
+        let mut news = json!({
             "tick": 1,
-            "news": { "A": { "correction": { "location": { "x": 1 } }, "commands": [{ "from": "B" }] } },
+            "correction": { "location": { "x": 1 } },
+            "commands": [{ "from": "B" }],
             "parameters": { "speed": { "mean": 1 } },
         });
-        add_extras(&mut clock);
-        for path in [
-            "",
-            "/news/A",
-            "/news/A/correction/location",
-            "/news/A/commands/0",
-        ] {
+        add_extras(&mut news);
+        for path in ["", "/correction/location", "/commands/0"] {
             assert!(
-                clock.pointer(path).unwrap().get("added_later").is_some(),
+                news.pointer(path).unwrap().get("added_later").is_some(),
                 "{path}"
             );
         }
-        for path in ["/news", "/parameters", "/parameters/speed"] {
+        for path in ["/parameters", "/parameters/speed"] {
             assert!(
-                clock.pointer(path).unwrap().get("added_later").is_none(),
+                news.pointer(path).unwrap().get("added_later").is_none(),
                 "{path}"
             );
         }

@@ -4,51 +4,73 @@ use serde_json::Value;
 
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::Transcript;
+use crate::script::{Entry, Transcript};
 
 /// What is shown of a value that differs, characters.
 const SHOWN: usize = 200;
 
-/// The first difference between the reports of two plays, in words: what the first has, and what the second has.
-pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<(String, String)> {
+/// Where two plays differ: what the first has, and what the second has, in words.
+#[derive(Debug)]
+pub(crate) struct Difference {
+    pub(crate) first: String,
+    pub(crate) second: String,
+}
+
+/// What a robot did in a tick: its report, and its commands with their targets.
+fn outcome(entry: &Entry) -> Value {
+    let mut value = serde_json::json!(entry.report);
+    value["epoch"] = Value::Null;
+    let commands = entry.commands.iter().map(|sent| {
+        let text = sent.command.as_ref().map(|command| command.command.clone());
+        format!("{} to {}", text.unwrap_or_default(), sent.to)
+    });
+    value["commands put"] = commands.collect::<Vec<_>>().into();
+
+    value
+}
+
+/// The first difference between the reports and commands of two plays. Their epochs may differ.
+pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<Difference> {
     for (one, two) in one.iter().zip(two) {
-        if one.report == two.report {
+        let tick = one.tick;
+        let first = outcome(one);
+        let second = outcome(two);
+        if first == second {
             continue;
         }
-        let tick = one.clock.tick;
-        let (one, two) = (serde_json::json!(one.report), serde_json::json!(two.report));
+
         let of = |value: &Value, field: &str| value.get(field).cloned().unwrap_or(Value::Null);
-        let fields = one
+        let field = first
             .as_object()
             .into_iter()
-            .chain(two.as_object())
-            .flat_map(|fields| fields.keys());
-        let field = fields
-            .into_iter()
-            .find(|field| of(&one, field) != of(&two, field))
-            .cloned();
-        let field = field.unwrap_or_default();
+            .chain(second.as_object())
+            .flat_map(|fields| fields.keys())
+            .find(|field| of(&first, field) != of(&second, field))
+            .cloned()
+            .unwrap_or_default();
         let shown = |value: &Value| {
             let text: String = of(value, &field).to_string().chars().take(SHOWN).collect();
             format!("in tick {tick}, {field}: {text}")
         };
-        return Some((shown(&one), shown(&two)));
+        return Some(Difference {
+            first: shown(&first),
+            second: shown(&second),
+        });
     }
-    (one.len() != two.len()).then(|| {
-        (
-            format!("{} ticks", one.len()),
-            format!("{} ticks", two.len()),
-        )
+
+    (one.len() != two.len()).then(|| Difference {
+        first: format!("{} ticks", one.len()),
+        second: format!("{} ticks", two.len()),
     })
 }
 
-/// Whether two plays gave the same reports.
+/// Whether two plays gave the same reports and commands.
 pub(crate) fn is_same(one: &Transcript, two: &Transcript) -> bool {
     difference(one, two).is_none()
 }
 
-/// Demands that what happened made no difference. A robot that does not even repeat itself is told so by its own rule,
-/// and by none else.
+/// Demands that what happened made no difference. A robot that does not even repeat itself fails by its own rule, and by
+/// no other.
 pub(crate) fn demand_same(
     kit: &Kit,
     what: &str,
@@ -58,11 +80,12 @@ pub(crate) fn demand_same(
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
+
     match difference(usual, other) {
         None => Ok(()),
-        Some((usual, other)) => Err(Failure::new(
-            format!("{what} makes no difference: {usual}"),
-            other,
+        Some(Difference { first, second }) => Err(Failure::new(
+            format!("{what} makes no difference: {first}"),
+            second,
         )),
     }
 }

@@ -182,11 +182,21 @@ impl Kit {
         self.pairs().into_iter().next().unwrap_or_default()
     }
 
-    /// What the robot is told when it joins at tick 0.
-    pub(crate) fn welcome(&self, run: &RunName) -> Welcome {
-        let (learned, setting) = (self.learned(), &self.setting);
-        let name = learned.request.name.clone();
-        let role = learned.cast.get(&name).cloned().unwrap_or_default();
+    /// Whether its news list the bodies around it.
+    pub(crate) fn wants_bodies(&self) -> bool {
+        self.learned().request.bodies
+    }
+
+    /// What the robot is welcomed with at tick 0.
+    pub(crate) fn template(&self, run: &RunName) -> Welcome {
+        let setting = &self.setting;
+        let learned = self.learned.get();
+        let name = learned.map_or_else(RobotName::operator, |learned| learned.request.name.clone());
+        let cast = learned
+            .map(|learned| learned.cast.clone())
+            .unwrap_or_default();
+        let role = cast.get(&name).cloned().unwrap_or_default();
+
         Welcome {
             protocol: PROTOCOL_VERSION,
             run: run.clone(),
@@ -201,12 +211,11 @@ impl Kit {
             body_m: setting.body_m,
             sensing_range_m: setting.sensing_range_m,
             location: role.location,
-            roster: learned.cast.keys().cloned().collect(),
+            roster: cast.into_keys().collect(),
             parameters: role.parameters,
+            news_flag: 0,
             last_state: None,
             state_before: None,
-            last_seq: 0,
-            repeat_ticks: 2,
         }
     }
 }

@@ -74,6 +74,11 @@ impl Process {
         let _gone = killpg(self.group, signal);
     }
 
+    /// How much it wrote to its standard error, bytes.
+    pub(crate) fn error_bytes(&self) -> u64 {
+        self.errors.metadata().map_or(0, |metadata| metadata.len())
+    }
+
     /// The last that it wrote to its standard error.
     pub(crate) fn errors(&self) -> String {
         tail(&self.errors)

@@ -31,7 +31,7 @@ const fn rule(name: &'static str, section: &'static str) -> Rule {
 }
 
 /// All rules, in the order of the page.
-pub const RULES: [Rule; 28] = [
+pub const RULES: [Rule; 33] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
     rule("join.refused", "joining"),
@@ -40,24 +40,29 @@ pub const RULES: [Rule; 28] = [
     rule("tick.initial", "a-tick"),
     rule("tick.state-first", "a-tick"),
     rule("command.order", "commands"),
-    rule("command.held", "commands"),
     rule("command.twice", "commands"),
-    rule("command.missing", "commands"),
     rule("command.sent", "commands"),
+    rule("operator.commands", "commands"),
+    rule("news.wait", "a-tick"),
     rule("query.tick", "queries"),
-    rule("query.early", "queries"),
+    rule("query.at-once", "queries"),
+    rule("query.asking", "queries"),
+    rule("query.once", "queries"),
     rule("query.unknown", "queries"),
     rule("clock.duplicate", "repeated-and-late-messages"),
     rule("clock.late", "repeated-and-late-messages"),
     rule("epoch.init", "epochs"),
+    rule("epoch.late", "epochs"),
     rule("determinism.seed", "epochs"),
     rule("return.generation", "incarnations"),
-    rule("return.numbers", "incarnations"),
     rule("return.replaced", "incarnations"),
     rule("end.clock", "the-end"),
     rule("end.sigterm", "the-end"),
+    rule("end.gone", "the-end"),
     rule("compat.unknown-fields", "tolerance"),
     rule("robust.malformed", "tolerance"),
     rule("number.angles", "numbers-and-chance"),
     rule("number.finite", "numbers-and-chance"),
+    rule("number.integers", "numbers-and-chance"),
+    rule("wire.qos", "words-and-transport"),
 ];

@@ -1,19 +1,18 @@
-//! The ticks that a robot is taken through: what befalls it is a function of the tick and of what it proposed, so that
+//! The ticks that a robot is taken through: what happens to it is a function of the tick and of what it proposed, so that
 //! the same robot meets the same again.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
-use protocol::messages::{Clock, CommandId, Correction, News, Point, Report, Welcome};
-use protocol::{RobotName, Seq, Tick};
+use protocol::messages::{Correction, Delivery, News, Performative, Point, Report, Welcome};
+use protocol::{Epoch, RobotName, Tick};
 
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::stage::Stage;
+use crate::stage::{Sent, Stage};
 
 /// Every so many ticks the same happens to it again.
 const ROUND: Tick = 16;
-/// In a round: it is placed elsewhere, its move is refused, it senses another robot, it cannot ask anybody.
+/// In a round: it is placed elsewhere, its move is refused, it senses another robot, it cannot query any other.
 const PLACED: Tick = 5;
 const REFUSED: Tick = 9;
 const SENSES: Tick = 12;
@@ -21,18 +20,13 @@ const CUT_OFF: Tick = 14;
 /// How far it is placed from where it stood, meters.
 const SHIFT: (f64, f64) = (0.25, 0.125);
 
-/// A command for the robot.
+/// A command that arrives at the robot.
 #[derive(Debug, Clone)]
-pub(crate) struct Delivery {
+pub(crate) struct Arrival {
     pub(crate) from: RobotName,
-    pub(crate) seq: Seq,
     pub(crate) text: String,
-    /// It is put just before the clock of this tick; `None`: never.
-    pub(crate) sent: Option<Tick>,
-    /// The tick whose clock names it.
-    pub(crate) named: Tick,
-    /// How often it is named there.
-    pub(crate) times: usize,
+    /// The tick in whose news it is.
+    pub(crate) tick: Tick,
 }
 
 /// Ticks to play.
@@ -40,18 +34,22 @@ pub(crate) struct Delivery {
 pub(crate) struct Script {
     /// How many after the first.
     pub(crate) ticks: Tick,
-    /// Commands, in the order in which they are put.
-    pub(crate) deliveries: Vec<Delivery>,
+    /// Commands, in the order in which they count.
+    pub(crate) arrivals: Vec<Arrival>,
 }
 
 /// A tick that was played.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
-    pub(crate) clock: Clock,
+    pub(crate) epoch: Epoch,
+    pub(crate) tick: Tick,
+    pub(crate) news: News,
     /// Where the robot stands in it.
     pub(crate) location: Point,
     pub(crate) report: Report,
-    /// Its place in [`crate::stage::Seen::answers`].
+    /// Its commands, by number.
+    pub(crate) commands: Vec<Sent>,
+    /// The place of its report in [`crate::stage::Seen::answers`].
     pub(crate) index: usize,
     pub(crate) took: Duration,
 }
@@ -59,14 +57,19 @@ pub(crate) struct Entry {
 /// What was played.
 pub(crate) type Transcript = Vec<Entry>;
 
-/// What a check does between the ticks. Nothing of it may make a difference to the robot.
+/// What a check does between the ticks. None of it may make a difference to the robot.
 pub(crate) trait Twist {
-    /// Before a clock is put.
-    fn before(&mut self, _stage: &mut Stage<'_>, _clock: &Clock) -> Result<(), Failure> {
+    /// Before a tick is granted.
+    fn before(&mut self, _stage: &mut Stage<'_>, _tick: Tick) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// After its report has come.
+    /// After news and clock of a tick are put.
+    fn during(&mut self, _stage: &mut Stage<'_>, _tick: Tick) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// After the tick is complete.
     fn after(&mut self, _stage: &mut Stage<'_>, _entry: &Entry) -> Result<(), Failure> {
         Ok(())
     }
@@ -80,28 +83,23 @@ impl Twist for Straight {}
 impl Script {
     /// The usual ticks: a few commands among them.
     pub(crate) fn usual(kit: &Kit) -> Self {
-        let ([one, two], from, operator) = (kit.texts(), kit.sender(), RobotName::operator());
-        let sent = |from: &RobotName, seq, text: &String, named: Tick| {
-            let (from, text) = (from.clone(), text.clone());
-            Delivery {
-                from,
-                seq,
-                text,
-                sent: named.checked_sub(1),
-                named,
-                times: 1,
-            }
+        let [one, two] = kit.texts();
+        let from = kit.sender();
+        let arrival = |from: &RobotName, text: &String, tick: Tick| Arrival {
+            from: from.clone(),
+            text: text.clone(),
+            tick,
         };
-        let base = if from == operator { 10 } else { 0 };
-        let deliveries = vec![
-            sent(&from, 1, &one, 3),
-            sent(&from, 2, &two, 7),
-            sent(&operator, base + 1, &one, 7),
-            sent(&from, 3, &one, 20),
-        ];
+
         Self {
             ticks: kit.setting.ticks,
-            deliveries,
+            arrivals: vec![
+                arrival(&from, &one, 3),
+                arrival(&from, &two, 7),
+                arrival(&from, &one, 7),
+                arrival(&RobotName::operator(), &one, 10),
+                arrival(&from, &one, 20),
+            ],
         }
     }
 
@@ -109,42 +107,48 @@ impl Script {
     pub(crate) fn quiet(ticks: Tick) -> Self {
         Self {
             ticks,
-            deliveries: Vec::new(),
+            arrivals: Vec::new(),
         }
     }
 
     /// A few ticks with these commands.
-    pub(crate) fn with(ticks: Tick, deliveries: Vec<Delivery>) -> Self {
-        Self { ticks, deliveries }
+    pub(crate) fn with(ticks: Tick, arrivals: Vec<Arrival>) -> Self {
+        Self { ticks, arrivals }
     }
 
-    fn named(&self, tick: Tick) -> Vec<CommandId> {
-        let due = self
-            .deliveries
-            .iter()
-            .filter(|delivery| delivery.named == tick);
-        let mut named: Vec<CommandId> = due
-            .flat_map(|delivery| {
-                let id = CommandId {
-                    from: delivery.from.clone(),
-                    seq: delivery.seq,
-                };
-                std::iter::repeat_n(id, delivery.times)
-            })
-            .collect();
-        named.sort();
-        named
+    fn deliveries(&self, tick: Tick) -> Vec<Delivery> {
+        let mut deliveries = Vec::new();
+        for arrival in &self.arrivals {
+            if arrival.tick == tick {
+                deliveries.push(Delivery {
+                    from: arrival.from.clone(),
+                    performative: Performative::Achieve,
+                    command: arrival.text.clone(),
+                });
+            }
+        }
+        deliveries.sort_by(|one, other| one.from.cmp(&other.from));
+
+        deliveries
     }
 }
 
 /// Where the robot stands, and where it wants to be.
-struct Body {
-    stands: Point,
-    proposal: Point,
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Body {
+    pub(crate) stands: Point,
+    pub(crate) proposal: Point,
 }
 
 impl Body {
-    /// Its move into a tick, and what the clock has to say about it.
+    pub(crate) fn at(location: Point) -> Self {
+        Self {
+            stands: location,
+            proposal: location,
+        }
+    }
+
+    /// Its move into a tick, and the correction if it does not stand where it proposed.
     fn advance(&mut self, tick: Tick, welcome: &Welcome) -> Option<Correction> {
         let half_m = welcome.body_m / 2.0;
         let is_free = |at: Point| {
@@ -174,86 +178,83 @@ impl Body {
                 blocked: true,
             });
         }
+
         self.stands = self.proposal;
         None
     }
 }
 
-/// Plays a script to a robot that has joined, from the tick after its welcome, or from tick 0 of an epoch on.
+/// Plays a script to a robot that has joined, from the next tick of its stage on.
 pub(crate) fn play(
     stage: &mut Stage<'_>,
-    welcome: &Welcome,
     script: &Script,
     twist: &mut dyn Twist,
 ) -> Result<Transcript, Failure> {
     let mut transcript = Transcript::new();
-    let is_newcomer = welcome.generation > 1;
-    let first = if is_newcomer { welcome.tick + 1 } else { 0 };
-    let mut body = Body {
-        stands: welcome.location,
-        proposal: welcome.location,
-    };
-    for tick in first..=first + script.ticks {
-        let mut news = News {
-            commands: script.named(tick),
-            ..News::default()
-        };
-        if tick == first {
-            news.joined = is_newcomer.then_some(welcome.generation);
-            news.correction = is_newcomer.then_some(Correction {
-                location: welcome.location,
-                blocked: false,
-            });
-        } else {
-            news.correction = body.advance(tick, welcome);
-            surround(&mut news, stage, welcome, tick);
-        }
-        let is_quiet = news.is_empty();
-        let named = BTreeMap::from([(welcome.name.clone(), news)]);
-        let clock = Clock {
-            epoch: welcome.epoch,
-            tick,
-            news: if is_quiet { BTreeMap::new() } else { named },
-            end: None,
-        };
-        for due in script
-            .deliveries
-            .iter()
-            .filter(|delivery| delivery.sent == Some(tick))
-        {
-            stage.put_command(
-                &due.from,
-                due.seq,
-                (welcome.epoch, tick.saturating_sub(1)),
-                &due.text,
-            )?;
-        }
-        twist.before(stage, &clock)?;
-        let (index, took) = stage.tick(&clock)?;
-        let Some(answer) = stage.seen.answers.get(index) else {
-            break;
-        };
-        let report = answer.reading.report.clone();
-        body.proposal = report.proposal;
-        let entry = Entry {
-            clock,
-            location: body.stands,
-            report,
-            index,
-            took,
-        };
-        twist.after(stage, &entry)?;
-        transcript.push(entry);
+    for _ in 0..=script.ticks {
+        transcript.push(step(stage, script, twist)?);
     }
+
     Ok(transcript)
 }
 
-/// What it senses, and whom it cannot ask.
-fn surround(news: &mut News, stage: &Stage<'_>, welcome: &Welcome, tick: Tick) {
-    if tick % ROUND == SENSES {
-        news.sensed = stage.cast.sensed(welcome.epoch, tick).into_iter().collect();
+/// Plays the next tick.
+pub(crate) fn step(
+    stage: &mut Stage<'_>,
+    script: &Script,
+    twist: &mut dyn Twist,
+) -> Result<Entry, Failure> {
+    let epoch = stage.epoch();
+    let tick = stage.next_tick();
+    let news = news_of(stage, script, tick);
+    twist.before(stage, tick)?;
+    stage.open(&news)?;
+    twist.during(stage, tick)?;
+
+    let done = stage.complete()?;
+    stage.body.proposal = done.report.proposal;
+    let entry = Entry {
+        epoch,
+        tick,
+        news,
+        location: stage.body.stands,
+        report: done.report,
+        commands: done.commands,
+        index: done.index,
+        took: done.took,
+    };
+    twist.after(stage, &entry)?;
+
+    Ok(entry)
+}
+
+/// What is new for the robot in a tick.
+fn news_of(stage: &mut Stage<'_>, script: &Script, tick: Tick) -> News {
+    let epoch = stage.epoch();
+    let mut news = News {
+        commands: script.deliveries(tick),
+        ..News::default()
+    };
+    if stage.kit.wants_bodies() {
+        news.bodies = stage.cast.bodies(epoch, tick);
     }
-    if tick % ROUND == CUT_OFF {
-        news.unreachable = stage.cast.names().cloned().collect();
+    if stage.takes_over() {
+        stage.body = Body::at(stage.template.location);
+        news.correction = Some(Correction {
+            location: stage.body.stands,
+            blocked: false,
+        });
+    } else if tick == 0 {
+        stage.body = Body::at(stage.template.location);
+    } else {
+        news.correction = stage.body.advance(tick, &stage.template);
+        if tick % ROUND == SENSES {
+            news.sensed = stage.cast.sensed(epoch, tick).into_iter().collect();
+        }
+        if tick % ROUND == CUT_OFF {
+            news.unreachable = stage.cast.names().cloned().collect();
+        }
     }
+
+    news
 }

@@ -32,6 +32,7 @@ pub(crate) use query::Query;
 
 use crate::declared::Declared;
 use crate::error::BusError;
+use crate::qos::Qos;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use query::{Asked, PeerId, ReplyLink};
 use star::{Calls, Declaration, Message, Star};
@@ -300,6 +301,14 @@ impl Session {
         )
     }
 
+    pub(super) fn subscribe_with_qos(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str, &[u8], Qos) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        self.subscribe(keys, move |key, bytes| handle(key, bytes, Qos::IN_ORDER))
+    }
+
     pub(super) fn queryable(
         &self,
         keys: &str,
@@ -329,6 +338,18 @@ impl Session {
             Pending::new(move |answer| drop(sender.send(answer))),
         )?;
         Ok(answers.recv().ok().flatten())
+    }
+
+    /// The one reply that this network passes on.
+    pub(super) fn get_all(
+        &self,
+        key: &str,
+        parameters: &str,
+        timeout: Duration,
+    ) -> Result<Vec<Reply>, BusError> {
+        let reply = self.get_within(key, parameters, None, timeout)?;
+
+        Ok(reply.into_iter().collect())
     }
 
     pub(super) fn get_then(

@@ -1,92 +1,128 @@
-//! Commands: in the order the clock names, when it names them, as often as it names them.
+//! Commands: in the order of the news, as often as they list them, from other robots and from an operator.
 
-use protocol::Tick;
-use protocol::messages::CommandId;
+use std::collections::BTreeMap;
 
-use super::{Findings, played, seated};
-use crate::comparison::{demand_same, difference, is_same};
+use protocol::messages::Variable;
+use protocol::{RobotName, Tick};
+use serde_json::Value;
+
+use super::{Findings, played};
+use crate::comparison::is_same;
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Delivery, Script, Straight, Transcript, play};
-use crate::stage::Options;
+use crate::script::{Arrival, Script, Transcript};
 
-/// When the commands of these checks are named, and for how long the robot is watched after it.
-const NAMED: Tick = 6;
+/// When the last commands of these checks arrive, and for how long the robot is watched.
+const LAST: Tick = 6;
 const TICKS: Tick = 12;
-/// A robot may wait so long for a command that was named and does not come; robots of this project wait 10 s.
-const MISSING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(25);
 
-/// The command `text` with number `seq`, put before the clock of tick `sent`.
-fn delivery(kit: &Kit, seq: u64, text: &str, sent: Tick) -> Delivery {
-    Delivery {
+/// The command `text` from the sender of the kit's commands.
+fn arrival(kit: &Kit, text: &str, tick: Tick) -> Arrival {
+    Arrival {
         from: kit.sender(),
-        seq,
         text: text.to_owned(),
-        sent: Some(sent),
-        named: NAMED,
-        times: 1,
+        tick,
     }
 }
 
-fn script(deliveries: Vec<Delivery>) -> Script {
-    Script::with(TICKS, deliveries)
+fn told(kit: &Kit, arrivals: Vec<Arrival>) -> Result<Transcript, Failure> {
+    played(kit, &Script::with(TICKS, arrivals))
 }
 
-/// What was named and had been put is not missing.
-fn demand_none_missing(transcript: &Transcript) -> Result<(), Failure> {
-    let missing = transcript
-        .iter()
-        .find(|entry| !entry.report.missing.is_empty());
-    match missing {
-        None => Ok(()),
-        Some(entry) => {
-            let expected = format!(
-                "nothing is missing in tick {}: all had been sent",
-                entry.clock.tick
-            );
-            Err(Failure::new(
-                expected,
-                format!("{:?}", names(&entry.report.missing)),
-            ))
-        }
+/// For and against something that is seen in several places of a report.
+#[derive(Default)]
+struct Votes {
+    right: usize,
+    wrong: usize,
+}
+
+impl Votes {
+    fn is_broken(&self) -> bool {
+        self.right == 0 && self.wrong > 0
     }
 }
 
-fn names(ids: &[CommandId]) -> Vec<String> {
-    ids.iter()
-        .map(|id| format!("{} {}", id.from, id.seq))
-        .collect()
-}
-
-/// Two commands that arrive in one order and in the other are executed as the clock names them.
+/// Two commands in the same news have the effect of the same two in two ticks, in the same order.
 pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
     for [one, two] in kit.pairs() {
-        let (first, second) = (delivery(kit, 1, &one, 5), delivery(kit, 2, &two, 5));
-        let straight = played(kit, &script(vec![first.clone(), second.clone()]))?;
-        let crossed = played(kit, &script(vec![second, first]))?;
-        demand_none_missing(&straight)?;
-        demand_none_missing(&crossed)?;
-        demand_same(
-            kit,
-            "the order in which two commands arrive",
-            &straight,
-            &crossed,
-        )?;
-        // Whether the robot would show it at all.
-        let swapped = played(
-            kit,
-            &script(vec![delivery(kit, 1, &two, 5), delivery(kit, 2, &one, 5)]),
-        )?;
-        if !is_same(&straight, &swapped) {
+        let apart = |first: &str, second: &str| {
+            told(
+                kit,
+                vec![arrival(kit, first, LAST - 1), arrival(kit, second, LAST)],
+            )
+        };
+        let together = |first: &str, second: &str| {
+            told(
+                kit,
+                vec![arrival(kit, first, LAST), arrival(kit, second, LAST)],
+            )
+        };
+        let straight = values(&apart(&one, &two)?);
+        let swapped = values(&apart(&two, &one)?);
+        let votes = vote(&values(&together(&one, &two)?), &straight, &swapped);
+        let back = vote(&values(&together(&two, &one)?), &swapped, &straight);
+        for (votes, first, second) in [(&votes, &one, &two), (&back, &two, &one)] {
+            if votes.is_broken() {
+                return Err(Failure::new(
+                    format!(
+                        "news that list {first:?} and then {second:?} have their effect in this order"
+                    ),
+                    "the effect of the other order",
+                ));
+            }
+        }
+        if votes.right > 0 && back.right > 0 {
             return Ok(());
         }
     }
+
     let reason = format!(
-        "the robot reports the same in whatever order it is told {}; name commands that it understands with --say",
+        "the robot does not show in which order it executes {}; name commands that it understands with --say",
         shown(kit)
     );
     findings.skip("command.order", &reason);
     Ok(())
+}
+
+/// What the robot reports after the last command, by tick and field.
+fn values(transcript: &Transcript) -> BTreeMap<(Tick, String), Value> {
+    let mut values = BTreeMap::new();
+    for entry in transcript.iter().filter(|entry| entry.tick >= LAST) {
+        let report = serde_json::json!(entry.report);
+        let fields = report.as_object().into_iter().flatten();
+        for (name, value) in fields {
+            if name == "state_variables" {
+                for (variable, value) in value.as_object().into_iter().flatten() {
+                    values.insert((entry.tick, format!("{name}.{variable}")), value.clone());
+                }
+            } else if name != "log" && name != "commands" {
+                values.insert((entry.tick, name.clone()), value.clone());
+            }
+        }
+    }
+
+    values
+}
+
+/// Where `wanted` and `other` differ: does `came` have the value of the one, or of the other?
+fn vote(
+    came: &BTreeMap<(Tick, String), Value>,
+    wanted: &BTreeMap<(Tick, String), Value>,
+    other: &BTreeMap<(Tick, String), Value>,
+) -> Votes {
+    let mut votes = Votes::default();
+    for (at, value) in wanted {
+        if other.get(at) == Some(value) {
+            continue;
+        }
+        if came.get(at) == Some(value) {
+            votes.right += 1;
+        } else if came.get(at) == other.get(at) {
+            votes.wrong += 1;
+        }
+    }
+
+    votes
 }
 
 /// The pairs of commands that were tried.
@@ -98,105 +134,113 @@ fn shown(kit: &Kit) -> String {
         .join(", ")
 }
 
-/// A command that comes long before it is named does what one does that comes just in time.
-pub(super) fn held(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let [text, _] = kit.texts();
-    let in_time = played(kit, &script(vec![delivery(kit, 1, &text, NAMED)]))?;
-    let early = played(kit, &script(vec![delivery(kit, 1, &text, 1)]))?;
-    demand_none_missing(&in_time)?;
-    demand_none_missing(&early)?;
-    demand_same(
-        kit,
-        "that a command comes some ticks before it is named",
-        &in_time,
-        &early,
-    )
-}
-
-/// One command that is named twice does what two do.
+/// A command that is listed twice is executed twice.
 pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    for [text, _] in kit.pairs() {
-        let once = played(kit, &script(vec![delivery(kit, 1, &text, 5)]))?;
-        let two = played(
-            kit,
-            &script(vec![delivery(kit, 1, &text, 5), delivery(kit, 2, &text, 5)]),
-        )?;
-        let doubled = played(
-            kit,
-            &script(vec![Delivery {
-                times: 2,
-                ..delivery(kit, 1, &text, 5)
-            }]),
-        )?;
-        demand_none_missing(&doubled)?;
-        if kit.is_deterministic.get() == Some(&false) {
-            findings.skip(
-                "command.twice",
-                "the robot does not repeat itself, so that nothing can be compared",
-            );
-            return Ok(());
-        }
-        if is_same(&once, &two) {
-            continue;
-        }
-        if is_same(&once, &doubled) {
-            let (wanted, came) = difference(&two, &doubled).unwrap_or_default();
-            let expected =
-                format!("a command that is named twice in a row is executed twice: {wanted}");
-            return Err(Failure::new(expected, came));
-        }
+    if kit.is_deterministic.get() == Some(&false) {
+        findings.skip(
+            "command.twice",
+            "the robot does not repeat itself, so that nothing can be compared",
+        );
         return Ok(());
     }
+
+    let none = numbers(&told(kit, Vec::new())?);
+    for [text, _] in kit.pairs() {
+        let at = |tick| arrival(kit, &text, tick);
+        let once = numbers(&told(kit, vec![at(LAST)])?);
+        let apart = numbers(&told(kit, vec![at(LAST - 1), at(LAST)])?);
+        let doubled = numbers(&told(kit, vec![at(LAST), at(LAST)])?);
+        let mut votes = Votes::default();
+        let mut counter = String::new();
+        for (name, first) in &once {
+            let (Some(before), Some(second), Some(came)) =
+                (none.get(name), apart.get(name), doubled.get(name))
+            else {
+                continue;
+            };
+            // Only a variable that counts commands tells one execution from two.
+            let is_counter = first != before && first - before == second - first;
+            if is_counter && came == second {
+                votes.right += 1;
+            } else if is_counter && came == first {
+                votes.wrong += 1;
+                counter.clone_from(name);
+            }
+        }
+        if votes.is_broken() {
+            return Err(Failure::new(
+                format!("a command that the news list twice is executed twice: {text:?}"),
+                format!("{counter} counts it once"),
+            ));
+        }
+        if votes.right > 0 {
+            return Ok(());
+        }
+    }
+
     let reason = format!(
-        "the robot reports the same for one command and for two of them, of {}",
+        "no variable of the robot counts the commands that it executes, of {}",
         shown(kit)
     );
     findings.skip("command.twice", &reason);
     Ok(())
 }
 
-/// A command that is named and never comes is reported missing, alone, and the next tick is answered.
-pub(super) fn missing(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let [text, _] = kit.texts();
-    let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    let mut twist = Straight;
-    play(&mut stage, &welcome, &Script::quiet(NAMED - 1), &mut twist)?;
-    let from = kit.sender();
-    let id = |seq| CommandId {
-        from: from.clone(),
-        seq,
+/// The numbers among the variables of the last report.
+fn numbers(transcript: &Transcript) -> BTreeMap<String, f64> {
+    let Some(last) = transcript.last() else {
+        return BTreeMap::new();
     };
-    stage.put_command(&from, 1, (1, NAMED - 1), &text)?;
-    let news = protocol::messages::News {
-        commands: vec![id(1), id(99)],
-        ..Default::default()
-    };
-    let news = std::collections::BTreeMap::from([(kit.subject(), news)]);
-    let clock = protocol::messages::Clock {
-        epoch: 1,
-        tick: NAMED,
-        news,
-        end: None,
-    };
-    let (index, _) = stage.tick_within(&clock, MISSING_PATIENCE)?;
-    let missing = stage
-        .seen
-        .answers
-        .get(index)
-        .map(|answer| answer.reading.report.missing.clone());
-    let missing = missing.unwrap_or_default();
-    if missing != [id(99)] {
-        let expected = format!("missing: {:?}", names(&[id(99)]));
-        return Err(Failure::new(
-            expected,
-            format!("missing: {:?}", names(&missing)),
-        ));
+    let variables = last.report.state_variables.iter();
+
+    variables
+        .filter_map(|(name, value)| match value {
+            Variable::Number(number) => Some((name.clone(), *number)),
+            _ => None,
+        })
+        .collect()
+}
+
+/// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.
+pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+    let operator = RobotName::operator();
+    let none = told(kit, Vec::new())?;
+    let mut is_seen = false;
+    for [text, _] in kit.pairs() {
+        let own = told(kit, vec![arrival(kit, &text, LAST)])?;
+        let from_operator = told(
+            kit,
+            vec![Arrival {
+                from: operator.clone(),
+                ..arrival(kit, &text, LAST)
+            }],
+        )?;
+        let answer = from_operator
+            .iter()
+            .flat_map(|entry| &entry.commands)
+            .find(|sent| sent.to == operator.as_str());
+        if answer.is_some() {
+            return Err(Failure::new(
+                "no command to the operator, who is not a robot of the roster",
+                format!("one, after {text:?} from the operator"),
+            ));
+        }
+        if kit.is_deterministic.get() == Some(&false) || is_same(&own, &none) {
+            continue;
+        }
+        is_seen = true;
+        if is_same(&from_operator, &none) {
+            let sender = kit.sender();
+            return Err(Failure::new(
+                format!("{text:?} from the operator is executed like that from {sender}"),
+                "it has no effect at all",
+            ));
+        }
     }
-    let next = protocol::messages::Clock {
-        epoch: 1,
-        tick: NAMED + 1,
-        ..Default::default()
-    };
-    stage.tick(&next).map(drop)
+
+    if !is_seen {
+        let reason = format!("no effect of {} is seen", shown(kit));
+        findings.skip("operator.commands", &reason);
+    }
+    Ok(())
 }

@@ -1,19 +1,29 @@
 //! Starting over, and repeating oneself.
 
-use protocol::messages::{JoinRequest, Welcome};
+use std::time::Duration;
+
+use protocol::messages::{Delivery, JoinRequest, News, Performative, Point};
+use protocol::{Epoch, Tick};
 
 use super::{Findings, seated, usual};
-use crate::comparison::{demand_same, difference};
+use crate::comparison::{Difference, demand_same, difference};
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Script, Straight, Transcript, play};
-use crate::stage::{Options, Stage};
+use crate::script::{Entry, Script, Straight, Twist, play};
+use crate::stage::{Options, PATIENCE, Stage};
+
+/// No report comes within this time where it is not the robot's turn.
+const QUIET: Duration = Duration::from_millis(300);
+/// Ticks of an epoch that is to leave nothing behind, commands among them.
+const BUSY: Tick = 21;
+/// So many streams and seeds are tried, for so many ticks each.
+const DRAWS: u64 = 16;
+const DRAWN: Tick = 12;
 
 /// Another process, the same seed: the same reports.
 pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    let again = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight)?;
+    let again = play(&mut stage, &Script::usual(kit), &mut Straight)?;
     if let [Ok(request)] = &stage.seen.requests[..]
         && request.instance == kit.first_instance()
     {
@@ -23,42 +33,140 @@ pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), Failur
             Failure::new("an instance that no other process has", came),
         );
     }
+
     let found = difference(usual(kit)?, &again);
     if kit.is_deterministic.set(found.is_none()).is_err() {
         unreachable!("it is asked once whether the robot repeats itself");
     }
     match found {
         None => Ok(()),
-        Some((one, two)) => Err(Failure::new(
-            format!("another process reports the same for the same seed: {one}"),
-            two,
+        Some(Difference { first, second }) => Err(Failure::new(
+            format!("another process reports the same for the same seed: {first}"),
+            second,
         )),
     }
 }
 
+/// Where a robot wants to be, and how it gets there.
+type Moves = Vec<(Point, f64, f64)>;
+
+/// What is drawn is decided by the seed together with the stream that the welcome names. Each welcome is that of a
+/// further epoch, so that one process does for all.
+pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    // Of a robot that does not repeat itself nothing can be compared.
+    if kit.is_deterministic.get() == Some(&false) {
+        return Ok(());
+    }
+
+    let mut stage = seated(kit, Options::default())?;
+    play(&mut stage, &Script::quiet(DRAWN), &mut Straight)?;
+    let seed = stage.template.seed;
+    let stream = stage.template.stream.clone();
+    let mut by_stream = Vec::new();
+    let mut by_seed = Vec::new();
+    for number in 1..=DRAWS {
+        by_stream.push(moves(&mut stage, seed, format!("{stream}#{number}"))?);
+        if by_stream.last().is_some_and(Vec::is_empty) {
+            return Ok(());
+        }
+        by_seed.push(moves(&mut stage, seed + number, stream.clone())?);
+    }
+
+    let is_one = |moves: &[Moves]| moves.iter().all(|other| Some(other) == moves.first());
+    // Only where no two are the same is it certain that chance would have shown in the others as well.
+    let is_rich = |moves: &[Moves]| (1..moves.len()).all(|at| !moves[..at].contains(&moves[at]));
+    let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
+    if is_rich(&by_seed) && is_one(&by_stream) {
+        return Err(Failure::new(
+            expected,
+            "the name of the stream makes no difference, the seed does",
+        ));
+    }
+    if is_rich(&by_stream) && is_one(&by_seed) {
+        return Err(Failure::new(
+            expected,
+            "the seed makes no difference, the name of the stream does",
+        ));
+    }
+    Ok(())
+}
+
+/// How the robot moves in a further epoch with this seed and stream.
+fn moves(stage: &mut Stage<'_>, seed: u64, stream: String) -> Result<Moves, Failure> {
+    stage.template.seed = seed;
+    stage.template.stream = stream;
+    let asked = stage.seen.requests.len();
+    stage.begin_epoch(stage.epoch() + 1);
+    let played = play(stage, &Script::quiet(DRAWN), &mut Straight);
+    // A robot that does not start over shows nothing here; that is another rule's matter.
+    if stage.seen.requests.len() == asked {
+        return Ok(Moves::new());
+    }
+
+    let shown = |entry: &Entry| {
+        (
+            entry.report.proposal,
+            entry.report.speed_mps,
+            entry.report.direction_rad,
+        )
+    };
+    Ok(played?.iter().map(shown).collect())
+}
+
 /// The clock of a higher epoch: it joins again, and goes through the same ticks as a fresh process.
 pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    /// At tick 0 the robot is welcomed to the epoch that is over before it is welcomed to the next one.
+    struct WrongWelcome;
+    impl Twist for WrongWelcome {
+        fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+            if tick > 0 {
+                return Ok(());
+            }
+            let joining = join_again(stage)?;
+            stage.welcome_to(&joining, 1);
+            stage.settle(QUIET);
+            demand_silence(
+                stage,
+                "welcomed to epoch 1, no report for a clock of epoch 2",
+            )?;
+            stage.repeat();
+            let joining = join_again(stage)?;
+            stage.admit(joining);
+            stage.keeps_requests = false;
+            Ok(())
+        }
+    }
     let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    let [text, _] = kit.texts();
-    play(&mut stage, &welcome, &Script::quiet(7), &mut Straight)?;
-    // A command of the old epoch that was never named: it must not be taken for one of the new epoch.
-    stage.put_command(
-        &kit.sender(),
-        1,
-        (1, 7),
-        &format!("{text}, of an epoch that is over"),
-    )?;
-    let welcome = Welcome {
-        epoch: 2,
-        ..welcome
+    let busy = Script {
+        ticks: BUSY,
+        ..Script::usual(kit)
     };
-    stage.rejoin = Some(welcome.clone());
-    let again = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight);
-    demand_joined_again(&stage)?;
-    let mut again = again?;
-    demand_epoch(&again)?;
-    again.iter_mut().for_each(|entry| entry.report.epoch = 1);
+    play(&mut stage, &busy, &mut Straight)?;
+    let [text, _] = kit.texts();
+    // News of a tick that is never granted: nobody may take them for those of the next epoch.
+    stage.put_news(&News {
+        epoch: 1,
+        tick: stage.next_tick(),
+        commands: vec![Delivery {
+            from: kit.sender(),
+            performative: Performative::Achieve,
+            command: text,
+        }],
+        ..News::default()
+    })?;
+    let tokens_lost = stage.seen.tokens_lost;
+
+    stage.begin_epoch(2);
+    stage.keeps_requests = true;
+    let again = play(&mut stage, &Script::usual(kit), &mut WrongWelcome);
+    demand_same_process(&stage)?;
+    let again = again?;
+    if stage.seen.tokens_lost > tokens_lost {
+        return Err(Failure::new(
+            "its token stays declared when an epoch begins",
+            "it was undeclared",
+        ));
+    }
     demand_same(
         kit,
         "to start over in a further epoch instead of a new process",
@@ -67,37 +175,90 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     )
 }
 
-/// It asked to join again, once, as the process that it is.
-fn demand_joined_again(stage: &Stage<'_>) -> Result<(), Failure> {
-    let expected = "one more request to join, with the same name and instance, when a clock begins a higher epoch";
-    let who =
-        |request: &JoinRequest| format!("{} with instance {:?}", request.name, request.instance);
-    match &stage.seen.requests[..] {
-        [Ok(first), Ok(again)] if who(first) == who(again) => Ok(()),
-        [Ok(first), Ok(again)] => Err(Failure::new(
+/// A robot that has missed the beginning of an epoch joins again, too, and waits until it is named.
+pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    play(&mut stage, &Script::quiet(3), &mut Straight)?;
+    let tokens_lost = stage.seen.tokens_lost;
+
+    stage.begin_epoch(2);
+    stage.miss()?;
+    stage.keeps_requests = true;
+    stage.open(&News::default())?;
+    let joining = join_again(&mut stage)?;
+    stage.admit(joining);
+    stage.keeps_requests = false;
+    demand_same_process(&stage)?;
+    stage.settle(QUIET);
+    stage.repeat();
+    stage.settle(QUIET);
+    let expected = "admitted in tick 1 of an epoch, no report before its news name its generation";
+    demand_silence(&stage, expected)?;
+
+    let transcript = play(&mut stage, &Script::quiet(4), &mut Straight)?;
+    demand_epoch(&transcript, 2)?;
+    if stage.seen.tokens_lost > tokens_lost {
+        return Err(Failure::new(
+            "its token stays declared when it joins a further epoch",
+            "it was undeclared",
+        ));
+    }
+    Ok(())
+}
+
+fn join_again(stage: &mut Stage<'_>) -> Result<crate::stage::Joining, Failure> {
+    let epoch = stage.epoch();
+    stage.next_join(PATIENCE).map_err(|failure| {
+        let expected = format!("another request to join for a clock of epoch {epoch}");
+        Failure::new(expected, failure.came)
+    })
+}
+
+/// No report of the epoch under way has come.
+fn demand_silence(stage: &Stage<'_>, expected: &str) -> Result<(), Failure> {
+    let epoch = stage.epoch();
+    let mut reports = stage
+        .seen
+        .answers
+        .iter()
+        .map(|answer| &answer.reading.report);
+    match reports.find(|report| report.epoch == epoch) {
+        None => Ok(()),
+        Some(report) => Err(Failure::new(
             expected,
-            format!("{} and before {}", who(again), who(first)),
-        )),
-        [.., Err(error)] => Err(Failure::new(expected, error)),
-        requests => Err(Failure::new(
-            expected,
-            format!("{} more requests", requests.len().saturating_sub(1)),
+            format!("a report for tick {} of epoch {epoch}", report.tick),
         )),
     }
 }
 
-fn demand_epoch(transcript: &Transcript) -> Result<(), Failure> {
-    match transcript
-        .iter()
-        .find(|entry| entry.report.epoch != entry.clock.epoch)
-    {
+/// It asked to join again as the process that it is.
+fn demand_same_process(stage: &Stage<'_>) -> Result<(), Failure> {
+    let expected = "further requests to join with the same name and instance when an epoch begins";
+    let who =
+        |request: &JoinRequest| format!("{} with instance {:?}", request.name, request.instance);
+    let mut first = None;
+    for request in &stage.seen.requests {
+        let request = match request {
+            Ok(request) => who(request),
+            Err(error) => return Err(Failure::new(expected, error)),
+        };
+        let first = first.get_or_insert_with(|| request.clone());
+        if *first != request {
+            return Err(Failure::new(
+                expected,
+                format!("{request}, and before {first}"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn demand_epoch(transcript: &[Entry], epoch: Epoch) -> Result<(), Failure> {
+    match transcript.iter().find(|entry| entry.report.epoch != epoch) {
         None => Ok(()),
         Some(entry) => {
             let came = format!("epoch {}", entry.report.epoch);
-            Err(Failure::new(
-                format!("reports of epoch {}", entry.clock.epoch),
-                came,
-            ))
+            Err(Failure::new(format!("reports of epoch {epoch}"), came))
         }
     }
 }

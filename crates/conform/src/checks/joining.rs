@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use protocol::messages::{JoinAnswer, Refusal};
+use protocol::keys::{QUERIES, STATE};
+use protocol::messages::Refusal;
 
 use super::Findings;
 use crate::kit::Kit;
@@ -19,7 +20,7 @@ const GRACE: Duration = Duration::from_secs(10);
 
 /// Everything is declared before the token, and the token comes after the welcome.
 pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = Stage::open(kit, Options::default())?;
+    let mut stage = Stage::open_run(kit, Options::default())?;
     stage.prepare()?;
     let joining = stage.next_join(START_PATIENCE)?;
     stage.settle(HELD_BACK);
@@ -29,21 +30,25 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             "it came before",
         ));
     }
-    let welcome = stage.welcome();
-    stage.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
+    stage.admit(joining);
+    stage.keeps_requests = false;
     stage.until_ready()?;
+
+    // First what takes longest to look up later: a queryable that is missing now was declared after the token.
     let subject = kit.subject();
-    let commands = stage.keys.command(&subject, &kit.sender());
-    for (what, key) in [("clocks", stage.keys.clock()), ("commands", commands)] {
-        if !stage.is_heard(&kit.bus, &key)? {
-            let expected = format!("{what} are subscribed to before the token is declared");
-            return Err(Failure::new(
-                expected,
-                format!("the token is there, and nobody hears {key}"),
-            ));
+    for what in QUERIES.iter().chain([&STATE]) {
+        if stage.ask(what, "")?.is_none() {
+            let expected = format!("a queryable of {what} is declared before the token");
+            return Err(Failure::new(expected, "the token without it"));
         }
     }
-    play(&mut stage, &welcome, &Script::quiet(2), &mut Straight).map(drop)
+    for key in [stage.keys.clock(), stage.keys.news(&subject)] {
+        if !stage.is_heard(&key)? {
+            let expected = format!("a subscriber of {key} is declared before the token");
+            return Err(Failure::new(expected, "the token without it"));
+        }
+    }
+    play(&mut stage, &Script::quiet(2), &mut Straight).map(drop)
 }
 
 /// Refused for good, it ends and says why; refused because its place is taken, it tries again until its patience is over.
@@ -54,7 +59,7 @@ pub(super) fn refused(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = Stage::open(kit, Options::default())?;
+    let mut stage = Stage::open_run(kit, Options::default())?;
     let joining = stage.next_join(START_PATIENCE)?;
     let explanation = format!("no robot of {} has this name", stage.run);
     stage.refuse_join(&joining, Refusal::UnknownName, &explanation);
@@ -80,26 +85,26 @@ fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
 }
 
 fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = Stage::open(kit, Options::default())?;
+    let mut stage = Stage::open_run(kit, Options::default())?;
     stage.prepare()?;
     for _ in 0..TAKEN {
         let joining = stage.next_join(START_PATIENCE)?;
         stage.refuse_join(
             &joining,
             Refusal::NameTaken,
-            "another living process is it already",
+            "another process is this robot",
         );
     }
-    let welcome = stage.welcome();
     let joining = stage.next_join(PATIENCE).map_err(|failure| {
         Failure::new(
             "another request to join after its place was taken (name_taken)",
             failure.came,
         )
     })?;
-    stage.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
+    stage.admit(joining);
+    stage.keeps_requests = false;
     stage.until_ready()?;
-    play(&mut stage, &welcome, &Script::quiet(2), &mut Straight).map(drop)
+    play(&mut stage, &Script::quiet(2), &mut Straight).map(drop)
 }
 
 fn taken_for_ever(kit: &Kit) -> Result<(), Failure> {
@@ -108,8 +113,8 @@ fn taken_for_ever(kit: &Kit) -> Result<(), Failure> {
         ..Options::default()
     };
     let patience = Duration::from_secs(u64::from(options.patience_s)) + GRACE;
-    let mut stage = Stage::open(kit, options)?;
-    let explanation = "another living process is it already";
+    let mut stage = Stage::open_run(kit, options)?;
+    let explanation = "another process is this robot";
     let expected = "its process ends when its place stays taken for longer than CARS_PATIENCE_S";
     let first = stage.next_join(START_PATIENCE)?;
     stage.refuse_join(&first, Refusal::NameTaken, explanation);

@@ -1,8 +1,10 @@
 //! The checks: each takes a process of the robot, or several, through something and says what it finds.
 
 mod commands;
+mod ends;
 mod epochs;
 mod joining;
+mod news;
 mod queries;
 mod repeated;
 mod returns;
@@ -55,6 +57,22 @@ impl Findings {
         });
     }
 
+    /// Adds what another check found: the worse verdict counts.
+    fn merge(&mut self, other: Self) {
+        for (rule, verdict) in other.0 {
+            match verdict {
+                Verdict::Failed(failure) => self.fail(rule, failure),
+                Verdict::Passed => match self.0.get(rule) {
+                    None | Some(Verdict::Skipped { .. }) => {
+                        self.0.insert(rule, verdict);
+                    }
+                    _ => {}
+                },
+                Verdict::Skipped { reason } => self.skip(rule, &reason),
+            }
+        }
+    }
+
     /// A check of these rules came to its end, or broke off: then the first rule tells why, and nothing is known of the
     /// others.
     fn close(&mut self, rules: &[&'static str], end: Result<(), Failure>) {
@@ -84,11 +102,16 @@ const fn check(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 18] = [
-    check(&["command.missing"], commands::missing),
+const CHECKS: [Check; 24] = [
     check(&["join.refused"], joining::refused),
-    check(&["query.early"], queries::early),
-    check(&["return.numbers"], returns::numbers),
+    check(&["end.gone"], ends::gone),
+    check(&["query.at-once"], queries::at_once),
+    check(&["query.once"], queries::once),
+    check(&["end.clock"], ends::clock),
+    check(&["news.wait"], news::wait),
+    check(&["epoch.init"], epochs::init),
+    check(&["epoch.late"], epochs::late),
+    check(&["return.generation"], returns::generation),
     check(&["join.ready-last"], joining::ready_last),
     check(
         &[
@@ -99,18 +122,19 @@ const CHECKS: [Check; 18] = [
         ],
         queries::by_tick,
     ),
+    check(&["query.asking"], queries::asking),
     check(&["query.unknown"], queries::unknown),
     check(&["command.order"], commands::order),
-    check(&["command.held"], commands::held),
     check(&["command.twice"], commands::twice),
+    check(&["operator.commands"], commands::from_operator),
     check(&["clock.duplicate"], repeated::duplicate),
     check(&["clock.late"], repeated::late),
-    check(&["epoch.init"], epochs::init),
-    check(&["return.generation"], returns::generation),
     check(&["return.replaced"], returns::replaced),
-    check(&["end.sigterm"], ticks::sigterm),
+    check(&["end.sigterm"], ends::sigterm),
     check(&["compat.unknown-fields"], tolerance::unknown_fields),
     check(&["robust.malformed"], tolerance::malformed),
+    check(&["tick.answer"], ticks::unasked),
+    check(&["determinism.seed"], epochs::streams),
 ];
 
 /// Takes the robot through all checks that the wanted rules need.
@@ -120,11 +144,10 @@ pub(crate) fn all(
     workers: usize,
 ) -> Result<(Verdicts, Option<AnswerTimes>), CannotRun> {
     let mut findings = Findings::default();
-    let (end, times) = ticks::usual(kit, &mut findings)?;
-    let goes_on = end.is_ok();
-    findings.close(&ticks::USUAL, end);
-    if !goes_on {
-        let reason = "the robot does not get through the usual ticks, see tick.answer";
+    let (broken, times) = ticks::usual(kit, &mut findings)?;
+    if let Some(rule) = broken {
+        let reason = format!("the robot does not get through the usual ticks, see {rule}");
+        let reason = &reason;
         RULES
             .iter()
             .for_each(|rule| findings.skip(rule.name, reason));
@@ -147,8 +170,7 @@ pub(crate) fn all(
                     own.close(check.rules, end);
                     all.lock()
                         .unwrap_or_else(PoisonError::into_inner)
-                        .0
-                        .extend(own.0);
+                        .merge(own);
                 }
             });
         }
@@ -161,17 +183,15 @@ pub(crate) fn all(
 
 /// A robot that has joined a run of its own, ready for its first clock.
 fn seated(kit: &Kit, options: Options) -> Result<Stage<'_>, Failure> {
-    let mut stage = Stage::open(kit, options)?;
-    let welcome = stage.welcome();
-    stage.join(&welcome)?;
+    let mut stage = Stage::open_run(kit, options)?;
+    stage.join()?;
     Ok(stage)
 }
 
 /// A process of its own, taken straight through a script.
 fn played(kit: &Kit, script: &Script) -> Result<Transcript, Failure> {
     let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    play(&mut stage, &welcome, script, &mut Straight)
+    play(&mut stage, script, &mut Straight)
 }
 
 /// The usual ticks, as the robot went through them without any disturbance.
@@ -185,16 +205,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_rule_has_one_check() {
-        let checked = CHECKS
+    fn each_rule_has_a_check() {
+        let mut checked: Vec<&str> = CHECKS
             .iter()
             .flat_map(|check| check.rules)
             .chain(&ticks::USUAL)
-            .chain(&["determinism.seed"]);
-        let mut checked: Vec<&str> = checked.copied().collect();
+            .copied()
+            .collect();
         checked.sort_unstable();
+        checked.dedup();
+
         let mut rules: Vec<&str> = RULES.iter().map(|rule| rule.name).collect();
         rules.sort_unstable();
         assert_eq!(checked, rules);
+    }
+
+    #[test]
+    fn the_worse_verdict_counts() {
+        let broken = || Verdict::Failed(Failure::new("a", "b"));
+        let mut findings = Findings::default();
+        findings.skip("x", "nothing to see");
+        findings.merge(Findings([("x", Verdict::Passed)].into()));
+        assert_eq!(findings.0["x"], Verdict::Passed);
+        findings.merge(Findings([("x", broken())].into()));
+        findings.merge(Findings([("x", Verdict::Passed)].into()));
+        assert_eq!(findings.0["x"], broken());
     }
 }

@@ -1,22 +1,26 @@
-//! Questions: in every tick everybody learns of the tick before.
+//! Queries: in every tick all robots learn of the tick before.
 
-use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use bus::Reply;
 use protocol::keys::{QUERIES, STATE};
-use protocol::messages::{Answer, Clock, Point, PublicState};
+use protocol::messages::{Answer, Correction, News, Point, PublicState};
 use protocol::{Epoch, Tick, decode};
 
+use super::ends::play_until_asking;
 use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
 use crate::kit::Kit;
 use crate::report::Failure;
 use crate::script::{Entry, Script, Straight, Twist, play};
-use crate::stage::{Options, Stage};
+use crate::stage::{Options, PATIENCE, Stage};
 
-/// A query has its answer within this time, or has none.
-const QUESTION_PATIENCE: Duration = Duration::from_secs(3);
+/// A query that is answered at once has its reply within this time, also on a busy machine.
+const AT_ONCE: Duration = Duration::from_millis(1500);
+/// A robot whose tick takes so long could have answered during it.
+const COMPUTES: Duration = Duration::from_millis(80);
+/// The kit's own limit where it waits until all replies are in.
+const ALL_REPLIES: Duration = Duration::from_secs(4);
 /// The last tick before the odd queries.
 const LAST: Tick = 8;
 /// One tick in so many is asked about at length: that costs time.
@@ -43,13 +47,13 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
             ..Options::default()
         },
     )?;
-    let welcome = stage.welcome();
     let mut asker = Asker {
         findings: Findings::default(),
         before: None,
-        location: welcome.location,
+        location: stage.template.location,
     };
-    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut asker);
+    let played = play(&mut stage, &Script::usual(kit), &mut asker);
+    super::ticks::check_wire(&stage, findings);
     findings.0.extend(asker.findings.0);
     if stage.seen.states.is_empty() {
         let came = "in none of the ticks, although somebody subscribes";
@@ -58,7 +62,9 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
             Failure::new("its state is put for those who follow it", came),
         );
     }
-    played.map(drop)
+    played?;
+    demand_refused(&mut stage, findings);
+    Ok(())
 }
 
 /// The state of a tick, if that is what the robot shows.
@@ -115,7 +121,8 @@ pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState
 
 impl Twist for Asker {
     fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-        let (epoch, tick) = (entry.clock.epoch, entry.clock.tick);
+        let epoch = entry.epoch;
+        let tick = entry.tick;
         let expected = format!("asked with tick={}, the state of tick {tick}", tick + 1);
         // At once after the report: whoever comes with the next clock may ask.
         let mut came = state_of(stage, epoch, tick, &expected)?;
@@ -148,7 +155,7 @@ impl Twist for Asker {
 impl Asker {
     /// It stands where it was put, and else where it proposed.
     fn check_location(&mut self, entry: &Entry, now: &PublicState) {
-        let tick = entry.clock.tick;
+        let tick = entry.tick;
         let came = format!("{:?} in tick {tick}", now.location);
         self.location = entry.location;
         if now.location == self.location {
@@ -160,13 +167,8 @@ impl Asker {
                 .findings
                 .fail("tick.initial", Failure::new(expected, came));
         }
-        let is_corrected = entry
-            .clock
-            .news
-            .values()
-            .any(|news| news.correction.is_some());
-        let why = if is_corrected {
-            "as the clock corrects it"
+        let why = if entry.news.correction.is_some() {
+            "as its news correct it"
         } else {
             "as it proposed"
         };
@@ -195,7 +197,7 @@ impl Asker {
 
 /// What followers are sent comes before the report, in every tick once the robot knows that somebody follows.
 fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
-    let tick = entry.clock.tick;
+    let tick = entry.tick;
     let report = stage
         .seen
         .answers
@@ -242,18 +244,16 @@ fn check_state(entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     ))
 }
 
-/// Asked without an epoch, or without anything, it says the same.
+/// Queried without parameters, it shows its newest state.
 fn check_newest(stage: &Stage<'_>, tick: Tick, now: &PublicState) -> Result<(), Failure> {
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
-    for parameters in [String::new(), format!("tick={}", tick + 1)] {
-        let expected =
-            format!("asked with {parameters:?} after tick {tick}, the state of tick {tick}");
-        let came = state(stage.ask(STATE, &parameters)?, &expected)?;
-        if came != *now {
-            return Err(Failure::new(expected, format!("{came:?}")));
-        }
+
+    let expected = format!("asked without parameters after tick {tick}, the state of tick {tick}");
+    let came = state(stage.ask(STATE, "")?, &expected)?;
+    if came != *now {
+        return Err(Failure::new(expected, format!("{came:?}")));
     }
     Ok(())
 }
@@ -310,49 +310,17 @@ fn same_value(one: &serde_json::Value, two: &serde_json::Value) -> bool {
     }
 }
 
-/// A query that has been asked: where its answer comes.
-type Pending = Receiver<Option<Reply>>;
-
-/// Asks for the state of the tick before `tick`, and goes on.
-fn ask_early(stage: &Stage<'_>, epoch: Epoch, tick: &str) -> Result<Pending, Failure> {
-    let (sender, answer) = channel();
-    let key = stage.keys.query(&stage.kit.subject(), STATE);
-    stage
-        .kit
-        .bus
-        .get_then(&key, &format!("tick={tick};epoch={epoch}"), move |came| {
-            // Nobody waits for it any more where this check is over.
-            let _ = sender.send(came);
-        })?;
-    Ok(answer)
+/// Queried for what it does not have, it refuses at once, in words.
+fn demand_refused(stage: &mut Stage<'_>, findings: &mut Findings) {
+    let result = try_refused(stage);
+    findings.settle("query.tick", result);
 }
 
-/// The answer to it; `None` if there is none.
-fn answer_to(pending: &Pending) -> Option<Reply> {
-    pending.recv_timeout(QUESTION_PATIENCE).ok().flatten()
-}
-
-/// Asked for the report that comes next it waits; asked for any other that it does not have it refuses.
-pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    let pending = ask_early(&stage, 1, "1")?;
-    let welcome = stage.welcome();
-    play(&mut stage, &welcome, &Script::quiet(LAST), &mut Straight)?;
-    demand_state(&stage, &pending, 0, "before tick 0")?;
-
-    // Whether it is shown in time is another rule's matter.
-    late_state_of(&stage, 1, LAST, "the state of the last tick")??;
-    let pending = ask_early(&stage, 1, &(LAST + 2).to_string())?;
-    stage.tick(&Clock {
-        epoch: 1,
-        tick: LAST + 1,
-        ..Clock::default()
-    })?;
-    demand_state(&stage, &pending, LAST + 1, &format!("after tick {LAST}"))?;
-
-    let now = LAST + 1;
-    late_state_of(&stage, 1, now, "the state of the last tick")??;
+fn try_refused(stage: &Stage<'_>) -> Result<(), Failure> {
+    let now = stage.next_tick() - 1;
     let never = [
+        (1, now + 2),
+        (2, 1),
         (1, 0),
         (1, now - 1),
         (1, 1),
@@ -360,14 +328,11 @@ pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         (1, now + 1000),
         (0, now + 1),
     ];
-    let never = never.map(|(epoch, tick): (Epoch, Tick)| (epoch, tick.to_string()));
-    for (epoch, tick) in never
-        .into_iter()
-        .chain([(1, "soon".to_owned()), (1, "-1".to_owned())])
-    {
-        let expected =
-            format!("after tick {now}, an error reply in words to tick={tick};epoch={epoch}");
-        match answer_to(&ask_early(&stage, epoch, &tick)?) {
+    for (epoch, tick) in never {
+        let expected = format!(
+            "after tick {now} of epoch 1, an error reply in words to tick={tick};epoch={epoch}, at once"
+        );
+        match stage.state_in(epoch, tick)? {
             Some(Reply {
                 result: Err(words), ..
             }) if !words.trim().is_empty() => {}
@@ -382,46 +347,219 @@ pub(super) fn early(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             None => return Err(Failure::new(expected, "no reply")),
         }
     }
-    stage
-        .tick(&Clock {
-            epoch: 1,
-            tick: now + 1,
-            ..Clock::default()
-        })
-        .map(drop)
+    Ok(())
 }
 
-/// A query that came early has its answer as soon as there is one.
-fn demand_state(
-    stage: &Stage<'_>,
-    pending: &Pending,
-    tick: Tick,
-    asked: &str,
-) -> Result<(), Failure> {
-    // A robot that takes long for its tick answers when nobody waits for it any more.
-    if stage.repeated.contains(&(1, tick)) {
-        return Ok(());
+/// It answers at once, also while it computes, waits for its news, or waits for another robot's answer.
+pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+    while_computing(kit)?;
+    while_waiting_for_news(kit)?;
+    let is_asking = while_waiting_for_another(kit)?;
+    if !is_asking {
+        let reason = "nothing speaks against it, but the robot queried no other one, so that this was not seen while it \
+                      waits for another robot's answer";
+        findings.skip("query.at-once", reason);
     }
+    Ok(())
+}
+
+fn while_computing(kit: &Kit) -> Result<(), Failure> {
+    /// Queries each tick as soon as its clock is put.
+    struct Curious(usize);
+    impl Twist for Curious {
+        fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+            if tick > 0 {
+                self.0 = stage.begin_query(stage.epoch(), tick)?;
+            }
+            Ok(())
+        }
+
+        fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+            if entry.tick == 0 {
+                return Ok(());
+            }
+            let number = self.0;
+            let tick = entry.tick;
+            let expected = format!("queried during tick {tick}, a reply at once");
+            stage.until(&expected, PATIENCE, |stage| {
+                stage.seen.replies.contains_key(&number).then_some(())
+            })?;
+            let report = stage
+                .seen
+                .answers
+                .get(entry.index)
+                .map_or(usize::MAX, |answer| answer.order);
+            let is_late = stage
+                .seen
+                .replies
+                .get(&number)
+                .is_some_and(|(order, _)| *order > report);
+            if is_late && entry.took > COMPUTES {
+                let came = format!(
+                    "one after its report, which took {} ms",
+                    entry.took.as_millis()
+                );
+                return Err(Failure::new(expected, came));
+            }
+            Ok(())
+        }
+    }
+    let mut stage = seated(kit, Options::default())?;
+    play(&mut stage, &Script::usual(kit), &mut Curious(0)).map(drop)
+}
+
+fn while_waiting_for_news(kit: &Kit) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    play(&mut stage, &Script::quiet(3), &mut Straight)?;
+    let tick = stage.next_tick();
+    stage.withholds_news = true;
+    stage.open(&News {
+        correction: Some(Correction {
+            location: stage.body.stands,
+            blocked: true,
+        }),
+        ..News::default()
+    })?;
+    demand_reply(&mut stage, tick, "while it waits for its news")
+}
+
+/// Returns whether there was an occasion to see it.
+fn while_waiting_for_another(kit: &Kit) -> Result<bool, Failure> {
+    let mut stage = seated(
+        kit,
+        Options {
+            puts_states: false,
+            ..Options::default()
+        },
+    )?;
+    stage.cast.hold();
+    if !play_until_asking(&mut stage)? {
+        return Ok(false);
+    }
+
+    let tick = stage.next_tick() - 1;
+    demand_reply(
+        &mut stage,
+        tick,
+        "while it waits for another robot's answer",
+    )?;
+    stage.cast.release();
+    stage.complete()?;
+    Ok(true)
+}
+
+fn demand_reply(stage: &mut Stage<'_>, tick: Tick, when: &str) -> Result<(), Failure> {
+    let number = stage.begin_query(1, tick)?;
     let expected = format!(
-        "asked with tick={} {asked}, the state of tick {tick} once it is there",
-        tick + 1
+        "queried in tick {tick} {when}, the state of tick {} at once",
+        tick - 1
     );
-    let came = state(answer_to(pending), &expected)?;
-    if (came.epoch, came.tick) == (1, tick) {
+    let reply = stage
+        .until(&expected, AT_ONCE, |stage| {
+            stage.seen.replies.get(&number).cloned()
+        })
+        .map_err(|_| Failure::new(&expected, "no reply"))?;
+    let came = state(reply.1, &expected)?;
+    if came.tick + 1 == tick {
         return Ok(());
     }
+
     Err(Failure::new(
         expected,
-        format!("the state of tick {} of epoch {}", came.tick, came.epoch),
+        format!("the state of tick {}", came.tick),
     ))
 }
 
-/// Asked what nobody can answer, it gives no answer and goes on.
+/// What it asks others: with tick and epoch, not at tick 0, not those that it cannot reach.
+pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(
+        kit,
+        Options {
+            puts_states: false,
+            ..Options::default()
+        },
+    )?;
+    let played = play(&mut stage, &Script::usual(kit), &mut Straight)?;
+    let asked = stage.cast.asked();
+    if asked.is_empty() {
+        findings.skip("query.asking", "the robot queried no other one");
+        return Ok(());
+    }
+
+    for query in asked {
+        let (epoch, tick) = query.now;
+        let came = format!(
+            "a query of {} in tick {tick} with tick={} and epoch={}",
+            query.of,
+            query.tick.as_deref().unwrap_or("nothing"),
+            query.epoch.as_deref().unwrap_or("nothing"),
+        );
+        if tick == 0 {
+            return Err(Failure::new("no query at tick 0", came));
+        }
+        let is_stated = query.tick == Some(tick.to_string());
+        if !is_stated || query.epoch != Some(epoch.to_string()) {
+            let expected = format!("queries of tick {tick} with tick={tick};epoch={epoch}");
+            return Err(Failure::new(expected, came));
+        }
+        let entry = played.iter().find(|entry| entry.tick == tick);
+        if entry.is_some_and(|entry| entry.news.unreachable.contains(&query.of)) {
+            let expected = format!("no query of {} in tick {tick}: unreachable", query.of);
+            return Err(Failure::new(expected, came));
+        }
+    }
+    Ok(())
+}
+
+/// Each query has exactly one reply, the query object is let go of, and no key is served that is not its own.
+pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    play(&mut stage, &Script::quiet(3), &mut Straight)?;
+    let subject = kit.subject();
+    for what in QUERIES.iter().chain([&STATE]) {
+        let begun = Instant::now();
+        let key = stage.keys.query(&subject, what);
+        let replies = kit.bus.get_all(&key, "tick=4;epoch=1", ALL_REPLIES)?;
+        if replies.len() != 1 {
+            let came = format!("{} replies", replies.len());
+            return Err(Failure::new(
+                format!("one reply to a query of {what}"),
+                came,
+            ));
+        }
+        if begun.elapsed() > ALL_REPLIES / 2 {
+            return Err(Failure::new(
+                format!("it lets go of a query of {what} when it has replied"),
+                "a query that ends only because time is up",
+            ));
+        }
+    }
+
+    for what in ["percept", "news", "report", "panel", "waiting"] {
+        let key = stage.keys.query(&subject, what);
+        let replies = kit.bus.get_all(&key, "", ALL_REPLIES)?;
+        if !replies.is_empty() {
+            let expected = format!("no queryable of {what}: a robot serves its seven keys");
+            return Err(Failure::new(expected, "a reply"));
+        }
+    }
+    for other in stage.cast.names() {
+        let key = stage.keys.query(other, STATE);
+        let replies = kit.bus.get_all(&key, "tick=4;epoch=1", ALL_REPLIES)?;
+        if replies.len() > 1 {
+            let expected = format!("no reply of its own to a query of {other}");
+            return Err(Failure::new(expected, format!("{} replies", replies.len())));
+        }
+    }
+    Ok(())
+}
+
+/// Queried for what does not exist, it gives no answer and goes on.
 pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Odd;
     impl Twist for Odd {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-            if !entry.clock.tick.is_multiple_of(8) {
+            if !entry.tick.is_multiple_of(8) {
                 return Ok(());
             }
             for (what, parameters) in [
@@ -443,7 +581,6 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         }
     }
     let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    let asked = play(&mut stage, &welcome, &Script::usual(kit), &mut Odd)?;
-    demand_same(kit, "a query that nobody can answer", usual(kit)?, &asked)
+    let asked = play(&mut stage, &Script::usual(kit), &mut Odd)?;
+    demand_same(kit, "a query for what does not exist", usual(kit)?, &asked)
 }

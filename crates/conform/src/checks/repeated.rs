@@ -1,114 +1,107 @@
 //! The same clock again, and clocks that come too late.
 
-use protocol::keys::STATE;
-use protocol::messages::{Clock, Correction, News, Point, Report};
-use protocol::{Epoch, Seq, Tick};
+use std::collections::BTreeMap;
+
+use protocol::messages::{Clock, Correction, News, Point};
+use protocol::{Epoch, Tick};
 
 use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
 use crate::kit::Kit;
 use crate::report::Failure;
 use crate::script::{Entry, Script, Twist, play};
-use crate::stage::{Options, PATIENCE, Stage};
+use crate::stage::{Answer, Options, PATIENCE, Sent, Stage};
 
-/// One clock in so many comes again.
+/// One clock in so many comes again, and each whose tick had commands.
 const EVERY: Tick = 3;
 
 /// A clock that comes again is answered as before, and a tick is done once.
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    /// The commands of the last ticks: tick, seq.
-    struct Again(Vec<(Tick, Seq)>);
+    struct Again;
     impl Twist for Again {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-            let tick = entry.clock.tick;
-            self.0
-                .retain(|(sent, _)| sent + stage.welcome().repeat_ticks > tick);
-            self.0
-                .extend(entry.report.sent.iter().map(|sent| (tick, sent.seq)));
-            if !tick.is_multiple_of(EVERY) && self.0.is_empty() {
+            let tick = entry.tick;
+            if !tick.is_multiple_of(EVERY) && entry.commands.is_empty() {
                 return Ok(());
             }
-            // Whatever was put before its answer has come before it, on one session.
-            stage.ask(STATE, "")?;
+
             stage.drain();
-            let before = count(stage, tick);
-            let sent: Vec<usize> = self.0.iter().map(|sent| count_sent(stage, *sent)).collect();
-            stage.put_clock(&entry.clock)?;
+            let since = stage.seen.count;
+            stage.repeat();
             let expected = format!("the report of tick {tick} again when its clock comes again");
-            stage.until(&expected, PATIENCE, |stage| {
-                (count(stage, tick) > before).then_some(())
+            let again = stage.until(&expected, PATIENCE, |stage| {
+                answers_of(stage, tick)
+                    .find(|answer| answer.order >= since)
+                    .map(|answer| (answer.order, answer.bytes.clone()))
             })?;
-            // On one session, what was put before it has come before it.
-            for (of, sent) in self.0.iter().zip(sent) {
-                if count_sent(stage, *of) == sent {
-                    let expected = format!(
-                        "command {} of tick {} again, before the report, when the clock of tick {tick} comes again",
-                        of.1, of.0
-                    );
-                    return Err(Failure::new(expected, "the report alone"));
-                }
-            }
-            demand_same_bytes(stage, tick)
+            let first = answers_of(stage, tick)
+                .next()
+                .map(|answer| answer.bytes.clone());
+            demand_bytes("report", &first.unwrap_or_default(), &again.1)?;
+            demand_commands(stage, entry, since, again.0)
         }
     }
     let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    let repeated = play(
-        &mut stage,
-        &welcome,
-        &Script::usual(kit),
-        &mut Again(Vec::new()),
-    )?;
+    let repeated = play(&mut stage, &Script::usual(kit), &mut Again)?;
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
 }
 
-fn count_of(stage: &Stage<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
-    let is_of = |report: &Report| (report.epoch, report.tick) == (epoch, tick);
+fn answers_of<'s>(stage: &'s Stage<'_>, tick: Tick) -> impl Iterator<Item = &'s Answer> {
     stage
         .seen
         .answers
         .iter()
-        .filter(|answer| is_of(&answer.reading.report))
-        .count()
+        .filter(move |answer| answer.reading.report.tick == tick)
 }
 
-fn count(stage: &Stage<'_>, tick: Tick) -> usize {
-    stage
-        .seen
-        .answers
-        .iter()
-        .filter(|answer| answer.reading.report.tick == tick)
-        .count()
-}
-
-/// How often a command came so far.
-fn count_sent(stage: &Stage<'_>, of: (Tick, Seq)) -> usize {
-    let is_it = |sent: &&crate::stage::Sent| {
-        sent.command
-            .as_ref()
-            .is_ok_and(|command| (command.tick, command.seq) == of)
-    };
-    stage.seen.commands.iter().filter(is_it).count()
-}
-
-fn demand_same_bytes(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
-    let mut reports = stage
-        .seen
-        .answers
-        .iter()
-        .filter(|answer| answer.reading.report.tick == tick);
-    let first = reports.next().map(|answer| &answer.bytes);
-    match reports.find(|answer| Some(&answer.bytes) != first) {
-        None => Ok(()),
-        Some(other) => {
-            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-            let expected = first.map(|bytes| text(bytes)).unwrap_or_default();
-            Err(Failure::new(
-                format!("the same report again: {expected}"),
-                text(&other.bytes),
-            ))
+/// The commands of the tick came again between two places among all that came: all of them, and the same bytes.
+fn demand_commands(
+    stage: &Stage<'_>,
+    entry: &Entry,
+    since: usize,
+    report: usize,
+) -> Result<(), Failure> {
+    let tick = entry.tick;
+    let mut again: BTreeMap<u32, &Sent> = BTreeMap::new();
+    for sent in &stage.seen.commands {
+        let Ok(command) = &sent.command else { continue };
+        let is_between = sent.order >= since && sent.order < report;
+        if command.tick == tick && is_between {
+            again.insert(command.number, sent);
         }
     }
+
+    for first in &entry.commands {
+        let Ok(command) = &first.command else {
+            continue;
+        };
+        let Some(repeated) = again.get(&command.number) else {
+            let expected = format!(
+                "command {} of tick {tick} again, before the report, when the clock of tick {tick} comes again",
+                command.number
+            );
+            return Err(Failure::new(expected, "the report without it"));
+        };
+        demand_bytes("command", &first.bytes, &repeated.bytes)?;
+    }
+    Ok(())
+}
+
+fn demand_bytes(what: &str, first: &[u8], again: &[u8]) -> Result<(), Failure> {
+    if first == again {
+        return Ok(());
+    }
+
+    Err(Failure::new(
+        format!("the same {what} again: {}", String::from_utf8_lossy(first)),
+        String::from_utf8_lossy(again),
+    ))
+}
+
+fn count_of(stage: &Stage<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
+    answers_of(stage, tick)
+        .filter(|answer| answer.reading.report.epoch == epoch)
+        .count()
 }
 
 /// Clocks of earlier ticks and epochs come too late to be answered.
@@ -116,32 +109,29 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// Reports that had come for the late clocks' epochs and ticks before they were put.
     struct Late(Vec<((Epoch, Tick), usize)>);
     impl Twist for Late {
-        fn before(&mut self, stage: &mut Stage<'_>, clock: &Clock) -> Result<(), Failure> {
-            if clock.tick < 6 || !clock.tick.is_multiple_of(EVERY) {
+        fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+            if tick < 6 || !tick.is_multiple_of(EVERY) {
                 return Ok(());
             }
-            // Would it heed them, it would stand elsewhere.
-            let correction = Some(Correction {
-                location: Point::new(1.0, 1.0),
-                blocked: true,
-            });
-            let news = News {
-                correction,
-                ..News::default()
-            };
-            let news = std::collections::BTreeMap::from([(stage.kit.subject(), news)]);
-            let late = [
-                (1, clock.tick - 2),
-                (1, clock.tick - 5),
-                (0, clock.tick),
-                (0, clock.tick + 9),
-            ];
+
+            let late = [(1, tick - 2), (1, tick - 5), (0, tick), (0, tick + 9)];
             self.0 = late.map(|of| (of, count_of(stage, of))).into();
+            let flag = stage.flag();
             for (epoch, tick) in late {
+                // If it took them for its own, it would stand elsewhere.
+                stage.put_news(&News {
+                    epoch,
+                    tick,
+                    correction: Some(Correction {
+                        location: Point::new(1.0, 1.0),
+                        blocked: true,
+                    }),
+                    ..News::default()
+                })?;
                 stage.put_clock(&Clock {
                     epoch,
                     tick,
-                    news: news.clone(),
+                    news: flag,
                     end: None,
                 })?;
             }
@@ -150,11 +140,11 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 
         fn after(&mut self, stage: &mut Stage<'_>, _: &Entry) -> Result<(), Failure> {
             // In order on one link: an answer to a late clock would have come before that to this one.
-            match self
+            let answered = self
                 .0
                 .iter()
-                .find(|(of, before)| count_of(stage, *of) > *before)
-            {
+                .find(|(of, before)| count_of(stage, *of) > *before);
+            match answered {
                 None => Ok(()),
                 Some(((epoch, tick), _)) => {
                     let came = format!("a report for tick {tick} of epoch {epoch}");
@@ -164,13 +154,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         }
     }
     let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    let played = play(
-        &mut stage,
-        &welcome,
-        &Script::usual(kit),
-        &mut Late(Vec::new()),
-    )?;
+    let played = play(&mut stage, &Script::usual(kit), &mut Late(Vec::new()))?;
     demand_same(
         kit,
         "a clock of an earlier tick or epoch",

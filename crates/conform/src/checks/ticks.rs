@@ -1,68 +1,75 @@
 //! The usual ticks, undisturbed: what every robot does, all the time.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use nix::sys::signal::Signal;
 use protocol::PROTOCOL_VERSION;
-use protocol::messages::{Clock, End, JoinAnswer, Performative};
+use protocol::messages::Performative;
+use protocol::name::OPERATOR;
 
 use super::{Findings, seated};
 use crate::kit::{CannotRun, Kit};
 use crate::report::{AnswerTimes, Failure};
-use crate::script::{Script, Straight, Transcript, play};
-use crate::stage::{Joining, Options, PATIENCE, START_PATIENCE, Stage};
+use crate::script::{Entry, Script, Straight, Transcript, play};
+use crate::stage::{Joining, Options, START_PATIENCE, Sent, Stage};
 
 /// The rules that the usual ticks show.
-pub(super) const USUAL: [&str; 6] = [
+pub(super) const USUAL: [&str; 7] = [
     "tick.answer",
     "join.request",
     "command.sent",
     "number.angles",
     "number.finite",
-    "end.clock",
+    "number.integers",
+    "wire.qos",
 ];
 
-/// A process that is told to end does so within this time. The page says 2 s; a busy machine may need more.
-const END_PATIENCE: Duration = Duration::from_secs(5);
-/// Whatever a robot said beside its reports has arrived after this time.
+/// Whatever a robot put beside its reports has arrived after this time.
 const ECHO: Duration = Duration::from_millis(200);
 /// How far an angle may be from a multiple of 1e-6 rad, in such multiples: what binary fractions leave.
 const ANGLE_TOLERANCE: f64 = 1e-3;
 /// Half a turn, rounded as angles are, in units of 1e-6 rad.
 const HALF_TURN: f64 = 3_141_593.0;
 
-/// Plays the usual ticks, and keeps them for comparison. It is here that the robot is met for the first time.
+/// Plays the usual ticks, and keeps them for comparison. It is here that the robot is met for the first time. Returns the
+/// rule that keeps the robot from getting through them, if one does.
 pub(super) fn usual(
     kit: &Kit,
     findings: &mut Findings,
-) -> Result<(Result<(), Failure>, Option<AnswerTimes>), CannotRun> {
+) -> Result<(Option<&'static str>, Option<AnswerTimes>), CannotRun> {
     let cannot =
         |failure: Failure| CannotRun::Robot(format!("{}: {}", failure.expected, failure.came));
-    let mut stage =
-        Stage::open(kit, Options::default()).map_err(|failure| CannotRun::Robot(failure.came))?;
+    let mut stage = Stage::open_run(kit, Options::default())
+        .map_err(|failure| CannotRun::Robot(failure.came))?;
     let joining = stage.next_join(START_PATIENCE).map_err(cannot)?;
     let request = joining.request.clone().map_err(CannotRun::Robot)?;
     kit.learn(&request)?;
     findings.settle("join.request", check_request(&stage, &joining));
     stage.prepare().map_err(cannot)?;
-    let welcome = stage.welcome();
-    stage.answer_join(&joining, &JoinAnswer::Welcome(Box::new(welcome.clone())));
+    stage.admit(joining);
+    stage.keeps_requests = false;
     stage.until_ready().map_err(cannot)?;
 
-    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight);
+    let played = play(&mut stage, &Script::usual(kit), &mut Straight);
+    check_wire(&stage, findings);
     let transcript = match played {
         Ok(transcript) => transcript,
-        Err(failure) => return Ok((Err(failure), None)),
+        Err(failure) => {
+            let broken = if stage.incomplete().is_some() {
+                "command.sent"
+            } else {
+                "tick.answer"
+            };
+            findings.close(&[&[broken], &USUAL[..]].concat(), Err(failure));
+            return Ok((Some(broken), None));
+        }
     };
-    let last = transcript
-        .last()
-        .map(|entry| entry.clock.clone())
-        .unwrap_or_default();
     stage.settle(ECHO);
-    findings.settle("end.clock", check_end(&mut stage, &last));
     findings.settle("tick.answer", check_answers(&stage, &transcript));
-    check_sent(&stage, &transcript, findings);
+    check_commands(&stage, &transcript, findings);
     check_numbers(&stage, &transcript, findings);
+    findings.close(&USUAL, Ok(()));
+
     let times = transcript
         .iter()
         .map(|entry| entry.took.as_secs_f64() * 1e3)
@@ -70,10 +77,10 @@ pub(super) fn usual(
     if kit.usual.set(transcript).is_err() {
         unreachable!("the usual ticks are played once");
     }
-    Ok((Ok(()), AnswerTimes::of(times)))
+    Ok((None, AnswerTimes::of(times)))
 }
 
-/// What a request to join must say.
+/// What a request to join must contain.
 fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
     let Ok(request) = &joining.request else {
         return Ok(());
@@ -85,6 +92,7 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
             Err(Failure::new(expected, came))
         }
     };
+
     let version = request.protocol;
     expect(
         version == PROTOCOL_VERSION,
@@ -93,13 +101,12 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
     )?;
     expect(
         request.run == stage.run,
-        format!("run {}, as CARS_RUN says", stage.run),
+        format!("run {}, the value of CARS_RUN", stage.run),
         format!("run {}", request.run),
     )?;
-    let instance = "an instance that tells this process from all others";
     expect(
         !request.instance.is_empty(),
-        instance.to_owned(),
+        "an instance that no other process has".to_owned(),
         "an empty one".to_owned(),
     )?;
     let own = stage.keys.join_as(&request.name);
@@ -110,29 +117,29 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
     )
 }
 
-/// One report for each clock, and none else.
+/// One report for each clock, and no other.
 fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure> {
     if let Some(unreadable) = stage.seen.unreadable.first() {
         return Err(Failure::new("reports that can be read", unreadable));
     }
-    let generation = stage.welcome().generation;
+
     for (index, answer) in stage.seen.answers.iter().enumerate() {
         let report = &answer.reading.report;
-        let (epoch, tick) = (report.epoch, report.tick);
+        let epoch = report.epoch;
+        let tick = report.tick;
         let came = format!(
             "epoch {epoch}, tick {tick}, generation {}",
             report.generation
         );
-        let Some(entry) = transcript.iter().find(|entry| entry.clock.tick == tick) else {
-            return Err(Failure::new("reports for ticks that were granted", came));
-        };
-        let (wanted, tick) = (entry.clock.epoch, entry.clock.tick);
-        if (epoch, report.generation) != (wanted, generation) {
-            let expected = format!("epoch {wanted}, tick {tick}, generation {generation}");
+        let granted = transcript
+            .iter()
+            .find(|entry| (entry.epoch, entry.tick) == (epoch, tick));
+        let Some(entry) = granted.filter(|_| report.generation == 1) else {
+            let expected = "reports of generation 1 for ticks that were granted";
             return Err(Failure::new(expected, came));
-        }
-        // A clock that was repeated while it was awaited may have been answered twice.
-        if entry.index != index && !stage.repeated.contains(&(wanted, tick)) {
+        };
+        // A clock that was repeated while its report was awaited may have been answered twice.
+        if entry.index != index && !stage.repeated.contains(&(epoch, tick)) {
             return Err(Failure::new(
                 format!("one report for tick {tick}"),
                 "more than one",
@@ -142,158 +149,161 @@ fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failu
     Ok(())
 }
 
-/// What it commands, its reports list.
-fn check_sent(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Findings) {
-    let has_sent = transcript.iter().any(|entry| !entry.report.sent.is_empty());
-    if !has_sent && stage.seen.commands.is_empty() {
+/// No clock, no report.
+pub(super) fn unasked(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    stage.settle(ECHO);
+    if let Some(answer) = stage.seen.answers.first() {
+        let came = format!("a report for tick {}", answer.reading.report.tick);
+        return Err(Failure::new("no report before the first clock", came));
+    }
+    let transcript = play(&mut stage, &Script::quiet(2), &mut Straight)?;
+    stage.settle(ECHO);
+    check_answers(&stage, &transcript)
+}
+
+/// Commands and reports fit together.
+fn check_commands(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Findings) {
+    let has_stated = transcript.iter().any(|entry| entry.report.commands > 0);
+    if !has_stated && stage.seen.commands.is_empty() {
         return findings.skip(
             "command.sent",
             "the robot sent no command in the usual ticks",
         );
     }
-    findings.settle(
-        "command.sent",
-        check_seqs(transcript, 0).and_then(|()| match_sent(stage, transcript)),
-    );
+
+    let checked = check_stamps(stage, transcript);
+    let checked = checked.and_then(|()| {
+        transcript
+            .iter()
+            .try_for_each(|entry| check_tick(stage, entry))
+    });
+    findings.settle("command.sent", checked);
 }
 
-/// What reports list is numbered from `last_seq` on, without a gap.
-pub(super) fn check_seqs(transcript: &Transcript, last_seq: u64) -> Result<(), Failure> {
-    for (seq, Entry { tick, sent }) in (last_seq + 1..).zip(transcript.iter().flat_map(Entry::of)) {
-        if sent.seq != seq || sent.performative != Performative::Achieve {
-            let expected = format!("seq {seq}, performative achieve, in tick {tick}");
-            let came = format!("seq {}, performative {}", sent.seq, sent.performative);
-            return Err(Failure::new(expected, came));
+/// Each command can be read, is of a tick that was granted, and goes to another robot of the roster.
+fn check_stamps(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure> {
+    let subject = stage.kit.subject();
+    for sent in &stage.seen.commands {
+        let command = match &sent.command {
+            Ok(command) => command,
+            Err(error) => return Err(Failure::new("commands that can be read", error)),
+        };
+        let is_granted = transcript
+            .iter()
+            .any(|entry| (entry.epoch, entry.tick) == (command.epoch, command.tick));
+        let is_own = sent.from == subject.as_str();
+        // That the operator is not commanded is a rule of its own.
+        let is_known = sent.to == OPERATOR
+            || stage
+                .template
+                .roster
+                .iter()
+                .any(|name| name.as_str() == sent.to);
+        let is_right = command.generation == 1 && command.performative == Performative::Achieve;
+        if !(is_granted && is_own && is_known && is_right) {
+            let expected = format!(
+                "commands of generation 1 and of a tick that was granted, performative achieve, from {subject} to robots \
+                 of the roster"
+            );
+            return Err(Failure::new(expected, describe(sent)));
         }
     }
     Ok(())
 }
 
-/// Each command that a report lists was put, and each that was put is listed.
-fn match_sent(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure> {
-    let mut listed = Vec::new();
-    for Entry { tick, sent } in transcript.iter().flat_map(Entry::of) {
-        let matches = |came: &&crate::stage::Sent| {
-            came.command.as_ref().is_ok_and(|command| {
-                came.to == sent.to.as_str()
-                    && (command.seq, command.tick) == (sent.seq, tick)
-                    && (command.performative, &command.command)
-                        == (sent.performative, &sent.command)
-            })
-        };
-        if stage.seen.commands.iter().find(matches).is_none() {
-            let expected = format!(
-                "command {} of tick {tick} on the key of {}, as the report lists it",
-                sent.seq, sent.to
-            );
-            let came = stage
-                .seen
-                .commands
-                .iter()
-                .map(describe)
-                .collect::<Vec<_>>()
-                .join("; ");
-            return Err(Failure::new(
-                expected,
-                if came.is_empty() {
-                    "no command at all".into()
-                } else {
-                    came
-                },
-            ));
+/// The commands of a tick are numbered from 1, are as many as the report states, and were put before it.
+fn check_tick(stage: &Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+    let tick = entry.tick;
+    let report = stage
+        .seen
+        .answers
+        .get(entry.index)
+        .map_or(usize::MAX, |answer| answer.order);
+    let mut first: BTreeMap<u32, &Sent> = BTreeMap::new();
+    for sent in &stage.seen.commands {
+        let Ok(command) = &sent.command else { continue };
+        if (command.epoch, command.tick) != (entry.epoch, tick) {
+            continue;
         }
-        listed.push((sent.to.as_str(), sent.seq));
+        let known = *first.entry(command.number).or_insert(sent);
+        if known.bytes != sent.bytes || known.to != sent.to {
+            let expected = format!("one command with number {} in tick {tick}", command.number);
+            return Err(Failure::new(expected, describe(sent)));
+        }
     }
-    let is_unlisted = |came: &&crate::stage::Sent| {
-        !came
-            .command
-            .as_ref()
-            .is_ok_and(|command| listed.contains(&(came.to.as_str(), command.seq)))
-    };
-    match stage.seen.commands.iter().find(is_unlisted) {
+
+    let stated = entry.report.commands;
+    let wanted: BTreeSet<u32> = (1..=stated).collect();
+    let numbers: BTreeSet<u32> = first.keys().copied().collect();
+    if numbers != wanted {
+        return Err(Failure::new(
+            format!("in tick {tick} the commands 1 to {stated}, since the report states {stated}"),
+            format!("commands with the numbers {numbers:?}"),
+        ));
+    }
+    match first.values().find(|sent| sent.order > report) {
         None => Ok(()),
-        Some(came) => Err(Failure::new(
-            "a report that lists each command",
-            describe(came),
+        Some(sent) => Err(Failure::new(
+            format!("the commands of tick {tick} before its report"),
+            format!("after it, {}", describe(sent)),
         )),
     }
 }
 
-/// A command in a report.
-struct Entry<'t> {
-    tick: u64,
-    sent: &'t protocol::messages::SentCommand,
-}
-
-impl<'t> Entry<'t> {
-    fn of(entry: &'t crate::script::Entry) -> impl Iterator<Item = Self> {
-        entry.report.sent.iter().map(|sent| Self {
-            tick: entry.clock.tick,
-            sent,
-        })
-    }
-}
-
-fn describe(sent: &crate::stage::Sent) -> String {
+fn describe(sent: &Sent) -> String {
     match &sent.command {
-        Ok(command) => {
-            format!(
-                "to {}: seq {} of tick {}: {:?}",
-                sent.to, command.seq, command.tick, command.command
-            )
-        }
+        Ok(command) => format!(
+            "from {} to {}: number {} of tick {}, epoch {}, generation {}, {}: {:?}",
+            sent.from,
+            sent.to,
+            command.number,
+            command.tick,
+            command.epoch,
+            command.generation,
+            command.performative,
+            command.command
+        ),
         Err(error) => error.clone(),
     }
 }
 
-/// Angles as they are published, and numbers that are numbers.
+/// How messages were put.
+pub(super) fn check_wire(stage: &Stage<'_>, findings: &mut Findings) {
+    if let Some(wrong) = stage.seen.wrong_qos.first() {
+        let expected = "put with congestion control block, not express, with the default priority";
+        findings.fail("wire.qos", Failure::new(expected, wrong));
+    }
+}
+
+/// Angles as they are published, and numbers that are finite and written as they should be.
 fn check_numbers(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Findings) {
     for answer in &stage.seen.answers {
         let tick = answer.reading.report.tick;
         if let Some(field) = answer.reading.not_numbers.first() {
-            let came = format!("{field} is none in tick {tick}");
+            let came = format!("{field} is not finite in tick {tick}");
             findings.fail("number.finite", Failure::new("finite numbers only", came));
         }
+        if let Some(field) = answer.reading.not_integers.first() {
+            let came = format!("{field} of the report of tick {tick}");
+            let expected = "integers without a fraction";
+            findings.fail("number.integers", Failure::new(expected, came));
+        }
     }
+    if let Some(field) = stage.seen.not_integers.first() {
+        let came = format!("{field} of a command");
+        let expected = "integers without a fraction";
+        findings.fail("number.integers", Failure::new(expected, came));
+    }
+
     for entry in transcript {
-        let (micro, tick) = (entry.report.direction_rad * 1e6, entry.clock.tick);
+        let micro = entry.report.direction_rad * 1e6;
         let is_rounded = (micro - micro.round()).abs() <= ANGLE_TOLERANCE;
         let is_minus_zero = micro == 0.0 && micro.is_sign_negative();
         if !is_rounded || is_minus_zero || micro.round().abs() > HALF_TURN {
             let expected = "direction_rad from -pi to pi, rounded to 1e-6 rad, 0 instead of -0";
-            let came = format!("{} in tick {tick}", entry.report.direction_rad);
+            let came = format!("{} in tick {}", entry.report.direction_rad, entry.tick);
             findings.fail("number.angles", Failure::new(expected, came));
         }
     }
-}
-
-/// The end of the run: it goes, as it should.
-fn check_end(stage: &mut Stage<'_>, last: &Clock) -> Result<(), Failure> {
-    let end = Clock {
-        end: Some(End::Finished),
-        news: [].into(),
-        ..last.clone()
-    };
-    stage.put_clock(&end)?;
-    let status = stage.until_ended(
-        "its process ends after the clock that ends the run",
-        PATIENCE,
-    )?;
-    if status.code() != Some(0) {
-        return Err(Failure::new(
-            "exit status 0 after the clock that ends the run",
-            stage.process.fate(),
-        ));
-    }
-    stage.until_gone()
-}
-
-/// Told to end by a signal, in the middle of a run.
-pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    play(&mut stage, &welcome, &Script::quiet(3), &mut Straight)?;
-    stage.process.signal(Signal::SIGTERM);
-    stage.until_ended("its process ends within 2 s of SIGTERM", END_PATIENCE)?;
-    stage.until_gone()
 }

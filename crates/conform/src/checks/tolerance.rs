@@ -1,6 +1,7 @@
-//! What a robot must bear: fields that it does not know, and messages that are none.
+//! What a robot must tolerate: unknown fields and malformed messages.
 
-use protocol::messages::{Clock, MAX_TEXT_BYTES};
+use protocol::Tick;
+use protocol::messages::MAX_TEXT_BYTES;
 
 use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
@@ -9,7 +10,7 @@ use crate::report::Failure;
 use crate::script::{Script, Straight, Twist, play};
 use crate::stage::{Options, Stage};
 
-/// Later versions of the contract add fields: everything the robot hears carries some.
+/// Later versions of the contract add fields: everything that the robot receives carries some.
 pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(
         kit,
@@ -18,39 +19,44 @@ pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), Failure>
             ..Options::default()
         },
     )?;
-    let welcome = stage.welcome();
-    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Straight)?;
-    demand_same(kit, "a field that nobody knows", usual(kit)?, &played)
+    let played = play(&mut stage, &Script::usual(kit), &mut Straight)?;
+    demand_same(kit, "an unknown field", usual(kit)?, &played)
 }
 
-/// Messages that cannot be understood change nothing.
+/// Messages that cannot be understood change nothing, and are reported.
 pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Rubbish;
     impl Twist for Rubbish {
-        fn before(&mut self, stage: &mut Stage<'_>, clock: &Clock) -> Result<(), Failure> {
-            if clock.tick % 4 != 1 {
+        fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+            if tick % 4 != 1 {
                 return Ok(());
             }
-            let (tick, subject) = (clock.tick, stage.kit.subject());
-            for rubbish in clocks(tick, subject.as_str()) {
+            for rubbish in clocks(tick) {
                 stage.put_as_clock(&rubbish)?;
             }
-            let key = stage.keys.command(&subject, &stage.kit.sender());
-            for rubbish in commands(tick) {
-                stage.kit.bus.put(&key, rubbish)?;
+            for rubbish in news(tick) {
+                stage.put_as_news(&rubbish)?;
             }
             Ok(())
         }
     }
     let mut stage = seated(kit, Options::default())?;
-    let welcome = stage.welcome();
-    let played = play(&mut stage, &welcome, &Script::usual(kit), &mut Rubbish)?;
+    let before = stage.process.error_bytes();
+    let played = play(&mut stage, &Script::usual(kit), &mut Rubbish)?;
     demand_same(
         kit,
         "a message that cannot be understood",
         usual(kit)?,
         &played,
-    )
+    )?;
+
+    if stage.process.error_bytes() == before {
+        return Err(Failure::new(
+            "messages that cannot be understood are reported on its standard error",
+            "nothing",
+        ));
+    }
+    Ok(())
 }
 
 /// Not JSON, not an object, not all of it, not the right kinds.
@@ -71,7 +77,7 @@ fn common() -> Vec<Vec<u8>> {
     rubbish
 }
 
-fn clocks(tick: u64, subject: &str) -> Vec<Vec<u8>> {
+fn clocks(tick: Tick) -> Vec<Vec<u8>> {
     let mut rubbish = common();
     for text in [
         format!("{{\"epoch\":\"1\",\"tick\":{tick}}}"),
@@ -80,13 +86,7 @@ fn clocks(tick: u64, subject: &str) -> Vec<Vec<u8>> {
         format!("{{\"epoch\":1,\"tick\":{tick}.5}}"),
         "{\"epoch\":1,\"tick\":9007199254740993}".to_owned(),
         format!("{{\"epoch\":1,\"tick\":{tick},\"news\":[]}}"),
-        format!("{{\"epoch\":1,\"tick\":{tick},\"news\":{{\"{subject}\":7}}}}"),
-        format!(
-            "{{\"epoch\":1,\"tick\":{tick},\"news\":{{\"{subject}\":{{\"correction\":{{\"location\":{{\"x\":\"left\"}}}}}}}}}}"
-        ),
-        format!(
-            "{{\"epoch\":1,\"tick\":{tick},\"news\":{{\"{subject}\":{{\"commands\":[{{\"from\":7,\"seq\":1}}]}}}}}}"
-        ),
+        format!("{{\"epoch\":1,\"tick\":{tick},\"news\":-1}}"),
         format!("{{\"epoch\":1,\"tick\":{tick},\"end\":\"somehow\"}}"),
         format!("{{\"epoch\":1,\"tick\":{tick}}} and more"),
     ] {
@@ -95,20 +95,21 @@ fn clocks(tick: u64, subject: &str) -> Vec<Vec<u8>> {
     rubbish
 }
 
-fn commands(tick: u64) -> Vec<Vec<u8>> {
+fn news(tick: Tick) -> Vec<Vec<u8>> {
     let mut rubbish = common();
+    let start = format!("{{\"epoch\":1,\"tick\":{tick}");
     for text in [
-        format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":1}}"),
-        format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":-1,\"command\":\"x\"}}"),
-        format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":\"1\",\"command\":\"x\"}}"),
-        format!("{{\"epoch\":1,\"tick\":{tick},\"seq\":1,\"command\":{{}}}}"),
+        format!("{{\"epoch\":1,\"tick\":\"{tick}\"}}"),
+        format!("{start},\"joined\":\"2\"}}"),
+        format!("{start},\"correction\":{{\"location\":{{\"x\":\"left\",\"y\":1}}}}}}"),
+        format!("{start},\"commands\":[{{\"from\":7,\"command\":\"x\"}}]}}"),
+        format!("{start},\"commands\":[{{\"from\":\"operator\"}}]}}"),
         format!(
-            "{{\"epoch\":1,\"tick\":{tick},\"seq\":1,\"command\":\"{}\"}}",
+            "{start},\"commands\":[{{\"from\":\"operator\",\"command\":\"{}\"}}]}}",
             "x".repeat(MAX_TEXT_BYTES + 1)
         ),
-        format!(
-            "{{\"epoch\":1,\"tick\":{tick},\"seq\":2,\"performative\":\"sing\",\"command\":\"x\"}}"
-        ),
+        format!("{start},\"unreachable\":\"all\"}}"),
+        format!("{start}"),
     ] {
         rubbish.push(text.into_bytes());
     }

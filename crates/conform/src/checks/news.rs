@@ -1,0 +1,102 @@
+//! News and clocks: which news a robot waits for.
+
+use std::time::Duration;
+
+use protocol::Tick;
+use protocol::messages::{Clock, Correction, News, Point};
+
+use super::{Findings, seated, usual};
+use crate::comparison::demand_same;
+use crate::kit::Kit;
+use crate::report::Failure;
+use crate::script::{Script, Straight, Twist, play};
+use crate::stage::{Options, Stage};
+
+/// A report that must not come has come after this time.
+const QUIET: Duration = Duration::from_millis(150);
+/// Up to this tick, news come late.
+const LATE_UP_TO: Tick = 14;
+
+/// It waits for the news of exactly this epoch and tick where its flag is set, and for no news where it is not.
+pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    /// The news of the first ticks come after their clock, and after news of other ticks and epochs.
+    struct LateNews;
+    impl Twist for LateNews {
+        fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+            stage.withholds_news = tick <= LATE_UP_TO;
+            Ok(())
+        }
+
+        fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+            let news = stage.open_news();
+            if tick > LATE_UP_TO || news.is_empty() {
+                return Ok(());
+            }
+
+            put_stale(stage, tick)?;
+            stage.settle(QUIET);
+            let has_answered = stage.seen.answers.iter().any(|answer| {
+                let report = &answer.reading.report;
+                (report.epoch, report.tick) == (news.epoch, tick)
+            });
+            if has_answered {
+                return Err(Failure::new(
+                    format!(
+                        "no report for tick {tick}, whose clock has its flag, before the news of tick {tick} are here"
+                    ),
+                    "a report",
+                ));
+            }
+            stage.put_news(&news)
+        }
+    }
+    let mut stage = seated(kit, Options::default())?;
+    let played = play(&mut stage, &Script::usual(kit), &mut LateNews)?;
+    demand_same(
+        kit,
+        "that its news come after the clock",
+        usual(kit)?,
+        &played,
+    )?;
+
+    others_flags(kit)
+}
+
+/// News of the tick before and of the epoch before, which would move the robot.
+fn put_stale(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
+    let elsewhere = Some(Correction {
+        location: Point::new(1.0, 1.0),
+        blocked: true,
+    });
+    let stale = |epoch, tick| News {
+        epoch,
+        tick,
+        correction: elsewhere,
+        ..News::default()
+    };
+    if let Some(before) = tick.checked_sub(1) {
+        stage.put_news(&stale(stage.epoch(), before))?;
+    }
+    stage.put_news(&stale(stage.epoch() - 1, tick))
+}
+
+/// Flags of other robots do not concern it.
+fn others_flags(kit: &Kit) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    play(&mut stage, &Script::quiet(2), &mut Straight)?;
+    // The barrier's own clock, which has no flag, does not reach the robot.
+    stage.is_cut_off = true;
+    stage.open(&News::default())?;
+    stage.put_clock(&Clock {
+        epoch: 1,
+        tick: 3,
+        news: !stage.flag(),
+        end: None,
+    })?;
+    stage.complete().map(drop).map_err(|failure| {
+        Failure::new(
+            "a report for a clock that has the flags of other robots only, without any news",
+            failure.came,
+        )
+    })
+}
