@@ -34,6 +34,11 @@ impl std::str::FromStr for Override {
         if path.iter().any(String::is_empty) {
             return Err(format!("{text:?}: a part of the path is empty"));
         }
+        if let Some(part) = path.iter().find(|part| !is_key(part)) {
+            return Err(format!(
+                "{text:?} is not of the form path=value: {part:?} is not a key"
+            ));
+        }
         let parsed = toml::from_str::<toml::Table>(&format!("value = {value}"));
         let parsed = parsed.ok().and_then(|mut table| table.remove("value"));
         Ok(Self {
@@ -41,6 +46,12 @@ impl std::str::FromStr for Override {
             value: parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned())),
         })
     }
+}
+
+/// Whether a part of a path is a key of TOML that needs no quotes, as all keys of our files and names of robots are.
+fn is_key(part: &str) -> bool {
+    part.chars()
+        .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-'))
 }
 
 impl std::fmt::Display for Override {
