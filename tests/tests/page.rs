@@ -253,9 +253,14 @@ fn limits_times_and_version_are_those_of_the_code() {
             "missing after 0.5 s",
         ),
         (
-            "simulator/src/server.rs",
+            "simulator/src/server/process.rs",
             "REPEAT_AFTER: Duration = Duration::from_secs(2)",
             "with its news, again every 2 s",
+        ),
+        (
+            "simulator/src/medium.rs",
+            "MAX_DELIVERED_BYTES: usize = 512 * 1024",
+            "more than 524288 bytes arrive at one robot in one tick",
         ),
         (
             "lockstep/src/barrier.rs",
