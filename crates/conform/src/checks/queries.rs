@@ -21,8 +21,6 @@ const AT_ONCE: Duration = Duration::from_millis(1500);
 const COMPUTES: Duration = Duration::from_millis(80);
 /// The kit's own limit where it waits until all replies are in.
 const ALL_REPLIES: Duration = Duration::from_secs(4);
-/// The last tick before the odd queries.
-const LAST: Tick = 8;
 /// One tick in so many is asked about at length: that costs time.
 const ROUND: Tick = 10;
 /// A state that is shown after the report is there after this time.
