@@ -216,8 +216,7 @@ fn judge(robots: &[(&str, Vec<Rule>)]) {
 
 #[test]
 fn a_wrong_robot_fails_by_the_rule_that_it_breaks_and_by_no_other() {
-    let robots: Vec<(&str, Vec<Rule>)> =
-        RULES.iter().map(|rule| (rule.name, Vec::new())).collect();
+    let robots: Vec<(&str, Vec<Rule>)> = RULES.iter().map(|rule| (rule.name, Vec::new())).collect();
     judge(&robots);
 }
 

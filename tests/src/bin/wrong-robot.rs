@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -85,6 +85,7 @@ struct Shared {
     machine: Arc<Mutex<Machine>>,
     phase: Arc<AtomicU8>,
     deferred: Arc<Mutex<Vec<Query>>>,
+    has_reported: Arc<AtomicBool>,
     wrong: Wrong,
 }
 
@@ -142,7 +143,7 @@ impl Shared {
         drop(machine);
         if let (Ok(state), Ok(newest)) = (&found, &newest)
             && state.tick < newest.tick
-            && newest.behavior_state == WALK
+            && self.has_reported.load(Ordering::SeqCst)
             && self.wrong.is("query.tick")
         {
             return query.reply_err("only the newest state is kept");
@@ -167,9 +168,6 @@ impl Shared {
         }
     }
 }
-
-/// Its behavior state; its predecessor's is another one.
-const WALK: &str = "WALK";
 
 /// The robot itself: walks at random, counts commands and replies to them, queries another robot now and then.
 struct Walker {
@@ -228,8 +226,8 @@ struct Host {
     /// What was put last.
     last: Option<(Epoch, Tick)>,
     last_clock: Clock,
-    /// News of a tick that was not granted.
-    stray: Option<News>,
+    /// All news that came, where it forgets none.
+    strays: Vec<News>,
 }
 
 fn main() -> ExitCode {
@@ -281,6 +279,7 @@ impl Host {
             machine: Arc::new(Mutex::new(machine)),
             phase: Arc::new(AtomicU8::new(Phase::Idle as u8)),
             deferred: Arc::default(),
+            has_reported: Arc::default(),
             wrong: wrong.clone(),
         };
         let states = bus.publisher(&keys.query(&name, STATE))?;
@@ -304,7 +303,7 @@ impl Host {
             explanation: String::new(),
             last: None,
             last_clock: Clock::default(),
-            stray: None,
+            strays: Vec::new(),
         };
         host.declare()?;
         host.perform(actions)?;
@@ -323,10 +322,12 @@ impl Host {
             self.listen_to_news()?;
         }
         let queue = self.queue.clone();
-        self.declared
-            .push(self.bus.liveliness(&self.keys.alive_sim(), move |_, is_present| {
-                let _ = queue.send(Event::Simulator(is_present));
-            })?);
+        self.declared.push(
+            self.bus
+                .liveliness(&self.keys.alive_sim(), move |_, is_present| {
+                    let _ = queue.send(Event::Simulator(is_present));
+                })?,
+        );
         if wrong.is("join.ready-last:first") {
             self.declare_token()?;
         }
@@ -337,8 +338,10 @@ impl Host {
         for what in QUERIES.iter().chain([&STATE]) {
             let shared = self.shared.clone();
             let key = self.keys.query(&self.name, what);
-            self.declared
-                .push(self.bus.queryable(&key, move |query| shared.receive(query))?);
+            self.declared.push(
+                self.bus
+                    .queryable(&key, move |query| shared.receive(query))?,
+            );
         }
         if self.wrong.is("query.once:percept") {
             let key = self.keys.query(&self.name, "percept");
@@ -499,7 +502,10 @@ impl Host {
 
     fn on_clock(&mut self, mut clock: Clock) -> Result<(), Failure> {
         let own = self.welcome.as_ref().map_or(0, |welcome| welcome.epoch);
-        let generation = self.welcome.as_ref().map_or(0, |welcome| welcome.generation);
+        let generation = self
+            .welcome
+            .as_ref()
+            .map_or(0, |welcome| welcome.generation);
         let flag = self.welcome.as_ref().map_or(0, |welcome| welcome.news_flag);
         let is_later = clock.epoch > own && own > 0;
         if clock.end.is_some() {
@@ -539,7 +545,13 @@ impl Host {
                 || self.wrong.is("epoch.late:early") && own > 1);
         if is_early {
             self.drive(|machine, out| {
-                machine.news(clock.epoch, clock.tick, Some(generation), News::default(), out);
+                machine.news(
+                    clock.epoch,
+                    clock.tick,
+                    Some(generation),
+                    News::default(),
+                    out,
+                );
             })?;
         }
 
@@ -554,7 +566,10 @@ impl Host {
     }
 
     fn on_news(&mut self, mut news: News) -> Result<(), Failure> {
-        let generation = self.welcome.as_ref().map_or(0, |welcome| welcome.generation);
+        let generation = self
+            .welcome
+            .as_ref()
+            .map_or(0, |welcome| welcome.generation);
         if self.wrong.is("return.replaced") && news.joined.is_some_and(|joined| joined > generation)
         {
             news.joined = None;
@@ -566,7 +581,7 @@ impl Host {
             tick = self.last_clock.tick;
         }
         if self.wrong.is("epoch.init:received") {
-            self.stray = Some(news.clone());
+            self.strays.push(news.clone());
         }
         self.drive(|machine, out| machine.news(epoch, tick, news.joined, news, out))
     }
@@ -653,7 +668,8 @@ impl Host {
             let welcome = self.welcome.clone().ok_or("no welcome")?;
             self.walker = Some(Walker::new(&welcome, &self.wrong));
             let (_, _, report) = self.act(welcome.epoch, 0, &News::default())?;
-            self.bus.put(&self.keys.report(&self.name), encode(&report))?;
+            self.bus
+                .put(&self.keys.report(&self.name), encode(&report))?;
         }
         Ok(())
     }
@@ -664,9 +680,10 @@ impl Host {
             self.begin();
         }
         let stray = self
-            .stray
-            .take_if(|stray| stray.epoch < turn.epoch && stray.tick == turn.tick);
-        let news = turn.news.or(stray).unwrap_or_default();
+            .strays
+            .iter()
+            .find(|stray| stray.epoch < turn.epoch && stray.tick == turn.tick);
+        let news = turn.news.or(stray.cloned()).unwrap_or_default();
         let (commands, state, report) = self.act(turn.epoch, turn.tick, &news)?;
         self.shared.enter(Phase::Idle);
         self.drive(|machine, out| machine.done(commands, state, report, out))
@@ -718,7 +735,10 @@ impl Host {
         for delivery in deliveries {
             walker.heard += 1;
             walker.last.clone_from(&delivery.command);
-            log.push(format!("heard {:?} from {}", delivery.command, delivery.from));
+            log.push(format!(
+                "heard {:?} from {}",
+                delivery.command, delivery.from
+            ));
             let answers_operator = wrong.is("operator.commands:answers");
             if welcome.roster.contains(&delivery.from) || answers_operator {
                 walker.sent += 1;
@@ -760,7 +780,7 @@ impl Host {
             direction_rad: ((angle + turn) * 1e6).round() / 1e6,
             state_variables,
             emotion_state: "CALM".to_owned(),
-            behavior_state: WALK.to_owned(),
+            behavior_state: "WALK".to_owned(),
         };
         let report = self.report(&welcome, &walker, &state, &commands, log);
         self.walker = Some(walker);
@@ -827,7 +847,9 @@ impl Host {
             return Ok(None);
         }
         let is_unreachable = news.unreachable.contains(&other);
-        if tick == 0 || !tick.is_multiple_of(2) {
+        // A tick that is done a second time is not one of the machine's.
+        let is_running = self.shared.is_in(Phase::Computing);
+        if tick == 0 || !tick.is_multiple_of(2) || !is_running {
             return Ok(None);
         }
         if is_unreachable {
@@ -880,6 +902,7 @@ impl Host {
         let at = (answer.epoch, answer.tick);
         let is_again = self.last == Some(at);
         self.last = Some(at);
+        self.shared.has_reported.store(true, Ordering::SeqCst);
         let mut report = answer.report.clone();
         if is_again && self.wrong.is("clock.duplicate") {
             (_, _, report) = self.act(answer.epoch, answer.tick, &News::default())?;
