@@ -16,7 +16,7 @@ use simulator::Scenario;
 /// Exit status: 0 all passed, 1 some failed, 2 nothing could be checked.
 #[derive(Debug, Args)]
 pub(crate) struct ConformArgs {
-    /// Whom the robot must ask to be; without it whoever it asks to be.
+    /// The name that the robot must ask for; without it any name will do.
     #[arg(long)]
     name: Option<RobotName>,
     /// A scenario, or a launch file whose scenario is meant: its parameters, field and roster. The other robots behave as

@@ -85,7 +85,7 @@ impl Kit {
     fn open(command: &Command, setting: &Setting) -> Result<Self, CannotRun> {
         let (bus, endpoint) = open_router()?;
         let mut own = process::copy(command);
-        // The robot meets this kit and nobody else.
+        // The robot connects to this kit only.
         own.env_remove("CARS_ZENOH_CONFIG");
         let (runs, learned, usual) = (AtomicUsize::new(0), OnceLock::new(), OnceLock::new());
         let (setting, is_deterministic) = (setting.clone(), OnceLock::new());
@@ -152,7 +152,7 @@ impl Kit {
             .collect()
     }
 
-    /// Who sends the robot commands: the first of the others, or whoever sits at the shell.
+    /// The sender of the robot's commands: the first of the others, or the operator.
     pub(crate) fn sender(&self) -> RobotName {
         self.others()
             .into_keys()

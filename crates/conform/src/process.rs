@@ -101,7 +101,7 @@ impl Process {
     }
 }
 
-/// The end of a file that somebody may still write: read in place, since its cursor is the writer's.
+/// The end of a file that may still be written: read in place, since its cursor belongs to the writer.
 fn tail(file: &File) -> String {
     let read = || -> std::io::Result<Vec<u8>> {
         let length = file.metadata()?.len();

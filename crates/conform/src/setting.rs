@@ -8,7 +8,7 @@ use protocol::{RobotName, Tick};
 /// What a conformance check plays.
 #[derive(Debug, Clone)]
 pub struct Setting {
-    /// Whom the robot must ask to be; without it whoever it asks to be.
+    /// The name that the robot must ask for; without it any name will do.
     pub name: Option<RobotName>,
     /// Where all chance comes from.
     pub seed: u64,

@@ -143,7 +143,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     };
     play(&mut stage, &busy, &mut Straight)?;
     let [text, _] = kit.texts();
-    // News of a tick that is never granted: nobody may take them for those of the next epoch.
+    // News of a tick that is never granted must not be taken for those of the next epoch.
     stage.put_news(&News {
         epoch: 1,
         tick: stage.next_tick(),

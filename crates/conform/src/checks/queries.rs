@@ -21,8 +21,6 @@ const AT_ONCE: Duration = Duration::from_millis(1500);
 const COMPUTES: Duration = Duration::from_millis(80);
 /// The kit's own limit where it waits until all replies are in.
 const ALL_REPLIES: Duration = Duration::from_secs(4);
-/// The last tick before the odd queries.
-const LAST: Tick = 8;
 /// One tick in so many is asked about at length: that costs time.
 const ROUND: Tick = 10;
 /// A state that is shown after the report is there after this time.
@@ -56,7 +54,7 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
     super::ticks::check_wire(&stage, findings);
     findings.0.extend(asker.findings.0);
     if stage.seen.states.is_empty() {
-        let came = "in none of the ticks, although somebody subscribes";
+        let came = "in none of the ticks, although there is a subscriber";
         findings.fail(
             "tick.state-first",
             Failure::new("its state is put for those who follow it", came),
@@ -124,7 +122,7 @@ impl Twist for Asker {
         let epoch = entry.epoch;
         let tick = entry.tick;
         let expected = format!("asked with tick={}, the state of tick {tick}", tick + 1);
-        // At once after the report: whoever comes with the next clock may ask.
+        // At once after the report: a robot that runs the next tick may query it.
         let mut came = state_of(stage, epoch, tick, &expected)?;
         if let Err(failure) = came {
             // Too late, or never?
@@ -177,7 +175,7 @@ impl Asker {
             .fail("tick.correction", Failure::new(expected, came));
     }
 
-    /// The tick before is still told to whoever asks late.
+    /// The tick before can still be queried.
     fn check_before(&self, stage: &Stage<'_>, epoch: Epoch, tick: Tick) -> Result<(), Failure> {
         let Some(before) = &self.before else {
             return Ok(());
@@ -195,7 +193,7 @@ impl Asker {
     }
 }
 
-/// What followers are sent comes before the report, in every tick once the robot knows that somebody follows.
+/// What subscribers are sent comes before the report, in every tick once the robot knows of a subscriber.
 fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     let tick = entry.tick;
     let report = stage
