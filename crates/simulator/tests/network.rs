@@ -238,7 +238,7 @@ fn cut_off(decision: &Decision) -> String {
 fn a_partition_cuts_commands_and_queries_from_its_first_to_its_last_tick() {
     let network = "[[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"10 s\"\n";
     let decisions = play(network, 30, |tick, medium| {
-        medium.accept(command("B", "C", tick))
+        medium.accept(command("B", "C", tick));
     });
     // What is decided at the ticks 10 to 19 was sent one tick earlier.
     assert_eq!(
@@ -281,7 +281,7 @@ fn a_partition_can_be_one_way_or_of_one_kind_only() {
     let one_way =
         "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0 s\"\none_way = true\n";
     let decisions = play(one_way, 20, |tick, medium| {
-        medium.accept(command("B", "A", tick))
+        medium.accept(command("B", "A", tick));
     });
     assert_eq!(lost(&decisions).len(), 20);
     assert!(
