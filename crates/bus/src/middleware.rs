@@ -140,7 +140,7 @@ impl Session {
             .session
             .declare_subscriber(keys)
             .callback(move |sample: Sample| {
-                handle(sample.key_expr().as_str(), &sample.payload().to_bytes())
+                handle(sample.key_expr().as_str(), &sample.payload().to_bytes());
             })
             .wait();
         let declared = used("subscribe to", keys, declared)?;

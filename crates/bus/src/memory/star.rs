@@ -595,7 +595,7 @@ impl Star {
             .and_then(|peer| peer.known.remove(&id));
         match declaration {
             Some(Declaration::Token(key)) if !self.is_there(&key) => {
-                self.tell_watchers(&key, false)
+                self.tell_watchers(&key, false);
             }
             Some(Declaration::Subscribe(keys, handle)) => {
                 self.rubbish.push(Box::new(handle));
