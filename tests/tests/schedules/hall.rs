@@ -8,8 +8,8 @@ use protocol::random::unit;
 use protocol::{Epoch, RobotName, RunName, Tick};
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, Variable};
 use simulator::diagnostic::Source;
+use simulator::scenario::Changes;
 use simulator::{Scenario, Simulation};
-use system_tests::hall::scenario;
 
 /// Ticks of every epoch.
 pub(crate) const TICKS: Tick = 40;
@@ -49,6 +49,21 @@ impl Halls {
     pub(crate) fn digest(&self, hall: usize, epoch: Epoch) -> &str {
         &self.digests[hall][usize::from(epoch > 1)]
     }
+}
+
+/// A shipped scenario with changes.
+fn scenario(file: &str, seed: u64, set: &[&str]) -> Scenario {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut changes = Changes {
+        seed: Some(seed),
+        duration_s: None,
+        set: Vec::new(),
+    };
+    for change in set {
+        changes.set.push(change.parse().expect("a legal change"));
+    }
+
+    Scenario::load(&root.join(file), &changes).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
 /// Something happens within [`TICKS`]: few treats, eager guests, commands that are repeated.

@@ -331,7 +331,8 @@ fn draw_lateness(chance: &mut Chance, roster: &[RobotName]) -> Lateness {
         OnLate::Wait,
         OnLate::Abort,
     ];
-    let deadline = chance.magnitude(5 * MS, 5 * S);
+    // Longer than a tick takes on links that are whole, with one query that is repeated.
+    let deadline = chance.magnitude(S, 5 * S);
     let mut drawn = lateness(
         chance.one_of(&policies),
         deadline,

@@ -229,10 +229,8 @@ impl World {
                     tick: Some(tick),
                     epoch: Some(epoch),
                 };
-                let get = self.next_id();
                 let message = Message::Query {
                     asker: None,
-                    get,
                     of: of.clone(),
                     query,
                 };
@@ -464,28 +462,14 @@ impl World {
             }
             Message::Clock(bytes) => self.on_clock(process, &bytes),
             Message::JoinReply(get, bytes) => self.on_answer(process, get, &bytes),
-            Message::Query {
-                asker,
-                get,
-                of,
-                query,
-            } => {
+            Message::Query { asker, of, query } => {
                 let answer = self.processes[process].participant.query(query);
                 let result = match answer {
                     Ok(state) => Ok(encode(state.as_ref()).into()),
                     Err(reason) => Err(reason.to_string()),
                 };
                 let asker = asker.expect("the router adds it");
-                self.send(
-                    process,
-                    Way::Up,
-                    Message::QueryReply {
-                        asker,
-                        get,
-                        of,
-                        result,
-                    },
-                );
+                self.send(process, Way::Up, Message::QueryReply { asker, of, result });
             }
             Message::QueryReply {
                 of,

@@ -39,13 +39,11 @@ pub(crate) enum Message {
     /// The number of the link that asks is added by the router.
     Query {
         asker: Option<usize>,
-        get: GetId,
         of: RobotName,
         query: StateQuery,
     },
     QueryReply {
         asker: usize,
-        get: GetId,
         of: RobotName,
         result: Result<Bytes, String>,
     },
@@ -323,20 +321,11 @@ impl World {
                     self.send(other, Way::Down, Message::State(of.clone(), bytes.clone()));
                 }
             }
-            Message::Query { get, of, query, .. } => {
+            Message::Query { of, query, .. } => {
                 for other in self.links_where(|other| other.is_declared && other.robot == of) {
                     let asker = Some(link);
                     let of = of.clone();
-                    self.send(
-                        other,
-                        Way::Down,
-                        Message::Query {
-                            asker,
-                            get,
-                            of,
-                            query,
-                        },
-                    );
+                    self.send(other, Way::Down, Message::Query { asker, of, query });
                 }
             }
             Message::QueryReply { asker, .. } => self.send(asker, Way::Down, message),

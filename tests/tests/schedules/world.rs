@@ -13,7 +13,7 @@ use crate::hall::{Halls, TICKS};
 use crate::plan::{Death, Family, MS, Micros, Plan, Point, S, What};
 use crate::process::{Life, PATIENCE, Process};
 use crate::simulator::Simulator;
-use crate::star::{GetId, Link, Message, Way};
+use crate::star::{GetId, Link, Way};
 
 /// Longest simulated time from one tick to the next, and until a robot is back, when nothing is broken any more: longer than
 /// any timer that repairs something.
@@ -473,12 +473,5 @@ impl World {
                 own.name
             ));
         }
-    }
-}
-
-/// For `Debug` of an event: a message in full is not needed.
-impl std::fmt::Display for Message {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{self:?}")
     }
 }
