@@ -551,9 +551,17 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         };
         self.news.retain(|of, _| *of > at);
         let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
+        // If the predecessor has reported for tick 0, its successor joins in tick 1, however often tick 0 is repeated.
+        let has_predecessor = self
+            .states
+            .answer(StateQuery {
+                tick: None,
+                epoch: Some(clock.epoch),
+            })
+            .is_ok();
         let begin = match self.standing {
             Standing::Seated => Begin::GoOn,
-            _ if clock.tick == 0 => Begin::Init,
+            _ if clock.tick == 0 && !has_predecessor => Begin::Init,
             _ if joined == Some(admission.generation) || !self.rules.hold(Rule::WaitsToBeNamed) => {
                 Begin::TakeOver
             }

@@ -70,6 +70,9 @@ pub struct Simulation {
     stood_at: Vec<Point>,
     /// Robots whose report of the last tick is missing: they propose nothing and cannot be queried.
     silent: Vec<RobotName>,
+    /// Robots of which a new incarnation joined in the last tick. They cannot be queried: the previous incarnation may have
+    /// published another state for that tick before it died, and followers of that state cannot tell the two apart.
+    newcomers: Vec<RobotName>,
     blocked: Vec<bool>,
     /// The generation that each robot took part with last in this epoch, and which incarnation of the epoch that is, from 1.
     /// The record counts incarnations, because generations also count processes that never took part.
@@ -112,6 +115,7 @@ impl Simulation {
             reports: BTreeMap::new(),
             stood_at: Vec::new(),
             silent: Vec::new(),
+            newcomers: Vec::new(),
             incarnations: BTreeMap::new(),
             sent: BTreeMap::new(),
             between: Vec::new(),
@@ -181,7 +185,7 @@ impl Simulation {
         let decision = self.medium.decide(self.now);
         self.events.extend(decision.events);
         self.arriving = decision.delivered;
-        self.unreachable = self.join_silent(decision.unreachable);
+        self.unreachable = self.join_silent_and_newcomers(decision.unreachable);
 
         self.compose_news(&verdicts);
         self.now
@@ -345,19 +349,22 @@ impl Simulation {
             .collect()
     }
 
-    /// Robots that each robot cannot query: those from which the medium cuts it off, and those whose last report is missing.
-    fn join_silent(
+    /// Robots that each robot cannot query: those from which the medium cuts it off, those whose last report is missing, and
+    /// those of which a new incarnation has just joined.
+    fn join_silent_and_newcomers(
         &self,
         mut cut: BTreeMap<RobotName, Vec<RobotName>>,
     ) -> BTreeMap<RobotName, Vec<RobotName>> {
-        if self.silent.is_empty() {
+        if self.silent.is_empty() && self.newcomers.is_empty() {
             return cut;
         }
 
         for name in &self.names {
             let others = cut.entry(name.clone()).or_default();
-            for silent in self.silent.iter().filter(|silent| *silent != name) {
-                others.push(silent.clone());
+            for other in self.silent.iter().chain(&self.newcomers) {
+                if other != name {
+                    others.push(other.clone());
+                }
             }
             others.sort();
             others.dedup();
@@ -366,12 +373,17 @@ impl Simulation {
     }
 
     fn note_membership(&mut self, membership: Vec<Membership>) {
+        self.newcomers.clear();
         for change in membership {
             self.events.push(match change {
                 Membership::Joined(robot, generation) => {
                     let incarnation = self.incarnation(&robot, generation);
                     self.incarnations
                         .insert(robot.clone(), (generation, incarnation));
+                    // At tick 0 every incarnation publishes the same state.
+                    if self.now > 0 {
+                        self.newcomers.push(robot.clone());
+                    }
                     Event::Joined {
                         at: self.location(&robot).unwrap_or_default(),
                         robot,
