@@ -19,6 +19,8 @@ use crate::stage::{Options, PATIENCE, Stage};
 const AT_ONCE: Duration = Duration::from_millis(1500);
 /// A robot whose tick takes so long could have answered during it.
 const COMPUTES: Duration = Duration::from_millis(80);
+/// After this time, a robot that received a clock is in its tick.
+const UNDER_WAY: Duration = Duration::from_millis(30);
 /// The kit's own limit where it waits until all replies are in.
 const ALL_REPLIES: Duration = Duration::from_secs(4);
 /// One tick in so many is asked about at length: that costs time.
@@ -362,21 +364,24 @@ pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
 }
 
 fn while_computing(kit: &Kit) -> Result<(), Failure> {
-    /// Queries each tick as soon as its clock is put.
-    struct Curious(usize);
+    /// Queries the robot in each tick that takes long: the number of the query of this tick.
+    struct Curious(Option<usize>);
     impl Twist for Curious {
         fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
-            if tick > 0 {
-                self.0 = stage.begin_query(stage.epoch(), tick)?;
+            self.0 = None;
+            let is_done = stage.until("the tick is complete", UNDER_WAY, |stage| {
+                (!stage.is_open()).then_some(())
+            });
+            if is_done.is_err() && tick > 0 {
+                self.0 = Some(stage.begin_query(stage.epoch(), tick)?);
             }
             Ok(())
         }
 
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-            if entry.tick == 0 {
+            let Some(number) = self.0 else {
                 return Ok(());
-            }
-            let number = self.0;
+            };
             let tick = entry.tick;
             let expected = format!("queried during tick {tick}, a reply at once");
             stage.until(&expected, PATIENCE, |stage| {
@@ -403,7 +408,7 @@ fn while_computing(kit: &Kit) -> Result<(), Failure> {
         }
     }
     let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::usual(kit), &mut Curious(0)).map(drop)
+    play(&mut stage, &Script::usual(kit), &mut Curious(None)).map(drop)
 }
 
 fn while_waiting_for_news(kit: &Kit) -> Result<(), Failure> {
@@ -418,6 +423,7 @@ fn while_waiting_for_news(kit: &Kit) -> Result<(), Failure> {
         }),
         ..News::default()
     })?;
+    stage.settle(UNDER_WAY);
     demand_reply(&mut stage, tick, "while it waits for its news")
 }
 
