@@ -201,7 +201,13 @@ impl Modules {
     /// Adds a module; `folder` is where the files of its children are.
     fn add(&mut self, name: &str, file: &Path, folder: &Path) {
         let text = stripped(&std::fs::read_to_string(file).unwrap());
+        let mut is_for_tests = false;
         for line in text.lines() {
+            // A model or a test may use its parent's parts.
+            let was_for_tests = std::mem::replace(&mut is_for_tests, line == "#[cfg(test)]");
+            if was_for_tests {
+                continue;
+            }
             let Some((_, declared)) = line.split_once("mod ") else {
                 continue;
             };
