@@ -541,8 +541,8 @@ impl Host {
         let is_early = clock.tick > 0
             && clock.epoch == own
             && self.last.is_none_or(|(epoch, _)| epoch < clock.epoch)
-            && (self.wrong.is("return.generation") && own == 1
-                || self.wrong.is("epoch.late:early") && own > 1);
+            && self.wrong.is("return.generation")
+            && own == 1;
         if is_early {
             self.drive(|machine, out| {
                 machine.news(
@@ -646,8 +646,18 @@ impl Host {
                 states.extend(state.clone().map(|state| (state.tick, state)));
             }
         }
+        let is_early = self.wrong.is("epoch.late:early") && welcome.epoch > 1 && welcome.tick > 0;
         self.welcome = Some(welcome);
-        self.drive(|machine, out| machine.admitted(admission, states, out))
+        self.drive(|machine, out| machine.admitted(admission, states, out))?;
+        if is_early {
+            let clock = self.last_clock;
+            let joined = Some(admission.generation);
+            self.drive(|machine, out| {
+                machine.news(clock.epoch, clock.tick, joined, News::default(), out);
+                machine.clock(clock, out);
+            })?;
+        }
+        Ok(())
     }
 
     fn on_declare_token(&mut self) -> Result<(), Failure> {
@@ -685,8 +695,9 @@ impl Host {
             .find(|stray| stray.epoch < turn.epoch && stray.tick == turn.tick);
         let news = turn.news.or(stray.cloned()).unwrap_or_default();
         let (commands, state, report) = self.act(turn.epoch, turn.tick, &news)?;
+        self.drive(|machine, out| machine.done(commands, state, report, out))?;
         self.shared.enter(Phase::Idle);
-        self.drive(|machine, out| machine.done(commands, state, report, out))
+        Ok(())
     }
 
     /// Back to the beginning of what it was welcomed to.
