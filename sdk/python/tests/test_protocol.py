@@ -167,7 +167,10 @@ def test_news_that_are_flagged_are_waited_for(stage: Stage) -> None:
     assert [line for line in report["log"] if line.startswith("command")] == ["command B note at last"]
     # The next ones are here already; another robot's flag means nothing.
     stage.put("clock", {"epoch": 1, "tick": 2, "news": flag("A")})
-    assert "command B note of the next tick" in stage.heard("robot/A/report")["log"]
+    report = stage.heard("robot/A/report")
+    while report["tick"] == 1:  # The clock that came twice may have repeated it.
+        report = stage.heard("robot/A/report")
+    assert "command B note of the next tick" in report["log"]
     stage.put("clock", {"epoch": 1, "tick": 3, "news": flag("B")})
     assert stage.heard("robot/A/report")["tick"] == 3
 
