@@ -32,7 +32,7 @@ fn listen(bus: &Bus, keys: &str) -> (Receiver<String>, Declared) {
 fn tokens(bus: &Bus, keys: &str) -> (Receiver<(String, bool)>, Declared) {
     let (sender, seen) = channel();
     let declared = bus.liveliness(keys, move |key, is_there| {
-        drop(sender.send((key.to_owned(), is_there)))
+        drop(sender.send((key.to_owned(), is_there)));
     });
     (seen, declared.unwrap())
 }

@@ -313,7 +313,7 @@ impl<'k> Stage<'k> {
                 if self.keeps_requests {
                     self.joins.push_back(joining);
                 } else {
-                    self.admit(joining);
+                    self.admit(&joining);
                 }
             }
             Event::Report {
@@ -343,7 +343,7 @@ impl<'k> Stage<'k> {
                     });
                 }
             }
-            Event::Token(robot, is_present) => self.on_token(robot, is_present),
+            Event::Token(robot, is_present) => self.on_token(&robot, is_present),
             Event::Reply(number, reply) => {
                 self.seen.replies.insert(number, (order, reply));
             }
@@ -412,14 +412,14 @@ impl<'k> Stage<'k> {
         self.drive(|barrier, out| barrier.command(&from, stamp, number, put, out));
     }
 
-    fn on_token(&mut self, robot: String, is_present: bool) {
+    fn on_token(&mut self, robot: &str, is_present: bool) {
         if is_present {
-            self.seen.present.insert(robot.clone());
+            self.seen.present.insert(robot.to_owned());
         } else {
-            self.seen.present.remove(&robot);
+            self.seen.present.remove(robot);
             self.seen.tokens_lost += 1;
         }
-        if let Ok(name) = RobotName::new(&robot)
+        if let Ok(name) = RobotName::new(robot)
             && self.barrier.has(&name)
         {
             self.drive(|barrier, out| barrier.token(&name, is_present, out));
@@ -649,35 +649,33 @@ impl<'k> Stage<'k> {
     /// The same where the other robots are set up.
     pub(crate) fn admit_first(&mut self) -> Result<(), Failure> {
         let joining = self.next_join(START_PATIENCE)?;
-        self.admit(joining);
+        self.admit(&joining);
         self.keeps_requests = false;
         self.until_ready()
     }
 
     /// Answers a request to join as the barrier decides.
-    pub(crate) fn admit(&mut self, joining: Joining) {
+    pub(crate) fn admit(&mut self, joining: &Joining) {
         self.seen.requests.push(joining.request.clone());
         let request = match &joining.request {
             Ok(request) => request.clone(),
-            Err(error) => return self.refuse_join(&joining, Refusal::Malformed, error),
+            Err(error) => return self.refuse_join(joining, Refusal::Malformed, error),
         };
 
         let mut admitted = Err(Refused::Ended);
         self.drive(|barrier, out| admitted = barrier.join(&request.name, &request.instance, out));
         match admitted {
-            Ok(admission) => self.welcome(&joining, admission),
+            Ok(admission) => self.welcome(joining, admission),
             Err(Refused::UnknownName) => self.refuse_join(
-                &joining,
+                joining,
                 Refusal::UnknownName,
                 "no robot of this run has this name",
             ),
-            Err(Refused::NameTaken) => self.refuse_join(
-                &joining,
-                Refusal::NameTaken,
-                "another process is this robot",
-            ),
+            Err(Refused::NameTaken) => {
+                self.refuse_join(joining, Refusal::NameTaken, "another process is this robot");
+            }
             Err(Refused::Ended) => {
-                self.refuse_join(&joining, Refusal::Ended, "the run is over");
+                self.refuse_join(joining, Refusal::Ended, "the run is over");
             }
         }
     }
@@ -764,7 +762,7 @@ impl<'k> Stage<'k> {
 
     /// Puts the last clock and its news again.
     pub(crate) fn repeat(&mut self) {
-        self.drive(|barrier, out| barrier.repeat(out));
+        self.drive(lockstep::Barrier::repeat);
     }
 
     /// The news of the open tick, as they are put.

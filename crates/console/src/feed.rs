@@ -145,7 +145,7 @@ impl Feed {
 
         // These are encoded for this browser alone, and therefore without the lock.
         messages.extend(lines.map(|lines| lines.message()));
-        messages.extend(frame.map(|frame| frame.message()));
+        messages.extend(frame.map(NewFrame::message));
         messages
     }
 }

@@ -205,7 +205,7 @@ impl Live {
             command: command.to_owned(),
             ..Command::default()
         };
-        message.check().map_err(malformed)?;
+        message.check().map_err(|error| malformed(&error))?;
         let bus = self.bus.get().ok_or_else(|| self.no_simulator())?;
         let key = self.keys.command(to, &RobotName::operator());
         bus.put(&key, encode(&message))
@@ -222,7 +222,7 @@ impl Live {
     }
 
     fn query(&self, control: &Control, timeout: Duration) -> Result<ControlAnswer, String> {
-        control.check().map_err(malformed)?;
+        control.check().map_err(|error| malformed(&error))?;
         let bus = self.bus.get().ok_or_else(|| self.no_simulator())?;
         let key = self.keys.control();
 
@@ -495,6 +495,6 @@ fn panels_of(run: &RunName) -> String {
     format!("cars/{run}/robot/*/panel")
 }
 
-fn malformed(error: FieldError) -> String {
+fn malformed(error: &FieldError) -> String {
     format!("malformed request: {}: {}", error.field, error.reason)
 }

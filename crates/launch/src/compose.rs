@@ -87,7 +87,7 @@ fn simulator_service(
         // Everybody in the private network is trusted, and nobody else reaches it.
         "--insecure".to_owned(),
         "--out=/runs".to_owned(),
-        format!("--speed={}", speed),
+        format!("--speed={speed}"),
     ]);
     let mut env = file.simulator.env.clone();
     env.entry(RUNTIME_VARIABLE.to_owned())

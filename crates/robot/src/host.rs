@@ -110,8 +110,7 @@ impl Stopper {
     /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Queries that the
     /// tick still makes are interrupted.
     pub fn stop(&self) {
-        self.shared
-            .each(|participant, actions| participant.stop(actions));
+        self.shared.each(lockstep::Participant::stop);
     }
 }
 
@@ -300,7 +299,7 @@ impl Host {
     ) -> Result<Option<End>, HostError> {
         match action {
             Action::Run(turn) => self.run_tick(name, &turn)?,
-            Action::Leave(leave) => return self.leave(name, leave).map(Some),
+            Action::Leave(leave) => return self.leave(name, &leave).map(Some),
             other => self.carry_out_io(name, other)?,
         }
 
@@ -394,8 +393,7 @@ impl Host {
         };
         let key = self.keys.join_as(name);
         let Some(answer) = self.bus.get(&key, "", Some(encode(&request)))? else {
-            self.shared
-                .with(name, |participant, actions| participant.unanswered(actions));
+            self.shared.with(name, lockstep::Participant::unanswered);
             return Ok(());
         };
 
@@ -492,12 +490,12 @@ impl Host {
         Ok(())
     }
 
-    fn leave(&self, name: &RobotName, leave: Leave) -> Result<End, HostError> {
+    fn leave(&self, name: &RobotName, leave: &Leave) -> Result<End, HostError> {
         Err(match leave {
-            Leave::End(end) => return Ok(end),
+            Leave::End(end) => return Ok(*end),
             Leave::Refused(reason) => HostError::Refused {
                 name: name.clone(),
-                reason,
+                reason: *reason,
                 explanation: self
                     .members
                     .get(name)

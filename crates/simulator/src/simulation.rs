@@ -213,7 +213,7 @@ impl Simulation {
             };
             let underway = self.number_commands(&name, commands);
             digest.report(&name, Some((&report, &underway)));
-            self.note_report(&name, report, underway);
+            self.note_report(&name, &report, underway);
         }
 
         self.tick = self.now;
@@ -445,7 +445,7 @@ impl Simulation {
         underway
     }
 
-    fn note_report(&mut self, robot: &RobotName, report: Arc<Report>, underway: Vec<Underway>) {
+    fn note_report(&mut self, robot: &RobotName, report: &Arc<Report>, underway: Vec<Underway>) {
         self.incarnations
             .entry(robot.clone())
             .or_insert((report.generation, 1));

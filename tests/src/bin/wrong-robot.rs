@@ -429,7 +429,7 @@ impl Host {
                 Action::Join => self.ask_to_join()?,
                 Action::DeclareToken => self.on_declare_token()?,
                 Action::Run(turn) => self.run_tick(turn)?,
-                Action::Put(answer) => self.put(*answer)?,
+                Action::Put(answer) => self.put(&answer)?,
                 Action::Query { of, tick, epoch } => self.query(of, tick, epoch)?,
                 Action::PutWaiting { tick, epoch, on } => {
                     let key = self.keys.waiting(&self.name);
@@ -616,7 +616,7 @@ impl Host {
         let reply = self.bus.get(&key, "", Some(encode(&request)))?;
         let bytes = reply.and_then(|reply| reply.result.ok());
         match bytes.and_then(|bytes| self.wrong.read(&key, &bytes)) {
-            None => self.drive(|machine, out| machine.unanswered(out)),
+            None => self.drive(lockstep::Participant::unanswered),
             Some(JoinAnswer::Refused {
                 reason,
                 explanation,
@@ -909,7 +909,7 @@ impl Host {
     }
 
     /// Puts what came of a tick: the commands, the state, the report.
-    fn put(&mut self, answer: Answer<PublicState, CommandText, Report>) -> Result<(), Failure> {
+    fn put(&mut self, answer: &Answer<PublicState, CommandText, Report>) -> Result<(), Failure> {
         let at = (answer.epoch, answer.tick);
         let is_again = self.last == Some(at);
         self.last = Some(at);
@@ -925,8 +925,9 @@ impl Host {
 
         let is_late = self.wrong.is("command.sent:late")
             || is_again && self.wrong.is("clock.duplicate:order");
-        if !is_late && !(is_again && self.wrong.is("clock.duplicate:commands")) {
-            self.put_commands(&answer)?;
+        let forgets_commands = is_again && self.wrong.is("clock.duplicate:commands");
+        if !is_late && !forgets_commands {
+            self.put_commands(answer)?;
         }
         let is_state_late = self.wrong.is("tick.state-first");
         if !is_state_late {
@@ -938,7 +939,7 @@ impl Host {
         }
         if is_late {
             std::thread::sleep(Duration::from_millis(20));
-            self.put_commands(&answer)?;
+            self.put_commands(answer)?;
         }
         if is_state_late {
             std::thread::sleep(Duration::from_millis(30));

@@ -258,7 +258,7 @@ impl World {
     /// Asks the simulator to admit the robot, and waits for the answer.
     fn join(&mut self, process: usize) {
         if !self.links[process].is_open_below() {
-            self.feed(process, |participant, out| participant.unanswered(out));
+            self.feed(process, lockstep::Participant::unanswered);
             return;
         }
 
@@ -285,7 +285,7 @@ impl World {
     pub(crate) fn time_out(&mut self, process: usize, get: GetId) {
         if self.processes[process].joining == Some(get) {
             self.processes[process].joining = None;
-            self.feed(process, |participant, out| participant.unanswered(out));
+            self.feed(process, lockstep::Participant::unanswered);
         }
         self.advance(process);
     }
@@ -337,7 +337,7 @@ impl World {
 
             let mut found = None;
             self.feed(process, |participant, out| {
-                found = participant.ask(&of, out)
+                found = participant.ask(&of, out);
             });
             let own = &mut self.processes[process];
             let is_interrupted = own.participant.is_interrupted();
@@ -439,10 +439,10 @@ impl World {
             return;
         }
         if own.joining.take().is_some() {
-            self.feed(process, |participant, out| participant.unanswered(out));
+            self.feed(process, lockstep::Participant::unanswered);
         }
         self.feed(process, |participant, out| {
-            participant.simulator(false, out)
+            participant.simulator(false, out);
         });
         self.advance(process);
     }
@@ -485,7 +485,7 @@ impl World {
             Message::QueryReply { .. } => {}
             Message::SimulatorToken(is_present) => {
                 self.feed(process, |participant, out| {
-                    participant.simulator(is_present, out)
+                    participant.simulator(is_present, out);
                 });
             }
             Message::Interest(is_followed) => {
@@ -525,7 +525,7 @@ impl World {
                 }
                 self.processes[process].welcome = Some(*welcome);
                 self.feed(process, |participant, out| {
-                    participant.admitted(admission, states, out)
+                    participant.admitted(admission, states, out);
                 });
             }
             JoinAnswer::Refused { reason, .. } => {

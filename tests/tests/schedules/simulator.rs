@@ -171,7 +171,7 @@ impl World {
                 }
                 self.put_down(None, &Message::Clock(encode(&clock).into()));
             }
-            Output::Complete(outcome) => self.complete(outcome),
+            Output::Complete(outcome) => self.complete(&outcome),
             Output::Aborted => self.end(End::Aborted),
             Output::SetTimer(timer, after) => self.set_timer(timer, after),
             Output::Held | Output::Released | Output::Ignored(..) => {}
@@ -196,10 +196,10 @@ impl World {
     }
 
     /// A tick is complete: this is where a wrong run shows.
-    fn complete(&mut self, outcome: Reports) {
+    fn complete(&mut self, outcome: &Reports) {
         let epoch = self.simulator.simulation.epoch();
-        let expected = self.simulator.barrier_tick(&outcome);
-        self.check_reports(&outcome, epoch);
+        let expected = self.simulator.barrier_tick(outcome);
+        self.check_reports(outcome, epoch);
         self.progress_at = self.now;
         self.simulator.is_gathering = false;
 
@@ -212,10 +212,10 @@ impl World {
                 record.tick
             ));
         }
-        self.check_commands(&outcome, &record);
-        self.check_membership(&outcome, record.tick, epoch);
-        self.compare(&outcome, &record);
-        self.note_facts(&outcome, record.tick, epoch);
+        self.check_commands(outcome, &record);
+        self.check_membership(outcome, record.tick, epoch);
+        self.compare(outcome, &record);
+        self.note_facts(outcome, record.tick, epoch);
         self.note_trace(self.simulator.simulation.digest().as_bytes());
 
         let due = self.now + self.plan.pace;
@@ -236,7 +236,7 @@ impl World {
                     wrong = Some(format!(
                         "tick {}: no process of {name} has made this report: {report:?}, {commands:?}",
                         report.tick
-                    ))
+                    ));
                 }
                 Some(made) => wrong = wrong.or_else(|| made.wrong.clone()),
             }

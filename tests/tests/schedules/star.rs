@@ -197,9 +197,11 @@ impl World {
                 copies = 2;
             }
         }
-        for _ in 0..copies {
-            self.links[link].way(way).waiting.push_back(message.clone());
+        let waiting = &mut self.links[link].way(way).waiting;
+        for _ in 1..copies {
+            waiting.push_back(message.clone());
         }
+        waiting.push_back(message);
         self.fill(link, way);
     }
 

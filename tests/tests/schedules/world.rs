@@ -235,10 +235,10 @@ impl World {
             Event::Start(name) => self.start(name),
             Event::Arrive { link, way, session } => self.arrive(link, way, session),
             Event::NoticeAbove { link, session } if self.links[link].session == session => {
-                self.close_above(link)
+                self.close_above(link);
             }
             Event::NoticeBelow { link, session } if self.links[link].session == session => {
-                self.close_below(link)
+                self.close_below(link);
             }
             Event::Heal { link, session } => self.open_session(link, session),
             Event::Expire { link, session } => self.expire(link, session),

@@ -34,11 +34,14 @@ fn told(kit: &Kit, arrivals: Vec<Arrival>) -> Result<Transcript, Failure> {
 struct Votes {
     right: usize,
     wrong: usize,
+    /// Neither the one nor the other: commands that arrive together also have an effect of their own, so that nothing follows
+    /// from a coincidence elsewhere.
+    neither: usize,
 }
 
 impl Votes {
     fn is_broken(&self) -> bool {
-        self.right == 0 && self.wrong > 0
+        self.right == 0 && self.neither == 0 && self.wrong > 0
     }
 }
 
@@ -119,6 +122,8 @@ fn vote(
             votes.right += 1;
         } else if came.get(at) == other.get(at) {
             votes.wrong += 1;
+        } else {
+            votes.neither += 1;
         }
     }
 

@@ -131,7 +131,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             )?;
             stage.repeat();
             let joining = join_again(stage)?;
-            stage.admit(joining);
+            stage.admit(&joining);
             stage.keeps_requests = false;
             Ok(())
         }
@@ -194,7 +194,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     })?;
     stage.is_cut_off = false;
     let joining = join_again(&mut stage)?;
-    stage.admit(joining);
+    stage.admit(&joining);
     stage.keeps_requests = false;
     demand_same_process(&stage)?;
     stage.settle(QUIET);

@@ -30,7 +30,7 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             "it came before",
         ));
     }
-    stage.admit(joining);
+    stage.admit(&joining);
     stage.keeps_requests = false;
     stage.until_ready()?;
 
@@ -101,7 +101,7 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
             failure.came,
         )
     })?;
-    stage.admit(joining);
+    stage.admit(&joining);
     stage.keeps_requests = false;
     stage.until_ready()?;
     play(&mut stage, &Script::quiet(2), &mut Straight).map(drop)

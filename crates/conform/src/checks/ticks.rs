@@ -46,7 +46,7 @@ pub(super) fn usual(
     kit.learn(&request)?;
     findings.settle("join.request", check_request(&stage, &joining));
     stage.prepare().map_err(cannot)?;
-    stage.admit(joining);
+    stage.admit(&joining);
     stage.keeps_requests = false;
     stage.until_ready().map_err(cannot)?;
 

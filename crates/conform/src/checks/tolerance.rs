@@ -109,7 +109,7 @@ fn news(tick: Tick) -> Vec<Vec<u8>> {
             "x".repeat(MAX_TEXT_BYTES + 1)
         ),
         format!("{start},\"unreachable\":\"all\"}}"),
-        format!("{start}"),
+        start.to_string(),
     ] {
         rubbish.push(text.into_bytes());
     }

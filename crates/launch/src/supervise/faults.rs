@@ -32,9 +32,9 @@ impl Supervisor {
                 continue;
             };
             if order.begins {
-                self.begin_fault(index, order)
+                self.begin_fault(index, order);
             } else {
-                self.end_fault(index, order.kind)
+                self.end_fault(index, order.kind);
             }
         }
         (done.0)();
