@@ -65,7 +65,11 @@ fn a_cut_changes_nothing(via: &str, cut_s: u64) {
     let healed = player.prints_after("the link of Leguin is whole", Some(cut));
     // The two lines come from two processes: the clock may go on before the healing is printed.
     let went_on = player.prints_after("the clock goes on", Some(gone));
-    let (named, gone, went_on) = (named - cut, gone - cut, went_on.saturating_duration_since(healed));
+    let (named, gone, went_on) = (
+        named - cut,
+        gone - cut,
+        went_on.saturating_duration_since(healed),
+    );
     println!(
         "{via}, {cut_s} s: named after {named:?}, gone after {gone:?}, on {went_on:?} after healing"
     );
