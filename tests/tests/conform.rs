@@ -127,7 +127,6 @@ const OTHERWISE: [&str; 46] = [
     "tick.answer:generation",
     "tick.answer:unasked",
     "tick.state-first:unheard",
-    "command.order:sorted",
     "command.sent:late",
     "command.sent:numbers",
     "command.sent:count",

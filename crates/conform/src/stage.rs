@@ -536,11 +536,6 @@ impl<'k> Stage<'k> {
         }
     }
 
-    /// Files what has arrived.
-    pub(crate) fn drain(&mut self) {
-        while self.pump(Duration::ZERO) {}
-    }
-
     /// Files what comes within a time, for what must not come.
     pub(crate) fn settle(&mut self, time: Duration) {
         let deadline = Instant::now() + time;

@@ -732,9 +732,6 @@ impl Host {
         if wrong.is("command.order") {
             deliveries.reverse();
         }
-        if wrong.is("command.order:sorted") {
-            deliveries.sort_by(|one, other| one.command.cmp(&other.command));
-        }
         if wrong.is("command.twice") {
             deliveries.dedup();
         }

@@ -62,8 +62,15 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
         };
         let straight = values(&apart(&one, &two)?);
         let swapped = values(&apart(&two, &one)?);
-        let votes = vote(&values(&together(&one, &two)?), &straight, &swapped);
-        let back = vote(&values(&together(&two, &one)?), &swapped, &straight);
+        let in_order = values(&together(&one, &two)?);
+        let reversed = values(&together(&two, &one)?);
+        // To this robot the order within a tick makes no difference: there is nothing to see.
+        if in_order == reversed {
+            continue;
+        }
+
+        let votes = vote(&in_order, &straight, &swapped);
+        let back = vote(&reversed, &swapped, &straight);
         for (votes, first, second) in [(&votes, &one, &two), (&back, &two, &one)] {
             if votes.is_broken() {
                 return Err(Failure::new(
@@ -230,7 +237,9 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Fa
                 format!("one, after {text:?} from the operator"),
             ));
         }
-        if kit.is_deterministic.get() == Some(&false) || is_same(&own, &none) {
+        // An answer to the sender is an effect that the operator cannot have.
+        let only_answers = values(&own) == values(&none);
+        if kit.is_deterministic.get() == Some(&false) || only_answers || is_same(&own, &none) {
             continue;
         }
         is_seen = true;

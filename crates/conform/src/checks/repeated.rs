@@ -1,6 +1,7 @@
 //! The same clock again, and clocks that come too late.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use protocol::messages::{Clock, Correction, News, Point};
 use protocol::{Epoch, Tick};
@@ -14,6 +15,8 @@ use crate::stage::{Answer, Options, PATIENCE, Sent, Stage};
 
 /// One clock in so many comes again, and each whose tick had commands.
 const EVERY: Tick = 3;
+/// How long a robot may still send what belongs to the tick itself.
+const BEFORE_REPEATING: Duration = Duration::from_millis(50);
 
 /// A clock that comes again is answered as before, and a tick is done once.
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
@@ -25,7 +28,8 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                 return Ok(());
             }
 
-            stage.drain();
+            // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
+            stage.settle(BEFORE_REPEATING);
             let since = stage.seen.count;
             stage.repeat();
             let expected = format!("the report of tick {tick} again when its clock comes again");
