@@ -23,6 +23,8 @@ const MAX_REPORTED: usize = MAX_MESSAGE_BYTES - (1 << 17);
 pub(super) struct Proxy {
     program: Arc<Program>,
     heard: Receiver<Heard>,
+    /// Whether the line `init` was the last one that the program was sent, so that it may be answering it.
+    is_initializing: bool,
     /// What the program said last.
     done: Done,
     panel: Panel,
@@ -33,6 +35,7 @@ impl Proxy {
         Self {
             program,
             heard,
+            is_initializing: false,
             done: Done::default(),
             panel: Panel::default(),
         }
@@ -130,14 +133,23 @@ impl Proxy {
     fn exchange(&mut self, cars: &mut Cars<'_>) -> Result<Done, String> {
         if cars.tick() > 0 {
             let commands: Vec<Arrived> = cars.commands().iter().map(arrived).collect();
-            self.begin(&Told::Tick {
+            let told = Told::Tick {
                 tick: cars.tick(),
                 location: cars.location(),
                 blocked: cars.was_blocked(),
                 commands: &commands,
                 sensed: cars.sensed_robots(),
-            })?;
+            };
+
+            // What the program says after an `init` in the middle of a run may arrive before this line is sent.
+            if self.is_initializing {
+                self.tell(&told)?;
+            } else {
+                self.begin(&told)?;
+            }
         }
+
+        self.is_initializing = false;
         self.converse(cars)
     }
 }
@@ -180,9 +192,11 @@ impl Robot for Proxy {
 
         let welcome = cars.welcome();
         let begun = self.begin(&Told::init(welcome, cars.tick(), cars.sensed_robots()));
+        self.is_initializing = true;
         if let Err(reason) = begun {
             cars.give_up(reason);
         }
+
         Ok(())
     }
 
