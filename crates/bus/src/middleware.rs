@@ -19,6 +19,7 @@ use crate::error::BusError;
 use crate::qos::Qos;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
+use crate::runtime::block;
 use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
 
 /// What else may be the matter with an encrypted endpoint.
@@ -28,6 +29,19 @@ const TLS_HINT: &str = " (are both certificates of the same `cars secure init`, 
 #[derive(Debug, Clone)]
 pub(super) struct Session {
     session: zenoh::Session,
+}
+
+/// A message of more bytes may fill the queue of its link, which holds two batches of 64 KiB.
+const LARGE: usize = 16 * 1024;
+
+/// Sends a message. To send a large one may block until the link has taken most of it: on the middleware's thread, another one
+/// takes over its duties meanwhile, which may be to empty that very queue.
+fn send<T>(message: Vec<u8>, send: impl FnOnce(Vec<u8>) -> T) -> T {
+    if message.len() > LARGE {
+        block(|| send(message))
+    } else {
+        send(message)
+    }
 }
 
 fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T, BusError> {
@@ -123,11 +137,12 @@ impl Session {
     }
 
     pub(super) fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
-        let put = self
-            .session
-            .put(key, message)
-            .congestion_control(CongestionControl::Block)
-            .wait();
+        let put = send(message, |message| {
+            self.session
+                .put(key, message)
+                .congestion_control(CongestionControl::Block)
+                .wait()
+        });
         used("put on", key, put)
     }
 
@@ -315,11 +330,8 @@ pub(super) struct Publisher {
 
 impl Publisher {
     pub(super) fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
-        used(
-            "put on",
-            self.inner.key_expr().as_str(),
-            self.inner.put(message).wait(),
-        )
+        let put = send(message, |message| self.inner.put(message).wait());
+        used("put on", self.inner.key_expr().as_str(), put)
     }
 
     pub(super) fn has_subscribers(&self) -> bool {
@@ -368,7 +380,10 @@ impl Query {
     }
 
     pub(super) fn reply(&self, key: &str, message: Vec<u8>) {
-        if let Err(error) = self.query.reply(key.to_owned(), message).wait() {
+        let replied = send(message, |message| {
+            self.query.reply(key.to_owned(), message).wait()
+        });
+        if let Err(error) = replied {
             tracing::debug!(%error, key, "an answer could not be sent");
         }
     }

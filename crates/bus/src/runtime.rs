@@ -1,36 +1,94 @@
-//! The middleware's threads.
+//! The middleware's threads, and work that is done on them.
 //!
 //! Its default of one small thread pool per duty costs a lock-step system up to half of its ticks: every message
 //! crosses several threads. One shared worker gave 1.2 to 2 times the ticks per second at half the processor time.
 
 use std::os::unix::process::CommandExt;
+use std::path::Path;
+
+use crate::endpoint;
 
 /// Environment variable that the middleware reads once, at its first use.
 pub const RUNTIME_VARIABLE: &str = "ZENOH_RUNTIME";
 
-/// All duties handed over to one runtime with one worker.
+/// All duties on one thread: the cheapest set-up, and under TLS the only safe one (two threads on one encrypted stream corrupt
+/// memory, eclipse-zenoh/zenoh issue 2557).
 pub const ONE_THREAD: &str = "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))";
 
-/// Makes this process use the lock-step thread set-up unless the environment already chooses one.
+/// The same, and a thread of its own for sending. What forwards messages needs it: a thread that receives blocks while the
+/// queue of the link that a message is forwarded to is full, and must not be the one that empties this queue.
+pub const OWN_SENDER: &str = "(rx:(handover:app),tx:(worker_threads:1),acc:(handover:app),net:(handover:app),app:(worker_threads:1))";
+
+/// Makes this process use one thread for the middleware, unless the environment chooses other set-ups than the two above.
 ///
-/// To be called first in `main`. The variable must be in the environment before any thread exists, which a running
-/// program cannot arrange for itself in safe code; so the program replaces itself, once, by itself with the variable
-/// set. The process keeps its id. Where that fails it goes on with the defaults: slower, not wrong.
+/// To be called before any thread exists. The variable must be in the environment by then, which a running program cannot
+/// arrange for itself in safe code; so the program replaces itself, once, by itself with the variable set. The process keeps
+/// its id. Where that fails it goes on with the defaults: slower, not wrong.
 pub fn use_one_thread() {
-    if std::env::var_os(RUNTIME_VARIABLE).is_some() {
+    use_threads(ONE_THREAD);
+}
+
+/// The same for a process that forwards messages between these endpoints and those of a configuration file of the
+/// middleware: a simulator or a router. Without TLS it gets [`OWN_SENDER`].
+pub fn use_router_threads<'a>(
+    endpoints: impl IntoIterator<Item = &'a str>,
+    zenoh_config: Option<&Path>,
+) {
+    let is_encrypted =
+        endpoints.into_iter().any(endpoint::is_tls) || zenoh_config.is_some_and(mentions_tls);
+
+    use_threads(if is_encrypted { ONE_THREAD } else { OWN_SENDER });
+}
+
+/// Whether a configuration file may have an encrypted endpoint. One that cannot be read is refused later, with the reason.
+fn mentions_tls(file: &Path) -> bool {
+    std::fs::read_to_string(file).map_or(true, |text| text.contains(&format!("{}/", endpoint::TLS)))
+}
+
+fn use_threads(wanted: &str) {
+    let chosen = std::env::var(RUNTIME_VARIABLE);
+    let is_ours = match chosen.as_deref() {
+        Ok(ONE_THREAD | OWN_SENDER) | Err(std::env::VarError::NotPresent) => true,
+        Ok(_) | Err(std::env::VarError::NotUnicode(_)) => false,
+    };
+    if !is_ours || chosen.as_deref() == Ok(wanted) {
         return;
     }
     let Ok(program) = std::env::current_exe() else {
         return;
     };
+
     let mut arguments = std::env::args_os();
     let mut command = std::process::Command::new(program);
     if let Some(name) = arguments.next() {
         command.arg0(name);
     }
-    let error = command
-        .args(arguments)
-        .env(RUNTIME_VARIABLE, ONE_THREAD)
-        .exec();
+    let error = command.args(arguments).env(RUNTIME_VARIABLE, wanted).exec();
     tracing::warn!(%error, "could not apply the lock-step thread set-up");
+}
+
+/// Whether this process sends on a thread of its own. Then a subscriber may put messages and take its time, and the process
+/// stays connected meanwhile.
+#[must_use]
+pub fn has_own_sender() -> bool {
+    std::env::var(RUNTIME_VARIABLE).as_deref() == Ok(OWN_SENDER)
+}
+
+/// Runs `work` soon on the middleware's thread, after the message that is being handled there: nothing is handed from one
+/// thread to another. For callers on that thread; on any other one `work` comes back.
+///
+/// # Errors
+/// The work, if this is not the middleware's thread.
+pub fn run_soon<W: FnOnce() + Send + 'static>(work: W) -> Result<(), W> {
+    let Ok(handle) = tokio::runtime::Handle::try_current() else {
+        return Err(work);
+    };
+
+    handle.spawn(async move { work() });
+    Ok(())
+}
+
+/// Runs something that may block. On the middleware's thread, another one takes over its duties meanwhile.
+pub fn block<T>(work: impl FnOnce() -> T) -> T {
+    tokio::task::block_in_place(work)
 }

@@ -32,7 +32,9 @@ pub(crate) struct RouterArgs {
 
 /// Forwards until it is told to end.
 pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
-    bus::runtime::use_one_thread();
+    let endpoints = args.listen.iter().chain(&args.connect);
+    bus::runtime::use_router_threads(endpoints.map(String::as_str), args.zenoh_config.as_deref());
+
     let (end, ended) = std::sync::mpsc::sync_channel(1);
     // A second signal finds the queue full and changes nothing.
     ctrlc::set_handler(move || {

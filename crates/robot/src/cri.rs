@@ -12,7 +12,7 @@ use crate::error::BadParameters;
 /// the commands it sent on the way. Its state between ticks is its own.
 ///
 /// A robot in the form of the paper's interface of thirteen methods is a [`CarsRobotInterface`](crate::CarsRobotInterface).
-pub trait Robot {
+pub trait Robot: Send {
     /// Returns to the initial state. Called before tick 0, at every start of a new epoch, and in a process that takes
     /// over from a lost one in the middle of an epoch.
     ///
@@ -30,6 +30,15 @@ pub trait Robot {
 
     /// Whether the robot perceives all bodies around it ([`Cars::bodies`]): its news are larger then.
     fn senses_bodies(&self) -> bool {
+        false
+    }
+
+    /// Whether `init`, `resume` and every tick take some milliseconds at most. Then they may run on the thread on which messages
+    /// arrive, which gives up to twice the ticks per second. That thread also keeps the process connected: one that is held
+    /// for more than a second may be taken for lost. By default not: robots run on a thread of their own and may take any time.
+    ///
+    /// A robot that waits for another robot's answer holds nothing up in either case.
+    fn is_quick(&self) -> bool {
         false
     }
 

@@ -9,7 +9,7 @@ use crate::error::BadParameters;
 
 /// The paper's `CARSRobotInterface` (Figure 7) under Rust's names. `getName` is [`Cars::name`], because the scenario
 /// names the robots. [`Paper`] makes a [`Robot`] of it.
-pub trait CarsRobotInterface {
+pub trait CarsRobotInterface: Send {
     /// `initRobot`: returns to the initial state. See [`Robot::init`].
     ///
     /// # Errors

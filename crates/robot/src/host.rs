@@ -3,13 +3,14 @@
 //!
 //! What arrives is fed to the participants where it arrives, on the middleware's thread: so a query is answered at once,
 //! also while a robot computes. What the participants want done is carried out by the host's own thread, which also runs the
-//! robots.
+//! robots; or, if all its robots are quick ([`Robot::is_quick`]), their ticks are run by the middleware's thread, soon after the
+//! clock arrives there.
 
 mod shared;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Role};
@@ -25,8 +26,10 @@ use crate::cri::Robot;
 use crate::error::RobotError;
 use crate::network::{Network, Undelivered};
 use crate::seat::{Done, Seat};
-use shared::{HostAction, HostAnswer, Shared, Waited};
+use shared::{HostAction, HostAnswer, Shared, Thread, Waited};
 
+/// More commands than this are put while another thread takes over the middleware's duties: they may fill its queue.
+const MANY_COMMANDS: usize = 16;
 /// A panel is for eyes: it is put no more often than this.
 const PANEL_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -98,6 +101,8 @@ pub struct Host {
     declared: Vec<Declared>,
     /// Subscriptions to other robots' states, by subscriber and robot.
     followed: BTreeMap<(RobotName, RobotName), Declared>,
+    /// How the run ended, or why the host cannot go on.
+    outcome: Option<Result<End, HostError>>,
 }
 
 /// Ends [`Host::run`] from another thread: for a signal, or when what a robot needs is gone.
@@ -123,6 +128,8 @@ struct Member {
     welcome: Option<Welcome>,
     /// Whether it perceives all bodies around it.
     senses_bodies: bool,
+    /// Whether its ticks may run on the middleware's thread.
+    is_quick: bool,
     explanation: String,
     report: Publisher,
     state: Publisher,
@@ -168,6 +175,7 @@ impl Host {
         for (name, robot) in robots {
             let member = Member {
                 senses_bodies: robot.senses_bodies(),
+                is_quick: robot.is_quick(),
                 robot: Some(robot),
                 seat: None,
                 welcome: None,
@@ -189,6 +197,7 @@ impl Host {
             members,
             declared: Vec::new(),
             followed: BTreeMap::new(),
+            outcome: None,
         };
         for name in &names {
             host.declare(name)?;
@@ -272,23 +281,54 @@ impl Host {
     ///
     /// # Errors
     /// [`HostError`] if it cannot go on.
-    pub fn run(mut self) -> Result<End, HostError> {
-        let outcome = loop {
-            let (name, action) = self.shared.next();
-            match self.carry_out(&name, action) {
-                Ok(None) => {}
-                Ok(Some(end)) => break Ok(end),
-                Err(error) => break Err(error),
-            }
-        };
+    pub fn run(self) -> Result<End, HostError> {
+        let shared = self.shared.clone();
+        let is_quick = self.members.values().all(|member| member.is_quick);
+        let host = Arc::new(Mutex::new(self));
+        if is_quick {
+            let host = Arc::downgrade(&host);
+            shared.run_on_arrival(Box::new(move || {
+                let host = host.clone();
+                let work = move || {
+                    if let Some(host) = host.upgrade() {
+                        work_here(&host);
+                    }
+                };
+                bus::runtime::run_soon(work).is_ok()
+            }));
+        }
 
+        loop {
+            let Ok(mut working) = host.lock() else {
+                panic!("a robot panicked in its tick");
+            };
+            working.work(Thread::Own);
+            if let Some(outcome) = working.outcome.take() {
+                working.leave_bus();
+                return outcome;
+            }
+            drop(working);
+
+            shared.sleep();
+        }
+    }
+
+    /// Carries out all that is for this thread.
+    fn work(&mut self, thread: Thread) {
+        while self.outcome.is_none()
+            && let Some((name, action)) = self.shared.next(thread)
+        {
+            self.outcome = self.carry_out(&name, action).transpose();
+        }
+    }
+
+    fn leave_bus(&mut self) {
         for member in self.members.values_mut() {
             member.token = None;
         }
         self.followed.clear();
         self.declared.clear();
         self.bus.close();
-        outcome
     }
 
     /// Does what a participant wants done. Returns how the run ended, when it has.
@@ -315,6 +355,9 @@ impl Host {
                 if let Some(member) = self.members.get_mut(name) {
                     member.token = Some(token);
                 }
+            }
+            Action::Put(answer) if answer.commands.len() > MANY_COMMANDS => {
+                bus::runtime::block(|| self.put(name, &answer))?;
             }
             Action::Put(answer) => self.put(name, &answer)?,
             Action::Query { of, tick, epoch } => {
@@ -513,6 +556,40 @@ impl Host {
     }
 }
 
+/// Runs what may run on the middleware's thread, unless another thread is at it, which then looks for more itself.
+fn work_here(host: &Mutex<Host>) {
+    loop {
+        let Ok(mut working) = host.try_lock() else {
+            return;
+        };
+        let shared = working.shared.clone();
+        let alarm = Alarm(&shared);
+        working.work(Thread::Middleware);
+        let is_over = working.outcome.is_some();
+        drop(working);
+        drop(alarm);
+
+        if is_over {
+            shared.end();
+            return;
+        }
+        if !shared.has_next(Thread::Middleware) {
+            return;
+        }
+    }
+}
+
+/// Wakes the host's own thread when a robot panics on the middleware's: it finds out, and the process ends.
+struct Alarm<'a>(&'a Shared);
+
+impl Drop for Alarm<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.end();
+        }
+    }
+}
+
 impl Member {
     /// Seats the robot with its newest welcome.
     fn take_seat(&mut self) {
@@ -564,7 +641,8 @@ impl Network for HostNetwork<'_> {
                 Waited::Found(state) => return Ok(state),
                 Waited::Interrupted => return Err(Undelivered::Interrupted),
                 Waited::Act(name, action) => {
-                    if let Err(error) = self.host.carry_out_io(&name, action) {
+                    let carried_out = bus::runtime::block(|| self.host.carry_out_io(&name, action));
+                    if let Err(error) = carried_out {
                         self.failed = Some(error);
                         return Err(Undelivered::Interrupted);
                     }

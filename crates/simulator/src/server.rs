@@ -1,11 +1,13 @@
-//! The simulator as a process: a loop that translates between the bus, the lock-step ([`lockstep::Barrier`]) and the
+//! The simulator as a process: it translates between the bus, the lock-step ([`lockstep::Barrier`]) and the
 //! [`Simulation`](crate::Simulation).
 //!
-//! One loop, one queue. Everything that can happen is an [`Event`]; the loop sleeps until one arrives or something is
-//! due. Control is answered by the same loop, also while the clock is held, because the loop never waits for a robot.
+//! One queue. Everything that can happen is an [`Event`], and one thread at a time works on them: the one on which an event
+//! arrives, or the server's own. Control is answered in the same way, also while the clock is held, because no work ever
+//! waits for a robot.
 
 mod control;
 mod faults;
+mod inbox;
 mod join;
 mod observers;
 mod orders;
@@ -13,4 +15,5 @@ mod pace;
 mod process;
 mod timers;
 
+pub use inbox::Inbox;
 pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError};

@@ -27,4 +27,8 @@ impl Robot for Idle {
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
         Action::stay(cars).emotion("CALM").behavior("IDLE")
     }
+
+    fn is_quick(&self) -> bool {
+        true
+    }
 }

@@ -33,6 +33,11 @@ impl Point {
 
     /// Refuses coordinates that are not finite; `field` is the point's path in the message.
     pub(super) fn check(self, field: &str) -> Result<(), FieldError> {
+        // The path is written only for a point that is wrong: this runs for every report.
+        if self.x.is_finite() && self.y.is_finite() {
+            return Ok(());
+        }
+
         finite(self.x, &format!("{field}.x"))?;
         finite(self.y, &format!("{field}.y"))
     }

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::Visitor;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::limits::{MAX_TEXT_BYTES, counted, few, finite, short};
 use super::numbers::{Epoch, Tick};
@@ -14,7 +15,7 @@ use crate::codec::{FieldError, Message};
 
 /// A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
 /// languages that do not tell them apart give the same run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Variable {
     /// Yes or no.
@@ -23,6 +24,48 @@ pub enum Variable {
     Number(f64),
     /// Text.
     Text(String),
+}
+
+/// Derived, it would be tried as one kind after the other, and an error would be written for each that it is not: this runs
+/// for every variable of every robot in every tick.
+impl<'de> Deserialize<'de> for Variable {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(VariableVisitor)
+    }
+}
+
+struct VariableVisitor;
+
+impl Visitor<'_> for VariableVisitor {
+    type Value = Variable;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a text, true or false")
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Variable, E> {
+        Ok(Variable::Flag(value))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Variable, E> {
+        Ok(Variable::Number(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Variable, E> {
+        Ok(Variable::Number(value as f64))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Variable, E> {
+        Ok(Variable::Number(value as f64))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Variable, E> {
+        Ok(Variable::Text(value.to_owned()))
+    }
+
+    fn visit_string<E>(self, value: String) -> Result<Variable, E> {
+        Ok(Variable::Text(value))
+    }
 }
 
 impl From<f64> for Variable {

@@ -1,7 +1,8 @@
-//! What the middleware's threads and the host's thread share: the participants, what they want done, and their timers.
+//! What the middleware's thread and the host's own share: the participants, what they want done, and their timers.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::fmt;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use lockstep::{Action, Answer, NoState, Participant, Patience, RobotTimer, StateQuery};
@@ -17,17 +18,39 @@ pub(super) type HostAction = Action<News, Arc<PublicState>, CommandText, Encoded
 pub(super) type HostAnswer = Answer<Arc<PublicState>, CommandText, Encoded>;
 
 /// The participants of a process.
-#[derive(Debug)]
 pub(super) struct Shared {
     inner: Mutex<Inner>,
-    changed: Condvar,
+    /// Wakes the host's own thread.
+    has_work: Condvar,
+    /// Wakes a robot that waits for another robot's answer.
+    has_news: Condvar,
+    /// Runs ticks on the middleware's thread, where the robots allow it.
+    runner: OnceLock<Runner>,
 }
+
+/// Has the middleware's thread carry out what it may. Returns whether it will.
+type Runner = Box<dyn Fn() -> bool + Send + Sync>;
 
 #[derive(Debug)]
 struct Inner {
     participants: BTreeMap<RobotName, HostParticipant>,
     actions: VecDeque<(RobotName, HostAction)>,
     timers: BTreeMap<(RobotName, RobotTimer), Instant>,
+    /// When the host's own thread wakes by itself, while it sleeps.
+    sleeps_until: Option<Instant>,
+    /// Whether a robot waits for another robot's answer. Its thread carries out what the others want meanwhile.
+    is_robot_waiting: bool,
+    /// Whether the host is to look why it cannot go on.
+    is_over: bool,
+}
+
+/// Which thread asks for something to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Thread {
+    /// The host's own.
+    Own,
+    /// The middleware's: it must neither wait for an answer nor declare anything.
+    Middleware,
 }
 
 /// The answer to a robot that waits for another robot's state.
@@ -40,6 +63,12 @@ pub(super) enum Waited {
     Act(RobotName, HostAction),
 }
 
+impl fmt::Debug for Shared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Shared").finish_non_exhaustive()
+    }
+}
+
 impl Shared {
     /// Participants for these robots, which begin by asking to join.
     pub(super) fn new(names: &[RobotName], patience: Patience) -> Self {
@@ -47,6 +76,9 @@ impl Shared {
             participants: BTreeMap::new(),
             actions: VecDeque::new(),
             timers: BTreeMap::new(),
+            sleeps_until: None,
+            is_robot_waiting: false,
+            is_over: false,
         };
         for name in names {
             let mut actions = Vec::new();
@@ -57,8 +89,16 @@ impl Shared {
 
         Self {
             inner: Mutex::new(inner),
-            changed: Condvar::new(),
+            has_work: Condvar::new(),
+            has_news: Condvar::new(),
+            runner: OnceLock::new(),
         }
+    }
+
+    /// From now on `runner` runs ticks on the middleware's thread.
+    pub(super) fn run_on_arrival(&self, runner: Runner) {
+        // There is one host, and it sets this once.
+        let _set_once = self.runner.set(runner);
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -74,8 +114,7 @@ impl Shared {
     ) {
         let mut inner = self.lock();
         inner.feed(name, feed);
-        drop(inner);
-        self.changed.notify_all();
+        self.wake(inner);
     }
 
     /// Feeds something to every participant, in the order of their names.
@@ -85,8 +124,32 @@ impl Shared {
         for name in names {
             inner.feed(&name, &feed);
         }
+        self.wake(inner);
+    }
+
+    /// Wakes the thread that is to carry out what was filed: the one of a robot that waits, the middleware's, or the host's own.
+    fn wake(&self, inner: MutexGuard<'_, Inner>) {
+        let is_robot_waiting = inner.is_robot_waiting;
+        let is_for_middleware = inner.is_next_for(Thread::Middleware);
+        let has_actions = !inner.actions.is_empty();
+        let has_earlier_timer = inner.has_earlier_timer();
         drop(inner);
-        self.changed.notify_all();
+
+        if is_robot_waiting {
+            self.has_news.notify_all();
+            return;
+        }
+        let runner = self.runner.get().filter(|_| is_for_middleware);
+        let is_run = runner.is_some_and(|runner| runner());
+        if has_earlier_timer || has_actions && !is_run {
+            self.has_work.notify_one();
+        }
+    }
+
+    /// Wakes the host's own thread because the host cannot go on.
+    pub(super) fn end(&self) {
+        self.lock().is_over = true;
+        self.has_work.notify_one();
     }
 
     /// Answers a query for the state of a robot of this process.
@@ -111,15 +174,32 @@ impl Shared {
         self.lock().participants.contains_key(name)
     }
 
-    /// Waits for the next thing to be done.
-    pub(super) fn next(&self) -> (RobotName, HostAction) {
+    /// Takes the next thing to be done that is for this thread.
+    pub(super) fn next(&self, thread: Thread) -> Option<(RobotName, HostAction)> {
         let mut inner = self.lock();
-        loop {
+        if thread == Thread::Own {
             inner.fire();
-            if let Some(next) = inner.actions.pop_front() {
-                return next;
-            }
-            inner = self.wait(inner);
+        }
+        if inner.is_next_for(thread) {
+            return inner.actions.pop_front();
+        }
+        if !inner.actions.is_empty() {
+            self.has_work.notify_one();
+        }
+
+        None
+    }
+
+    /// Whether there is something to do for this thread.
+    pub(super) fn has_next(&self, thread: Thread) -> bool {
+        self.lock().is_next_for(thread)
+    }
+
+    /// The host's own thread sleeps until there is something to do.
+    pub(super) fn sleep(&self) {
+        let inner = self.lock();
+        if inner.actions.is_empty() && !inner.is_over {
+            let _woken = wait(&self.has_work, inner);
         }
     }
 
@@ -147,24 +227,30 @@ impl Shared {
             if let Some((name, action)) = index.and_then(|index| inner.actions.remove(index)) {
                 return Waited::Act(name, action);
             }
-            inner = self.wait(inner);
+            inner.is_robot_waiting = true;
+            inner = bus::runtime::block(|| wait(&self.has_news, inner));
+            inner.is_robot_waiting = false;
         }
     }
+}
 
-    /// Sleeps until something arrives or a timer fires.
-    fn wait<'a>(&self, inner: MutexGuard<'a, Inner>) -> MutexGuard<'a, Inner> {
-        let due = inner.timers.values().min().copied();
-        let Some(due) = due else {
-            return self
-                .changed
-                .wait(inner)
-                .unwrap_or_else(PoisonError::into_inner);
-        };
+/// Sleeps until something arrives or a timer fires.
+fn wait<'a>(condition: &Condvar, mut inner: MutexGuard<'a, Inner>) -> MutexGuard<'a, Inner> {
+    let due = inner.timers.values().min().copied();
+    inner.sleeps_until = due;
+    let mut inner = match due {
+        None => condition
+            .wait(inner)
+            .unwrap_or_else(PoisonError::into_inner),
+        Some(due) => {
+            let patience: Duration = due.saturating_duration_since(Instant::now());
+            let waited = condition.wait_timeout(inner, patience);
+            waited.unwrap_or_else(PoisonError::into_inner).0
+        }
+    };
 
-        let patience: Duration = due.saturating_duration_since(Instant::now());
-        let waited = self.changed.wait_timeout(inner, patience);
-        waited.unwrap_or_else(PoisonError::into_inner).0
-    }
+    inner.sleeps_until = None;
+    inner
 }
 
 impl Inner {
@@ -192,6 +278,25 @@ impl Inner {
                 Some(due) => self.timers.insert(key, due),
                 None => self.timers.remove(&key),
             };
+        }
+    }
+
+    /// Whether this thread may carry out what is to be done next.
+    fn is_next_for(&self, thread: Thread) -> bool {
+        match self.actions.front() {
+            None => false,
+            Some((_, Action::Run(_) | Action::Put(_))) => true,
+            Some(_) => thread == Thread::Own,
+        }
+    }
+
+    /// Whether a timer fires before the host's own thread wakes by itself.
+    fn has_earlier_timer(&self) -> bool {
+        let due = self.timers.values().min();
+        match (due, self.sleeps_until) {
+            (Some(due), Some(planned)) => *due < planned,
+            (Some(_), None) => true,
+            (None, _) => false,
         }
     }
 

@@ -102,6 +102,10 @@ impl Robot for Leguin {
         cars.log("is back, and takes over where the last one was lost");
     }
 
+    fn is_quick(&self) -> bool {
+        true
+    }
+
     fn senses_bodies(&self) -> bool {
         true
     }

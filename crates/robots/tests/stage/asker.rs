@@ -1,7 +1,6 @@
 //! A robot that only queries another one.
 
-use std::cell::RefCell;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex};
 
 use robot::{Action, BadParameters, Cars, PublicState, Robot};
 
@@ -9,12 +8,12 @@ use super::{Role, Stage, feet};
 
 struct Asker {
     of: String,
-    heard: Rc<RefCell<Option<PublicState>>>,
+    heard: Arc<Mutex<Option<PublicState>>>,
 }
 
 /// What `of` answers, beside Butler on the usual stage.
 pub(crate) fn answers(seed: u64, of: &str) -> PublicState {
-    let heard = Rc::new(RefCell::new(None));
+    let heard = Arc::new(Mutex::new(None));
     let asker = Asker {
         of: of.to_owned(),
         heard: heard.clone(),
@@ -31,7 +30,7 @@ pub(crate) fn answers(seed: u64, of: &str) -> PublicState {
     );
     stage.begin();
     stage.step();
-    heard.borrow_mut().take().unwrap()
+    heard.lock().unwrap().take().unwrap()
 }
 
 impl Robot for Asker {
@@ -40,7 +39,7 @@ impl Robot for Asker {
     }
 
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
-        *self.heard.borrow_mut() = cars
+        *self.heard.lock().unwrap() = cars
             .get_robot_state(&self.of)
             .ok()
             .map(|state| (*state).clone());

@@ -59,8 +59,9 @@ struct Args {
 }
 
 fn main() -> miette::Result<ExitCode> {
-    bus::runtime::use_one_thread();
     let args = Args::parse();
+    bus::runtime::use_router_threads([args.listen.as_str()], args.zenoh_config.as_deref());
+
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| "warn,zenoh=error".into());
     tracing_subscriber::fmt()
@@ -103,9 +104,8 @@ fn run(args: &Args) -> miette::Result<Summary> {
         repeat_after: REPEAT_AFTER,
     };
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;
-    let queue = server.queue();
-    // The queue is closed only when the run is over, and then there is nothing left to end.
-    ctrlc::set_handler(move || drop(queue.send(Event::Terminate))).into_diagnostic()?;
+    let inbox = server.inbox();
+    ctrlc::set_handler(move || inbox.send(Event::Terminate)).into_diagnostic()?;
     if let Some(file) = &args.operator_config {
         write_line(
             &folder.file(OPERATOR_CONFIG),

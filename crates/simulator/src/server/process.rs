@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
@@ -19,13 +18,12 @@ use crate::scenario::Scenario;
 use crate::simulation::Simulation;
 use crate::summary::{Summary, Wall};
 
+use super::inbox::{Events, Inbox, Running, inbox};
 use super::observers::Observers;
 use super::orders::{Orders, Underway};
 use super::pace::Pace;
 use super::timers::Timers;
 
-/// Messages that may queue up before links are slowed down.
-const QUEUE: usize = 65_536;
 /// While the clock is held it is repeated this often: what was lost on the wire is then sent again.
 pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
 /// How long the simulator waits at the end of a run for the robots to leave.
@@ -138,8 +136,8 @@ pub struct Server {
     pub(super) options: Options,
     bus: Bus,
     keys: Keys,
-    queue: SyncSender<Event>,
-    events: Receiver<Event>,
+    inbox: Inbox,
+    pub(super) events: Events,
     declared: Vec<Declared>,
     clock: Publisher,
     news: BTreeMap<RobotName, Publisher>,
@@ -168,7 +166,7 @@ impl Server {
     /// [`BusError`] if something cannot be declared.
     pub fn open(bus: Bus, scenario: &Scenario, options: Options) -> Result<Self, BusError> {
         let keys = Keys::new(&options.run);
-        let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
+        let (inbox, events) = inbox();
         let mut news = BTreeMap::new();
         for name in scenario.robots.keys() {
             news.insert(name.clone(), bus.publisher(&keys.news(name))?);
@@ -203,56 +201,55 @@ impl Server {
             options,
             bus,
             keys,
-            queue,
+            inbox,
             events,
         };
         server.declare()?;
         Ok(server)
     }
 
-    /// Where signals and tests put events.
+    /// Where signals and tests send events to.
     #[must_use]
-    pub fn queue(&self) -> SyncSender<Event> {
-        self.queue.clone()
+    pub fn inbox(&self) -> Inbox {
+        self.inbox.clone()
     }
 
     /// Declares what the simulator subscribes to and answers, its token last.
     fn declare(&mut self) -> Result<(), BusError> {
-        // A send fails only when the process ends, and then no message matters any more.
-        let queue = self.queue();
+        let inbox = self.inbox();
         let reports = self
             .bus
             .subscribe(&self.keys.reports(), move |key, bytes| {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
                 let report = decode(key, &robot, bytes);
-                let _ = queue.send(Event::Report { robot, report });
+                inbox.send(Event::Report { robot, report });
             })?;
 
-        let queue = self.queue();
+        let inbox = self.inbox();
         let commands = self
             .bus
             .subscribe(&self.keys.commands(), move |key, bytes| {
                 let to = Keys::robot_of(key).unwrap_or_default().to_owned();
                 let from = Keys::last_chunk(key).to_owned();
                 let command = decode(key, &from, bytes);
-                let _ = queue.send(Event::Command { from, to, command });
+                inbox.send(Event::Command { from, to, command });
             })?;
 
-        let queue = self.queue();
+        let inbox = self.inbox();
         let waiting = self
             .bus
             .subscribe(&self.keys.all_waiting(), move |key, bytes| {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
                 let waiting = decode(key, &robot, bytes);
-                let _ = queue.send(Event::Waiting { robot, waiting });
+                inbox.send(Event::Waiting { robot, waiting });
             })?;
 
-        let queue = self.queue();
+        let inbox = self.inbox();
         let tokens = self
             .bus
             .liveliness(&self.keys.alive_robots(), move |key, is_present| {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
-                let _ = queue.send(Event::Token { robot, is_present });
+                inbox.send(Event::Token { robot, is_present });
             })?;
         self.declared.extend([reports, commands, waiting, tokens]);
 
@@ -261,9 +258,9 @@ impl Server {
             (self.keys.joins(), Event::Join),
             (self.keys.control(), Event::Control),
         ] {
-            let queue = self.queue();
+            let inbox = self.inbox();
             self.declared.push(self.bus.queryable(&key, move |query| {
-                let _ = queue.send(event(query));
+                inbox.send(event(query));
             })?);
         }
         self.declared.push(self.bus.token(&self.keys.alive_sim())?);
@@ -281,13 +278,19 @@ impl Server {
     ) -> Result<Summary, ServerError> {
         let mut epoch: Epoch = 1;
         loop {
-            let mut simulation = Simulation::new(scenario.clone(), epoch)?;
-            let mut recorder = Recorder::begin(folder, &self.options.run, &simulation)?;
-            self.wall = Wall::default();
-            let interrupt = match self.epoch(&mut simulation, &mut recorder) {
-                Ok(()) => Interrupt::End(End::Finished),
-                Err(interrupt) => interrupt,
-            };
+            let mut simulation = Simulation::new(scenario, epoch)?;
+            let recorder = Recorder::begin(folder, &self.options.run, &simulation)?;
+            self.begin_epoch(&mut simulation);
+
+            let inbox = self.inbox();
+            let (running, interrupt) = inbox.run(Running::new(self, simulation, recorder));
+            let Running {
+                server,
+                mut simulation,
+                recorder,
+                ..
+            } = running;
+            self = server;
             match interrupt {
                 Interrupt::Init(next) => {
                     scenario = *next;
@@ -299,27 +302,32 @@ impl Server {
         }
     }
 
-    fn epoch(
-        &mut self,
-        simulation: &mut Simulation,
-        recorder: &mut Recorder,
-    ) -> Result<(), Interrupt> {
-        // Nothing of an epoch before may reach into this one.
+    /// Begins to gather robots. Nothing of an epoch before may reach into this one.
+    fn begin_epoch(&mut self, simulation: &mut Simulation) {
+        self.wall = Wall::default();
         self.operator.clear();
         self.outputs.clear();
         self.culprits.clear();
         for name in &self.with_bodies {
             simulation.list_bodies(name, true);
         }
+
         self.pace.gather();
         self.stage = Stage::Robots;
         self.waiting_since = Instant::now();
         let lateness = simulation.scenario().lateness.to_lockstep();
         self.barrier
             .gather(simulation.epoch(), lateness, &mut self.outputs);
+    }
 
+    /// Does all that can be done now. Returns how long to wait at most before looking again.
+    pub(super) fn work(
+        &mut self,
+        simulation: &mut Simulation,
+        recorder: &mut Recorder,
+    ) -> Result<Option<Duration>, Interrupt> {
         loop {
-            while let Ok(event) = self.events.try_recv() {
+            while let Some(event) = self.events.try_next() {
                 self.handle(event, simulation)?;
             }
             while let Some(timer) = self.timers.take_due() {
@@ -327,15 +335,12 @@ impl Server {
             }
             self.carry_out(simulation, recorder)?;
             if simulation.tick() >= simulation.scenario().ticks && !self.is_waiting_for_robots() {
-                return Ok(());
+                return Err(Interrupt::End(End::Finished));
             }
 
-            let patience = match self.advance(simulation)? {
-                Next::Opened => continue,
-                Next::Wait(patience) => patience,
-            };
-            if let Some(event) = self.receive(patience) {
-                self.handle(event, simulation)?;
+            match self.advance(simulation)? {
+                Next::Opened => {}
+                Next::Wait(patience) => return Ok(patience),
             }
         }
     }
@@ -518,7 +523,7 @@ impl Server {
 
         while !awaited.is_empty() && Instant::now() < deadline {
             let left = deadline.saturating_duration_since(Instant::now());
-            match self.receive(Some(self.options.repeat_after.min(left))) {
+            match self.events.wait(self.options.repeat_after.min(left)) {
                 Some(Event::Token {
                     robot,
                     is_present: false,
@@ -531,14 +536,6 @@ impl Server {
                 // The run is over: nothing else changes anything any more.
                 Some(event) => drop(self.handle(event, simulation)),
             }
-        }
-    }
-
-    /// The next event, or `None` after `patience`.
-    fn receive(&self, patience: Option<Duration>) -> Option<Event> {
-        match patience {
-            Some(patience) => self.events.recv_timeout(patience).ok(),
-            None => self.events.recv().ok(),
         }
     }
 
