@@ -6,6 +6,7 @@
 )]
 
 mod ending;
+mod limits;
 mod program;
 mod rubbish;
 mod skeletons;
