@@ -34,15 +34,31 @@ pub fn use_router_threads<'a>(
     endpoints: impl IntoIterator<Item = &'a str>,
     zenoh_config: Option<&Path>,
 ) {
-    let is_encrypted =
-        endpoints.into_iter().any(endpoint::is_tls) || zenoh_config.is_some_and(mentions_tls);
-
-    use_threads(if is_encrypted { ONE_THREAD } else { OWN_SENDER });
+    use_threads(if is_encrypted(endpoints, zenoh_config) {
+        ONE_THREAD
+    } else {
+        OWN_SENDER
+    });
 }
 
-/// Whether a configuration file may have an encrypted endpoint. One that cannot be read is refused later, with the reason.
-fn mentions_tls(file: &Path) -> bool {
-    std::fs::read_to_string(file).map_or(true, |text| text.contains(&format!("{}/", endpoint::TLS)))
+/// Whether one of these endpoints is encrypted, or one of a configuration file may be. A file that cannot be read is refused
+/// later, with the reason.
+pub(crate) fn is_encrypted(
+    endpoints: impl IntoIterator<Item = impl AsRef<str>>,
+    zenoh_config: Option<&Path>,
+) -> bool {
+    let mut endpoints = endpoints.into_iter();
+    if endpoints.any(|endpoint| endpoint::is_tls(endpoint.as_ref())) {
+        return true;
+    }
+
+    let Some(file) = zenoh_config else {
+        return false;
+    };
+    match std::fs::read_to_string(file) {
+        Ok(text) => text.contains(&format!("{}/", endpoint::TLS)),
+        Err(_) => true,
+    }
 }
 
 fn use_threads(wanted: &str) {

@@ -52,7 +52,11 @@ fn play(label: &str, talkers: &[Talker], ticks: u32) {
             "[[robot]]\nname = \"{name}\"\nat = [\"{} m\", \"5 m\"]\n",
             3 * index + 2
         );
-        let asks: Vec<String> = talker.asks.iter().map(|other| format!(", {other:?}")).collect();
+        let asks: Vec<String> = talker
+            .asks
+            .iter()
+            .map(|other| format!(", {other:?}"))
+            .collect();
         launch += &format!(
             "[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"python3\", {:?}, \"{count}\", \
              \"{bytes}\"{}]\n",
