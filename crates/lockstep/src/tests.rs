@@ -204,7 +204,7 @@ fn a_hang_is_lost_at_the_tick_of_the_scenario_whatever_its_token_does() {
 }
 
 #[test]
-fn a_robot_is_back_after_a_hang_when_it_has_reported() {
+fn a_robot_is_back_after_a_hang_when_it_has_joined_again() {
     let mut barrier = gathered(lateness(OnLate::Continue, 3));
     open(&mut barrier, 0);
     report(&mut barrier, "A", 0);
@@ -215,10 +215,26 @@ fn a_robot_is_back_after_a_hang_when_it_has_reported() {
     barrier.fault(&name("B"), None);
     assert!(!barrier.is_back(&name("B")));
 
-    let out = report(&mut barrier, "B", 1);
+    let late = report(&mut barrier, "B", 1);
+    assert!(!barrier.is_back(&name("B")));
+    let again = barrier.join(&name("B"), "B", &mut Vec::new());
 
-    assert_eq!(out, [Output::Ignored(Ignored::Stale, name("B"))]);
+    assert_eq!(late, [Output::Ignored(Ignored::Stale, name("B"))]);
+    assert_eq!(again.map(|admission| admission.generation), Ok(2));
     assert!(barrier.is_back(&name("B")));
+    let outcome = {
+        let mut out = open(&mut barrier, 2);
+        out.extend(report(&mut barrier, "A", 2));
+        let stamp = Stamp {
+            epoch: 1,
+            tick: 2,
+            generation: 2,
+        };
+        barrier.report(&name("B"), stamp, 0, "report", &mut out);
+        outcome(out).expect("both have reported")
+    };
+    assert_eq!(outcome.membership, [Membership::Joined(name("B"), 2)]);
+    assert_eq!(outcome.reports.len(), 2);
 }
 
 #[test]
