@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use lockstep::{Exchange, Membership, Outcome, Sent};
+use lockstep::{Exchange, Membership, Naming, Outcome, Sent};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, NEWS_FLAGS, News, Performative, Point,
@@ -234,17 +234,18 @@ impl Simulation {
         self.news.keys().cloned().collect()
     }
 
-    /// The news of a robot for the tick under way. `joined` names the incarnation that takes part from this tick on, which
+    /// The news of a robot for the tick under way, with the incarnations that they name. One that takes part from this tick on
     /// must learn where it stands.
     #[must_use]
-    pub fn news(&self, name: &RobotName, joined: Option<Generation>) -> News {
+    pub fn news(&self, name: &RobotName, naming: Naming) -> News {
         let mut news = self.news.get(name).cloned().unwrap_or(News {
             epoch: self.epoch,
             tick: self.now,
             ..News::default()
         });
-        if joined.is_some() {
-            news.joined = joined;
+        news.joined = naming.joined;
+        news.rejoin = naming.rejoin;
+        if naming.joined.is_some() {
             news.correction = news.correction.or_else(|| {
                 let location = self.location(name)?;
                 Some(Correction {
@@ -321,6 +322,7 @@ impl Simulation {
                 epoch: self.epoch,
                 tick: self.now,
                 joined: None,
+                rejoin: None,
                 correction: is_corrected.then(|| Correction {
                     location: to_wire(self.world.robots()[index]),
                     blocked: is_refused,

@@ -165,8 +165,8 @@ impl World {
                 self.on_opened(0);
             }
             Output::Grant { news, clock } => {
-                for (name, joined) in news {
-                    let news = self.simulator.simulation.news(&name, joined);
+                for (name, naming) in news {
+                    let news = self.simulator.simulation.news(&name, naming);
                     self.put_down(Some(&name), &Message::News(encode(&news).into()));
                 }
                 self.put_down(None, &Message::Clock(encode(&clock).into()));

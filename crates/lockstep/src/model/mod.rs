@@ -190,8 +190,11 @@ impl World {
             },
             Self::InitTwice => Star {
                 last_tick: 0,
+                victim: Some("B"),
+                is_gathered: true,
                 ..waits.with(Budget {
                     inits: 2,
+                    cuts: 1,
                     duplicates: 2,
                     ..NOTHING
                 })

@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
 /// While waiting, the loop looks this often whether what it waits for has come about.
 const LOOK: Duration = Duration::from_millis(20);
-/// A robot whose hang is over gets the clock again this often, and counts as back when it answers.
+/// A robot whose hang is over is asked to join again this often, and counts as back when it has joined.
 const NUDGE: Duration = Duration::from_millis(100);
 
 impl Server {
@@ -34,7 +34,9 @@ impl Server {
 
         simulation.note_faults(&orders);
         for order in &orders {
-            let fault = order.begins.then_some(order.kind);
+            // The end of a fault that lasts for a time of the launcher's is not ordered.
+            let lasts = order.begins && order.for_s.is_none();
+            let fault = lasts.then_some(order.kind);
             self.barrier.fault(&order.robot, fault);
         }
         let now = Instant::now();
@@ -109,7 +111,7 @@ impl Server {
     }
 }
 
-/// Whether a robot is as the order wants it: a killed one is disconnected, one whose fault is over is back.
+/// Whether a robot is as the order wants it: a killed one is disconnected, one whose fault is over can take part again.
 fn is_in_effect<R: Clone, C: Clone>(
     barrier: &lockstep::Barrier<R, C>,
     order: &ProcessOrder,
