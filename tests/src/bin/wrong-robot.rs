@@ -572,6 +572,9 @@ impl Host {
         {
             news.joined = None;
         }
+        if self.wrong.is("return.rejoin") {
+            news.rejoin = None;
+        }
         let mut epoch = news.epoch;
         let mut tick = news.tick;
         if self.wrong.is("news.wait:any") && self.shared.is_in(Phase::AwaitingNews) {
@@ -715,6 +718,9 @@ impl Host {
             }
             if self.wrong.is("epoch.init:count") {
                 walker.sent = before.sent;
+            }
+            if self.wrong.is("return.rejoin:variables") && welcome.generation > 1 {
+                walker.heard = before.heard;
             }
         }
         self.walker = Some(walker);
