@@ -160,6 +160,9 @@ class Host:
                 # A process that was admitted before is refused its own name only if another one has taken its place.
                 if answer.reason == "name_taken" and name in self._members:
                     self._left = self._left or _replaced(name)
+                # The end of the run may be in the queue.
+                self.link.drain()
+                if self._left is not None:
                     return None
                 # A predecessor that was killed is noticed within its lease.
                 if answer.reason != "name_taken" or is_last_try:
