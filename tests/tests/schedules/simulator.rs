@@ -159,6 +159,9 @@ impl World {
             let fault = begins.then_some(FaultKind::Hang);
             self.simulator.barrier.fault(&stop.robot, fault);
             self.stop_robot(&stop.robot, begins);
+            if begins {
+                self.simulator.simulation.stop(&stop.robot);
+            }
         }
         if next != stop.until || self.simulator.barrier.is_back(&stop.robot) {
             return true;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bus::BusError;
 use protocol::encode;
-use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
+use protocol::messages::{FaultKind, FaultOrder, OnLate, ProcessOrder};
 
 use super::orders::Underway;
 use super::process::{REPEAT_AFTER, Server, Stage};
@@ -38,6 +38,11 @@ impl Server {
             let lasts = order.begins && order.for_s.is_none();
             let fault = lasts.then_some(order.kind);
             self.barrier.fault(&order.robot, fault);
+            let is_stopped = matches!(fault, Some(FaultKind::Crash | FaultKind::Hang));
+            let policy = self.barrier.lateness().of(&order.robot);
+            if is_stopped && policy == OnLate::Continue {
+                simulation.stop(&order.robot);
+            }
         }
         let now = Instant::now();
         Ok(Some(Underway {
