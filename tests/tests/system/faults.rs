@@ -2,9 +2,13 @@
 
 use std::time::{Duration, Instant};
 
+use bus::{Bus, Role};
 use nix::sys::signal::Signal;
+use protocol::keys::Keys;
+use protocol::messages::Clock;
+use protocol::{RunName, encode};
 use system_tests::processes::{find, send};
-use system_tests::{Lab, assert_same, eventually, root, side_by_side};
+use system_tests::{Lab, PATIENCE, assert_same, eventually, root, side_by_side};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
 
@@ -435,6 +439,41 @@ fn a_robot_that_returns_from_a_hang_of_the_scenario_does_the_same_every_time() {
 #[test]
 fn a_robot_that_returns_from_a_short_hang_does_the_same_every_time() {
     returns_from_hang(14, 70);
+}
+
+/// Robots ask the simulator which epoch it is, and go on where they were.
+#[test]
+fn stray_clocks_of_a_later_epoch_change_nothing() {
+    let lab = Lab::new();
+    let run = "stray-clocks";
+    let args = ["launch", FILE, "--duration", "60 s", "--speed", "20"];
+    let mut launch = lab.start(run, &args);
+    launch.prints("behavior");
+    let endpoint = std::fs::read_to_string(lab.file(run, "endpoint")).unwrap();
+    let role = Role::Client {
+        connect: endpoint.trim().to_owned(),
+        patience: PATIENCE,
+    };
+    let bus = Bus::open(&role, None).unwrap();
+    let key = Keys::new(&RunName::new(run).unwrap()).clock();
+    for tick in 0..20 {
+        let clock = Clock {
+            epoch: 9,
+            tick,
+            ..Clock::default()
+        };
+        bus.put(&key, encode(&clock)).unwrap();
+        std::thread::sleep(Duration::from_millis(50)); // So that they meet robots in many states.
+    }
+    bus.close();
+
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "no-strays", "--duration", "60 s"]);
+    assert_same(
+        ("with stray clocks", &lab.bytes(run)),
+        ("without", &lab.bytes("no-strays")),
+    );
+    nobody_is_left(run);
 }
 
 #[test]
