@@ -117,7 +117,7 @@ fn a_robot_by_hand_gives_occasion_to_every_rule() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 45] = [
+const OTHERWISE: [&str; 46] = [
     "join.request:instance",
     "join.ready-last:first",
     "join.ready-last:queryables",
@@ -158,6 +158,7 @@ const OTHERWISE: [&str; 45] = [
     "determinism.seed:stream",
     "return.generation:number",
     "return.generation:state",
+    "return.rejoin:variables",
     "return.replaced:status",
     "end.clock:aborted",
     "end.clock:news",

@@ -31,7 +31,7 @@ const fn rule(name: &'static str, section: &'static str) -> Rule {
 }
 
 /// All rules, in the order of the page.
-pub const RULES: [Rule; 33] = [
+pub const RULES: [Rule; 34] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
     rule("join.refused", "joining"),
@@ -55,6 +55,7 @@ pub const RULES: [Rule; 33] = [
     rule("epoch.late", "epochs"),
     rule("determinism.seed", "epochs"),
     rule("return.generation", "incarnations"),
+    rule("return.rejoin", "incarnations"),
     rule("return.replaced", "incarnations"),
     rule("end.clock", "the-end"),
     rule("end.sigterm", "the-end"),

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Qos, Query, Reply};
 use lockstep::{
-    Admission, Barrier, Lateness, Outcome, Output, Refused, Sent as Put, Stamp, Timer, Timing,
+    Admission, Barrier, Lateness, Naming, Outcome, Output, Refused, Sent as Put, Stamp, Timer,
+    Timing,
 };
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
@@ -463,7 +464,7 @@ impl<'k> Stage<'k> {
     }
 
     /// Puts news and clock, and reports for the robots that the kit plays.
-    fn grant(&mut self, news: &[(RobotName, Option<u32>)], clock: &Clock) {
+    fn grant(&mut self, news: &[(RobotName, Naming)], clock: &Clock) {
         let at = (clock.epoch, clock.tick);
         if self.granted == Some(at) {
             self.repeated.insert(at);
@@ -487,19 +488,20 @@ impl<'k> Stage<'k> {
         }
     }
 
-    fn put_tick(&self, news: &[(RobotName, Option<u32>)], clock: &Clock) -> Result<(), Failure> {
+    fn put_tick(&self, news: &[(RobotName, Naming)], clock: &Clock) -> Result<(), Failure> {
         if self.options.puts_states {
             self.cast.put_states(&self.kit.bus, &self.keys)?;
         }
         let subject = self.kit.subject();
         let own = news.iter().find(|(name, _)| *name == subject);
-        if let Some((_, joined)) = own
+        if let Some((_, naming)) = own
             && !self.withholds_news
         {
             self.put_news(&News {
                 epoch: clock.epoch,
                 tick: clock.tick,
-                joined: *joined,
+                joined: naming.joined,
+                rejoin: naming.rejoin,
                 ..self.news.clone()
             })?;
         }

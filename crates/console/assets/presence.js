@@ -15,7 +15,7 @@ export function presence({ name, presence, generation }, awaiting) {
   if (presence === "lost") return { word: "lost", since: "", detail: "the run goes on without it", tone: "bad" };
   if (presence === "gone") return { word: "gone", since, detail: "its process or its link is down", tone: "bad" };
   if (awaited) return { word: "late", since, detail: because(awaited.because), tone: "warning" };
-  if (generation > 1) return { word: "returned", since: "", detail: `this is its process number ${generation}`, tone: "neutral" };
+  if (generation > 1) return { word: "returned", since: "", detail: `this is its incarnation number ${generation}`, tone: "neutral" };
 
   return { word: "here", since: "", detail: "", tone: "good" };
 }

@@ -8,7 +8,7 @@ use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Re
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::{Membership, Outcome, Sent};
-use crate::member::{Admission, Lateness, Member, Turn};
+use crate::member::{Admission, Lateness, Member, Naming, Turn};
 use crate::rules::{Rule, Rules};
 
 /// How long the barrier waits for what.
@@ -50,10 +50,10 @@ pub enum Timer {
 pub enum Output<R, C> {
     /// Every robot of the roster is connected: grant tick 0.
     Gathered,
-    /// Put these news, each to its robot with the incarnation that it names, then the clock.
+    /// Put these news, each to its robot with the incarnations that it names, then the clock.
     Grant {
         /// Robots that get news, in the order of their names.
-        news: Vec<(RobotName, Option<Generation>)>,
+        news: Vec<(RobotName, Naming)>,
         /// The clock.
         clock: Clock,
     },
@@ -191,7 +191,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         for member in self.members.values_mut() {
             member.turn = Turn::default();
             member.fault = None;
-            member.has_recovered = true;
+            member.must_rejoin = false;
         }
 
         out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
@@ -246,15 +246,23 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             return Err(Refused::NameTaken);
         }
 
-        // The same process asks again: its answer was lost, or it joins a further epoch.
+        // The same process asks again: its answer was lost, it joins a further epoch, or it must join again.
         let is_new = member.instance.as_deref() != Some(instance);
+        let is_further = if is_new {
+            member.generation == 0 || self.rules.hold(Rule::CountsGenerations)
+        } else {
+            member.must_rejoin && self.rules.hold(Rule::CountsRejoining)
+        };
+        if is_further {
+            member.generation += 1;
+        }
+        if is_new || member.must_rejoin {
+            member.is_coming = member.seated > 0;
+            member.must_rejoin = false;
+        }
         if is_new {
             member.instance = Some(Arc::from(instance));
             member.is_reserved = self.rules.hold(Rule::ReservesPlace);
-            if member.generation == 0 || self.rules.hold(Rule::CountsGenerations) {
-                member.generation += 1;
-            }
-            member.is_coming = member.seated > 0;
             if self.rules.hold(Rule::DropsPredecessor) && !member.turn.is_complete(true) {
                 let is_given_up = member.turn.is_given_up;
                 member.turn = Turn {
@@ -266,8 +274,6 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
                 Timer::Token(name.clone()),
                 self.timing.token,
             ));
-        } else if member.is_lost && self.rules.hold(Rule::TakesBack) {
-            member.is_coming = true;
         }
 
         Ok(Admission {
@@ -290,8 +296,6 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if is_present {
             // From now on its place is free as soon as its token goes.
             member.is_reserved = false;
-            member.has_recovered |= member.fault.is_none();
-            member.is_coming |= member.is_lost && self.rules.hold(Rule::TakesBack);
         }
         let is_awaited = is_awaited(self.phase, member, self.rules);
         if is_present && takes_in_now && is_awaited {
@@ -360,9 +364,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
             return;
         };
-        member.has_recovered |= member.fault.is_none();
         if member.is_lost && stamp.generation == member.generation {
-            member.is_coming |= self.rules.hold(Rule::TakesBack);
             out.push(Output::Ignored(Ignored::Lost, from.clone()));
             return;
         }
@@ -441,10 +443,6 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// what becomes of the robot, and no timer does.
     pub fn fault(&mut self, robot: &RobotName, fault: Option<FaultKind>) {
         if let Some(member) = self.members.get_mut(robot) {
-            // A robot that was stopped counts as back when it sends something again.
-            let was_hung =
-                member.fault == Some(FaultKind::Hang) && self.rules.hold(Rule::AwaitsRecovery);
-            member.has_recovered = fault.is_none() && !was_hung;
             member.fault = fault;
         }
     }
@@ -524,7 +522,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// Whether a robot can take part in the next tick.
     #[must_use]
     pub fn is_back(&self, robot: &RobotName) -> bool {
-        self.members.get(robot).is_none_or(Member::is_back)
+        self.members
+            .get(robot)
+            .is_none_or(|member| member.is_back(self.rules))
     }
 
     /// The report of a robot for the open tick, if it is here.
@@ -597,11 +597,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     fn grant(&mut self, has_news: bool, out: &mut Vec<Output<R, C>>) {
         let mut named = BTreeMap::new();
         for (name, member) in &self.members {
-            let is_replacement = member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
-            let is_newcomer =
-                self.tick > 0 && !member.has_reported && self.rules.hold(Rule::NamesUntilReported);
-            if is_replacement || is_newcomer {
-                named.insert(name.clone(), member.seated);
+            let naming = self.naming(member);
+            if naming != Naming::default() {
+                named.insert(name.clone(), naming);
             }
         }
 
@@ -614,7 +612,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let mut news = Vec::new();
         for (index, name) in self.members.keys().enumerate() {
             if has_news && flags & (1 << (index % NEWS_FLAGS)) != 0 {
-                news.push((name.clone(), named.get(name).copied()));
+                news.push((name.clone(), named.get(name).copied().unwrap_or_default()));
             }
         }
 
@@ -633,6 +631,21 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         });
     }
 
+    /// The incarnations that a robot's news name.
+    fn naming(&self, member: &Member<R, C>) -> Naming {
+        let is_replacement = member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
+        let is_newcomer = self.tick > 0
+            && !member.has_reported
+            && !member.must_rejoin
+            && self.rules.hold(Rule::NamesUntilReported);
+        let asked = member.asked_to_rejoin();
+
+        Naming {
+            joined: (is_replacement || is_newcomer).then_some(member.seated),
+            rejoin: asked.filter(|_| self.rules.hold(Rule::AsksToRejoin)),
+        }
+    }
+
     fn set_timers(&self, out: &mut Vec<Output<R, C>>) {
         out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
         out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
@@ -645,22 +658,18 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
     }
 
-    /// Where the clock goes on without late robots, it does not wait for those that cannot report.
+    /// Where the clock goes on without late robots, it does not wait for those that cannot report. It never waits for a report
+    /// that would not count.
     fn give_up_those_that_are_out(&mut self) {
-        if !self.rules.hold(Rule::GoesOnWithoutAbsent) {
-            return;
+        let goes_on = self.rules.hold(Rule::GoesOnWithoutAbsent);
+        let mut out = Vec::new();
+        for (name, member) in &self.members {
+            let policy = self.lateness.of(name);
+            let is_out = member.is_out(self.tick) && policy == OnLate::Continue && goes_on;
+            if !member.is_lost && (is_out || member.must_rejoin) {
+                out.push(name.clone());
+            }
         }
-
-        let tick = self.tick;
-        let lateness = &self.lateness;
-        let out: Vec<RobotName> = self
-            .members
-            .iter()
-            .filter(|(name, member)| {
-                !member.is_lost && member.is_out(tick) && lateness.of(name) == OnLate::Continue
-            })
-            .map(|(name, _)| name.clone())
-            .collect();
 
         for name in out {
             self.give_up(&name);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use protocol::messages::{FaultKind, OnLate};
+use protocol::messages::{FaultKind, News, OnLate};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::Sent;
@@ -42,6 +42,24 @@ pub struct Admission {
     pub news_flag: u32,
 }
 
+/// The incarnations that a robot's news name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Naming {
+    /// The incarnation that takes part from this tick on.
+    pub joined: Option<Generation>,
+    /// The incarnation that takes part no more, and whose process is to join again.
+    pub rejoin: Option<Generation>,
+}
+
+impl From<&News> for Naming {
+    fn from(news: &News) -> Self {
+        Self {
+            joined: news.joined,
+            rejoin: news.rejoin,
+        }
+    }
+}
+
 /// A robot of the roster.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Member<R, C> {
@@ -57,14 +75,15 @@ pub(crate) struct Member<R, C> {
     pub(crate) seated: Generation,
     /// Whether the clock goes on without it.
     pub(crate) is_lost: bool,
-    /// Whether it takes part again as soon as its token is declared: a further incarnation, or a lost one that sends again.
+    /// Whether a further incarnation takes part as soon as its token is declared.
     pub(crate) is_coming: bool,
+    /// Whether the clock has gone on without its process, which takes part again as a further incarnation only: it was lost, or
+    /// the scenario stopped it.
+    pub(crate) must_rejoin: bool,
     /// Whether this incarnation has reported in this epoch since it was taken in.
     pub(crate) has_reported: bool,
     /// The fault that the scenario has brought upon its process.
     pub(crate) fault: Option<FaultKind>,
-    /// Whether it has reported or declared its token since its fault was over.
-    pub(crate) has_recovered: bool,
     /// Ticks in a row that it has missed.
     pub(crate) missed: u32,
     /// The open tick.
@@ -117,9 +136,9 @@ impl<R, C> Default for Member<R, C> {
             seated: 0,
             is_lost: false,
             is_coming: false,
+            must_rejoin: false,
             has_reported: false,
             fault: None,
-            has_recovered: true,
             missed: 0,
             turn: Turn::default(),
         }
@@ -144,6 +163,7 @@ impl<R, C> Member<R, C> {
         self.seated = self.generation;
         self.is_lost = false;
         self.is_coming = false;
+        self.must_rejoin = false;
         self.has_reported = false;
         self.missed = 0;
     }
@@ -175,12 +195,19 @@ impl<R, C> Member<R, C> {
         let is_hung = self.fault == Some(FaultKind::Hang) && rules.hold(Rule::HangDecides);
         let is_gone = !self.is_present && !is_hung;
         self.is_lost = self.missed >= lose_after || is_gone;
+
+        // How many old clocks a stopped process answers when it goes on is wall clock: its state must not matter any more.
+        let was_stopped = self.fault == Some(FaultKind::Hang) && rules.hold(Rule::RejoinsAfterHang);
+        let has_successor = self.generation != self.seated;
+        self.must_rejoin |= (self.is_lost || was_stopped) && !has_successor;
         self.is_lost
     }
 
     /// Whether the next clock finds it able to take part.
-    pub(crate) fn is_back(&self) -> bool {
-        self.is_present && self.has_recovered && (!self.is_lost || self.is_coming)
+    pub(crate) fn is_back(&self, rules: Rules) -> bool {
+        let has_rejoined = !self.must_rejoin || !rules.hold(Rule::AwaitsRejoining);
+
+        self.is_present && has_rejoined && (!self.is_lost || self.is_coming)
     }
 
     /// Whether it cannot report for this tick: the scenario keeps its process from running, or it is not connected.
@@ -188,5 +215,10 @@ impl<R, C> Member<R, C> {
         let is_stopped = matches!(self.fault, Some(FaultKind::Hang | FaultKind::Crash));
 
         tick > 0 && (is_stopped || !self.is_present)
+    }
+
+    /// The incarnation whose process is asked to join again, if it is connected.
+    pub(crate) fn asked_to_rejoin(&self) -> Option<Generation> {
+        (self.must_rejoin && self.is_present).then_some(self.generation)
     }
 }

@@ -7,7 +7,7 @@ use protocol::messages::{Clock, End, Refusal};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::Sent;
-use crate::member::Admission;
+use crate::member::{Admission, Naming};
 use crate::rules::{Rule, Rules};
 use crate::states::{NoState, StateQuery, States};
 
@@ -26,7 +26,8 @@ const JOIN_AGAIN: Duration = Duration::from_millis(100);
 const QUERY_AGAIN: Duration = Duration::from_millis(500);
 /// After this long without an answer people are told for whom the robot waits.
 const WAITING_AFTER: Duration = Duration::from_millis(250);
-/// Most news that are kept while their clock is not here. Only the newest clock is ever run.
+/// Most news that are kept while their clock is not here, of the epoch and of later ones each. Only the newest clock is ever
+/// run.
 const MAX_NEWS: usize = 4;
 /// A robot that was not queried for this many ticks is followed no more.
 const UNUSED_TICKS: Tick = 64;
@@ -145,12 +146,10 @@ pub enum Leave {
 /// Where a participant stands.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Standing {
-    /// It has asked to join.
+    /// It has asked to join, for the first time or again.
     Joining,
-    /// It was admitted to the epoch and has not run a tick of it.
+    /// It was admitted.
     Admitted,
-    /// It takes part.
-    Seated,
     /// It has left.
     Left,
 }
@@ -178,14 +177,24 @@ pub struct Participant<N, S, C, R> {
     /// Whether the last answer to its request was that the name is taken.
     is_name_taken: bool,
     has_token: bool,
-    /// The newest clock that has not been run.
+    /// Whether it has run a tick as the incarnation that it was admitted as, in the epoch that it was admitted to.
+    is_seated: bool,
+    /// Whether its process has played an earlier incarnation in this epoch.
+    has_rejoined: bool,
+    /// The newest clock that has not been run, of the epoch that it was admitted to.
     pending: Option<Clock>,
+    /// The newest clock of a later epoch. Only a welcome to that epoch shows that it has begun.
+    later: Option<Clock>,
     /// News of ticks that have not been run.
     news: BTreeMap<(Epoch, Tick), Arrived<N>>,
     /// The tick that the robot is running.
     running: Option<(Epoch, Tick)>,
+    /// Whether the robot still runs a tick as what it is no more: its result is thrown away.
+    is_discarding: bool,
     /// What came of the last tick.
     answer: Option<Box<Answer<S, C, R>>>,
+    /// Whether the answer has not been put, because the robot was joining again.
+    is_held_back: bool,
     states: States<S>,
     asking: Option<Asking>,
     /// States of other robots, with the tick when each was last asked for.
@@ -219,10 +228,15 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             admission: None,
             is_name_taken: false,
             has_token,
+            is_seated: false,
+            has_rejoined: false,
             pending: None,
+            later: None,
             news: BTreeMap::new(),
             running: None,
+            is_discarding: false,
             answer: None,
+            is_held_back: false,
             states: States::default(),
             asking: None,
             others: BTreeMap::new(),
@@ -244,15 +258,23 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return;
         }
 
-        let is_new_epoch = self.admission.is_none_or(|old| old.epoch < admission.epoch);
-        if is_new_epoch {
-            // A query that names no epoch means the present one.
-            self.states.clear();
-        }
-        self.admission = Some(admission);
+        let before = self.admission.replace(admission);
         self.standing = Standing::Admitted;
-        for (tick, state) in states {
-            self.states.add(admission.epoch, tick, state);
+        self.take_later(admission.epoch);
+        let is_unchanged = before.is_some_and(|before| {
+            let is_of_epoch = before.epoch == admission.epoch;
+            let is_of_generation = before.generation == admission.generation;
+            is_of_epoch && (is_of_generation || !self.rules.hold(Rule::StartsOver))
+        });
+        if is_unchanged && self.rules.hold(Rule::GoesOnInOwnEpoch) {
+            if std::mem::take(&mut self.is_held_back) {
+                self.put(out);
+            }
+        } else {
+            self.start_over(before.is_some_and(|before| before.epoch == admission.epoch));
+            for (tick, state) in states {
+                self.states.add(admission.epoch, tick, state);
+            }
         }
 
         if !self.has_token {
@@ -303,12 +325,12 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         };
 
         let at = (clock.epoch, clock.tick);
-        if clock.epoch > admission.epoch && self.standing != Standing::Joining {
+        if clock.epoch > admission.epoch {
             if self.rules.hold(Rule::JoinsNewEpoch) {
-                self.join_epoch(out);
-            } else {
-                return;
+                self.note_later(clock);
+                self.join_again(out);
             }
+            return;
         }
         if clock.epoch < admission.epoch && self.rules.hold(Rule::IgnoresLate) {
             return;
@@ -335,12 +357,12 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
     }
 
-    /// News arrived for the tick that they name. `joined` is the incarnation that takes part from that tick on.
+    /// News arrived for the tick that they name, and name these incarnations.
     pub fn news(
         &mut self,
         epoch: Epoch,
         tick: Tick,
-        joined: Option<Generation>,
+        naming: Naming,
         news: N,
         out: &mut Out<N, S, C, R>,
     ) {
@@ -350,10 +372,18 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         if self.standing == Standing::Left || epoch < admission.epoch {
             return;
         }
-        let is_replaced = joined.is_some_and(|generation| generation > admission.generation);
+        let Naming { joined, rejoin } = naming;
+        // While it joins again, a higher generation may become its own.
+        let is_joining = self.standing == Standing::Joining && self.rules.hold(Rule::AwaitsWelcome);
+        let is_replaced =
+            joined.is_some_and(|generation| generation > admission.generation) && !is_joining;
         if epoch == admission.epoch && is_replaced && self.rules.hold(Rule::EndsWhenReplaced) {
             self.leave(Leave::Replaced, out);
             return;
+        }
+        let must_rejoin = rejoin == Some(admission.generation);
+        if epoch == admission.epoch && must_rejoin && self.rules.hold(Rule::JoinsWhenAsked) {
+            self.join_again(out);
         }
         let is_answered = self
             .answer
@@ -364,14 +394,23 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
 
         self.news.insert((epoch, tick), Arrived { joined, news });
-        while self.news.len() > MAX_NEWS {
-            self.news.pop_first();
+        // Those of later epochs, which only a welcome confirms, take no room from the others.
+        let mut later = self.news.split_off(&(admission.epoch, Tick::MAX));
+        for kept in [&mut self.news, &mut later] {
+            while kept.len() > MAX_NEWS {
+                kept.pop_first();
+            }
         }
+        self.news.extend(later);
         self.run_if_possible(out);
     }
 
     /// The robot has done the tick that it was to run.
     pub fn done(&mut self, commands: Vec<Sent<C>>, state: S, report: R, out: &mut Out<N, S, C, R>) {
+        if std::mem::take(&mut self.is_discarding) {
+            self.run_if_possible(out);
+            return;
+        }
         let (Some((epoch, tick)), Some(admission)) = (self.running.take(), self.admission) else {
             return;
         };
@@ -380,20 +419,18 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return;
         }
 
-        // What was run in an epoch that is over is thrown away.
-        if epoch == admission.epoch {
-            self.states.add(epoch, tick, state.clone());
-            self.answer = Some(Box::new(Answer {
-                epoch,
-                tick,
-                generation: admission.generation,
-                commands,
-                state,
-                report,
-            }));
-            if self.standing != Standing::Joining {
-                self.put(out);
-            }
+        self.states.add(epoch, tick, state.clone());
+        self.answer = Some(Box::new(Answer {
+            epoch,
+            tick,
+            generation: admission.generation,
+            commands,
+            state,
+            report,
+        }));
+        self.is_held_back = self.standing == Standing::Joining;
+        if !self.is_held_back {
+            self.put(out);
         }
         self.run_if_possible(out);
     }
@@ -455,12 +492,11 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
     }
 
-    /// Whether the tick that runs is of no use any more: the run is over, a newer clock is here, or the process leaves.
+    /// Whether the tick that runs is of no use any more: the run is over, a newer clock is here, the process leaves, or it is
+    /// another incarnation now.
     #[must_use]
     pub fn is_interrupted(&self) -> bool {
-        self.standing == Standing::Left
-            || self.standing == Standing::Joining
-            || self.pending.is_some()
+        self.standing == Standing::Left || self.is_discarding || self.pending.is_some()
     }
 
     /// The simulator's liveliness token was declared or undeclared.
@@ -517,10 +553,44 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
     }
 
-    /// `init`: the same process, in the next epoch.
-    fn join_epoch(&mut self, out: &mut Out<N, S, C, R>) {
-        self.standing = Standing::Joining;
-        out.push(Action::Join);
+    /// The same process, in the next epoch or as a further incarnation. The welcome decides which, if any.
+    fn join_again(&mut self, out: &mut Out<N, S, C, R>) {
+        if self.standing != Standing::Joining {
+            self.standing = Standing::Joining;
+            out.push(Action::Join);
+        }
+    }
+
+    /// Keeps the newest clock of a later epoch.
+    fn note_later(&mut self, clock: Clock) {
+        let is_newest = self
+            .later
+            .is_none_or(|later| (clock.epoch, clock.tick) >= (later.epoch, later.tick));
+        if is_newest || !self.rules.hold(Rule::RunsNewest) {
+            self.later = Some(clock);
+        }
+    }
+
+    /// The welcome shows which epoch it is: a clock of a still later one is ignored, and so are its news. Both are repeated.
+    fn take_later(&mut self, epoch: Epoch) {
+        if let Some(clock) = self.later.take()
+            && clock.epoch == epoch
+        {
+            self.pending = Some(clock);
+        }
+        self.news.retain(|of, _| of.0 <= epoch);
+    }
+
+    /// Forgets what it was. `has_rejoined` says whether it was another incarnation in the same epoch.
+    fn start_over(&mut self, has_rejoined: bool) {
+        self.has_rejoined = has_rejoined;
+        self.is_seated = false;
+        self.is_discarding |= self.running.take().is_some();
+        self.asking = None;
+        self.answer = None;
+        self.is_held_back = false;
+        // A query that names no epoch means the present one.
+        self.states.clear();
     }
 
     /// Runs the pending clock if everything that belongs to it is here and it is this robot's turn.
@@ -528,8 +598,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         let (Some(clock), Some(admission)) = (self.pending, self.admission) else {
             return;
         };
-        let is_ready = matches!(self.standing, Standing::Admitted | Standing::Seated);
-        if !is_ready || self.running.is_some() || clock.epoch > admission.epoch {
+        let is_busy = self.running.is_some() || self.is_discarding;
+        if self.standing != Standing::Admitted || is_busy {
             return;
         }
         let at = (clock.epoch, clock.tick);
@@ -552,23 +622,27 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         self.news.retain(|of, _| *of > at);
         let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
         // If the predecessor has reported for tick 0, its successor joins in tick 1, however often tick 0 is repeated.
-        let has_predecessor = self
-            .states
-            .answer(StateQuery {
-                tick: None,
-                epoch: Some(clock.epoch),
-            })
-            .is_ok();
-        let begin = match self.standing {
-            Standing::Seated => Begin::GoOn,
-            _ if clock.tick == 0 && !has_predecessor => Begin::Init,
-            _ if joined == Some(admission.generation) || !self.rules.hold(Rule::WaitsToBeNamed) => {
-                Begin::TakeOver
-            }
-            _ => return, // Its turn comes with the news that name it.
+        let has_predecessor = self.has_rejoined
+            || self
+                .states
+                .answer(StateQuery {
+                    tick: None,
+                    epoch: Some(clock.epoch),
+                })
+                .is_ok();
+        let is_named =
+            joined == Some(admission.generation) || !self.rules.hold(Rule::WaitsToBeNamed);
+        let begin = if self.is_seated {
+            Begin::GoOn
+        } else if clock.tick == 0 && !has_predecessor {
+            Begin::Init
+        } else if is_named {
+            Begin::TakeOver
+        } else {
+            return; // Its turn comes with the news that name it.
         };
 
-        self.standing = Standing::Seated;
+        self.is_seated = true;
         self.running = Some(at);
         self.unfollow_unused(clock.tick, out);
         out.push(Action::Run(Turn {

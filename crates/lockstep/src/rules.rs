@@ -38,10 +38,14 @@ pub(crate) enum Rule {
     GoesOnWithoutAbsent,
     /// While the scenario keeps a process stopped, its token decides nothing.
     HangDecides,
-    /// A robot is back after a hang when it has reported, or declared its token, again.
-    AwaitsRecovery,
-    /// A lost robot that sends again is taken back.
-    TakesBack,
+    /// A robot that has missed a tick because the scenario stopped it takes part again as a further incarnation only.
+    RejoinsAfterHang,
+    /// A robot is back after a hang when it has joined again.
+    AwaitsRejoining,
+    /// A connected robot that was lost is asked to join again.
+    AsksToRejoin,
+    /// A process that joins again after it was lost is a further incarnation.
+    CountsRejoining,
     /// A robot that was given up is not counted in that tick any more.
     GivesUpForGood,
     /// A robot waits for its news where its flag is set.
@@ -58,6 +62,14 @@ pub(crate) enum Rule {
     IgnoresLate,
     /// A clock of a later epoch makes a robot join again.
     JoinsNewEpoch,
+    /// A robot that is asked to join again does so.
+    JoinsWhenAsked,
+    /// A robot that joins again takes no other process to be its successor before it has an answer.
+    AwaitsWelcome,
+    /// A process that is admitted as a further incarnation starts over.
+    StartsOver,
+    /// A welcome to the epoch that a robot takes part in changes nothing.
+    GoesOnInOwnEpoch,
     /// A robot that joined in the middle of an epoch waits until it is named.
     WaitsToBeNamed,
     /// A process ends when news name a later incarnation.

@@ -8,8 +8,9 @@ use protocol::messages::{Clock, FaultKind, OnLate, Refusal};
 
 use crate::states::States;
 use crate::{
-    Action, Admission, Barrier, Ignored, Lateness, Leave, Membership, NoState, Outcome, Output,
-    Participant, Patience, Refused, RobotTimer, Sent, Stamp, StateQuery, Timer, Timing,
+    Action, Admission, Barrier, Begin, Ignored, Lateness, Leave, Membership, Naming, NoState,
+    Outcome, Output, Participant, Patience, Refused, RobotTimer, Sent, Stamp, StateQuery, Timer,
+    Timing, Turn,
 };
 
 type Simulator = Barrier<&'static str, &'static str>;
@@ -204,7 +205,7 @@ fn a_hang_is_lost_at_the_tick_of_the_scenario_whatever_its_token_does() {
 }
 
 #[test]
-fn a_robot_is_back_after_a_hang_when_it_has_reported() {
+fn a_robot_is_back_after_a_hang_when_it_has_joined_again() {
     let mut barrier = gathered(lateness(OnLate::Continue, 3));
     open(&mut barrier, 0);
     report(&mut barrier, "A", 0);
@@ -215,10 +216,26 @@ fn a_robot_is_back_after_a_hang_when_it_has_reported() {
     barrier.fault(&name("B"), None);
     assert!(!barrier.is_back(&name("B")));
 
-    let out = report(&mut barrier, "B", 1);
+    let late = report(&mut barrier, "B", 1);
+    assert!(!barrier.is_back(&name("B")));
+    let again = barrier.join(&name("B"), "B", &mut Vec::new());
 
-    assert_eq!(out, [Output::Ignored(Ignored::Stale, name("B"))]);
+    assert_eq!(late, [Output::Ignored(Ignored::Stale, name("B"))]);
+    assert_eq!(again.map(|admission| admission.generation), Ok(2));
     assert!(barrier.is_back(&name("B")));
+    let outcome = {
+        let mut out = open(&mut barrier, 2);
+        out.extend(report(&mut barrier, "A", 2));
+        let stamp = Stamp {
+            epoch: 1,
+            tick: 2,
+            generation: 2,
+        };
+        barrier.report(&name("B"), stamp, 0, "report", &mut out);
+        outcome(out).expect("both have reported")
+    };
+    assert_eq!(outcome.membership, [Membership::Joined(name("B"), 2)]);
+    assert_eq!(outcome.reports.len(), 2);
 }
 
 #[test]
@@ -354,4 +371,170 @@ fn a_simulator_that_is_back_in_time_is_not_gone() {
     robot.timer(RobotTimer::Gone, &mut out);
 
     assert_eq!(out.last(), Some(&Action::Leave(Leave::SimulatorGone)));
+}
+
+/// A robot that runs tick 1 of epoch 1, after it has answered tick 0.
+fn running() -> Robot {
+    let mut robot = robot();
+    robot.admitted(ADMISSION, [], &mut Vec::new());
+    robot.clock(clock(1, 0), &mut Vec::new());
+    robot.done(Vec::new(), "of tick 0", (), &mut Vec::new());
+    robot.clock(clock(1, 1), &mut Vec::new());
+
+    robot
+}
+
+fn run(epoch: u32, tick: u64, begin: Begin) -> Action<(), &'static str, (), ()> {
+    let has_news = begin == Begin::TakeOver;
+
+    Action::Run(Turn {
+        epoch,
+        tick,
+        begin,
+        news: has_news.then_some(()),
+    })
+}
+
+fn joined(generation: u32) -> Naming {
+    Naming {
+        joined: Some(generation),
+        rejoin: None,
+    }
+}
+
+#[test]
+fn a_clock_of_an_epoch_that_has_not_begun_costs_a_welcome_and_nothing_else() {
+    let mut robot = running();
+    let mut out = Vec::new();
+
+    for tick in 0..8 {
+        robot.clock(clock(9, tick), &mut out);
+        robot.news(9, tick, Naming::default(), (), &mut out);
+    }
+    assert_eq!(out, [Action::Join]);
+    assert!(!robot.is_interrupted(), "its tick may count");
+    out.clear();
+    robot.done(Vec::new(), "of tick 1", (), &mut out);
+    robot.news(1, 2, Naming::default(), (), &mut out);
+    let flagged = Clock {
+        news: ADMISSION.news_flag,
+        ..clock(1, 2)
+    };
+    robot.clock(flagged, &mut out);
+    assert_eq!(out, []);
+
+    robot.admitted(ADMISSION, [(0, "of the welcome")], &mut out);
+
+    assert!(matches!(&out[0], Action::Put(answer) if answer.tick == 1));
+    let turn = Turn {
+        epoch: 1,
+        tick: 2,
+        begin: Begin::GoOn,
+        news: Some(()),
+    };
+    assert_eq!(out[1..], [Action::Run(turn)]);
+    assert_eq!(robot.query(StateQuery::default()), Ok("of tick 1"));
+}
+
+#[test]
+fn a_robot_that_joins_again_forgets_the_tick_that_it_runs() {
+    let mut robot = running();
+    let mut out = Vec::new();
+    let asked = Naming {
+        joined: None,
+        rejoin: Some(1),
+    };
+    let further = Admission {
+        generation: 2,
+        ..ADMISSION
+    };
+
+    robot.news(1, 5, asked, (), &mut out);
+    robot.news(1, 5, asked, (), &mut out);
+    assert_eq!(out, [Action::Join]);
+    out.clear();
+    // Its next incarnation may be named before the answer arrives.
+    robot.news(1, 6, joined(2), (), &mut out);
+    robot.clock(clock(1, 6), &mut out);
+    robot.admitted(further, [(0, "of the welcome")], &mut out);
+    assert_eq!(out, []);
+    assert!(robot.is_interrupted());
+    assert_eq!(robot.query(StateQuery::default()), Ok("of the welcome"));
+    robot.done(Vec::new(), "of an incarnation that is over", (), &mut out);
+
+    assert_eq!(out, [run(1, 6, Begin::TakeOver)]);
+    assert_eq!(robot.query(StateQuery::default()), Ok("of the welcome"));
+    out.clear();
+    robot.news(1, 7, asked, (), &mut out);
+    assert_eq!(out, [], "it has joined again already");
+}
+
+#[test]
+fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnation() {
+    let mut barrier = gathered(lateness(OnLate::Continue, 3));
+    open(&mut barrier, 0);
+    report(&mut barrier, "A", 0);
+    report(&mut barrier, "B", 0);
+    let mut out = Vec::new();
+    barrier.gather(2, lateness(OnLate::Continue, 3), &mut out);
+    open(&mut barrier, 0);
+    barrier.token(&name("B"), false, &mut out);
+
+    // Tick 0 is not repeated: the first clock that it sees is of a later one.
+    let complete = |barrier: &mut Simulator, tick: u64| {
+        let mut out = open(barrier, tick);
+        let stamp = Stamp {
+            epoch: 2,
+            tick,
+            generation: 1,
+        };
+        barrier.report(&name("A"), stamp, 0, "report", &mut out);
+        out
+    };
+    let stamp = Stamp {
+        epoch: 2,
+        tick: 0,
+        generation: 1,
+    };
+    barrier.report(&name("A"), stamp, 0, "report", &mut out);
+    complete(&mut barrier, 1);
+    barrier.token(&name("B"), true, &mut out);
+    let asked = Naming {
+        joined: None,
+        rejoin: Some(1),
+    };
+    let granted = complete(&mut barrier, 2);
+    assert!(matches!(&granted[0], Output::Grant { news, .. } if news[..] == [(name("B"), asked)]));
+
+    let mut robot = running();
+    let mut actions = Vec::new();
+    robot.done(Vec::new(), "of epoch 1", (), &mut actions);
+    actions.clear();
+    robot.news(2, 2, asked, (), &mut actions);
+    robot.clock(clock(2, 2), &mut actions);
+    assert_eq!(actions, [Action::Join]);
+    let admission = barrier.join(&name("B"), "B", &mut out).expect("joins");
+    assert_eq!((admission.epoch, admission.generation), (2, 2));
+    robot.admitted(admission, [], &mut actions);
+    let taken_in = complete(&mut barrier, 3);
+    let joins = Membership::Joined(name("B"), 2);
+    assert!(
+        matches!(&taken_in[0], Output::Grant { news, .. } if news[..] == [(name("B"), joined(2))])
+    );
+    actions.clear();
+    robot.news(2, 3, joined(2), (), &mut actions);
+    robot.clock(clock(2, 3), &mut actions);
+    assert_eq!(actions, [run(2, 3, Begin::TakeOver)]);
+
+    let stamp = Stamp {
+        epoch: 2,
+        tick: 3,
+        generation: 2,
+    };
+    barrier.report(&name("B"), stamp, 0, "report", &mut out);
+    let last = out
+        .into_iter()
+        .rev()
+        .find_map(|output| outcome(vec![output]));
+    assert_eq!(last.expect("both have reported").membership, [joins]);
 }

@@ -39,6 +39,7 @@ fn news() -> News {
         epoch: 2,
         tick: 7,
         joined: Some(2),
+        rejoin: Some(1),
         correction: Some(Correction {
             location: Point::new(1.0, 2.0),
             blocked: true,
@@ -241,6 +242,7 @@ fn malformed_news_are_named_by_key_sender_and_field() {
         (r#""epoch":2"#, r#""epoch":2.5"#, "epoch"),
         (r#""tick":7"#, r#""tick":9007199254740992"#, "tick"),
         (r#""joined":2"#, r#""joined":"two""#, "joined"),
+        (r#""rejoin":1"#, r#""rejoin":true"#, "rejoin"),
         (
             r#""from":"Butler""#,
             r#""from":"But/ler""#,

@@ -13,8 +13,8 @@ use crate::error::BadParameters;
 ///
 /// A robot in the form of the paper's interface of thirteen methods is a [`CarsRobotInterface`](crate::CarsRobotInterface).
 pub trait Robot: Send {
-    /// Returns to the initial state. Called before tick 0, at every start of a new epoch, and in a process that takes
-    /// over from a lost one in the middle of an epoch.
+    /// Returns to the initial state. Called before tick 0, at every start of a new epoch, and in the middle of an epoch
+    /// when the robot takes part again after it was lost, in the same process or in another one.
     ///
     /// # Errors
     /// [`BadParameters`] if the robot cannot work with the parameters of the scenario.
@@ -24,8 +24,8 @@ pub trait Robot: Send {
     /// queried yet.
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action;
 
-    /// Continues from the state variables that the lost process published last. Called after [`init`](Robot::init) in
-    /// the process that takes over. By default the robot starts afresh.
+    /// Continues from the state variables that the robot published last, before it was lost. Called after
+    /// [`init`](Robot::init). By default the robot starts afresh.
     fn resume(&mut self, _cars: &mut Cars<'_>, _last: &StateVariables) {}
 
     /// Whether the robot perceives all bodies around it ([`Cars::bodies`]): its news are larger then.

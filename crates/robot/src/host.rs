@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Role};
-use lockstep::{Action, Admission, Begin, Leave, Patience, StateQuery, Turn};
+use lockstep::{Action, Admission, Begin, Leave, Naming, Patience, StateQuery, Turn};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
@@ -215,7 +215,8 @@ impl Host {
             .subscribe(&self.keys.news(name), move |key, bytes| {
                 match decode::<News>(key, "simulator", bytes) {
                     Ok(news) => shared.with(&own, |participant, actions| {
-                        participant.news(news.epoch, news.tick, news.joined, news, actions);
+                        let naming = Naming::from(&news);
+                        participant.news(news.epoch, news.tick, naming, news, actions);
                     }),
                     Err(error) => tracing::warn!("{error}"),
                 }

@@ -112,13 +112,13 @@ impl LocalHost {
                 continue;
             };
             let mut actions: Vec<LocalAction> = Vec::new();
-            for (name, joined) in to {
+            for (name, naming) in to {
                 let index = self.names.iter().position(|own| *own == name);
                 if let Some(index) = index {
                     // Robots that share a flag all get news, also those for which nothing is new.
                     let news = news.remove(&name).unwrap_or_default();
                     let participant = &mut self.participants[index];
-                    participant.news(clock.epoch, clock.tick, joined, news, &mut actions);
+                    participant.news(clock.epoch, clock.tick, naming, news, &mut actions);
                 }
             }
             for (index, participant) in self.participants.iter_mut().enumerate() {

@@ -56,7 +56,7 @@ impl Seat {
         &self.welcome
     }
 
-    /// The same robot in a new epoch.
+    /// The same robot in a new epoch, or as a further incarnation.
     pub fn start_over(&mut self, welcome: Welcome) {
         self.random = stream(welcome.seed, &welcome.stream);
         self.proposal = welcome.location;

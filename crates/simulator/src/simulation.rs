@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use lockstep::{Exchange, Membership, Outcome, Sent};
+use lockstep::{Exchange, Membership, Naming, Outcome, Sent};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, NEWS_FLAGS, News, Performative, Point,
@@ -73,6 +73,9 @@ pub struct Simulation {
     /// Robots of which a new incarnation joined in the last tick. They cannot be queried: the previous incarnation may have
     /// published another state for that tick before it died, and followers of that state cannot tell the two apart.
     newcomers: Vec<RobotName>,
+    /// Robots whose processes the scenario stops before the next tick. They cannot be queried: whether another robot has the
+    /// state of the last tick already is a matter of real time.
+    stopped: Vec<RobotName>,
     blocked: Vec<bool>,
     /// The generation that each robot took part with last in this epoch, and which incarnation of the epoch that is, from 1.
     /// The record counts incarnations, because generations also count processes that never took part.
@@ -116,6 +119,7 @@ impl Simulation {
             stood_at: Vec::new(),
             silent: Vec::new(),
             newcomers: Vec::new(),
+            stopped: Vec::new(),
             incarnations: BTreeMap::new(),
             sent: BTreeMap::new(),
             between: Vec::new(),
@@ -185,7 +189,8 @@ impl Simulation {
         let decision = self.medium.decide(self.now);
         self.events.extend(decision.events);
         self.arriving = decision.delivered;
-        self.unreachable = self.join_silent_and_newcomers(decision.unreachable);
+        self.unreachable = self.join_unanswering(decision.unreachable);
+        self.stopped.clear();
 
         self.compose_news(&verdicts);
         self.now
@@ -234,17 +239,18 @@ impl Simulation {
         self.news.keys().cloned().collect()
     }
 
-    /// The news of a robot for the tick under way. `joined` names the incarnation that takes part from this tick on, which
+    /// The news of a robot for the tick under way, with the incarnations that they name. One that takes part from this tick on
     /// must learn where it stands.
     #[must_use]
-    pub fn news(&self, name: &RobotName, joined: Option<Generation>) -> News {
+    pub fn news(&self, name: &RobotName, naming: Naming) -> News {
         let mut news = self.news.get(name).cloned().unwrap_or(News {
             epoch: self.epoch,
             tick: self.now,
             ..News::default()
         });
-        if joined.is_some() {
-            news.joined = joined;
+        news.joined = naming.joined;
+        news.rejoin = naming.rejoin;
+        if naming.joined.is_some() {
             news.correction = news.correction.or_else(|| {
                 let location = self.location(name)?;
                 Some(Correction {
@@ -321,6 +327,7 @@ impl Simulation {
                 epoch: self.epoch,
                 tick: self.now,
                 joined: None,
+                rejoin: None,
                 correction: is_corrected.then(|| Correction {
                     location: to_wire(self.world.robots()[index]),
                     blocked: is_refused,
@@ -349,19 +356,22 @@ impl Simulation {
             .collect()
     }
 
-    /// Robots that each robot cannot query: those from which the medium cuts it off, those whose last report is missing, and
-    /// those of which a new incarnation has just joined.
-    fn join_silent_and_newcomers(
+    /// Robots that each robot cannot query: those from which the medium cuts it off, those whose last report is missing, those
+    /// of which a new incarnation has just joined, and those whose processes have just been stopped.
+    fn join_unanswering(
         &self,
         mut cut: BTreeMap<RobotName, Vec<RobotName>>,
     ) -> BTreeMap<RobotName, Vec<RobotName>> {
-        if self.silent.is_empty() && self.newcomers.is_empty() {
+        let mut unanswering = self.silent.clone();
+        unanswering.extend_from_slice(&self.newcomers);
+        unanswering.extend_from_slice(&self.stopped);
+        if unanswering.is_empty() {
             return cut;
         }
 
         for name in &self.names {
             let others = cut.entry(name.clone()).or_default();
-            for other in self.silent.iter().chain(&self.newcomers) {
+            for other in &unanswering {
                 if other != name {
                     others.push(other.clone());
                 }
@@ -521,6 +531,11 @@ impl Simulation {
                 begins: order.begins,
             });
         }
+    }
+
+    /// The scenario stops the process of a robot before the next tick, and the clock goes on without it.
+    pub fn stop(&mut self, robot: &RobotName) {
+        self.stopped.push(robot.clone());
     }
 
     /// A command from outside the roster; it arrives at the next tick.

@@ -337,6 +337,48 @@ def test_a_successor_waits_for_its_clock_and_takes_over(stage: Stage) -> None:
     assert stage.nothing_more("robot/A/report")
 
 
+def test_who_is_asked_to_joins_again_and_starts_over(stage: Stage) -> None:
+    """[return.rejoin]"""
+    begin(stage)
+    order(stage, 1, "draw")
+    stage.welcome = lambda _: welcome(generation=2, tick=4, stream="robot/A#2")
+    # Also in the middle of a tick, whose result is thrown away.
+    stage.clock(2, A={"commands": [says("ask B")]})
+    assert stage.heard("robot/A/waiting")["on"] == "B"
+    for _ in range(2):
+        stage.clock(5, A={"rejoin": 1})
+    eventually("it to join again", lambda: len(stage.joins) == 2 or None)
+    stage.clock(5, A={"rejoin": 1})
+    report = stage.tick(6, A={"joined": 2, "commands": [says("draw")]})
+    assert (report["generation"], report["log"][0]) == (2, "init")
+    assert f"draws {stream(42, 'robot/A#2').next_u64()}" in report["log"]
+    assert len(stage.joins) == 2 and stage.joins[0]["instance"] == stage.joins[1]["instance"]
+    assert stage.nothing_more("robot/A/report")
+
+
+def test_a_clock_of_an_epoch_that_has_not_begun_changes_nothing(stage: Stage) -> None:
+    """[epoch.init] A clock from elsewhere, for example."""
+    begin(stage)
+    order(stage, 1, "draw")
+    for tick in range(6):
+        stage.news("A", tick, epoch=9, commands=[says("draw")])
+        stage.clock(tick, epoch=9)
+    eventually("it to join again", lambda: len(stage.joins) > 1 or None)
+    first, second = stream(42, "robot/A"), order(stage, 2, "draw")
+    first.next_u64()
+    assert second["log"][0] == "location" and f"draws {first.next_u64()}" in second["log"]
+    # Also in the middle of a tick.
+    stage.clock(3, A={"commands": [says("ask B")]})
+    assert stage.heard("robot/A/waiting")["on"] == "B"
+    asked = len(stage.joins)
+    stage.clock(0, epoch=9)
+    eventually("it to join again", lambda: len(stage.joins) > asked or None)
+    at = {"location": {"x": 1, "y": 1}, "speed_mps": 0, "direction_rad": 0, "state_variables": {}}
+    stage.put("robot/B/state", at | {"epoch": 1, "tick": 2, "emotion_state": "SAD", "behavior_state": "SIT"})
+    report = stage.heard("robot/A/report")
+    assert report["tick"] == 3 and "B is SAD" in report["log"]
+
+
 def test_one_who_is_replaced_ends(stage: Stage) -> None:
     """[return.replaced]"""
     robot = begin(stage)

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query, Reply, Role};
 use lockstep::{
-    Action, Admission, Answer, Begin, Leave, Participant, Patience, RobotTimer, Sent, StateQuery,
-    Turn,
+    Action, Admission, Answer, Begin, Leave, Naming, Participant, Patience, RobotTimer, Sent,
+    StateQuery, Turn,
 };
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
@@ -545,13 +545,11 @@ impl Host {
             && own == 1;
         if is_early {
             self.drive(|machine, out| {
-                machine.news(
-                    clock.epoch,
-                    clock.tick,
-                    Some(generation),
-                    News::default(),
-                    out,
-                );
+                let naming = Naming {
+                    joined: Some(generation),
+                    rejoin: None,
+                };
+                machine.news(clock.epoch, clock.tick, naming, News::default(), out);
             })?;
         }
 
@@ -574,6 +572,9 @@ impl Host {
         {
             news.joined = None;
         }
+        if self.wrong.is("return.rejoin") {
+            news.rejoin = None;
+        }
         let mut epoch = news.epoch;
         let mut tick = news.tick;
         if self.wrong.is("news.wait:any") && self.shared.is_in(Phase::AwaitingNews) {
@@ -583,7 +584,8 @@ impl Host {
         if self.wrong.is("epoch.init:received") {
             self.strays.push(news.clone());
         }
-        self.drive(|machine, out| machine.news(epoch, tick, news.joined, news, out))
+        let naming = Naming::from(&news);
+        self.drive(|machine, out| machine.news(epoch, tick, naming, news, out))
     }
 
     fn ask_to_join(&mut self) -> Result<(), Failure> {
@@ -651,9 +653,12 @@ impl Host {
         self.drive(|machine, out| machine.admitted(admission, states, out))?;
         if is_early {
             let clock = self.last_clock;
-            let joined = Some(admission.generation);
+            let naming = Naming {
+                joined: Some(admission.generation),
+                rejoin: None,
+            };
             self.drive(|machine, out| {
-                machine.news(clock.epoch, clock.tick, joined, News::default(), out);
+                machine.news(clock.epoch, clock.tick, naming, News::default(), out);
                 machine.clock(clock, out);
             })?;
         }
@@ -713,6 +718,9 @@ impl Host {
             }
             if self.wrong.is("epoch.init:count") {
                 walker.sent = before.sent;
+            }
+            if self.wrong.is("return.rejoin:variables") && welcome.generation > 1 {
+                walker.heard = before.heard;
             }
         }
         self.walker = Some(walker);

@@ -109,7 +109,7 @@ fn every_schedule_is_a_run_that_the_rules_allow() {
         }
     }
     assert_eq!(failed, 0, "{failed} of {count} schedules failed");
-    assert_same_deaths_are_same_runs(&found, &halls);
+    assert_same_causes_are_same_runs(&found, &halls);
 
     let happened = [
         counts.cuts,
@@ -119,6 +119,7 @@ fn every_schedule_is_a_run_that_the_rules_allow() {
         counts.held_back,
         counts.crashes,
         counts.hangs,
+        counts.stopped,
         counts.inits,
         counts.operator,
         counts.commands,
@@ -133,13 +134,15 @@ fn every_schedule_is_a_run_that_the_rules_allow() {
     );
 }
 
-/// Where and when a process dies decides what the run becomes, and nothing else of the schedule does.
-fn assert_same_deaths_are_same_runs(found: &BTreeMap<u64, Came>, halls: &Halls) {
+/// Where and when a process dies, or the scenario stops it, decides what the run becomes, and nothing else of the schedule
+/// does.
+fn assert_same_causes_are_same_runs(found: &BTreeMap<u64, Came>, halls: &Halls) {
     let mut runs: BTreeMap<_, BTreeMap<&str, Vec<u64>>> = BTreeMap::new();
     for (seed, came) in found {
         let plan = Plan::draw(*seed, halls);
-        if plan.family == Family::Death {
-            let digests = runs.entry((plan.hall, plan.death)).or_default();
+        if matches!(plan.family, Family::Death | Family::Stopped) {
+            let cause = (plan.hall, plan.death, plan.stop);
+            let digests = runs.entry(cause).or_default();
             digests.entry(&came.digest).or_default().push(*seed);
         }
     }
@@ -147,7 +150,7 @@ fn assert_same_deaths_are_same_runs(found: &BTreeMap<u64, Came>, halls: &Halls) 
     runs.retain(|_, digests| digests.len() > 1);
     assert!(
         runs.is_empty(),
-        "the same death gave different runs (digest, then seeds): {runs:#?}"
+        "the same cause gave different runs (digest, then seeds): {runs:#?}"
     );
 }
 

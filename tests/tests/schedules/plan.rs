@@ -26,6 +26,8 @@ pub(crate) enum Family {
     Processes,
     /// The clock goes on without late robots, or ends the run.
     Late,
+    /// The clock goes on, and the scenario stops one process: the run depends on the scenario only.
+    Stopped,
 }
 
 /// How links behave.
@@ -104,6 +106,18 @@ pub(crate) struct Death {
     pub(crate) point: Point,
 }
 
+/// The scenario stops the process of a robot.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Stop {
+    pub(crate) robot: RobotName,
+    /// First tick without it.
+    pub(crate) from: Tick,
+    /// First tick after that.
+    pub(crate) until: Tick,
+    /// After this many missed ticks it is lost.
+    pub(crate) lose_after: u32,
+}
+
 /// A defect of the star or of the hosts' loop, to show that it would be found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Flaw {
@@ -129,6 +143,7 @@ pub(crate) struct Plan {
     pub(crate) lateness: Lateness,
     pub(crate) blows: Vec<Blow>,
     pub(crate) death: Option<Death>,
+    pub(crate) stop: Option<Stop>,
     pub(crate) flaw: Flaw,
 }
 
@@ -141,6 +156,7 @@ impl Plan {
             Family::Death,
             Family::Processes,
             Family::Late,
+            Family::Stopped,
         ]);
         let is_late = family == Family::Late;
 
@@ -159,16 +175,21 @@ impl Plan {
             lateness: lateness(OnLate::Wait, 5 * S, 3),
             blows: Vec::new(),
             death: None,
+            stop: None,
             flaw: Flaw::None,
         };
         let roster = halls.scenario(hall, 1).roster();
         if is_late {
             plan.lateness = draw_lateness(&mut chance, &roster);
         }
+        if family == Family::Stopped {
+            plan.draw_stop(&mut chance, &roster);
+            return plan;
+        }
         plan.draw_operator(&mut chance, &roster);
         plan.draw_cuts(&mut chance, &roster);
         match family {
-            Family::Links => plan.draw_hangs(&mut chance, &roster, false),
+            Family::Links | Family::Stopped => plan.draw_hangs(&mut chance, &roster, false),
             Family::Death => plan.draw_death(&mut chance, &roster),
             Family::Processes | Family::Late => {
                 plan.draw_crashes(&mut chance, &roster);
@@ -287,6 +308,22 @@ impl Plan {
             tick: chance.one_of(&[0, 1, 2, 9, 17, TICKS - 1]),
             point: chance.one_of(&points),
         });
+    }
+
+    fn draw_stop(&mut self, chance: &mut Chance, roster: &[RobotName]) {
+        // Few ways to be stopped, so that several schedules share each.
+        let (from, until) = chance.one_of(&[(3, 4), (3, 20), (12, 30)]);
+        let stop = Stop {
+            robot: chance.one_of(roster),
+            from,
+            until,
+            lose_after: chance.one_of(&[3, 50]),
+        };
+
+        // Where the clock goes on, a link that is cut and a robot that is late decide what the run becomes.
+        self.links.cuts = 0.0;
+        self.lateness = lateness(OnLate::Continue, 3_600 * S, stop.lose_after);
+        self.stop = Some(stop);
     }
 
     fn draw_moment(&self, chance: &mut Chance) -> Option<(Epoch, Tick)> {

@@ -8,7 +8,9 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use lockstep::{Action, Admission, Answer, Begin, Leave, Participant, Patience, RobotTimer, Turn};
+use lockstep::{
+    Action, Admission, Answer, Begin, Leave, Naming, Participant, Patience, RobotTimer, Turn,
+};
 use protocol::messages::{
     Command, CommandText, JoinAnswer, JoinRequest, News, PublicState, Waiting, Welcome,
 };
@@ -456,8 +458,9 @@ impl World {
         match message {
             Message::News(bytes) => {
                 let news: News = self.read(&bytes);
+                let naming = Naming::from(&news);
                 self.feed(process, |participant, out| {
-                    participant.news(news.epoch, news.tick, news.joined, news, out);
+                    participant.news(news.epoch, news.tick, naming, news, out);
                 });
             }
             Message::Clock(bytes) => self.on_clock(process, &bytes),

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lockstep::{Begin, Membership, Outcome, Sent, Turn};
+use lockstep::{Begin, Membership, Naming, Outcome, Sent, Turn};
 use protocol::messages::{CommandText, PublicState, Report};
 use protocol::{Generation, RobotName, RunName, Tick};
 use robot::{Done, Network, Seat, Undelivered};
@@ -92,6 +92,10 @@ impl Reference {
             self.seat(name, generation);
         }
 
+        let naming = Naming {
+            joined,
+            rejoin: None,
+        };
         let has_news = self.simulation.robots_with_news().contains(name) || joined.is_some();
         let turn = Turn {
             epoch: self.simulation.epoch(),
@@ -101,7 +105,7 @@ impl Reference {
                 (_, Some(_)) => Begin::TakeOver,
                 (_, None) => Begin::GoOn,
             },
-            news: has_news.then(|| self.simulation.news(name, joined)),
+            news: has_news.then(|| self.simulation.news(name, naming)),
         };
         let seat = self
             .seats

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use lockstep::{Barrier, Lateness, Membership, Output, Refused, Sent, Stamp, Timer, Timing};
 use protocol::messages::{
-    Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, PublicState, Refusal,
-    Report, Waiting,
+    Clock, Command, CommandText, End, FaultKind, JoinAnswer, JoinRequest, MAX_ENTRIES, PublicState,
+    Refusal, Report, Waiting,
 };
 use protocol::{Epoch, Generation, RobotName, RunName, Tick, encode};
 use simulator::{Event as Recorded, Simulation, TickRecord};
@@ -18,6 +18,8 @@ use crate::reference::{Reference, Reports};
 use crate::star::{Bytes, Message};
 use crate::world::{BOUND, Event, World};
 
+/// A robot whose process goes on is asked to join again this often.
+const NUDGE: Micros = 100 * MS;
 /// How long the simulator waits at the end of a run for the robots to leave.
 const GOODBYE: Micros = S;
 
@@ -37,6 +39,8 @@ pub(crate) struct Simulator {
     stage: Stage,
     /// Whether robots join and tick 0 is not complete: the operator's `init` is refused.
     is_gathering: bool,
+    /// The tick before which the last order of the scenario was carried out.
+    ordered: Option<Tick>,
     with_bodies: BTreeSet<RobotName>,
     operator: Vec<(RobotName, String)>,
     /// Commands of the operator that the next tick's record must show.
@@ -67,6 +71,7 @@ impl Simulator {
             timers: BTreeMap::new(),
             stage: Stage::Robots,
             is_gathering: true,
+            ordered: None,
             with_bodies: BTreeSet::new(),
             operator: Vec::new(),
             passed_on: 0,
@@ -131,8 +136,42 @@ impl World {
             if self.now < due {
                 return;
             }
-            self.open();
+            if self.has_faults_carried_out() {
+                self.open();
+            }
         }
+    }
+
+    /// Has the scenario's orders carried out that are due before the next tick. The clock is held until a robot that went on
+    /// can take part again.
+    fn has_faults_carried_out(&mut self) -> bool {
+        let Some(stop) = self.plan.stop.clone() else {
+            return true;
+        };
+        let next = self.simulator.simulation.tick() + 1;
+        if (stop.from..=stop.until).contains(&next) {
+            self.disturb(0);
+        }
+        let is_due = next == stop.from || next == stop.until;
+        if is_due && self.simulator.ordered != Some(next) {
+            self.simulator.ordered = Some(next);
+            let begins = next == stop.from;
+            let fault = begins.then_some(FaultKind::Hang);
+            self.simulator.barrier.fault(&stop.robot, fault);
+            self.stop_robot(&stop.robot, begins);
+            if begins {
+                self.simulator.simulation.stop(&stop.robot);
+            }
+        }
+        if next != stop.until || self.simulator.barrier.is_back(&stop.robot) {
+            return true;
+        }
+
+        let simulator = &mut self.simulator;
+        simulator.barrier.repeat(&mut simulator.outputs);
+        simulator.stage = Stage::Grant(self.now + NUDGE);
+        self.schedule(NUDGE, Event::Grant);
+        false
     }
 
     fn open(&mut self) {
@@ -165,8 +204,8 @@ impl World {
                 self.on_opened(0);
             }
             Output::Grant { news, clock } => {
-                for (name, joined) in news {
-                    let news = self.simulator.simulation.news(&name, joined);
+                for (name, naming) in news {
+                    let news = self.simulator.simulation.news(&name, naming);
                     self.put_down(Some(&name), &Message::News(encode(&news).into()));
                 }
                 self.put_down(None, &Message::Clock(encode(&clock).into()));
@@ -299,7 +338,7 @@ impl World {
             return;
         }
         self.counts.missed += 1;
-        if self.plan.family != Family::Late {
+        if !matches!(self.plan.family, Family::Late | Family::Stopped) {
             self.fail_wrong(format!("tick {tick} is completed without {missing:?}"));
         }
         if self.now > self.disturbed_until + BOUND {

@@ -72,6 +72,7 @@ pub(crate) struct Counts {
     pub(crate) held_back: u64,
     pub(crate) crashes: u64,
     pub(crate) hangs: u64,
+    pub(crate) stopped: u64,
     pub(crate) inits: u64,
     pub(crate) operator: u64,
     pub(crate) commands: u64,
@@ -93,6 +94,7 @@ impl Counts {
         self.held_back += other.held_back;
         self.crashes += other.crashes;
         self.hangs += other.hangs;
+        self.stopped += other.stopped;
         self.inits += other.inits;
         self.operator += other.operator;
         self.commands += other.commands;
@@ -335,6 +337,11 @@ impl World {
     fn hang(&mut self, process: usize, lasts: Micros) {
         self.counts.hangs += 1;
         self.disturb(lasts);
+        self.stop(process);
+        self.schedule(lasts, Event::Resume { process });
+    }
+
+    fn stop(&mut self, process: usize) {
         self.processes[process].life = Life::Hung;
         let session = self.links[process].session;
         self.schedule(
@@ -344,7 +351,20 @@ impl World {
                 session,
             },
         );
-        self.schedule(lasts, Event::Resume { process });
+    }
+
+    /// The scenario stops the process of a robot, or lets it go on.
+    pub(crate) fn stop_robot(&mut self, robot: &RobotName, begins: bool) {
+        let of_robot = |process: &Process| process.name == *robot;
+        let Some(process) = self.processes.iter().position(of_robot) else {
+            return;
+        };
+        if begins {
+            self.counts.stopped += 1;
+            self.stop(process);
+        } else {
+            self.resume(process);
+        }
     }
 
     /// Whether a process dies here, as planned.

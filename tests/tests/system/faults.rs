@@ -2,9 +2,13 @@
 
 use std::time::{Duration, Instant};
 
+use bus::{Bus, Role};
 use nix::sys::signal::Signal;
+use protocol::keys::Keys;
+use protocol::messages::Clock;
+use protocol::{RunName, encode};
 use system_tests::processes::{find, send};
-use system_tests::{Lab, assert_same, eventually, root, side_by_side};
+use system_tests::{Lab, PATIENCE, assert_same, eventually, root, side_by_side};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
 
@@ -341,10 +345,11 @@ fn a_crash_of_the_scenario_happens_at_its_tick_and_is_the_same_every_time() {
 
 /// Plays the hall eight times side by side with Leguin stopped at 10 s, and demands the same record of all. The deadline is
 /// as long as the lease of her token, which ends in the middle of the hang. Returns the events of one run.
-fn play_hang(run: &str, end: &str) -> Vec<serde_json::Value> {
+fn play_hang(run: &str, end: &str, lose_after: u32) -> Vec<serde_json::Value> {
     const REPETITIONS: usize = 8;
     let lab = Lab::new();
     let fault = format!("fault=[{{ robot = \"Leguin\", do = \"hang\", at = \"10 s\"{end} }}]");
+    let lose_after = format!("lose_after={lose_after}");
     let runs: Vec<String> = (1..=REPETITIONS)
         .map(|repetition| format!("{run}-{repetition}"))
         .collect();
@@ -363,7 +368,7 @@ fn play_hang(run: &str, end: &str) -> Vec<serde_json::Value> {
             "--set",
             "deadline=2 s",
             "--set",
-            "lose_after=70",
+            &lose_after,
         ];
         lab.start(run, &args).finish();
         nobody_is_left(run);
@@ -393,7 +398,7 @@ fn ticks_of_leguin(events: &[serde_json::Value], kind: &str) -> Vec<u64> {
 /// decide nothing.
 #[test]
 fn a_hang_of_the_scenario_loses_the_robot_at_the_same_tick_whatever_the_lease_does() {
-    let events = play_hang("fault-lease", "");
+    let events = play_hang("fault-lease", "", 70);
     let of = |kind| ticks_of_leguin(&events, kind);
     assert_eq!(
         (of("fault"), of("lost"), of("joined")),
@@ -402,16 +407,73 @@ fn a_hang_of_the_scenario_loses_the_robot_at_the_same_tick_whatever_the_lease_do
     assert_eq!(of("missed"), (20..=120).collect::<Vec<_>>());
 }
 
-#[test]
-#[ignore = "fails one time in three: how many old clocks a robot runs when it goes on, before the newest, is wall clock"]
-fn a_robot_that_returns_from_a_hang_of_the_scenario_does_the_same_every_time() {
-    let events = play_hang("fault-return", ", until = \"50 s\"");
+/// Plays a hang from 10 s to `until_s`. Leguin returns at its end as a further incarnation, whether the hang has lost her or
+/// not, and reports every tick from then on.
+fn returns_from_hang(until_s: u64, lose_after: u32) {
+    let run = format!("fault-return-{until_s}-{lose_after}");
+    let events = play_hang(&run, &format!(", until = \"{until_s} s\""), lose_after);
     let of = |kind| ticks_of_leguin(&events, kind);
+    let until = 2 * until_s;
+    let lost = 20 + u64::from(lose_after) - 1;
+    let expected_lost: Vec<u64> = (lost < until).then_some(lost).into_iter().collect();
+
     assert_eq!(
         (of("fault"), of("lost"), of("joined")),
-        (vec![20, 100], vec![89], vec![0, 100])
+        (vec![20, until], expected_lost, vec![0, until])
     );
-    assert_eq!(of("missed"), (20..100).collect::<Vec<_>>());
+    assert_eq!(of("missed"), (20..until).collect::<Vec<_>>());
+    let last = events.last().unwrap();
+    assert_eq!(
+        (last["reason"].as_str(), last["tick"].as_u64()),
+        (Some("finished"), Some(120))
+    );
+}
+
+#[test]
+fn a_robot_that_returns_from_a_hang_of_the_scenario_does_the_same_every_time() {
+    returns_from_hang(50, 70);
+    returns_from_hang(50, 100);
+}
+
+/// Its link has not been given up.
+#[test]
+fn a_robot_that_returns_from_a_short_hang_does_the_same_every_time() {
+    returns_from_hang(14, 70);
+}
+
+/// Robots ask the simulator which epoch it is, and go on where they were.
+#[test]
+fn stray_clocks_of_a_later_epoch_change_nothing() {
+    let lab = Lab::new();
+    let run = "stray-clocks";
+    let args = ["launch", FILE, "--duration", "60 s", "--speed", "20"];
+    let mut launch = lab.start(run, &args);
+    launch.prints("behavior");
+    let endpoint = std::fs::read_to_string(lab.file(run, "endpoint")).unwrap();
+    let role = Role::Client {
+        connect: endpoint.trim().to_owned(),
+        patience: PATIENCE,
+    };
+    let bus = Bus::open(&role, None).unwrap();
+    let key = Keys::new(&RunName::new(run).unwrap()).clock();
+    for tick in 0..20 {
+        let clock = Clock {
+            epoch: 9,
+            tick,
+            ..Clock::default()
+        };
+        bus.put(&key, encode(&clock)).unwrap();
+        std::thread::sleep(Duration::from_millis(50)); // So that they meet robots in many states.
+    }
+    bus.close();
+
+    launch.finish();
+    lab.ok(&["run", FILE, "--run", "no-strays", "--duration", "60 s"]);
+    assert_same(
+        ("with stray clocks", &lab.bytes(run)),
+        ("without", &lab.bytes("no-strays")),
+    );
+    nobody_is_left(run);
 }
 
 #[test]

@@ -102,7 +102,7 @@ const fn check(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 24] = [
+const CHECKS: [Check; 25] = [
     check(&["join.refused"], joining::refused),
     check(&["end.gone"], ends::gone),
     check(&["query.at-once"], queries::at_once),
@@ -112,6 +112,7 @@ const CHECKS: [Check; 24] = [
     check(&["epoch.init"], epochs::init),
     check(&["epoch.late"], epochs::late),
     check(&["return.generation"], returns::generation),
+    check(&["return.rejoin"], returns::rejoin),
     check(&["join.ready-last"], joining::ready_last),
     check(
         &[

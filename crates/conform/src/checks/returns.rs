@@ -6,9 +6,10 @@ use protocol::messages::{Clock, News, PublicState};
 use protocol::{Generation, Tick};
 
 use super::{Findings, seated, usual};
+use crate::comparison::demand_same;
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Entry, Script, Straight, play};
+use crate::script::{Entry, Script, Straight, play, step};
 use crate::stage::{Options, PATIENCE, Stage};
 
 /// The last tick of the predecessor.
@@ -32,11 +33,18 @@ fn state_of(entry: &Entry) -> PublicState {
     }
 }
 
-/// A stage on which the robot has joined as a second incarnation.
-fn returned(kit: &Kit) -> Result<Stage<'_>, Failure> {
+/// A stage on which the robot has joined as a second incarnation, whose predecessor was gone after tick `last`.
+fn returned(kit: &Kit, last: Tick) -> Result<Stage<'_>, Failure> {
     let mut stage = Stage::open_run(kit, Options::default())?;
     stage.prepare()?;
-    stage.play_predecessor(LAST)?;
+    stage.play_predecessor(last)?;
+    bequeath(kit, &mut stage)?;
+    stage.admit_first()?;
+    Ok(stage)
+}
+
+/// Further welcomes are those of a second incarnation. Its predecessor has reported as usual, [`LAST`] being the last tick.
+fn bequeath(kit: &Kit, stage: &mut Stage<'_>) -> Result<(), Failure> {
     let state =
         |tick| usual(kit).map(|usual| usual.iter().find(|entry| entry.tick == tick).map(state_of));
 
@@ -46,13 +54,12 @@ fn returned(kit: &Kit) -> Result<Stage<'_>, Failure> {
     if let Some(last) = &stage.template.last_state {
         stage.template.location = last.location;
     }
-    stage.admit_first()?;
-    Ok(stage)
+    Ok(())
 }
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = returned(kit)?;
+    let mut stage = returned(kit, LAST)?;
     // The last tick was its predecessor's; the next one may go on without it.
     stage.repeat();
     stage.put_clock(&Clock {
@@ -88,6 +95,10 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     }
 
     let transcript = play(&mut stage, &Script::quiet(5), &mut Straight)?;
+    demand_generation(&transcript)
+}
+
+fn demand_generation(transcript: &[Entry]) -> Result<(), Failure> {
     match transcript
         .iter()
         .find(|entry| entry.report.generation != GENERATION)
@@ -101,6 +112,43 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             ))
         }
     }
+}
+
+/// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does.
+pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    let usual = Script::usual(kit);
+    for _ in 0..=LAST {
+        step(&mut stage, &usual, &mut Straight)?;
+    }
+    bequeath(kit, &mut stage)?;
+    stage.miss()?;
+
+    stage.keeps_requests = true;
+    stage.open(&News::default())?;
+    let expected = "another request to join when its news have its generation as `rejoin`";
+    let joining = stage
+        .next_join(PATIENCE)
+        .map_err(|failure| Failure::new(expected, failure.came))?;
+    stage.admit(&joining);
+    stage.keeps_requests = false;
+    let mut instances = Vec::new();
+    for request in stage.seen.requests.iter().flatten() {
+        instances.push(&request.instance);
+    }
+    instances.dedup();
+    if instances.len() > 1 {
+        let came = format!("{instances:?}");
+        return Err(Failure::new("the same instance in all requests", came));
+    }
+
+    // Its turn is the next tick, whose news name it.
+    let last = stage.next_tick() - 1;
+    stage.settle(QUIET);
+    let again = play(&mut stage, &Script::quiet(5), &mut Straight)?;
+    demand_generation(&again)?;
+    let anew = play(&mut returned(kit, last)?, &Script::quiet(5), &mut Straight)?;
+    demand_same(kit, "to join again instead of a new process", &anew, &again)
 }
 
 /// News that name a later incarnation: this one ends.

@@ -49,6 +49,7 @@ const NOTHING: Budget = Budget {
     rivals: 0,
     early: 0,
     inits: 0,
+    strays: 0,
 };
 
 /// What goes wrong together; all of it at once would be too much to explore.
@@ -61,7 +62,9 @@ enum World {
     Cuts,
     Successor,
     Rival,
+    Stray,
     Init,
+    InitTwice,
     InitWhileCut,
     InitWithSuccessor,
     GoesOn,
@@ -70,13 +73,14 @@ enum World {
     GoesOnWhileCut,
     GoesOnAfterInit,
     Hang,
+    ShortHang,
     HangOfSuccessor,
     HangWhileLinkDies,
     ScenarioCrash,
     Aborts,
 }
 
-const WORLDS: [World; 20] = [
+const WORLDS: [World; 23] = [
     World::Calm,
     World::Losses,
     World::Echoes,
@@ -84,7 +88,9 @@ const WORLDS: [World; 20] = [
     World::Cuts,
     World::Successor,
     World::Rival,
+    World::Stray,
     World::Init,
+    World::InitTwice,
     World::InitWhileCut,
     World::InitWithSuccessor,
     World::GoesOn,
@@ -93,6 +99,7 @@ const WORLDS: [World; 20] = [
     World::GoesOnWhileCut,
     World::GoesOnAfterInit,
     World::Hang,
+    World::ShortHang,
     World::HangOfSuccessor,
     World::HangWhileLinkDies,
     World::ScenarioCrash,
@@ -163,12 +170,32 @@ impl World {
                     ..NOTHING
                 })
             },
+            Self::Stray => Star {
+                is_slow: true,
+                last_tick: 1,
+                ..waits.with(Budget {
+                    strays: 2,
+                    inits: 1,
+                    ..NOTHING
+                })
+            },
             Self::Init => Star {
                 is_slow: true,
                 last_tick: 1,
                 ..waits.with(Budget {
                     inits: 1,
                     duplicates: 1,
+                    ..NOTHING
+                })
+            },
+            Self::InitTwice => Star {
+                last_tick: 0,
+                victim: Some("B"),
+                is_gathered: true,
+                ..waits.with(Budget {
+                    inits: 2,
+                    cuts: 1,
+                    duplicates: 2,
                     ..NOTHING
                 })
             },
@@ -198,9 +225,9 @@ impl World {
             }),
             Self::GoesOnSlowly => Star {
                 is_slow: true,
-                lose_after: 1,
+                lose_after: 3,
                 ..goes_on.with(Budget {
-                    early: 1,
+                    early: 2,
                     duplicates: 1,
                     ..NOTHING
                 })
@@ -225,6 +252,13 @@ impl World {
                 last_tick: 4,
                 scenario: Some(hang),
                 ..goes_on.with(Budget { cuts: 1, ..NOTHING })
+            },
+            Self::ShortHang => Star {
+                is_slow: true,
+                last_tick: 3,
+                lose_after: 3,
+                scenario: Some(Ordered { until: 2, ..hang }),
+                ..goes_on
             },
             Self::HangOfSuccessor => Star {
                 last_tick: 3,
@@ -328,7 +362,7 @@ fn every_rule_holds_in_every_world() {
 }
 
 /// Each rule, a world in which breaking it shows, and what goes wrong there.
-const SHOWN: [(Rule, World, &str); 32] = [
+const SHOWN: [(Rule, World, &str); 38] = [
     (Rule::WaitsForAll, World::Calm, "NoVerdict"),
     (Rule::ChecksEpoch, World::Init, "WrongReport"),
     (Rule::ChecksTick, World::Echoes, "WrongReport"),
@@ -350,12 +384,18 @@ const SHOWN: [(Rule, World, &str); 32] = [
         World::HangWhileLinkDies,
         "LostByAccident",
     ),
+    (Rule::RejoinsAfterHang, World::ShortHang, "OldState"),
+    (Rule::AwaitsRejoining, World::ShortHang, "NoVerdict"),
+    (Rule::AsksToRejoin, World::GoesOnWhileCut, FULL_END),
     (
-        Rule::AwaitsRecovery,
-        World::HangWhileLinkDies,
-        "LostByAccident",
+        Rule::CountsRejoining,
+        World::GoesOnWhileCut,
+        "WrongMembership",
     ),
-    (Rule::TakesBack, World::GoesOnWhileCut, FULL_END),
+    (Rule::JoinsWhenAsked, World::GoesOnWhileCut, FULL_END),
+    (Rule::AwaitsWelcome, World::ShortHang, "ReplacedConnected"),
+    (Rule::StartsOver, World::GoesOnWhileCut, "BeganEarly"),
+    (Rule::GoesOnInOwnEpoch, World::Stray, END),
     (
         Rule::GivesUpForGood,
         World::GoesOnWithoutB,
@@ -366,7 +406,7 @@ const SHOWN: [(Rule, World, &str); 32] = [
     (Rule::AnswersOnce, World::Echoes, "RanBackwards"),
     (Rule::RepeatsReport, World::Losses, END),
     (Rule::RepeatsCommands, World::Losses, END),
-    (Rule::IgnoresLate, World::InitWhileCut, ""),
+    (Rule::IgnoresLate, World::InitTwice, ""),
     (Rule::JoinsNewEpoch, World::Init, END),
     (Rule::WaitsToBeNamed, World::Crash, "BeganEarly"),
     (Rule::EndsWhenReplaced, World::Successor, FULL_END),

@@ -8,7 +8,7 @@ use protocol::{Epoch, Generation, RobotName, Tick};
 use super::simulation::{self, News, Order, Report, Simulation, Violation};
 use crate::barrier::{Refused, Stamp};
 use crate::exchange::Sent;
-use crate::member::Admission;
+use crate::member::{Admission, Naming};
 use crate::participant::{Action, Begin, Leave, Participant, Patience, RobotTimer, Turn};
 use crate::rules::{Rule, Rules};
 
@@ -26,7 +26,7 @@ pub(super) enum Up {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Down {
     Answer(Result<Admission, Refused>),
-    News(Epoch, Tick, Option<Generation>, News),
+    News(Epoch, Tick, Naming, News),
     Clock(Clock),
 }
 
@@ -54,8 +54,12 @@ pub(super) struct Process {
     pub(super) asks_again: bool,
     /// The tick that it runs.
     pub(super) running: Option<Turn<News>>,
-    /// Ghost: the tick that it ran last.
+    /// As what it runs, and its first tick as that: all that it knows is from this tick on.
+    generation: Generation,
+    since: Tick,
+    /// Ghost: the tick that it ran last, and as what.
     last_run: Option<(Epoch, Tick)>,
+    last_as: Option<(Epoch, Generation)>,
     /// Whether its link is dead and the router has not noticed.
     pub(super) is_unnoticed: bool,
     /// Ghost: whether its link was ever cut.
@@ -93,7 +97,10 @@ impl Process {
             is_asking: false,
             asks_again: false,
             running: None,
+            generation: 0,
+            since: 0,
             last_run: None,
+            last_as: None,
             is_unnoticed: false,
             was_cut: false,
         };
@@ -130,7 +137,7 @@ impl Process {
                 };
                 robot.refused(refusal, out);
             }
-            Down::News(epoch, tick, joined, news) => robot.news(epoch, tick, joined, news, out),
+            Down::News(epoch, tick, naming, news) => robot.news(epoch, tick, naming, news, out),
             Down::Clock(clock) => robot.clock(clock, out),
         })
     }
@@ -138,12 +145,13 @@ impl Process {
     /// It has done its tick.
     pub(super) fn finish(&mut self, around: Around) -> Option<Violation> {
         let turn = self.running.take()?;
-        let generation = self.robot.admission()?.generation;
+        let generation = self.generation;
         let commands = simulation::commands(&self.name, turn.epoch, turn.tick, generation);
         let report = Report {
             epoch: turn.epoch,
             tick: turn.tick,
             generation,
+            since: self.since,
             orders: turn.news.map(|news| news.orders).unwrap_or_default(),
         };
 
@@ -246,7 +254,8 @@ impl Process {
     fn run(&mut self, turn: Turn<News>, around: Around) -> Option<Violation> {
         let at = (turn.epoch, turn.tick);
         let is_backwards = self.last_run.is_some_and(|last| at <= last);
-        let is_first = self.last_run.is_none_or(|(epoch, _)| epoch != turn.epoch);
+        let generation = self.robot.admission().map_or(0, |own| own.generation);
+        let is_first = self.last_as != Some((turn.epoch, generation));
         let violation = if is_backwards {
             Some(Violation::RanBackwards)
         } else if !self.has_its_news(&turn, around.simulation) {
@@ -257,7 +266,12 @@ impl Process {
             None
         };
 
+        if turn.begin != Begin::GoOn {
+            self.generation = generation;
+            self.since = turn.tick;
+        }
         self.last_run = Some(at);
+        self.last_as = Some((turn.epoch, generation));
         self.running = Some(turn);
         if around.is_slow {
             return violation;

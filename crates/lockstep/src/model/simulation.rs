@@ -30,6 +30,8 @@ pub(super) struct Report {
     pub(super) epoch: Epoch,
     pub(super) tick: Tick,
     pub(super) generation: Generation,
+    /// The first tick of the incarnation: its state depends on what came from then on.
+    pub(super) since: Tick,
     pub(super) orders: Vec<Order>,
 }
 
@@ -44,6 +46,8 @@ pub(super) enum Violation {
     VerdictChanged,
     /// A report counts that is not what the robot must report in this tick, epoch and incarnation.
     WrongReport,
+    /// A report counts that depends on what came before the scenario's hang was over.
+    OldState,
     /// The commands of a tick are not those that the robot sent in it.
     WrongCommands,
     /// A robot joined or was lost twice, or reports without taking part.
@@ -211,7 +215,7 @@ impl Simulation {
         let part = self.parts.get_mut(name)?;
         let is_wrong = match change {
             Membership::Joined(_, generation) => {
-                let is_known = part.takes_part && part.generation >= *generation;
+                let is_known = part.generation >= *generation;
                 part.takes_part = true;
                 part.generation = *generation;
                 is_known
@@ -233,6 +237,7 @@ impl Simulation {
             epoch: self.epoch,
             tick: self.tick,
             generation: part.generation,
+            since: report.since,
             orders: self.news.get(name).cloned().unwrap_or_default(),
         };
         let commands = commands(name, self.epoch, self.tick, part.generation);

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use protocol::messages::{Clock, End, FaultKind, OnLate};
-use protocol::{Epoch, Generation, RobotName, Tick};
+use protocol::{Epoch, RobotName, Tick};
 use stateright::{Model, Property};
 
 use super::process::{Around, Down, Process, Robot, Up};
 use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
 use crate::barrier::{Barrier, Output, Timer, Timing};
-use crate::exchange::Membership;
-use crate::member::Lateness;
+use crate::exchange::{Membership, Outcome};
+use crate::member::{Lateness, Naming};
 use crate::participant::RobotTimer;
 use crate::rules::{Rule, Rules};
 
@@ -38,6 +38,8 @@ pub(super) struct Budget {
     pub(super) early: u8,
     /// New epochs.
     pub(super) inits: u8,
+    /// Clocks of an epoch that has not begun, from elsewhere.
+    pub(super) strays: u8,
 }
 
 /// What is explored: bounds, and perhaps a broken rule.
@@ -112,6 +114,8 @@ pub(super) enum Step {
     /// The simulator repeats the last clock while it waits for a robot to be back.
     RepeatBetween,
     Init,
+    /// A clock of a later epoch, which is not the simulator's, is on the link of a process.
+    Stray(usize),
 }
 
 impl Step {
@@ -270,7 +274,9 @@ impl Star {
                 Output::Gathered => state.simulation.next = Some(0),
                 Output::Grant { news, clock } => Self::put(state, news, clock),
                 Output::Complete(outcome) => {
-                    let accident = self.lost_by_accident(state, &outcome.membership);
+                    let accident = self
+                        .lost_by_accident(state, &outcome.membership)
+                        .or_else(|| self.remembers_hang(&outcome));
                     let barrier = &state.barrier;
                     let is_stopped = self.has_fault(state.simulation.tick);
                     let violation = state.simulation.record(outcome, |name| {
@@ -305,16 +311,28 @@ impl Star {
         (decides_alone && is_lost && !is_due).then_some(Violation::LostByAccident)
     }
 
+    /// What a robot does after a hang does not depend on what its process made of the clocks before its end.
+    fn remembers_hang(&self, outcome: &Outcome<Report, Order>) -> Option<Violation> {
+        let fault = self
+            .scenario
+            .filter(|fault| fault.kind == FaultKind::Hang)?;
+        let (report, _) = outcome.reports.get(&super::name("B"))?;
+        let is_after = report.tick >= fault.until;
+
+        (is_after && report.since < fault.until).then_some(Violation::OldState)
+    }
+
     /// The news each to its robot, then the clock to all, as [`Output::Grant`] wants it.
-    fn put(state: &mut State, news: Vec<(RobotName, Option<Generation>)>, clock: Clock) {
+    fn put(state: &mut State, news: Vec<(RobotName, Naming)>, clock: Clock) {
         let simulation = &mut state.simulation;
-        for (name, joined) in news {
+        for (name, naming) in news {
             let content = News {
                 epoch: clock.epoch,
                 tick: clock.tick,
                 orders: simulation.news.get(&name).cloned().unwrap_or_default(),
             };
-            if let (Some(generation), Some(part)) = (joined, simulation.parts.get_mut(&name)) {
+            if let (Some(generation), Some(part)) = (naming.joined, simulation.parts.get_mut(&name))
+            {
                 part.named = Some((clock.epoch, clock.tick, generation));
             }
             for process in state.processes.iter_mut().flatten() {
@@ -322,7 +340,7 @@ impl Star {
                     process.down.push_back(Down::News(
                         clock.epoch,
                         clock.tick,
-                        joined,
+                        naming,
                         content.clone(),
                     ));
                 }
@@ -495,6 +513,9 @@ impl Star {
                 steps.push(Step::Blip(number));
             }
         }
+        if left.strays > 0 && process.is_connected {
+            steps.push(Step::Stray(number));
+        }
         if process.is_unnoticed {
             steps.push(Step::Notice(number));
         }
@@ -634,6 +655,14 @@ impl Star {
                 self.show(state, number, false);
             }
             Step::Heal(number) => state.process(number).heal(),
+            Step::Stray(number) => {
+                state.left.strays -= 1;
+                let clock = Clock {
+                    epoch: state.simulation.epoch + 1,
+                    ..Clock::default()
+                };
+                state.process(number).down.push_back(Down::Clock(clock));
+            }
             Step::Crash(number) => {
                 state.left.crashes -= 1;
                 state.process(number).end();

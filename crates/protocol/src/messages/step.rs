@@ -173,6 +173,10 @@ pub struct News {
     /// The incarnation of this generation takes part from this tick on. Any other process with this name has been replaced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joined: Option<Generation>,
+    /// The clock has gone on without the incarnation of this generation, which takes part no more. Its process joins again, and
+    /// takes part as a further incarnation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rejoin: Option<Generation>,
     /// Where it stands, if not where it proposed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<Correction>,
@@ -199,6 +203,7 @@ impl News {
             epoch: _,
             tick: _,
             joined,
+            rejoin,
             correction,
             commands,
             unreachable,
@@ -207,6 +212,7 @@ impl News {
         } = self;
 
         joined.is_none()
+            && rejoin.is_none()
             && correction.is_none()
             && commands.is_empty()
             && unreachable.is_empty()

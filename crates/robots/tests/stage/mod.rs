@@ -286,6 +286,7 @@ impl Stage {
             epoch: 1,
             tick: self.tick,
             joined: None,
+            rejoin: None,
             correction: Some(Correction {
                 location: at,
                 blocked: is_blocked,

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bus::BusError;
 use protocol::encode;
-use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
+use protocol::messages::{FaultKind, FaultOrder, OnLate, ProcessOrder};
 
 use super::orders::Underway;
 use super::process::{REPEAT_AFTER, Server, Stage};
@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
 /// While waiting, the loop looks this often whether what it waits for has come about.
 const LOOK: Duration = Duration::from_millis(20);
-/// A robot whose hang is over gets the clock again this often, and counts as back when it answers.
+/// A robot whose hang is over is asked to join again this often, and counts as back when it has joined.
 const NUDGE: Duration = Duration::from_millis(100);
 
 impl Server {
@@ -34,8 +34,15 @@ impl Server {
 
         simulation.note_faults(&orders);
         for order in &orders {
-            let fault = order.begins.then_some(order.kind);
+            // The end of a fault that lasts for a time of the launcher's is not ordered.
+            let lasts = order.begins && order.for_s.is_none();
+            let fault = lasts.then_some(order.kind);
             self.barrier.fault(&order.robot, fault);
+            let is_stopped = matches!(fault, Some(FaultKind::Crash | FaultKind::Hang));
+            let policy = self.barrier.lateness().of(&order.robot);
+            if is_stopped && policy == OnLate::Continue {
+                simulation.stop(&order.robot);
+            }
         }
         let now = Instant::now();
         Ok(Some(Underway {
@@ -109,7 +116,7 @@ impl Server {
     }
 }
 
-/// Whether a robot is as the order wants it: a killed one is disconnected, one whose fault is over is back.
+/// Whether a robot is as the order wants it: a killed one is disconnected, one whose fault is over can take part again.
 fn is_in_effect<R: Clone, C: Clone>(
     barrier: &lockstep::Barrier<R, C>,
     order: &ProcessOrder,

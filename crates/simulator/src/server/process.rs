@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
-use lockstep::{Barrier, Outcome, Output, Sent, Stamp, Timing};
+use lockstep::{Barrier, Naming, Outcome, Output, Sent, Stamp, Timing};
 use protocol::keys::Keys;
 use protocol::messages::{
     Clock, Command, CommandText, End, MAX_ENTRIES, Presence, Reason, Report, Waiting,
@@ -419,12 +419,12 @@ impl Server {
     fn put(
         &mut self,
         simulation: &Simulation,
-        news: &[(RobotName, Option<Generation>)],
+        news: &[(RobotName, Naming)],
         clock: Clock,
     ) -> Result<(), BusError> {
-        for (name, joined) in news {
+        for (name, naming) in news {
             if let Some(publisher) = self.news.get(name) {
-                publisher.put(encode(&simulation.news(name, *joined)))?;
+                publisher.put(encode(&simulation.news(name, *naming)))?;
             }
         }
 

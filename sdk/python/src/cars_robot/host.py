@@ -134,7 +134,7 @@ class Host:
         def on_news(news: News) -> None:
             member = self._members.get(name)
             if member is not None and not member.on_news(news):
-                self._left = self._left or HostError(f"another process is {name} now")
+                self._left = self._left or _replaced(name)
 
         self.link.subscribe(self._keys.news(name), "simulator", read_news, on_news)
         for what in (*QUERIES, STATE):
@@ -157,6 +157,13 @@ class Host:
             if isinstance(answer, Welcome):
                 return answer
             if isinstance(answer, Refused):
+                # A process that was admitted before is refused its own name only if another one has taken its place.
+                if answer.reason == "name_taken" and name in self._members:
+                    self._left = self._left or _replaced(name)
+                # The end of the run may be in the queue.
+                self.link.drain()
+                if self._left is not None:
+                    return None
                 # A predecessor that was killed is noticed within its lease.
                 if answer.reason != "name_taken" or is_last_try:
                     raise HostError(f"{name} may not join: {answer}") from answer
@@ -207,16 +214,26 @@ class Host:
             member.on_clock(clock)
 
     def _is_interrupted(self) -> bool:
+        # Only the welcome shows whether the tick that runs is of no use any more.
+        for member in self._members.values():
+            self._join_again(member)
         return self._left is not None or any(member.is_interrupted for member in self._members.values())
 
-    def _advance(self, member: _Member) -> bool:
-        """Runs a robot's tick if it is its turn. Returns whether it was."""
+    def _join_again(self, member: _Member) -> None:
+        """Joins with the same process in the next epoch, or as a further incarnation, if a robot must."""
         if self._left is None and member.must_join:
-            # `init`: the same process, in the next epoch.
             welcome = self._join(member.name, math.inf)
             if welcome is not None:
                 member.admit(welcome)
+
+    def _advance(self, member: _Member) -> bool:
+        """Runs a robot's tick if it is its turn. Returns whether it was."""
+        self._join_again(member)
         return self._left is None and member.advance()
+
+
+def _replaced(name: str) -> HostError:
+    return HostError(f"another process is {name} now")
 
 
 class _Member:
@@ -226,16 +243,26 @@ class _Member:
     def __init__(self, link: Link, seat: Seat) -> None:
         self.name = name = seat.welcome.name
         self.must_join = False
-        """Whether a clock of a later epoch than its own has arrived."""
+        """Whether a clock of a later epoch than its own has arrived, or news that ask it to join again."""
         self._seat = seat
+        self._welcome = seat.welcome
+        """The newest welcome. The seat has it from the next tick on that begins."""
         self._link = link
         self._is_seated = False
-        """Whether it has run a tick of its epoch."""
+        """Whether it has run a tick as what it was welcomed as."""
+        self._has_rejoined = False
+        """Whether it was another incarnation before, in the same epoch."""
         self._pending: Clock | None = None
-        """The newest clock that has not been run."""
+        """The newest clock that has not been run, of its epoch."""
+        self._later: Clock | None = None
+        """The newest clock of a later epoch. Only a welcome to that epoch shows that it has begun."""
         self._news: dict[tuple[int, int], News] = {}
         """News of ticks that have not been run."""
         self._running: tuple[int, int] | None = None
+        self._is_void = False
+        """Whether the tick that runs is one of what it is no more."""
+        self._held_back: Report | None = None
+        """What came of a tick while it was to join again."""
         self._answered = (0, -1)
         """Epoch and tick of the last answer."""
         self._commands: list[tuple[str, bytes]] = []
@@ -250,26 +277,44 @@ class _Member:
 
     def _show_predecessor(self) -> None:
         """Others may still ask for what the previous incarnation reported last."""
-        for last in (self._seat.welcome.state_before, self._seat.welcome.last_state):
+        for last in (self._welcome.state_before, self._welcome.last_state):
             if last is not None:
                 self._link.board.show(self.name, last)
 
     def admit(self, welcome: Welcome) -> None:
-        """It has joined again. A simulator that is not in a later epoch, either, will repeat the clock."""
+        """It has joined again. Clocks of a later epoch than that of the welcome are ignored, and so are their news: both are
+        repeated."""
+        before, self._welcome = self._welcome, welcome
         self.must_join = False
-        if welcome.epoch > self._seat.welcome.epoch:
-            self._seat.start_over(welcome)
-            self._is_seated = False
-            self._link.board.host(self.name)
-            self._show_predecessor()
+        if self._later is not None and self._later.epoch == welcome.epoch:
+            self._pending = self._later
+        self._later = None
+        self._news = {of: news for of, news in self._news.items() if of[0] <= welcome.epoch}
+        held_back, self._held_back = self._held_back, None
+        if (welcome.epoch, welcome.generation) == (before.epoch, before.generation):
+            if held_back is not None:
+                self._answer_with(held_back)
+            return
+
+        self._has_rejoined = welcome.epoch == before.epoch
+        self._is_seated = False
+        self._is_void = self._running is not None
+        self._running = None
+        self._answered = (0, -1)
+        self._link.board.host(self.name)
+        self._show_predecessor()
 
     def on_clock(self, clock: Clock) -> None:
         """A clock arrived."""
         at = (clock.epoch, clock.tick)
-        epoch = self._seat.welcome.epoch
+        epoch = self._welcome.epoch
+        if clock.epoch > epoch:
+            self.must_join = True
+            if self._later is None or at >= (self._later.epoch, self._later.tick):
+                self._later = clock
+            return
         if clock.epoch < epoch or at == self._running:
             return
-        self.must_join = self.must_join or clock.epoch > epoch
         if at <= self._answered:
             if at == self._answered and self._running is None:
                 self._put()
@@ -283,24 +328,30 @@ class _Member:
     def on_news(self, news: News) -> bool:
         """News arrived. Returns whether it is still this process that takes part."""
         at = (news.epoch, news.tick)
-        welcome = self._seat.welcome
-        if news.epoch == welcome.epoch and news.joined is not None and news.joined > welcome.generation:
+        welcome = self._welcome
+        is_replaced = news.epoch == welcome.epoch and news.joined is not None and news.joined > welcome.generation
+        # While it joins again, a higher generation may become its own.
+        if is_replaced and not self.must_join:
             return False
+        if news.epoch == welcome.epoch and news.rejoin == welcome.generation:
+            self.must_join = True
         if news.epoch >= welcome.epoch and at > max(self._answered, self._running or (0, -1)):
             self._news[at] = news
-            if len(self._news) > MAX_NEWS:
-                del self._news[min(self._news)]
+            # Those of later epochs, which only a welcome confirms, take no room from the others.
+            of_same = [of for of in self._news if (of[0] > welcome.epoch) == (at[0] > welcome.epoch)]
+            if len(of_same) > MAX_NEWS:
+                del self._news[min(of_same)]
         return True
 
     @property
     def is_interrupted(self) -> bool:
-        """Whether a newer clock than the one that it runs has arrived."""
-        return self._running is not None and self._pending is not None
+        """Whether the tick that it runs is of no use any more."""
+        return self._is_void or (self._running is not None and self._pending is not None)
 
     def advance(self) -> bool:
         """Runs the pending clock if all that belongs to it is here and it is this robot's turn. Returns whether it was."""
-        clock, welcome = self._pending, self._seat.welcome
-        if clock is None or clock.epoch > welcome.epoch:
+        clock, welcome = self._pending, self._welcome
+        if clock is None or self.must_join:
             return False
         at = (clock.epoch, clock.tick)
         news = self._news.get(at)
@@ -310,9 +361,12 @@ class _Member:
         self._pending = None
         self._news = {of: one for of, one in self._news.items() if of > at}
         is_named = news is not None and news.joined == welcome.generation
-        if clock.epoch < welcome.epoch or not (self._is_seated or clock.tick == 0 or is_named):
+        begins = clock.tick == 0 and not self._has_rejoined
+        if clock.epoch < welcome.epoch or not (self._is_seated or begins or is_named):
             return False
         is_first = not self._is_seated
+        if is_first:
+            self._seat.start_over(welcome)
         self._is_seated = True
         self._running = at
         self._link.begin(*at)
@@ -321,10 +375,13 @@ class _Member:
         except Interrupted:
             return True
         finally:
+            is_void, self._is_void = self._is_void, False
             self._running = None
-        # What was run in an epoch that is over is thrown away.
         self._link.drain()
-        if not self.must_join:
+        # What was run as what it is no more is thrown away.
+        if self.must_join and not is_void:
+            self._held_back = report
+        elif not is_void:
             self._answer_with(report)
         return True
 

@@ -160,6 +160,8 @@ class News:
     tick: int = 0
     joined: int | None = None
     """The incarnation of this generation takes part from this tick on."""
+    rejoin: int | None = None
+    """The incarnation of this generation takes part no more: its process joins again."""
     correction: Correction | None = None
     commands: tuple[Delivery, ...] = ()
     """Commands that arrive now, in this order. One that is listed twice counts as two."""
@@ -494,6 +496,7 @@ def read_news(value: object) -> News:
         epoch=_epoch(of),
         tick=_tick(of),
         joined=None if of.get("joined") is None else _integer(of, "joined", 1 << 32),
+        rejoin=None if of.get("rejoin") is None else _integer(of, "rejoin", 1 << 32),
         correction=_optional(of, "correction", _read_correction),
         commands=_all(of, "commands", _read_delivery),
         unreachable=_all(of, "unreachable", lambda name: _as_name(name, ".")),

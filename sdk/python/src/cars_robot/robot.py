@@ -29,7 +29,7 @@ class Robot(ABC):
 
     @abstractmethod
     def init_robot(self, cars: Cars) -> None:
-        """Back to the initial state, before tick 0 and after every ``init`` (``initRobot``).
+        """Back to the initial state, before tick 0, after every ``init``, and where it takes part again (``initRobot``).
 
         :raises BadParameters: if the scenario's parameters make no sense to it.
         """

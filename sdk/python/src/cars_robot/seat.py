@@ -40,7 +40,7 @@ class Seat:
         self.start_over(welcome)
 
     def start_over(self, welcome: Welcome) -> None:
-        """The same robot in a new epoch."""
+        """The same robot in a new epoch, or as a further incarnation."""
         self.welcome = welcome
         self._random = stream(welcome.seed, welcome.stream)
         self._proposal = welcome.location
