@@ -27,6 +27,7 @@ pub fn assert_conforms(launch_file: &Path, robot: &str) {
         .find(|process| process.name == robot)
         .expect("a process of this name");
     let mut words = process.command;
+
     // As the launcher does: what stands after a `--` is the program's own.
     let at = words
         .iter()
@@ -37,6 +38,7 @@ pub fn assert_conforms(launch_file: &Path, robot: &str) {
     if own.exists() {
         words[0] = own.display().to_string();
     }
+
     let output = Command::new(programs().join("cars"))
         .current_dir(launch_file.parent().expect("a folder"))
         .args([

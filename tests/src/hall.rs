@@ -31,6 +31,7 @@ pub fn scenario(file: &str, seed: u64, set: &[&str]) -> Scenario {
         set,
     };
     let file = root().join(Path::new(file));
+
     Scenario::load(&file, &changes).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
 }
 
@@ -99,6 +100,7 @@ impl Hall {
         let value = variables
             .get(variable)
             .unwrap_or_else(|| panic!("{robot} does not publish {variable}"));
+
         value
             .as_f64()
             .unwrap_or_else(|| panic!("{variable} of {robot} is no number"))

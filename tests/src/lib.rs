@@ -44,6 +44,7 @@ pub fn cargo() -> Command {
             cargo.env_remove(name);
         }
     }
+
     cargo
 }
 
@@ -51,6 +52,7 @@ pub fn cargo() -> Command {
 #[must_use]
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
+
     PROGRAMS.get_or_init(|| {
         // The test itself is `target/{profile}/deps/…`.
         let own = std::env::current_exe().unwrap();
@@ -117,6 +119,7 @@ impl Lab {
             .stdin(Stdio::null())
             .env_remove("CARS_RUN")
             .env_remove("CARS_CONNECT");
+
         command
     }
 
@@ -132,6 +135,7 @@ impl Lab {
             "cars {args:?}: {}\n{out}\n{err}",
             output.status
         );
+
         out.into_owned()
     }
 
@@ -159,6 +163,7 @@ impl Lab {
             String::from_utf8_lossy(&output.stdout),
             String::from_utf8_lossy(&output.stderr)
         );
+
         (output.status.code().unwrap_or(-1), text)
     }
 
@@ -203,6 +208,7 @@ pub fn assert_same(a: (&str, &[u8]), b: (&str, &[u8])) {
     if a.1 == b.1 {
         return;
     }
+
     let lines = |bytes: &[u8]| {
         String::from_utf8_lossy(bytes)
             .lines()
@@ -215,6 +221,7 @@ pub fn assert_same(a: (&str, &[u8]), b: (&str, &[u8])) {
         .zip(&right)
         .position(|(l, r)| l != r)
         .unwrap_or(left.len().min(right.len()));
+
     panic!(
         "{} and {} differ from line {} on:\n  {}\n  {}",
         a.0,
@@ -241,6 +248,7 @@ pub fn side_by_side(checks: &[(&str, &(dyn Fn() + Sync))]) {
             }
         }
     });
+
     assert!(failed.is_empty(), "{failed:?} failed; see above");
 }
 

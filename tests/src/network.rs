@@ -43,13 +43,16 @@ pub fn has_namespaces(test: &str) -> bool {
         lacks_tool(test, "there is no `ip` here (Debian: apt install iproute2)");
         return false;
     }
+
     let probe = format!("carsprobe{}-{test}", std::process::id());
     let cable = [
         "-n", &probe, "link", "add", "name", "a", "type", "veth", "peer", "name", "b",
     ];
     let made = ip(&["netns", "add", &probe]).and_then(|()| ip(&cable));
+
     // One that could not be made cannot be removed.
     let _made_or_not = ip(&["netns", "del", &probe]);
+
     match made {
         Ok(()) => true,
         // A right that is missing is nothing that can be installed.
@@ -98,6 +101,7 @@ impl Row {
                 row.cable(before, i);
             }
         }
+
         row
     }
 
@@ -107,6 +111,7 @@ impl Row {
             "name", "next", "type", "veth", "peer", "name", "before", "netns", right,
         ];
         ip(&[["-n", left, "link", "add"].as_slice(), &ends].concat()).expect("a cable");
+
         for (host, end, number) in [(left, "next", 1), (right, "before", 2)] {
             ip(&[
                 "-n",

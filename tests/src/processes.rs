@@ -31,6 +31,7 @@ impl Running {
         let printed = Arc::default();
         collect(child.stdout.take(), &printed);
         collect(child.stderr.take(), &printed);
+
         Self {
             child,
             run: run.to_owned(),
@@ -55,6 +56,7 @@ impl Running {
     pub fn prints_after(&mut self, text: &str, after: Option<Instant>) -> Instant {
         let printed = self.printed.clone();
         let begun = Instant::now();
+
         loop {
             let found = printed
                 .lock()
@@ -78,6 +80,7 @@ impl Running {
     /// Waits for its end.
     pub fn wait(&mut self) -> ExitStatus {
         let begun = Instant::now();
+
         loop {
             if let Some(status) = self.child.try_wait().expect("it is our child") {
                 return status;
@@ -146,6 +149,7 @@ fn collect(from: Option<impl Read + Send + 'static>, into: &Arc<Mutex<Vec<(Insta
     let (Some(from), into) = (from, into.clone()) else {
         return;
     };
+
     std::thread::spawn(move || {
         for line in BufReader::new(from).lines().map_while(Result::ok) {
             into.lock()
@@ -184,6 +188,7 @@ pub fn find(run: &str) -> Vec<(u32, String)> {
     let own = std::process::id();
     let alive =
         |pid: &u32| stat(*pid).is_some_and(|stat| stat.first().is_some_and(|state| state != "Z"));
+
     pids.filter(|pid| *pid != own && is_of_run(*pid) && alive(pid))
         .map(|pid| (pid, program(pid)))
         .collect()
@@ -199,6 +204,7 @@ pub fn named(run: &str, robot: &str) -> Option<u32> {
             .windows(argument.len())
             .any(|part| part == argument.as_bytes())
     };
+
     find(run)
         .into_iter()
         .find(|(pid, _)| is_robot(*pid))

@@ -145,10 +145,13 @@ fn measure_once(
     if let Some(there) = there.filter(|_| is_other_first) {
         results.there.push(results.subject.measure(bench, there)?);
     }
+
     results.here.push(results.subject.measure(bench, here)?);
+
     if let Some(there) = there.filter(|_| !is_other_first) {
         results.there.push(results.subject.measure(bench, there)?);
     }
+
     Ok(())
 }
 
@@ -209,7 +212,9 @@ mod tests {
     fn every_subject_comes_once_and_after_its_floors() {
         let names = names(&[]);
         assert_eq!(names.len(), 1 + 4 + 4 + 1 + 2, "{names:?}");
+
         let place = |name: &str| names.iter().position(|other| other == name).unwrap();
+
         for (floor, subject) in [
             ("raw TCP barrier, 2 processes", "zenoh star, 2 clients"),
             ("zenoh star, 2 clients", "bare lock-step, 2 robots"),

@@ -28,6 +28,7 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
             }
         }
     }
+
     Ok(if are_all_good {
         ExitCode::SUCCESS
     } else {
@@ -40,9 +41,11 @@ fn describe(path: &Path) -> Result<String, FileError> {
     if !is_launch_file(path)? {
         return Ok(content(&Scenario::load(path, &Changes::default())?));
     }
+
     let file = LaunchFile::load(path)?;
     let scenario = file.load_scenario(&Changes::default())?;
     file.check_robots(&scenario)?;
+
     Ok(format!(
         "{}, {}",
         count(file.processes.len(), "process", "processes"),

@@ -78,13 +78,16 @@ fn check(args: &ConformArgs) -> miette::Result<Report> {
     if let Some(ticks) = args.ticks {
         setting.ticks = ticks;
     }
+
     if let Some(file) = &args.scenario {
         stage(&mut setting, &launch::scenario_file(file)?)?;
     }
+
     // What the user says goes first.
     for role in setting.cast.values_mut() {
         role.hears.splice(0..0, args.says.iter().cloned());
     }
+
     setting.commands.splice(0..0, args.says.iter().cloned());
     let (program, arguments) = args
         .command
@@ -92,6 +95,7 @@ fn check(args: &ConformArgs) -> miette::Result<Report> {
         .ok_or_else(|| miette!("no command is given"))?;
     let mut command = Command::new(program);
     command.args(arguments);
+
     conform::check(&command, &setting, &args.rules).map_err(|error| miette!("{program}: {error}"))
 }
 

@@ -45,6 +45,7 @@ impl RunRef {
         if let Some(run) = &self.run {
             return Ok(run.clone());
         }
+
         let link = self.out.join(LATEST);
         let target = std::fs::read_link(&link).map_err(|_| {
             miette!(
@@ -53,6 +54,7 @@ impl RunRef {
                 self.out.display()
             )
         })?;
+
         RunName::new(&target.to_string_lossy()).into_diagnostic()
     }
 
@@ -64,6 +66,7 @@ impl RunRef {
         if let Some(connect) = &self.connect {
             return Ok(connect.clone());
         }
+
         let (run, file) = (self.run()?, self.folder()?.file(ENDPOINT));
         let text = std::fs::read_to_string(&file).map_err(|_| {
             let help =
@@ -74,6 +77,7 @@ impl RunRef {
                 file.display()
             )
         })?;
+
         Ok(text.trim().to_owned())
     }
 
@@ -215,11 +219,13 @@ pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
         }
         refusal @ ControlAnswer::Refused { .. } => return Err(refused(&refusal)),
     };
+
     if args.json {
         println!("{}", serde_json::to_string(&status).into_diagnostic()?);
     } else {
         print!("{}", describe(&status));
     }
+
     Ok(ExitCode::SUCCESS)
 }
 
@@ -251,6 +257,7 @@ fn ask_over(
     } else {
         PATIENCE
     };
+
     let answer = bus
         .get_within(&keys.control(), "", Some(encode(control)), patience)
         .into_diagnostic()?;
@@ -258,6 +265,7 @@ fn ask_over(
         answer,
         &format!("no simulator of run {} answers", run.run()?),
     )?;
+
     decode(&keys.control(), "simulator", &bytes).into_diagnostic()
 }
 
@@ -280,15 +288,18 @@ fn describe(status: &Status) -> String {
         status.seed,
         status.epoch
     );
+
     if status.pending_steps > 0 {
         text += &format!("{} steps are pending\n", status.pending_steps);
     }
+
     for awaited in &status.awaiting {
         text += &format!(
             "waiting for {} since {:.1} s: it {}\n",
             awaited.name, awaited.since_s, awaited.because
         );
     }
+
     for robot in &status.robots {
         let presence = match robot.presence {
             Presence::Here => "present",
@@ -300,9 +311,11 @@ fn describe(status: &Status) -> String {
             robot.name, robot.generation
         );
     }
+
     for (reason, count) in &status.ignored {
         text += &format!("ignored {count} messages: {reason}\n");
     }
+
     text
 }
 
@@ -335,12 +348,14 @@ pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
         ),
     )?;
     let answer: serde_json::Value = serde_json::from_slice(&bytes).into_diagnostic()?;
+
     // The value is what was asked for; the tick around it is for programs.
     let value = answer.get("value").unwrap_or(&answer);
     match value.as_str() {
         Some(text) => println!("{text}"),
         None => println!("{}", serde_json::to_string_pretty(value).into_diagnostic()?),
     }
+
     Ok(ExitCode::SUCCESS)
 }
 
@@ -403,10 +418,12 @@ pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
     let file = args.run.folder()?.log();
     let past = std::fs::read_to_string(&file)
         .map_err(|error| miette!("cannot read {}: {error}", file.display()));
+
     if !args.follow {
         print!("{}", past?);
         return Ok(ExitCode::SUCCESS);
     }
+
     let (bus, keys) = args.run.open()?;
     let (lines, received) = std::sync::mpsc::sync_channel(1024);
     let gone = lines.clone();
@@ -427,8 +444,10 @@ pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
     all.iter()
         .skip(all.len().saturating_sub(TAIL))
         .for_each(|line| println!("{line}"));
+
     while let Ok(Some(line)) = received.recv() {
         println!("{}", log_line(&line));
     }
+
     Ok(ExitCode::SUCCESS)
 }

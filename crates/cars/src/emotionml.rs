@@ -40,6 +40,7 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
     } else {
         View::Own
     };
+
     let export = Export::open(&folder, args.robot)?;
     let mut out = open_output(args.output.as_deref(), export.path())?;
     match export.write(&mut out, view) {
@@ -58,14 +59,17 @@ fn find(args: &EmotionmlArgs) -> miette::Result<RunFolder> {
     if let Some(folder) = lab::folder::find(&args.out, &args.run) {
         return Ok(folder);
     }
+
     let run = args.run.display();
     let out = args.out.display();
+
     if args.run == Path::new(LATEST) {
         return Err(miette!(
             help = "name one, or start one with `cars run`",
             "no run is known in {out}"
         ));
     }
+
     Err(miette!(
         help = "give a run's name, with --out where its folder is elsewhere, or its folder",
         "there is no run {run}, neither in {out} nor as a folder"
@@ -76,6 +80,7 @@ fn open_output(output: Option<&Path>, source: &Path) -> miette::Result<Box<dyn W
     let Some(output) = output else {
         return Ok(Box::new(BufWriter::new(std::io::stdout())));
     };
+
     let is_source = output
         .canonicalize()
         .is_ok_and(|path| source.canonicalize().is_ok_and(|own| own == path));
@@ -85,7 +90,9 @@ fn open_output(output: Option<&Path>, source: &Path) -> miette::Result<Box<dyn W
             output.display()
         ));
     }
+
     let file = File::create(output)
         .map_err(|error| miette!("cannot write {}: {error}", output.display()))?;
+
     Ok(Box::new(BufWriter::new(file)))
 }

@@ -116,6 +116,7 @@ impl LaunchArgs {
             is_insecure: self.insecure,
             grace: self.grace,
         };
+
         Ok((what, options))
     }
 }
@@ -136,10 +137,12 @@ fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> miette::Re
     if !is_quiet && let Some(summary) = lab::folder::read_summary(folder)? {
         table::print(&summary, folder.path());
     }
+
     if let Some(failure) = &outcome.failure {
         eprintln!("{failure}");
         return Ok(ExitCode::from(failure.code));
     }
+
     match outcome.asked {
         Some(signal) => Ok(ExitCode::from(code_of(signal))),
         None => Ok(ExitCode::SUCCESS),

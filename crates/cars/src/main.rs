@@ -91,6 +91,7 @@ fn main() -> miette::Result<ExitCode> {
         .with_writer(std::io::stderr)
         .without_time()
         .init();
+
     match cli.subcommand {
         Subcommands::Launch(args) => launch::launch(args),
         Subcommands::Exec(args) => exec::exec(&args),

@@ -144,5 +144,6 @@ fn play(args: PlayArgs) -> miette::Result<ExitCode> {
         launch_args: args.launch_args,
     };
     let code = net::play(&play, |line| eprintln!("{line}"))?;
+
     Ok(ExitCode::from(code))
 }

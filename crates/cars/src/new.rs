@@ -239,6 +239,7 @@ fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
         .canonicalize()
         .ok()
         .filter(|folder| folder.join("crates/robot/Cargo.toml").is_file());
+
     found.ok_or_else(|| {
         let help = "give the folder that you have cloned: --cars DIR";
         miette!(
@@ -261,6 +262,7 @@ fn write(file: &Path, text: &str) -> miette::Result<()> {
         }
         Ok(())
     };
+
     writing()
         .into_diagnostic()
         .wrap_err_with(|| format!("writing {}", file.display()))

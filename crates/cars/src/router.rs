@@ -34,6 +34,7 @@ pub(crate) struct RouterArgs {
 pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
     bus::runtime::use_one_thread();
     let (end, ended) = std::sync::mpsc::sync_channel(1);
+
     // A second signal finds the queue full and changes nothing.
     ctrlc::set_handler(move || {
         let _asked_already = end.try_send(());
@@ -53,7 +54,9 @@ pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
             args.listen.join(", ")
         }
     );
+
     ended.recv().into_diagnostic()?;
     bus.close();
+
     Ok(ExitCode::SUCCESS)
 }

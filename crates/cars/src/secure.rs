@@ -55,6 +55,7 @@ pub(crate) fn secure(args: SecureArgs) -> miette::Result<ExitCode> {
     };
     let validity = certificates.make()?;
     explain(&certificates, &validity);
+
     Ok(ExitCode::SUCCESS)
 }
 

@@ -80,6 +80,7 @@ impl FileError {
         let Some(place) = &self.place else {
             return self.message.clone();
         };
+
         let before = place
             .source
             .inner()
@@ -87,6 +88,7 @@ impl FileError {
             .unwrap_or_default();
         let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
         let reason = place.label.label().unwrap_or(&self.message);
+
         format!("line {line}: {reason}")
     }
 
@@ -126,6 +128,7 @@ impl Source {
         file.take(MAX_FILE_BYTES + 1)
             .read_to_string(&mut text)
             .map_err(unreadable)?;
+
         if text.len() as u64 > MAX_FILE_BYTES {
             let text = format!(
                 "cannot read {}: it is longer than {MAX_FILE_BYTES} bytes",
@@ -133,6 +136,7 @@ impl Source {
             );
             return Err(FileError::new(text));
         }
+
         Ok(Self {
             name: path.display().to_string(),
             text,

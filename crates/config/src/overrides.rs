@@ -34,13 +34,16 @@ impl std::str::FromStr for Override {
         if path.iter().any(String::is_empty) {
             return Err(format!("{text:?}: a part of the path is empty"));
         }
+
         if let Some(part) = path.iter().find(|part| !is_key(part)) {
             return Err(format!(
                 "{text:?} is not of the form path=value: {part:?} is not a key"
             ));
         }
+
         let parsed = toml::from_str::<toml::Table>(&format!("value = {value}"));
         let parsed = parsed.ok().and_then(|mut table| table.remove("value"));
+
         Ok(Self {
             path,
             value: parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned())),
@@ -112,6 +115,7 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
         *at = value.clone();
         return Ok(());
     };
+
     let next = match at {
         toml::Value::Table(table) if rest.is_empty() => {
             table.insert(first.clone(), value.clone());
@@ -127,6 +131,7 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
             ));
         }
     };
+
     set(next, rest, value)
 }
 

@@ -52,6 +52,7 @@ mod tests {
             assert_eq!(text.parse(), Ok(speed));
             assert_eq!(speed.to_string().parse(), Ok(speed));
         }
+
         for text in ["0", "-1", "inf", "NaN", "fast", ""] {
             assert!(text.parse::<Speed>().is_err(), "{text:?}");
         }

@@ -56,6 +56,7 @@ pub fn quantity(text: &str) -> Option<(f64, Dimension)> {
         .ok()
         .filter(|number: &f64| number.is_finite())?;
     let unit = unit.trim();
+
     UNITS
         .iter()
         .find(|(name, ..)| *name == unit)
@@ -81,6 +82,7 @@ macro_rules! quantity_type {
         impl<'de> Deserialize<'de> for $type {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
                 struct Visitor;
+
                 impl serde::de::Visitor<'_> for Visitor {
                     type Value = $type;
                     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -90,6 +92,7 @@ macro_rules! quantity_type {
                         text.parse().map_err(E::custom)
                     }
                 }
+
                 deserializer.deserialize_str(Visitor)
             }
         }

@@ -75,6 +75,7 @@ impl Export {
             .next()?
             .ok_or_else(|| miette!("{} holds no tick yet", source.path().display()))?;
         check_robot(only.as_ref(), &first)?;
+
         Ok(Self {
             source,
             first,
@@ -132,13 +133,16 @@ fn check_robot(only: Option<&RobotName>, first: &Moment) -> miette::Result<()> {
     let Some(only) = only else {
         return Ok(());
     };
+
     let mut names = Vec::new();
     for robot in &first.robots {
         names.push(robot.name.as_str());
     }
+
     if names.contains(&only.as_str()) {
         return Ok(());
     }
+
     Err(miette!(
         "no robot of this run is called {only}; there are {}",
         names.join(", ")

@@ -36,6 +36,7 @@ pub fn execute(
         Ok(())
     })?;
     let recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
+
     Ok(recorder.finish(&simulation)?)
 }
 
@@ -111,5 +112,6 @@ pub fn make_robots(
         })?;
         Ok((name.clone(), robot))
     };
+
     scenario.robots.iter().map(make).collect()
 }

@@ -23,6 +23,7 @@ impl Estimate {
             .map(|value| (value - mean) * (value - mean))
             .sum::<f64>()
             / (n - 1.0);
+
         Self {
             mean,
             half_width: student_975(n - 1.0) * (variance / n).sqrt(),
@@ -85,6 +86,7 @@ mod tests {
             (estimate.mean - 6.0).abs() <= estimate.half_width
         });
         let share = covers.count() as f64 / 4000.0;
+
         assert!((0.935..0.965).contains(&share), "{share}");
     }
 

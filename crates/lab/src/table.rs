@@ -55,6 +55,7 @@ pub fn rows(summary: &Summary) -> Vec<[String; 5]> {
             moves(robot),
         ]);
     }
+
     rows
 }
 
@@ -70,6 +71,7 @@ pub fn held_up(summary: &Summary) -> Vec<String> {
             ));
         }
     }
+
     lines
 }
 
@@ -98,6 +100,7 @@ fn shares(times_s: &BTreeMap<String, f64>, entered: Option<&BTreeMap<String, u64
             count.unwrap_or_default()
         )
     };
+
     sorted.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
@@ -119,12 +122,15 @@ fn commands(robot: &RobotSummary) -> String {
         .iter()
         .map(|(command, count)| format!("{count} {command}"))
         .collect();
+
     lines.push(format!("{} received", robot.received));
+
     for (count, what) in [(robot.dropped, "lost on the way")] {
         if count > 0 {
             lines.push(format!("{count} {what}"));
         }
     }
+
     lines.join("\n")
 }
 

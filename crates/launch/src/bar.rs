@@ -30,6 +30,7 @@ impl From<WorldFrame> for Progress {
             awaiting,
             ..
         } = frame;
+
         Self {
             time_s,
             duration_s,
@@ -49,6 +50,7 @@ impl From<Status> for Progress {
             awaiting,
             ..
         } = status;
+
         Self {
             time_s,
             duration_s,
@@ -76,11 +78,14 @@ impl Bar {
         } else {
             "{bar:24} {wide_msg}"
         };
+
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
+
         bar.set_message("starting");
         bar.force_draw();
+
         Self {
             bar,
             progress: None,
@@ -99,13 +104,16 @@ impl Bar {
     /// Shows where the run is now; without news, for how long it has been held.
     pub(super) fn update(&mut self, news: Option<Progress>) {
         let was_held = self.is_held();
+
         if let Some(news) = news {
             self.speed.add(&news);
             self.progress = Some(news);
         }
+
         let Some(progress) = &self.progress else {
             return;
         };
+
         let millis = |seconds: f64| (seconds * 1000.0) as u64;
         self.bar.update(|state| {
             state.set_len(millis(progress.duration_s).max(1));
@@ -117,6 +125,7 @@ impl Bar {
             Instant::now(),
             self.has_colors,
         ));
+
         // Nothing may follow for a long time: the last thing to say must not fall to the limit on redraws.
         if was_held || self.is_held() || progress.phase != Phase::Running {
             self.bar.force_draw();
@@ -145,7 +154,9 @@ fn message(progress: &Progress, factor: Option<f64>, now: Instant, has_colors: b
     } else {
         100.0
     };
+
     let place = format!("{percent:>3} %  {time_s:.1} of {duration_s:.1} s");
+
     if let Some(held) = held(&progress.awaiting, now.duration_since(progress.at)) {
         return if has_colors {
             format!("{place}  \u{1b}[33m{held}\u{1b}[0m")
@@ -153,6 +164,7 @@ fn message(progress: &Progress, factor: Option<f64>, now: Instant, has_colors: b
             format!("{place}  {held}")
         };
     }
+
     match factor.filter(|_| *phase == Phase::Running) {
         Some(factor) => format!("{place}  {phase}  {factor:.1} x real time"),
         None => format!("{place}  {phase}"),
@@ -174,6 +186,7 @@ fn held(awaiting: &[Awaited], seen_ago: Duration) -> Option<String> {
     if awaiting.len() > MAX_NAMED {
         names.push(format!("{} more", awaiting.len() - MAX_NAMED));
     }
+
     Some(format!(
         "held for {for_s} s: waiting for {}",
         names.join(", ")
@@ -193,10 +206,12 @@ impl Speedometer {
             .samples
             .back()
             .is_some_and(|(_, before_s)| time_s < *before_s);
+
         // What the clock does while it is held says nothing of how fast it goes.
         if is_new_epoch || news.phase != Phase::Running || !news.awaiting.is_empty() {
             self.samples.clear();
         }
+
         while self
             .samples
             .front()
@@ -204,6 +219,7 @@ impl Speedometer {
         {
             self.samples.pop_front();
         }
+
         self.samples.push_back((at, time_s));
     }
 
@@ -256,6 +272,7 @@ mod tests {
     #[test]
     fn the_speed_is_that_of_late() {
         let (mut speed, begin) = (Speedometer::default(), Instant::now());
+
         for tenth in 0..100_u32 {
             let factor = if tenth < 50 { 1.0 } else { 20.0 };
             let (at, time_s) = (
@@ -268,7 +285,9 @@ mod tests {
                 ..progress(Vec::new())
             });
         }
+
         assert!((speed.factor().unwrap() - 20.0).abs() < 1e-6);
+
         speed.add(&Progress {
             time_s: 0.0,
             ..progress(Vec::new())

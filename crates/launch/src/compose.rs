@@ -43,11 +43,14 @@ pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<S
             "more than {MAX_SERVICES} processes do not fit into one network"
         )));
     }
+
     let mut text = format!("{HEAD}\nservices:\n");
     simulator_service(&mut text, file, run, speed)?;
+
     for (index, process) in file.processes.iter().enumerate() {
         robot_service(&mut text, process, run, FIRST_HOST + 1 + index);
     }
+
     if let Some(console) = &file.console {
         console_service(
             &mut text,
@@ -56,14 +59,17 @@ pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<S
             FIRST_HOST + 1 + file.processes.len(),
         );
     }
+
     let _infallible = write!(
         text,
         "networks:\n  cars:\n    internal: true\n    ipam:\n      config:\n        - subnet: {NETWORK}.0/24\n"
     );
+
     if file.console.is_some() {
         // A private network publishes nothing; the browser comes in by another one.
         text += "  browser: {}\n";
     }
+
     Ok(text)
 }
 
@@ -89,6 +95,7 @@ fn simulator_service(
         "--out=/runs".to_owned(),
         format!("--speed={speed}"),
     ]);
+
     let mut env = file.simulator.env.clone();
     env.entry(RUNTIME_VARIABLE.to_owned())
         .or_insert_with(|| ONE_THREAD.to_owned());
@@ -102,7 +109,9 @@ fn simulator_service(
             "./runs:/runs".to_owned(),
         ],
     );
+
     service.end(FIRST_HOST);
+
     Ok(())
 }
 
@@ -140,15 +149,18 @@ fn robot_service(text: &mut String, process: &Process, run: &RunName, host: usiz
     let mut service = Service::begin(text, &process.name.to_lowercase(), &command);
     service.map("environment", guest_env(process, run).iter());
     service.list("depends_on", &[SIMULATOR.to_owned()]);
+
     match process.restart {
         Restart::Never => {}
         Restart::OnFailure => service.line("restart: on-failure:5"),
         Restart::Always => service.line("restart: unless-stopped"),
     }
+
     if process.is_extern {
         // Not started with the others; `docker-compose --profile extern up` does.
         service.list("profiles", &["extern".to_owned()]);
     }
+
     service.end(host);
 }
 
@@ -232,6 +244,7 @@ mod tests {
         let text = export(&file, &run, file.speed.unwrap()).unwrap();
         let committed = std::fs::read_to_string(root.join("docker-compose.yml")).unwrap();
         let how = "cars launch launch/hors_doeuvres.toml --export compose > docker-compose.yml";
+
         assert_eq!(
             text, committed,
             "make it anew, at the top of the project: {how}"

@@ -108,5 +108,6 @@ fn listen(
         program.kill();
         std::process::exit(code_of(signal).into());
     });
+
     asked
 }

@@ -194,10 +194,12 @@ impl LaunchFile {
             }
             processes.push(process);
         }
+
         let scenario_span = Some(raw.scenario.span());
         let scenario = tidy(&folder.join(raw.scenario.into_inner()));
         let secure = raw.secure.map(|secure| tidy(&folder.join(secure)));
         let folder = folder.to_owned();
+
         Ok(Self {
             source,
             folder,
@@ -220,6 +222,7 @@ impl LaunchFile {
                 vec![format!("cars-{}", spec.class.to_lowercase())],
             )
         };
+
         Self {
             source,
             folder: roster.parent().unwrap_or(Path::new("")).to_owned(),
@@ -263,6 +266,7 @@ impl LaunchFile {
                 }
             }
         }
+
         match scenario
             .robots
             .keys()
@@ -329,10 +333,12 @@ fn second_process(source: &Source, span: Range<usize>, name: &str) -> FileError 
         return FileError::at(source, Some(span), "this name is the simulator's own")
             .with_help("to change how the simulator starts, write a table [simulator]");
     }
+
     if name == CONSOLE {
         return FileError::at(source, Some(span), "this name is the console's own")
             .with_help("to change how the console starts, write a table [console]");
     }
+
     FileError::at(
         source,
         Some(span),
@@ -347,6 +353,7 @@ fn check_simulator(source: &Source, raw: RawSimulator) -> Result<Process, FileEr
         Some(command) => check_command(source, command)?,
         None => vec![SIMULATOR_PROGRAM.to_owned()],
     };
+
     Ok(Process {
         span,
         env: raw.env,
@@ -366,6 +373,7 @@ fn console(raw: RawConsole) -> Process {
 
 fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError> {
     let span = raw.name.span();
+
     // A process is named like a robot, and mostly as its robot: the name is that of a file, too.
     let name = RobotName::new(raw.name.get_ref());
     let name =
@@ -376,6 +384,7 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
         .map(|backoff| check_backoff(source, &backoff))
         .transpose()?;
     let command_span = raw.command.span();
+
     Ok(Process {
         span: Some(command_span),
         robots: raw
@@ -422,6 +431,7 @@ fn check_backoff(source: &Source, backoff: &Spanned<Time>) -> Result<Duration, F
 /// The same path without detours: `launch/../configs/x` is `configs/x`.
 fn tidy(path: &Path) -> PathBuf {
     use std::path::Component;
+
     let mut tidied = PathBuf::new();
     for part in path.components() {
         let is_below = matches!(tidied.components().next_back(), Some(Component::Normal(_)));
@@ -432,6 +442,7 @@ fn tidy(path: &Path) -> PathBuf {
             tidied.push(part);
         }
     }
+
     tidied
 }
 

@@ -129,10 +129,12 @@ impl Launch {
                 roster.display()
             ));
         }
+
         if self.secured.is_some() {
             let help = "export it without `secure`: the containers have a network of their own";
             return Err(miette!(help = help, "a secured launch cannot be exported"));
         }
+
         Ok(compose::export(&self.file, &self.run, self.speed())?)
     }
 
@@ -161,6 +163,7 @@ impl Launch {
             .links
             .iter()
             .try_for_each(|link| link.lay(&mut planned))?;
+
         Ok(planned)
     }
 
@@ -180,6 +183,7 @@ impl Launch {
                 .into_diagnostic()?;
             return Ok(endpoint.clone());
         }
+
         let free = || {
             endpoint::free_port()
                 .into_diagnostic()
@@ -256,6 +260,7 @@ impl Launch {
                 robots.join(", ")
             ));
         }
+
         notice(&format!(
             "run {} at {endpoint}, recorded in {}",
             self.run,
@@ -302,10 +307,13 @@ impl Launch {
             std::io::Result::Ok(supervisor.run().await)
         };
         let outcome = runtime.block_on(running).into_diagnostic()?;
+
         if let Some(observer) = observer {
             observer.finish();
         }
+
         screen.finish();
+
         Ok(outcome)
     }
 }
@@ -315,12 +323,14 @@ fn secured(options: &LaunchOptions, file: &LaunchFile) -> miette::Result<Option<
     let Some(folder) = options.secure.as_ref().or(file.secure.as_ref()) else {
         return Ok(None);
     };
+
     file.check_certificates()?;
     let robots = file
         .processes
         .iter()
         .flat_map(|process| process.robots.iter().map(RobotName::as_str));
     let console = file.console.iter().map(|_| file::CONSOLE);
+
     Secured::find(folder, robots.chain(console)).map(Some)
 }
 

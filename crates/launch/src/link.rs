@@ -35,7 +35,9 @@ impl FromStr for Link {
         if process.is_empty() || endpoint.is_empty() || namespace.is_some_and(str::is_empty) {
             return Err(bad());
         }
+
         let namespace = namespace.map(str::to_owned);
+
         Ok(Self {
             process: process.to_owned(),
             endpoint: endpoint.to_owned(),
@@ -68,10 +70,12 @@ impl Link {
                 FileError::new(text).with_help("a link is that of a process of the launch file")
             );
         };
+
         let command = &mut found.command;
         command
             .env
             .insert("CARS_CONNECT".to_owned(), self.endpoint.clone());
+
         if let Some(namespace) = &self.namespace {
             let program = std::mem::replace(&mut command.program, PathBuf::from("ip"));
             let within = ["netns", "exec", namespace].map(str::to_owned);
@@ -80,6 +84,7 @@ impl Link {
                 within.into_iter().chain([program.display().to_string()]),
             );
         }
+
         Ok(())
     }
 }

@@ -51,6 +51,7 @@ impl Observer {
                 .tell
                 .notice(format!("the run cannot be watched: {error}")),
         });
+
         Self { ended }
     }
 
@@ -75,6 +76,7 @@ impl Watch {
                 Err(error) => tracing::warn!("{error}"),
             }
         })?];
+
         if self.wants_world {
             let tell = self.tell.clone();
             declared.push(bus.subscribe(&keys.world(), move |key, bytes| {
@@ -84,12 +86,14 @@ impl Watch {
                 }
             })?);
         }
+
         declared.extend(
             self.faults
                 .as_ref()
                 .map(|queue| hear_faults(&bus, &keys, queue.clone()))
                 .transpose()?,
         );
+
         // Dropping the sender is the message.
         let end = std::sync::Mutex::new(Some(end));
         declared.push(bus.liveliness(&keys.alive_sim(), move |_, is_there| {
@@ -97,9 +101,11 @@ impl Watch {
                 end.take();
             }
         })?);
+
         if self.wants_world {
             self.catch_up(&bus, &keys)?;
         }
+
         Ok((bus, declared))
     }
 
@@ -116,14 +122,18 @@ impl Watch {
         let Some(answer) = bus.get(&keys.control(), "", Some(encode(&Control::Status)))? else {
             return Ok(None);
         };
+
         let Ok(body) = answer.result else {
             return Ok(None);
         };
+
         let Ok(ControlAnswer::Done(status)) = decode(&answer.key, "the simulator", &body) else {
             return Ok(None);
         };
+
         let phase = status.phase;
         self.tell.progress(Progress::from(*status));
+
         Ok(Some(phase))
     }
 }

@@ -51,6 +51,7 @@ impl RunOptions {
         );
         args.extend(self.speed.map(|speed| format!("--speed={speed}")));
         args.extend(self.set.iter().map(|change| format!("--set={change}")));
+
         args
     }
 

@@ -96,6 +96,7 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
         )?;
         planned.push(prepare(process, command));
     }
+
     if let Some(process) = file.console.as_ref().filter(|_| execution.has_console) {
         let args = execution
             .opens_browser
@@ -108,6 +109,7 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
             ..prepare(process, command)
         });
     }
+
     Ok(planned)
 }
 
@@ -122,19 +124,23 @@ fn guest(
     let mut env = process.env.clone();
     env.insert("CARS_RUN".to_owned(), execution.run.to_string());
     env.insert("CARS_CONNECT".to_owned(), connectable(execution.endpoint));
+
     // A process is let in as its robot; only the console is none.
     let name = if process.name == CONSOLE {
         Some(CONSOLE)
     } else {
         process.robots.first().map(RobotName::as_str)
     };
+
     if let (Some(secured), Some(name)) = (execution.secured, name) {
         env.entry(ZENOH_CONFIG.to_owned())
             .or_insert_with(|| secured.config_of(name).display().to_string());
     }
+
     let program = program(file, process, &process.command[0], places)?;
     let args = with_own_args(&process.command[1..], args);
     let args = locate_inner(file, process, args, places)?;
+
     Ok(CommandLine { program, args, env })
 }
 
@@ -164,6 +170,7 @@ fn locate_inner(
     if let Some(inner) = inner.filter(|inner| inner.contains('/')) {
         *inner = program(file, process, inner, places)?.display().to_string();
     }
+
     Ok(args)
 }
 
@@ -190,6 +197,7 @@ fn simulator(
         format!("--out={}", execution.out.display()),
         format!("--speed={}", execution.speed),
     ]);
+
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
     args.extend(execution.is_insecure.then(|| "--insecure".to_owned()));
     let mut env = process.env.clone();
@@ -203,8 +211,10 @@ fn simulator(
             secured.operator().display()
         ));
     }
+
     let program = program(file, process, &process.command[0], places)?;
     let command = CommandLine { program, args, env };
+
     Ok(Planned {
         part: Part::Simulator,
         ..prepare(process, command)
@@ -215,6 +225,7 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
     let runtime = bus::runtime::RUNTIME_VARIABLE;
     let chosen = std::env::var(runtime).unwrap_or_else(|_| bus::runtime::ONE_THREAD.to_owned());
     command.env.entry(runtime.to_owned()).or_insert(chosen);
+
     if !process.is_extern {
         // Its output goes into a file, too, and files have no colors.
         command
@@ -222,6 +233,7 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
             .entry("NO_COLOR".to_owned())
             .or_insert_with(|| "1".to_owned());
     }
+
     Planned {
         name: process.name.clone(),
         command,
@@ -318,6 +330,7 @@ mod tests {
             located(&file(text)).unwrap(),
             ["-c", "./sh", "--", "/usr/../bin/sh", "./sh"]
         );
+
         let wrong = located(&file(
             &text.replace("\"--\", \"./sh\"", "\"--\", \"./nobody\""),
         ))

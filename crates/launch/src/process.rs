@@ -77,6 +77,7 @@ pub(super) fn start(command: &CommandLine) -> std::io::Result<Started> {
     let pid = child.id().and_then(|id| i32::try_from(id).ok());
     let pid = pid.ok_or_else(|| std::io::Error::other("the system gave no process id"))?;
     let group = Group(Pid::from_raw(pid));
+
     Ok(Started {
         group,
         child,
@@ -99,11 +100,14 @@ impl Started {
             .take()
             .map(|pipe| tokio::spawn(copy(pipe, file, output, true)));
         let status = self.child.wait().await;
+
         // What the leader left behind would hold the pipes, and the run.
         drop(self.kill);
+
         for copying in [out, err].into_iter().flatten() {
             let _given_up = tokio::time::timeout(REST_OF_OUTPUT, copying).await;
         }
+
         status
     }
 }

@@ -43,11 +43,13 @@ impl Places {
                 )])
             });
         }
+
         let beside = self.beside.iter().map(|folder| folder.join(program));
         let mut candidates = beside.chain(self.path.iter().map(|folder| folder.join(program)));
         let found = candidates
             .find(|file| is_program(file))
             .and_then(|file| std::path::absolute(file).ok());
+
         found.ok_or_else(|| {
             let beside = self
                 .beside
@@ -79,13 +81,16 @@ mod tests {
             launch_file: "/usr/../bin".into(),
             path: vec!["/usr/bin".into()],
         };
+
         assert_eq!(places.find("sh").unwrap(), Path::new("/bin/sh"));
         assert_eq!(places.find("./sh").unwrap(), Path::new("/usr/../bin/sh"));
+
         let elsewhere = Places {
             beside: Some("/nowhere".into()),
             ..places.clone()
         };
         assert_eq!(elsewhere.find("sh").unwrap(), Path::new("/usr/bin/sh"));
+
         let NotFound(places) = places.find("no-such-program").unwrap_err();
         assert_eq!(
             places,

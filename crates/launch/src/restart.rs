@@ -62,15 +62,18 @@ impl Budget {
         {
             self.recent.pop_front();
         }
+
         if self.recent.len() >= BUDGET {
             return None;
         }
+
         let doublings = u32::try_from(self.recent.len()).unwrap_or(u32::MAX);
         let wait = self
             .backoff
             .saturating_mul(2_u32.saturating_pow(doublings))
             .min(MAX_BACKOFF.max(self.backoff));
         self.recent.push_back(now);
+
         Some((wait, self.recent.len()))
     }
 }

@@ -54,6 +54,7 @@ impl Look {
         let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
         let may_color = !is_set("NO_COLOR") && !is_dumb;
         let is_terminal = std::io::stderr().is_terminal();
+
         Self {
             names,
             is_quiet,
@@ -144,6 +145,7 @@ impl Screen {
             bar,
             tell: tell.clone(),
         };
+
         Self {
             tell,
             thread: std::thread::spawn(move || painter.paint(&shows)),
@@ -189,7 +191,9 @@ impl Painter {
                 break;
             }
         }
+
         self.say_dropped();
+
         if let Some(bar) = self.bar {
             bar.clear();
         }
@@ -229,10 +233,13 @@ impl Painter {
                 _ => pieces.push(Piece { is_out, text: line }),
             }
         }
+
         self.write(&pieces);
+
         if let Some(bar) = &mut self.bar {
             bar.update(progress);
         }
+
         if self.tell.waiting.load(Ordering::Relaxed) == 0 {
             self.say_dropped();
         }
@@ -242,6 +249,7 @@ impl Painter {
         if pieces.is_empty() {
             return;
         }
+
         let (out, err) = (&mut self.out, &mut self.err);
         let mut write = || {
             for piece in pieces {
@@ -252,6 +260,7 @@ impl Painter {
                     .and_then(|()| to.flush());
             }
         };
+
         match &self.bar {
             Some(bar) => bar.aside(write),
             None => write(),
@@ -279,10 +288,13 @@ impl Painter {
             ..record.clone()
         };
         let line = log_line(&record);
+
         if !self.look.has_colors_out {
             return line + "\n";
         }
+
         let (head, text) = line.split_at(line.len() - record.text.len());
+
         format!("{}{text}\n", color(self.color_of(&record.source), head))
     }
 
@@ -301,6 +313,7 @@ impl Painter {
         } else {
             head
         };
+
         format!("{head} {line}\n")
     }
 
@@ -387,6 +400,7 @@ mod tests {
             tell.log(record("going home"));
             tell.notice("Leguin has left");
         });
+
         assert_eq!(
             err,
             "simulator | ready\nLeguin    | here\nLeguin has left\n"
@@ -419,6 +433,7 @@ mod tests {
                 tell.output(1, "trouble".to_owned(), true);
             },
         );
+
         assert_eq!(err, "Leguin    | trouble\n");
     }
 

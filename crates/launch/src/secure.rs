@@ -70,6 +70,7 @@ impl Certificates {
         // A folder is called after each, and some file systems do not tell `Butler` from `butler`.
         let mut taken: BTreeSet<String> = RESERVED.iter().map(|name| (*name).to_owned()).collect();
         taken.insert(CA.to_owned());
+
         match self
             .robots
             .iter()
@@ -105,7 +106,9 @@ impl Certificates {
                 folder.display()
             ));
         }
+
         make_private_folder(folder)?;
+
         forget_participants(folder)
     }
 
@@ -118,16 +121,20 @@ impl Certificates {
             .map(|host| (*host).to_owned())
             .chain(self.hosts.iter().cloned())
             .collect();
+
         authority.equip(&self.folder, SIMULATOR, hosts, |credentials| {
             simulator_config(&keys, &self.robots, credentials)
         })?;
+
         for name in self.clients() {
             authority.equip(&self.folder, name, Vec::new(), |credentials| {
                 client_config(name, credentials)
             })?;
         }
+
         // Last: a folder with it is complete.
         write_file(&self.folder.join(CA), &authority.issuer.pem(), 0o644)?;
+
         Ok(authority.validity)
     }
 }
@@ -143,6 +150,7 @@ struct Authority {
 impl Authority {
     fn new(days: u32) -> miette::Result<Self> {
         let now = SystemTime::now();
+
         // Clocks of two machines differ by something.
         let (from, until) = (now - DAY / 24, now + DAY * days);
         let mut params = named("CARS certificate authority", from, until);
@@ -151,6 +159,7 @@ impl Authority {
         let validity = format!("{} (UTC)", params.not_after.date());
         let key = KeyPair::generate().into_diagnostic()?;
         let issuer = CertifiedIssuer::self_signed(params, key).into_diagnostic()?;
+
         Ok(Self {
             issuer,
             from,
@@ -192,6 +201,7 @@ impl Authority {
         make_private_folder(&folder)?;
         write_file(&folder.join(CERTIFICATE), &certificate, 0o644)?;
         write_file(&folder.join(KEY), &key, 0o600)?;
+
         write_file(&folder.join(CONFIG), &config(&credentials), 0o600)
     }
 }
@@ -249,6 +259,7 @@ fn forget_participants(folder: &Path) -> miette::Result<()> {
         // Somebody may keep something of their own in it.
         let _kept = std::fs::remove_dir(&entry);
     }
+
     let ca = folder.join(CA);
     if ca.exists() { remove(&ca) } else { Ok(()) }
 }
@@ -315,6 +326,7 @@ mod tests {
             run: None,
             replaces: force,
         };
+
         certificates.make().map(drop)
     }
 
@@ -328,6 +340,7 @@ mod tests {
         let folder = lab.path().join("certificates");
         init(&folder, &["Butler", "Leguin"], false).unwrap();
         assert_eq!(mode(&folder), 0o700);
+
         for name in ["simulator", "operator", "console", "Butler", "Leguin"] {
             assert_eq!(mode(&folder.join(name)), 0o700, "{name}");
             for secret in [KEY, CONFIG] {
@@ -339,6 +352,7 @@ mod tests {
             }
             assert!(folder.join(name).join(CERTIFICATE).is_file());
         }
+
         let files = std::fs::read_dir(&folder).unwrap().count();
         assert_eq!(
             files, 6,
@@ -378,6 +392,7 @@ mod tests {
     fn names_that_would_pass_for_others_are_refused() {
         let lab = tempfile::tempdir().unwrap();
         let folder = lab.path().join("certificates");
+
         for robots in [
             &["operator"][..],
             &["Simulator"],
@@ -393,6 +408,7 @@ mod tests {
                 "{robots:?}"
             );
         }
+
         assert!(!folder.exists());
     }
 

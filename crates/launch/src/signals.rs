@@ -26,6 +26,7 @@ pub(super) fn listen(queue: &UnboundedSender<Event>) -> std::io::Result<()> {
             while signals.recv().await.is_some() && queue.send(Event::Asked(asking)).is_ok() {}
         });
     }
+
     Ok(())
 }
 

@@ -109,6 +109,7 @@ impl Supervisor {
                 is_slow: false,
             }
         };
+
         Self {
             kept: planned.into_iter().map(keep).collect(),
             logs: logs.to_owned(),
@@ -138,6 +139,7 @@ impl Supervisor {
                 self.start(index);
             }
         }
+
         while self.stage < Stage::GivenUp
             && (self.stage == Stage::Running || self.is_anybody_there())
         {
@@ -146,6 +148,7 @@ impl Supervisor {
                 None => unreachable!("the supervisor holds a sender of its own queue"),
             }
         }
+
         self.outcome
     }
 
@@ -184,6 +187,7 @@ impl Supervisor {
                 return report(&queue, Event::Ended(index, ended));
             }
         };
+
         kept.group = Some(started.group);
         let (tell, tail) = (self.tell.clone(), kept.tail.clone());
         let output = Output {
@@ -192,6 +196,7 @@ impl Supervisor {
             log: log_of(&self.logs, &kept.planned.name),
             tail,
         };
+
         tokio::spawn(async move {
             let ended = match started.run(output).await {
                 Ok(status) => Ended::Exited(status),
@@ -203,6 +208,7 @@ impl Supervisor {
 
     fn on_ended(&mut self, index: usize, ended: &Ended) {
         self.kept[index].group = None;
+
         if self.kept[index].planned.part == Part::Simulator {
             self.on_simulator_ended(index, ended);
         } else if self.kept[index].is_down {
@@ -265,6 +271,7 @@ impl Supervisor {
                 "{name} {ended}, and has been restarted {BUDGET} times already"
             ));
         }
+
         if !has_failed {
             // Robots leave when they hear that the run is over, often before the simulator does.
             tracing::debug!("{name} {ended}");
@@ -306,6 +313,7 @@ impl Supervisor {
         if stage != self.stage {
             return; // The end went on faster than that.
         }
+
         match stage {
             Stage::Running | Stage::GivenUp => {
                 unreachable!("no patience with a stage that waits for nothing")
@@ -343,6 +351,7 @@ impl Supervisor {
             tail: kept.tail.lines(),
             log,
         };
+
         self.outcome.failure.get_or_insert(failure);
     }
 

@@ -43,9 +43,11 @@ pub(crate) fn check_log_name(name: &str) -> Result<(), LogNameError> {
         && name
             .bytes()
             .all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
+
     if !is_plain {
         return Err(LogNameError::NotPlain(name.to_owned()));
     }
+
     let is_taken = [EVENTS, RECORDING, SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG].contains(&name)
         || name.starts_with("scenario")
         || name.starts_with("events")

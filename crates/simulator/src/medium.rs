@@ -152,6 +152,7 @@ impl Medium {
         if self.network.partitions.is_empty() {
             return;
         }
+
         let mut now: BTreeMap<Pair, Scope> = BTreeMap::new();
         for partition in self
             .network
@@ -165,6 +166,7 @@ impl Medium {
                 scope.queries |= partition.queries;
             }
         }
+
         let before = std::mem::replace(&mut self.cut, now);
         let concerned: BTreeSet<&Pair> = before.keys().chain(self.cut.keys()).collect();
         for pair in concerned {
@@ -192,6 +194,7 @@ impl Medium {
         if !self.network.has_bursts() {
             return;
         }
+
         for pair in pairs(&self.roster) {
             for (kind, channel) in [
                 (Kind::Commands, self.network.commands(&pair.0, &pair.1)),
@@ -225,6 +228,7 @@ impl Medium {
         let to = command.to.clone();
         let from = command.from.clone();
         let seq = command.seq;
+
         if !self.roster.contains(&to) {
             events.push(Event::CommandDropped {
                 from,
@@ -234,13 +238,16 @@ impl Medium {
             });
             return;
         }
+
         // A person at the console is not on the robots' network.
         if from.is_operator() {
             self.arrivals.entry(tick).or_default().push((command, 1));
             return;
         }
+
         let channel = self.network.commands(&from, &to);
         let mut chance = stream(self.seed, &format!("medium/{}/{from}/{to}/{seq}", tick - 1));
+
         // Always three draws in one order, so that each decision is the same whatever else the scenario says.
         let [loss, duplication, delay] = std::array::from_fn(|_| unit(&mut chance));
         let pair = (from.clone(), to.clone());
@@ -253,6 +260,7 @@ impl Medium {
             });
             return;
         }
+
         let late = channel
             .delay_s
             .map_or(0, |delay_s| ticks(delay_s.quantile(delay), self.tick_s));
@@ -264,14 +272,17 @@ impl Medium {
                 until: tick + late,
             });
         }
+
         let copies = if duplication < channel.duplication {
             2
         } else {
             1
         };
+
         if copies > 1 {
             events.push(Event::CommandDuplicated { from, to, seq });
         }
+
         self.arrivals
             .entry(tick + late)
             .or_default()
@@ -286,6 +297,7 @@ impl Medium {
         } else {
             cut.queries
         };
+
         let is_bad = self
             .bad
             .get(&(kind, pair.clone()))
@@ -358,6 +370,7 @@ impl Medium {
         if is_perfect {
             return;
         }
+
         for (asker, target) in pairs(&self.roster) {
             let back_is_cut = self
                 .cut
@@ -405,6 +418,7 @@ fn pairs(roster: &[RobotName]) -> impl Iterator<Item = Pair> {
             .cloned()
             .collect::<Vec<_>>()
     };
+
     roster
         .iter()
         .flat_map(move |from| with(from).into_iter().map(|to| (from.clone(), to)))

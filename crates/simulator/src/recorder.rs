@@ -55,6 +55,7 @@ impl RunFolder {
                 FileError::new(text).with_help("choose another --run or --out, or move it away")
             );
         }
+
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
         let lock = self.lock()?;
         let log = self.log();
@@ -65,7 +66,9 @@ impl RunFolder {
                 std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
             }
         }
+
         self.write_scenario(scenario)?;
+
         Ok(lock)
     }
 
@@ -82,9 +85,11 @@ impl RunFolder {
         if link.is_symlink() {
             let _ = std::fs::remove_file(&link);
         }
+
         let Some(name) = self.path.file_name() else {
             return;
         };
+
         if let Err(error) = std::os::unix::fs::symlink(name, &link) {
             tracing::debug!(%error, "no link to the latest run");
         }
@@ -114,6 +119,7 @@ impl RunFolder {
                 .iter()
                 .any(|file| name.starts_with(&superseded_prefix(file)))
         };
+
         entries
             .map(|entry| entry.path())
             .filter(is_superseded)
@@ -134,6 +140,7 @@ impl RunFolder {
                     .map_err(|error| self.failed("keep files in", &error))?;
             }
         }
+
         Ok(())
     }
 
@@ -202,6 +209,7 @@ impl Recorder {
             folder.keep(epoch)?;
             folder.write_scenario(scenario)?;
         }
+
         let make = |name| {
             File::create(folder.file(name)).map_err(|error| folder.failed("write to", &error))
         };
@@ -224,9 +232,11 @@ impl Recorder {
                 .transpose()?,
             summary: Summary::begin(run, simulation),
         };
+
         if let Some(recording) = &mut recorder.recording {
             writeln!(recording, "{}", json(&header(run, simulation))).map_err(unwritable)?;
         }
+
         Ok(recorder)
     }
 
@@ -256,8 +266,10 @@ impl Recorder {
                 });
             }
         }
+
         self.events.flush().map_err(unwritable)?;
         self.write_log(&lines).map_err(unwritable)?;
+
         // The end of a run is no tick of its own.
         if !matches!(record.events.last(), Some(Event::End { .. }))
             && let Some(recording) = &mut self.recording
@@ -265,6 +277,7 @@ impl Recorder {
             writeln!(recording, "{}", json(&recorded(simulation))).map_err(unwritable)?;
             recording.flush().map_err(unwritable)?;
         }
+
         Ok(lines)
     }
 
@@ -346,6 +359,7 @@ fn recorded(simulation: &Simulation) -> RecordedTick {
         })
     };
     let guests = simulation.world().guests().iter();
+
     RecordedTick {
         tick: simulation.tick(),
         robots: simulation.names().iter().filter_map(robot).collect(),

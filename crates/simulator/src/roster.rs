@@ -33,6 +33,7 @@ pub fn scenario_of(roster: &Source) -> Result<Source, FileError> {
         text += &format!("\n[[robot]]\nname = \"{name}\"\nat = [\"{x} ft\", \"{y} ft\"]\n");
         count += 1;
     }
+
     Ok(Source {
         name: format!("{} (as a scenario)", roster.name),
         text,

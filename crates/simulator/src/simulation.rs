@@ -374,6 +374,7 @@ impl Simulation {
 
     fn note_membership(&mut self, membership: Vec<Membership>) {
         self.newcomers.clear();
+
         for change in membership {
             self.events.push(match change {
                 Membership::Joined(robot, generation) => {

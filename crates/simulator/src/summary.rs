@@ -108,6 +108,7 @@ impl Summary {
             .iter()
             .map(|name| (name.clone(), RobotSummary::default()))
             .collect();
+
         Self {
             run: run.clone(),
             seed: simulation.scenario().seed,
@@ -129,6 +130,7 @@ impl Summary {
     pub fn count(&mut self, simulation: &Simulation, line: &Line) {
         let tick_s = simulation.scenario().tick_s;
         self.network.count(simulation, line.tick, &line.event);
+
         match &line.event {
             Event::Emotion { robot, to, .. } => self.enter_emotion(robot, to, line.tick, tick_s),
             Event::Behavior { robot, to, .. } => self.enter_behavior(robot, to, line.tick, tick_s),
@@ -176,6 +178,7 @@ impl Summary {
     pub fn finish(&mut self, simulation: &Simulation) {
         (self.ticks, self.time_s) = (simulation.tick(), simulation.time_s(simulation.tick()));
         self.digest = simulation.digest();
+
         for (robot, since) in std::mem::take(&mut self.since) {
             let (ticks, tick_s) = (self.ticks, simulation.scenario().tick_s);
             let own = self.robot(&robot);
@@ -186,6 +189,7 @@ impl Summary {
                 .cloned()
                 .unwrap_or_default();
         }
+
         self.wall.elapsed_s = self
             .begun
             .map_or(0.0, |begun| begun.elapsed().as_secs_f64());

@@ -139,6 +139,7 @@ fn a_fault_ends_by_the_wall_clock_only_where_the_clock_waits() {
              at = \"4 s\"\n{end}\n"
         ))
     };
+
     for kind in ["hang", "crash", "slow"] {
         let waiting = with("", kind, "for = \"1 s\"");
         assert!(waiting.is_ok(), "{kind}: {waiting:?}");

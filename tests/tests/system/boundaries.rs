@@ -78,6 +78,7 @@ fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
             .collect()
     };
     let packages = metadata["packages"].as_array().unwrap();
+
     packages
         .iter()
         .map(|p| {
@@ -98,6 +99,7 @@ fn crates_depend_only_on_what_their_layer_allows() {
         ours,
         "a crate came or went"
     );
+
     for (name, allowed) in ALLOWED {
         for dependency in found[name]
             .iter()
@@ -236,6 +238,7 @@ impl Modules {
                 self.add(&format!("{name}::{child}"), &file, &folder.join(child));
             }
         }
+
         self.texts.insert(name.to_owned(), text);
     }
 
@@ -263,7 +266,9 @@ impl Modules {
                 imports.insert(self.module_of(&path));
             }
         }
+
         imports.remove(name);
+
         imports
     }
 
@@ -282,6 +287,7 @@ impl Modules {
         for name in self.texts.keys() {
             reached.insert(name, self.imports(name));
         }
+
         // As often as a path can be long.
         for _ in 0..self.texts.len() {
             let before = reached.clone();
@@ -291,6 +297,7 @@ impl Modules {
                 }
             }
         }
+
         reached
             .into_iter()
             .filter(|(name, targets)| targets.contains(*name))
@@ -312,6 +319,7 @@ fn stripped(text: &str) -> String {
         }
         stripped.push('\n');
     }
+
     stripped
 }
 
@@ -331,6 +339,7 @@ fn heads(text: &str) -> Vec<(usize, &str)> {
             heads.push((begin, &text[begin..at]));
         }
     }
+
     heads
 }
 
@@ -346,6 +355,7 @@ fn leaves(text: &str, above: &str) -> (Vec<String>, usize) {
     let Some(below) = text.strip_prefix("::") else {
         return (vec![above.to_owned()], 0);
     };
+
     if let Some(list) = below.strip_prefix('{') {
         let mut paths = Vec::new();
         let mut at = 0;
@@ -362,6 +372,7 @@ fn leaves(text: &str, above: &str) -> (Vec<String>, usize) {
             at += rest.find([',', '}', ';']).unwrap_or(rest.len());
         }
     }
+
     let length = below.find(|c| !is_of_name(c)).unwrap_or(below.len());
     let path = match &below[..length] {
         "super" => above
@@ -372,6 +383,7 @@ fn leaves(text: &str, above: &str) -> (Vec<String>, usize) {
         name => format!("{above}::{name}"),
     };
     let (paths, rest) = leaves(&below[length..], &path);
+
     (paths, 2 + length + rest)
 }
 
@@ -430,11 +442,13 @@ fn exec_knows_no_launch_files() {
             reached.insert(name.clone());
         }
     }
+
     for _ in 0..modules.texts.len() {
         for name in reached.clone() {
             reached.extend(modules.imports(&name));
         }
     }
+
     for forbidden in ["crate", "crate::file", "crate::plan", "crate::launching"] {
         assert!(!reached.contains(forbidden), "exec imports {forbidden}");
     }

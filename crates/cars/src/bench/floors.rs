@@ -69,6 +69,7 @@ impl Subject {
                 .floor()
                 .is_some_and(|star| star.second_floor().is_some()),
         };
+
         has_two.then_some(Self::Tcp {
             processes: TCP_PROCESSES,
         })

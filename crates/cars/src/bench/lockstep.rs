@@ -30,7 +30,9 @@ pub(super) fn bare(bench: &Bench<'_>, programs: &Programs, robots: usize) -> mie
         command.args(["bench-robot", "--name", &format!("r{number}")]);
         commands.push(command);
     }
+
     let duration_s = ticks as f64 * TICK_S;
+
     as_processes(bench, programs, &scenario, duration_s, commands)
 }
 
@@ -42,6 +44,7 @@ fn bare_scenario(robots: usize) -> String {
          [field]\n\
          size = [\"{field_m} m\", \"{field_m} m\"]\n"
     );
+
     for number in 0..robots {
         let x = APART_M * (1 + number % columns);
         let y = APART_M * (1 + number / columns);
@@ -51,6 +54,7 @@ fn bare_scenario(robots: usize) -> String {
              at = [\"{x} m\", \"{y} m\"]\n"
         );
     }
+
     text
 }
 
@@ -64,7 +68,9 @@ pub(super) fn crowd(bench: &Bench<'_>, programs: &Programs, robots: usize) -> mi
             commands.push(robot(programs, class, &format!("{class}{number}")));
         }
     }
+
     let duration_s = ticks as f64 * TICK_S;
+
     as_processes(bench, programs, &scenario, duration_s, commands)
 }
 
@@ -76,6 +82,7 @@ fn crowd_scenario(pairs: usize) -> String {
          [field]\n\
          size = [\"{field_m} m\", \"{field_m} m\"]\n"
     );
+
     for number in 0..pairs {
         let left_m = ROOM_M * (number % columns);
         let bottom_m = ROOM_M * (number / columns);
@@ -96,6 +103,7 @@ fn crowd_scenario(pairs: usize) -> String {
             bottom_m + 2,
         );
     }
+
     text
 }
 
@@ -150,6 +158,7 @@ fn as_processes(
         robot.env("CARS_RUN", RUN).env("CARS_CONNECT", &endpoint);
         commands.push(robot);
     }
+
     execute(bench, &mut simulator, duration_s, commands)
 }
 

@@ -32,6 +32,7 @@ impl Programs {
         let programs = Self {
             folder: folder.to_owned(),
         };
+
         for name in ["cars", "cars-sim", "cars-butler", "cars-leguin"] {
             let program = folder.join(name);
             if !program.exists() {
@@ -42,6 +43,7 @@ impl Programs {
                 ));
             }
         }
+
         Ok(programs)
     }
 

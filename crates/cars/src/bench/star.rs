@@ -154,9 +154,11 @@ fn wait_for_clients(bus: &Bus, clients: u64) -> miette::Result<()> {
             }
         })
         .into_diagnostic()?;
+
     for _ in 0..clients {
         wait(&arrivals)?;
     }
+
     Ok(())
 }
 

@@ -47,6 +47,7 @@ fn row(results: &Results, all: &[Results], is_compared: bool) -> Vec<String> {
         ratio_to(results.subject.floor(), results, all),
         ratio_to(results.subject.second_floor(), results, all),
     ];
+
     if is_compared && results.there.is_empty() {
         row.extend([String::new(), String::new()]);
     } else if is_compared {
@@ -56,6 +57,7 @@ fn row(results: &Results, all: &[Results], is_compared: bool) -> Vec<String> {
             paired_ratio(&results.here, &results.there)
         ));
     }
+
     row
 }
 

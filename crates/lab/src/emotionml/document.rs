@@ -131,6 +131,7 @@ impl<W: Write> Document<W> {
         let keys = Keys::new(&facts.run);
         write_info(&mut xml, &about(&facts, &keys))?;
         let (emotions, tendencies, left_out) = Default::default();
+
         Ok(Self {
             xml,
             facts,
@@ -206,6 +207,7 @@ impl<W: Write> Document<W> {
             .iter()
             .map(|name| (terms::token(name), describe_emotion(name)))
             .collect();
+
         write_vocabulary(&mut self.xml, "category", EMOTIONS, emotions)?;
         let tendencies = self
             .tendencies
@@ -213,12 +215,15 @@ impl<W: Write> Document<W> {
             .map(|t| (t.name().to_owned(), describe_tendency(*t)));
         let tendencies: Vec<_> = tendencies.collect();
         write_vocabulary(&mut self.xml, "action-tendency", TENDENCIES, tendencies)?;
+
         for (name, count) in &self.left_out {
             note(&format!(
                 "{count} episodes of {name:?} are left out: no standard vocabulary can say it"
             ));
         }
+
         self.xml.write_event(Event::End(BytesEnd::new(ROOT)))?;
+
         self.xml.get_mut().write_all(b"\n")
     }
 
@@ -227,6 +232,7 @@ impl<W: Write> Document<W> {
         let mean_intensity = episode.intensity.values().and_then(mean);
         let mut descriptors = Vec::new();
         descriptors.extend(self.category(episode));
+
         if let Some(schema) = schema {
             let value = mean_intensity
                 .zip(sign(schema.valence))
@@ -245,11 +251,14 @@ impl<W: Write> Document<W> {
                 Scale::Trace,
             ));
         }
+
         if let Some(urgency) = self.urgency(episode) {
             descriptors.push(Descriptor::appraisal(terms::URGENCY, urgency));
             descriptors.push(Descriptor::appraisal(terms::DESIRABILITY, 1.0 - urgency));
         }
+
         descriptors.extend(schema.and_then(|schema| self.tendency(schema.action_tendency)));
+
         descriptors
     }
 
@@ -260,10 +269,12 @@ impl<W: Write> Document<W> {
         } else {
             Scale::Unsaid
         };
+
         if self.is_standard {
             let term = terms::nearest_category(emotion)?;
             return Some(Descriptor::of_w3c(Kind::Category, term, scale));
         }
+
         Some(Descriptor::own(
             Kind::Category,
             EMOTIONS,
@@ -281,6 +292,7 @@ impl<W: Write> Document<W> {
                 Scale::Unsaid,
             ));
         }
+
         let name = tendency.name().to_owned();
         Some(Descriptor::own(
             Kind::ActionTendency,
@@ -303,6 +315,7 @@ impl<W: Write> Document<W> {
             .iter()
             .map(|rho| (rho / rho_max).min(1.0))
             .collect();
+
         mean(&urgencies)
     }
 
@@ -350,6 +363,7 @@ impl Told {
         let other = other
             .filter(|_| schema.agency == AgencyRole::Other)
             .map(str::to_owned);
+
         Self { account, other }
     }
 }
@@ -425,6 +439,7 @@ fn about(facts: &Facts, keys: &Keys) -> String {
     let epoch = facts
         .epoch
         .map_or_else(String::new, |epoch| format!(", epoch {epoch}"));
+
     format!(
         "Emotions of robots in the simulated run {run}{epoch}, seed {seed}, from its {file}, by cars {}. \
          Times are simulated milliseconds since tick 0 of {}; a tick lasts {tick_s} s and a trace has one sample a tick. \
@@ -457,6 +472,7 @@ fn describe_tendency(tendency: ActionTendency) -> String {
     parts.extend(
         terms::nearest_tendency(tendency).map(|term| format!("nearest: {}", term.in_words())),
     );
+
     parts.join("; ")
 }
 
@@ -474,6 +490,7 @@ fn write_descriptor<W: Write>(
 ) -> io::Result<()> {
     let element = xml.create_element(descriptor.kind.element());
     let element = element.with_attribute(("name", descriptor.name.as_str()));
+
     match (&descriptor.scale, trace) {
         (Scale::Value(value), _) => element
             .with_attribute(("value", terms::scale_value(*value).as_str()))
@@ -487,6 +504,7 @@ fn write_descriptor<W: Write>(
         })?,
         (Scale::Unsaid, _) | (Scale::Trace, None) => element.write_empty()?,
     };
+
     Ok(())
 }
 
@@ -507,6 +525,7 @@ fn write_vocabulary<W: Write>(
     if items.is_empty() {
         return Ok(());
     }
+
     xml.create_element("vocabulary")
         .with_attributes([("type", kind), ("id", id)])
         .write_inner_content(|xml| {
@@ -518,5 +537,6 @@ fn write_vocabulary<W: Write>(
             }
             Ok(())
         })?;
+
     Ok(())
 }

@@ -108,12 +108,14 @@ impl Episode {
         let (intensity, need_ratio) = measures(&episode.begun);
         episode.intensity.push(intensity);
         episode.need_ratio.push(need_ratio);
+
         episode
     }
 
     fn go_on(&mut self, tick: Tick, seen: &Seen) {
         let unheard = tick.saturating_sub(self.last + 1);
         let (intensity, need_ratio) = measures(seen);
+
         for (trace, value) in [
             (&mut self.intensity, intensity),
             (&mut self.need_ratio, need_ratio),
@@ -121,6 +123,7 @@ impl Episode {
             trace.hold(unheard);
             trace.push(value);
         }
+
         self.last = tick;
     }
 }
@@ -151,6 +154,7 @@ impl Episodes {
         if seen.missed {
             return None;
         }
+
         self.note_oddities(&seen);
         let feels = !seen.emotion.is_empty() && seen.emotion != NEUTRAL;
         let Some((before, episode)) = self.robots.get_mut(&seen.name) else {
@@ -158,6 +162,7 @@ impl Episodes {
             self.robots.insert(seen.name.clone(), (seen, episode));
             return None;
         };
+
         let mut ended = None;
         match episode {
             Some(episode) if episode.begun.emotion == seen.emotion => episode.go_on(tick, &seen),
@@ -166,7 +171,9 @@ impl Episodes {
                 ended = std::mem::replace(episode, begun);
             }
         }
+
         *before = seen;
+
         ended
     }
 
@@ -181,7 +188,9 @@ impl Episodes {
         if !(is_without || lacks_intensity) || !self.noted.insert(seen.name.clone()) {
             return;
         }
+
         let name = &seen.name;
+
         if is_without {
             note(&format!(
                 "{name} has a state without emotion, {:?}, which is left out",
@@ -236,6 +245,7 @@ mod tests {
                 intensity,
             )
         };
+
         all.into_iter().map(short).collect()
     }
 
@@ -250,6 +260,7 @@ mod tests {
             ("HAPPY".to_owned(), 0, 1, Some(vec![0.0, 0.1])),
             ("CONFIDENT".to_owned(), 2, 2, Some(vec![0.3])),
         ];
+
         assert_eq!(found, expected);
     }
 
@@ -262,10 +273,12 @@ mod tests {
             seen("A", 0.4),
             missed("A"),
         ]);
+
         assert_eq!(
             found,
             [("A".to_owned(), 0, 3, Some(vec![0.1, 0.1, 0.1, 0.4]))]
         );
+
         let found = episodes(vec![seen("A", 0.1), missed("A"), seen("B", 0.4)]);
         assert_eq!(
             found,
@@ -284,6 +297,7 @@ mod tests {
             seen("A", 0.2),
             seen("B", 1.0),
         ]);
+
         assert_eq!(
             found,
             [

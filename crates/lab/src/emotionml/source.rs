@@ -61,6 +61,7 @@ impl Source {
         if recording.exists() {
             return Self::recording(folder, Lines::open(recording)?);
         }
+
         if events.exists() {
             note(&format!(
                 "{} has no {RECORDING} (`[record] frames = false`?): read from {EVENTS}, without intensities",
@@ -68,7 +69,9 @@ impl Source {
             ));
             return Self::events(folder, Lines::open(events)?);
         }
+
         let folder = folder.path().display();
+
         Err(miette!(
             help = "is it the folder of a run?",
             "{folder} has neither {RECORDING} nor {EVENTS}"
@@ -85,6 +88,7 @@ impl Source {
             file: RECORDING,
             parameters: parameters(folder),
         };
+
         Self::begin(lines, facts, None)
     }
 
@@ -99,6 +103,7 @@ impl Source {
                 lines.path.display()
             ));
         };
+
         let (run, file) = (name(folder)?, EVENTS);
         let facts = Facts {
             run,
@@ -108,6 +113,7 @@ impl Source {
             file,
             parameters: parameters(folder),
         };
+
         Self::begin(lines, facts, Some(Replay::default()))
     }
 
@@ -120,6 +126,7 @@ impl Source {
                 replay,
             });
         }
+
         Err(miette!(
             "{}: a tick of {} s cannot be",
             lines.path.display(),
@@ -145,6 +152,7 @@ impl Source {
         let Some(moment) = self.read()? else {
             return Ok(None);
         };
+
         if moment.tick != self.due {
             let (path, line) = (self.path().display(), self.lines.number);
             return Err(miette!(
@@ -153,6 +161,7 @@ impl Source {
                 self.due
             ));
         }
+
         self.due += 1;
         Ok(Some(moment))
     }
@@ -165,12 +174,14 @@ impl Source {
                 robots: recorded.robots.into_iter().map(Seen::from).collect(),
             }));
         };
+
         while let Some(line) = self.lines.next::<Line>()? {
             let tick = line.tick;
             if let Some(robots) = replay.take(line.event) {
                 return Ok(Some(Moment { tick, robots }));
             }
         }
+
         Ok(None)
     }
 }
@@ -222,6 +233,7 @@ impl Replay {
             }
             _ => {}
         }
+
         None
     }
 
@@ -301,9 +313,11 @@ impl Lines {
             .by_ref()
             .take(MAX_LINE_BYTES)
             .read_until(b'\n', &mut bytes);
+
         read.map_err(|error| miette!("cannot read {}: {error}", self.path.display()))?;
         self.number += 1;
         let is_whole = bytes.ends_with(b"\n") || bytes.len() as u64 == MAX_LINE_BYTES;
+
         match serde_json::from_slice(&bytes) {
             Ok(value) => Ok(Some(value)),
             Err(_) if bytes.is_empty() => Ok(None),
@@ -368,6 +382,7 @@ mod tests {
             tick(),
         ]);
         let (happy, concerned) = (Some("HAPPY".to_owned()), Some("CONCERNED".to_owned()));
+
         assert_eq!(
             heard,
             [

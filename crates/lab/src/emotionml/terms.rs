@@ -110,6 +110,7 @@ pub(super) fn token(name: &str) -> String {
             let _ = write!(token, "_x{:X}_", u32::from(char));
         }
     }
+
     token
 }
 
@@ -145,6 +146,7 @@ mod tests {
         assert_eq!(token("VERY_CONTENT-2.1"), "VERY_CONTENT-2.1");
         assert_eq!(token("si content!"), "si_x20_content_x21_");
         assert_eq!(token("ému"), "_xE9_mu");
+
         let names = [
             "a b",
             "a_x20_b",
@@ -161,11 +163,13 @@ mod tests {
         let tokens: std::collections::BTreeSet<String> =
             names.iter().map(|name| token(name)).collect();
         assert_eq!(tokens.len(), names.len());
+
         let is_plain = |token: &String| {
             token
                 .chars()
                 .all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c))
         };
+
         assert!(tokens.iter().all(is_plain), "{tokens:?}");
     }
 

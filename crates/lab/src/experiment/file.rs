@@ -160,6 +160,7 @@ impl Experiment {
                 return Self::parse(&source, folder).map(Some);
             }
         }
+
         Ok(None)
     }
 
@@ -249,6 +250,7 @@ impl From<RawFactor> for Factor {
                 RawValue::Time(time) => Value::Time(time.0),
             });
         }
+
         Self {
             name: raw.name,
             values,
@@ -346,6 +348,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_shown_where_it_stands() {
         let (path, text) = SHIPPED[0];
+
         for (from, to, reason) in [
             ("seeds = 32", "seeds = 2", "at least 8 seeds"),
             ("question", "qestion", "unknown field"),

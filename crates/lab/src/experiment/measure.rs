@@ -123,14 +123,18 @@ fn sum(value: &Value, path: &[&str]) -> Option<f64> {
     let Some((first, rest)) = path.split_first() else {
         return value.as_f64();
     };
+
     let table = value.as_object()?;
+
     if *first != "*" {
         return sum(table.get(*first)?, rest);
     }
+
     let mut total = 0.0;
     for entry in table.values() {
         total += sum(entry, rest)?;
     }
+
     Some(total)
 }
 

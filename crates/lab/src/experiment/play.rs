@@ -139,6 +139,7 @@ impl Experiment {
             duration_s: Some(self.duration_s),
             set,
         };
+
         Ok(Scenario::load(&options.scenario, &changes)?)
     }
 
@@ -205,6 +206,7 @@ impl Experiment {
                 });
             }
         }
+
         cells
     }
 
@@ -218,9 +220,11 @@ impl Experiment {
             self.duration_s,
             self.explained(),
         );
+
         for arm in &self.arms {
             text += &format!("  {:<13} {}\n", arm.name, arm.what);
         }
+
         text
     }
 }

@@ -223,6 +223,7 @@ fn parse(line: &[u8]) -> Result<Said, String> {
     let Some(kind) = value.get("type").and_then(Value::as_str) else {
         return Err(format!("it has no type; {EXPECTED}"));
     };
+
     Ok(match kind {
         "query" => Said::Query(fields(&value)?),
         "percept" => Said::Percept,
@@ -272,6 +273,7 @@ fn check_done(raw: RawDone) -> Result<Done, String> {
         .into_iter()
         .map(variable)
         .collect::<Result<_, _>>()?;
+
     // The limits are those of what others will read.
     let state = check(PublicState {
         epoch: 0,
@@ -283,6 +285,7 @@ fn check_done(raw: RawDone) -> Result<Done, String> {
         emotion_state: raw.emotion_state,
         behavior_state: raw.behavior_state,
     })?;
+
     Ok(Done {
         proposal: raw.proposal,
         speed_mps: state.speed_mps,

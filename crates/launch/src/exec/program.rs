@@ -83,6 +83,7 @@ impl Program {
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
             unreachable!("all three are piped")
         };
+
         let pid = i32::try_from(child.id())
             .into_diagnostic()
             .wrap_err("the system's process id")?;
@@ -95,6 +96,7 @@ impl Program {
             ended: Condvar::new(),
             heard: tell.clone(),
         });
+
         // Dropped when there is nothing more to read.
         let (reading, rest) = std::sync::mpsc::sync_channel::<()>(1);
         let (also_reading, tail, name) = (reading.clone(), program.tail.clone(), name.clone());
@@ -108,6 +110,7 @@ impl Program {
         });
         let kept = program.clone();
         std::thread::spawn(move || kept.keep(Pid::from_raw(pid), &rest, &stopper));
+
         Ok((program, heard))
     }
 
@@ -117,11 +120,13 @@ impl Program {
         while waitid(Id::Pid(pid), WaitPidFlag::WEXITED | WaitPidFlag::WNOWAIT)
             == Err(nix::errno::Errno::EINTR)
         {}
+
         let status = lock(&self.child).wait();
         let _somebody_else_holds_its_pipes =
             rest.recv_timeout(REST_OF_OUTPUT) == Err(RecvTimeoutError::Timeout);
         *lock(&self.status) = status.ok();
         self.ended.notify_all();
+
         // Between two ticks nobody listens to the program.
         if let Some(stopper) = stopper.get().cloned() {
             std::thread::spawn(move || {
@@ -129,6 +134,7 @@ impl Program {
                 stopper.stop();
             });
         }
+
         let _over = self.heard.send(Heard::Ended);
     }
 
@@ -168,7 +174,9 @@ impl Program {
         let Some(status) = self.wait(REST_OF_OUTPUT) else {
             return otherwise.to_owned();
         };
+
         let ended = format!("its program {} before the run did", Ended::Exited(status));
+
         match self.tail.lines() {
             lines if lines.is_empty() => format!("{ended}, and wrote no errors"),
             lines => format!(
@@ -192,6 +200,7 @@ impl Program {
             let _gone = program.tell(&Told::End { reason });
             drop(lock(&program.stdin).take());
         });
+
         if self.wait(END_PATIENCE).is_none() {
             self.kill();
             self.wait(END_PATIENCE);
@@ -240,8 +249,10 @@ fn forward(mut stderr: ChildStderr, name: &RobotName, tail: &Tail) {
         let _unread = writeln!(std::io::stderr(), "{name}: {line}");
         tail.push(line);
     };
+
     while let Ok(read @ 1..) = stderr.read(&mut buffer) {
         lines.push(&buffer[..read], show);
     }
+
     lines.finish(show);
 }

@@ -42,6 +42,7 @@ impl Compose {
                 "with --via compose only --run and --speed can be chosen"
             ));
         }
+
         let project = format!("carsnet{}", std::process::id());
         let own = std::env::current_exe().into_diagnostic()?;
         let text = output(
@@ -49,6 +50,7 @@ impl Compose {
                 .args(start.args(&[]))
                 .args(["--export", "compose"]),
         )?;
+
         // Made anew under a name that cannot be foreseen: a link that waits there is not followed.
         let mut file = tempfile::Builder::new()
             .prefix(&project)
@@ -56,9 +58,11 @@ impl Compose {
             .tempfile()
             .into_diagnostic()
             .wrap_err("making a compose file")?;
+
         file.write_all(text.as_bytes())
             .into_diagnostic()
             .wrap_err_with(|| file.path().display().to_string())?;
+
         Ok(Self {
             tool: tool()?,
             project,
@@ -102,6 +106,7 @@ impl Links for Compose {
         let network = self.network();
         let mut docker = Command::new("docker");
         docker.arg("network");
+
         if shape.flow == Flow::Open {
             let Some(Away { container, address }) = self.away.remove(process) else {
                 return Ok(());
@@ -116,6 +121,7 @@ impl Links for Compose {
             self.away
                 .insert(process.to_owned(), Away { container, address });
         }
+
         Ok(())
     }
 }
@@ -133,6 +139,7 @@ fn tool() -> miette::Result<&'static [&'static str]> {
         command.status().is_ok_and(|status| status.success())
     };
     let help = "install docker and docker-compose (Debian: apt install docker.io docker-compose)";
+
     tools
         .iter()
         .find(is_there)
@@ -148,12 +155,14 @@ fn output(command: &mut Command) -> miette::Result<String> {
         .output()
         .into_diagnostic()
         .wrap_err_with(|| said.clone())?;
+
     if !output.status.success() {
         return Err(miette!(
             "{said}: {}",
             String::from_utf8_lossy(&output.stderr).trim()
         ));
     }
+
     Ok(String::from_utf8_lossy(&output.stdout)
         .trim_end()
         .to_owned())

@@ -124,6 +124,7 @@ mod tests {
                 ..Shape::default()
             },
         );
+
         assert_eq!(pace.due(now, shape, 1.0), now + ms(60));
         assert_eq!(
             pace.due(now + ms(5), shape, 0.0),
@@ -143,6 +144,7 @@ mod tests {
                 ..Shape::default()
             },
         );
+
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_millis(500));
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_secs(1));
         assert_eq!(

@@ -45,11 +45,13 @@ impl Namespaces {
                 "more than {MAX_PROCESSES} processes do not fit into one network"
             ));
         }
+
         remove_abandoned();
         let processes = processes
             .iter()
             .map(|process| process.name.clone())
             .collect();
+
         // From here on whatever was made is removed, also if the rest cannot be made.
         let namespaces = Self {
             prefix: format!("{PREFIX}{}-", std::process::id()),
@@ -61,6 +63,7 @@ impl Namespaces {
                 "{error}"
             )
         })?;
+
         Ok(namespaces)
     }
 
@@ -79,7 +82,9 @@ impl Namespaces {
             "forward_delay",
             "0",
         ])?;
+
         ip(&["-n", &switch, "link", "set", "hub", "up"])?;
+
         (0..=self.processes.len()).try_for_each(|index| self.cable(&switch, index))
     }
 
@@ -102,8 +107,10 @@ impl Namespaces {
             "dev",
             "eth0",
         ])?;
+
         ip(&["-n", &host, "link", "set", "eth0", "up"])?;
         let retrans = ["retrans", ASK_FOR_ADDRESS_AGAIN_MS];
+
         ip(&[
             ["-n", &host, "ntable", "change"].as_slice(),
             &["name", "arp_cache", "dev", "eth0"],
@@ -151,14 +158,17 @@ impl Links for Namespaces {
             .args(["netns", "exec", &self.host(0)])
             .arg(own)
             .args(start.args(&links));
+
         // Nobody else is in this network.
         command
             .arg(format!("--listen={endpoint}"))
             .arg("--insecure");
+
         if !start.more.iter().any(|arg| arg == NO_CONSOLE) {
             // A browser would not reach it there.
             command.arg(NO_CONSOLE);
         }
+
         Ok(command)
     }
 
@@ -197,6 +207,7 @@ fn remove_abandoned() {
             .parse::<u32>()
             .ok()
     };
+
     for name in listed
         .lines()
         .filter_map(|line| line.split_whitespace().next())
@@ -216,6 +227,7 @@ fn ip(args: &[&str]) -> Result<(), String> {
     if output.status.success() {
         return Ok(());
     }
+
     Err(format!(
         "{said}: {}",
         String::from_utf8_lossy(&output.stderr).trim()

@@ -97,6 +97,7 @@ impl Plan {
                     .with_help("name a plan of faults by --plan; docs/links.md says how one looks"),
             );
         }
+
         let wall = |tick: Tick| Duration::try_from_secs_f64(tick as f64 * scenario.tick_s / speed);
         let mut faults = Vec::new();
         for partition in partitions {
@@ -125,6 +126,7 @@ impl Plan {
             };
             faults.extend(cut_off(partition).map(cut));
         }
+
         Ok(Self { faults })
     }
 
@@ -204,6 +206,7 @@ impl Plan {
                 }
             }
         }
+
         Ok(())
     }
 }
@@ -229,6 +232,7 @@ fn cut_off(partition: &Partition) -> impl Iterator<Item = &RobotName> {
         .iter()
         .enumerate()
         .filter(move |(index, _)| Some(*index) != kept);
+
     others.flat_map(|(_, group)| group)
 }
 
@@ -246,15 +250,18 @@ fn check(source: &Source, raw: RawFault, robots: &BTreeSet<RobotName>) -> Result
         )
         .with_help(format!("there are links of {}", names.join(", "))));
     }
+
     let (begin, length) = (time(&raw.at)?, time(&raw.r#for)?);
     if length.is_zero() {
         return Err(refuse(raw.r#for.span(), "a fault lasts for more than zero"));
     }
+
     let end = begin
         .checked_add(length)
         .ok_or_else(|| refuse(raw.r#for.span(), "this never ends"))?;
     let span = raw.r#do.span();
     let shape = shape(raw.r#do.into_inner()).map_err(|reason| refuse(span, &reason))?;
+
     Ok(Fault {
         robot,
         begin,
@@ -286,12 +293,15 @@ fn shape(raw: RawShape) -> Result<Shape, String> {
         bandwidth_bps: slow.bandwidth_bps,
         ..Shape::default()
     };
+
     if slow.bandwidth_bps == Some(0) {
         return Err("a bandwidth is above zero; to let nothing through, write \"cut\"".to_owned());
     }
+
     if shape == Shape::default() {
         return Err("this fault does nothing".to_owned());
     }
+
     Ok(shape)
 }
 
@@ -331,6 +341,7 @@ mod tests {
         };
         let times: Vec<u64> = plan.changes().iter().map(Duration::as_secs).collect();
         assert_eq!(times, [1, 2, 5, 8, 10, 12]);
+
         let leguin: Vec<String> = times.iter().map(|s| shown("Leguin", *s)).collect();
         let slow = "delay 50ms, jitter 10ms";
         assert_eq!(
@@ -344,6 +355,7 @@ mod tests {
                 "whole"
             ]
         );
+
         assert_eq!(
             (shown("Butler", 1), shown("Butler", 2)),
             ("bandwidth 64000 bit/s".into(), "whole".into())
@@ -371,6 +383,7 @@ mod tests {
             })
             .collect();
         let text = format!("seed = 5\ntick = \"0.5 s\"\n{network}\n{robots}");
+
         Scenario::parse(
             &Source {
                 name: "scenario.toml".to_owned(),
@@ -398,14 +411,17 @@ mod tests {
             ["whole", "cut", "cut", "whole"]
         );
         assert_eq!(plan.robots().len(), 1, "the larger group keeps its links");
+
         let endless = Plan::of_partitions(&partition(""), 20.0).unwrap();
         assert!(endless.changes().contains(&NEVER));
+
         for refused in ["one_way = true", "cuts = [\"queries\"]"] {
             assert!(
                 Plan::of_partitions(&partition(refused), 20.0).is_err(),
                 "{refused}"
             );
         }
+
         assert!(Plan::of_partitions(&scenario(""), 20.0).is_err());
     }
 
@@ -455,6 +471,7 @@ mod tests {
             },
             || begun.elapsed() > Duration::from_millis(200),
         );
+
         assert_eq!(
             (played, seen),
             (

@@ -97,6 +97,7 @@ impl Links for Proxies {
         command
             .args(start.args(&links))
             .arg(format!("--listen={}", self.endpoint));
+
         Ok(command)
     }
 
@@ -202,6 +203,7 @@ fn make_links(
 fn check_not_secured(file: &LaunchFile) -> miette::Result<()> {
     let help =
         "play it --via proxy, or leave out `secure`: nobody else is in the network of these links";
+
     if file.secure.is_some() {
         Err(miette!(
             help = help,
@@ -236,6 +238,7 @@ fn wait_for_clock(launch: &mut Child, events: &Path, begun: SystemTime) -> miett
             .and_then(|file| file.modified())
             .is_ok_and(|at| at >= begun)
     };
+
     loop {
         if is_new() && last_tick(events).is_some_and(|tick| tick > 0) {
             return Ok(true);
@@ -260,6 +263,7 @@ fn last_tick(events: &Path) -> Option<u64> {
         .unwrap_or(&tail)
         .rsplit(|byte| *byte == b'\n')
         .next()?;
+
     serde_json::from_slice::<serde_json::Value>(line)
         .ok()?
         .get("tick")?
@@ -346,6 +350,7 @@ impl Signals {
             terminate(launch.load(Ordering::SeqCst));
         })
         .into_diagnostic()?;
+
         Ok(signals)
     }
 
@@ -360,9 +365,11 @@ impl Signals {
             i32::try_from(child.id()).into_diagnostic()?,
             Ordering::SeqCst,
         );
+
         if self.is_asked.load(Ordering::SeqCst) {
             self.end();
         }
+
         Ok(child)
     }
 
@@ -387,6 +394,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join(EVENTS);
         assert_eq!(last_tick(&file), None);
+
         for (text, tick) in [
             ("", None),
             ("{\"tick\":0,\"event\":\"joined\"}\n", Some(0)),
@@ -396,6 +404,7 @@ mod tests {
             std::fs::write(&file, text).unwrap();
             assert_eq!(last_tick(&file), tick, "{text}");
         }
+
         std::fs::write(&file, "{\"tick\":1}\n".repeat(5000) + "{\"tick\":2}\n").unwrap();
         assert_eq!(last_tick(&file), Some(2));
     }

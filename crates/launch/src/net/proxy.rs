@@ -166,6 +166,7 @@ fn forward(
     if !is_open || gate.shape().flow == Flow::Closed {
         return Ok(());
     }
+
     let there = pipe(
         client.try_clone()?,
         server.try_clone()?,
@@ -176,6 +177,7 @@ fn forward(
     for writer in [there, back] {
         drop(writer.join());
     }
+
     Ok(())
 }
 
@@ -226,7 +228,9 @@ fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
             to.write_all(slice).is_ok()
         })
     });
+
     gate.pass();
+
     // The end of one direction leaves the other one open; a failure ends both.
     let _gone = to.shutdown(if is_whole {
         Shutdown::Write
@@ -264,6 +268,7 @@ mod tests {
             side.set_read_timeout(Some(Duration::from_secs(20)))
                 .unwrap();
         }
+
         (proxy, client, server)
     }
 
@@ -286,6 +291,7 @@ mod tests {
         let (proxy, mut client, mut server) = link();
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
+
         proxy.set(Shape {
             flow: Flow::Cut,
             ..Shape::default()
@@ -296,11 +302,13 @@ mod tests {
             is_silent(&mut server) && is_silent(&mut client),
             "nothing comes through a cut"
         );
+
         proxy.set(Shape::default());
         assert_eq!(
             (receive(&mut server, 3), receive(&mut client, 4)),
             (b"two".to_vec(), b"back".to_vec())
         );
+
         drop(client);
         assert_eq!(
             server.read(&mut [0]).unwrap(),
@@ -323,6 +331,7 @@ mod tests {
         listener.set_nonblocking(true).unwrap();
         std::thread::sleep(SHORT);
         assert!(listener.accept().is_err(), "nobody has come through");
+
         listener.set_nonblocking(false).unwrap();
         proxy.set(Shape::default());
         assert_eq!(receive(&mut listener.accept().unwrap().0, 5), b"hello");
@@ -333,6 +342,7 @@ mod tests {
         let (proxy, mut client, mut server) = link();
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
+
         proxy.set(Shape {
             flow: Flow::Closed,
             ..Shape::default()
@@ -344,6 +354,7 @@ mod tests {
             ),
             (0, 0)
         );
+
         let mut newcomer = TcpStream::connect(proxy.local).unwrap();
         newcomer
             .set_read_timeout(Some(Duration::from_secs(20)))
@@ -370,6 +381,7 @@ mod tests {
             "there and back took {:?}",
             sent.elapsed()
         );
+
         // 4,000 bytes at 80 kbit/s: 0.4 s.
         proxy.set(Shape {
             bandwidth_bps: Some(80_000),

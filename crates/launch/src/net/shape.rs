@@ -64,17 +64,21 @@ impl std::fmt::Display for Shape {
             Flow::Cut => parts.push("cut".to_owned()),
             Flow::Closed => parts.push("closed".to_owned()),
         }
+
         if !self.delay.is_zero() {
             parts.push(format!("delay {:?}", self.delay));
         }
+
         if !self.jitter.is_zero() {
             parts.push(format!("jitter {:?}", self.jitter));
         }
+
         parts.extend(
             self.bandwidth_bps
                 .map(|bps| format!("bandwidth {bps} bit/s")),
         );
         f.write_str(if parts.is_empty() { "whole" } else { "" })?;
+
         f.write_str(&parts.join(", "))
     }
 }
@@ -206,6 +210,7 @@ mod tests {
             shape = line.parse::<Order>().unwrap().apply(shape);
             assert_eq!(shape.to_string(), shown, "after {line}");
         }
+
         for line in [
             "",
             "cut it",
@@ -238,6 +243,7 @@ mod tests {
             bandwidth_bps: Some(10),
             ..Shape::default()
         };
+
         assert_eq!(slow.and(cut), both);
         assert_eq!(cut.and(slow), both);
         assert!(

@@ -17,6 +17,7 @@ impl Supervisor {
         if self.stage != Stage::Running {
             return;
         }
+
         for order in orders {
             let runs = |kept: &super::Kept| kept.planned.robots.contains(&order.robot);
             let Some(index) = self
@@ -37,11 +38,13 @@ impl Supervisor {
                 self.end_fault(index, order.kind);
             }
         }
+
         (done.0)();
     }
 
     fn begin_fault(&mut self, index: usize, order: &ProcessOrder) {
         let kept = &mut self.kept[index];
+
         match order.kind {
             FaultKind::Crash if kept.is_down => return,
             FaultKind::Crash => {
@@ -55,6 +58,7 @@ impl Supervisor {
                 self.pulse(index, true);
             }
         }
+
         if let Some(wall) = order
             .for_s
             .and_then(|for_s| Duration::try_from_secs_f64(for_s).ok())
@@ -66,6 +70,7 @@ impl Supervisor {
     /// A fault is over, by order or by the wall clock.
     pub(super) fn end_fault(&mut self, index: usize, kind: FaultKind) {
         let kept = &mut self.kept[index];
+
         match kind {
             FaultKind::Crash if kept.is_down && kept.group.is_some() => {
                 // Its end has not been noticed yet.
@@ -91,11 +96,13 @@ impl Supervisor {
         if !self.kept[index].is_slow || self.stage != Stage::Running {
             return;
         }
+
         let (signal, wait) = if stops {
             (Signal::SIGSTOP, SLOW_STOP)
         } else {
             (Signal::SIGCONT, SLOW_GO)
         };
+
         self.signal(index, signal);
         self.after(wait, Event::Pulse(index, !stops));
     }

@@ -77,6 +77,7 @@ impl Hall {
             }
             running.await.unwrap()
         });
+
         screen.finish();
         outcome
     }
@@ -159,6 +160,7 @@ fn who_watches_is_told_when_the_run_is_over_and_does_not_end_it() {
         .with(broken);
     let told = hall.path("told");
     let outcome = hall.run(&[], &[]);
+
     assert_eq!((outcome.failure, outcome.asked), (None, None));
     assert!(told.exists());
 }
@@ -186,6 +188,7 @@ fn the_first_required_failure_ends_the_run_in_good_order() {
         "stopped\n",
         "the simulator was to write its record"
     );
+
     let mut log: Vec<String> = hall.read("Butler.log").lines().map(str::to_owned).collect();
     log.sort();
     assert_eq!(log, ["one", "plain", "two"]);
@@ -222,6 +225,7 @@ fn a_program_that_cannot_be_started_is_a_failure() {
         .run(&[], &[])
         .failure
         .unwrap();
+
     assert_eq!(failure.code, 126);
     assert!(
         failure
@@ -254,6 +258,7 @@ fn a_failed_robot_is_restarted_and_the_run_goes_on() {
         grace: Duration::from_millis(100),
         ..hall
     };
+
     assert_eq!(hall.run(&[], &[]).failure, None);
     assert_eq!(hall.read("starts"), "up\nup\nup\n");
 }
@@ -303,6 +308,7 @@ fn asked_once_all_are_ended_also_one_that_is_stopped() {
     ));
     let begun = Instant::now();
     let outcome = hall.run(&["up", "stopped"], &[Signal::SIGINT]);
+
     assert!(
         begun.elapsed() < Duration::from_secs(10),
         "nobody had to be killed"
@@ -345,8 +351,10 @@ fn nobody_is_left_behind_when_the_launcher_gives_up_in_the_middle() {
             panic!("as a defect of the launcher would");
         });
     }));
+
     assert!(result.is_err());
     assert_gone(&hall.read("own"));
     assert_gone(&hall.read("grandchild"));
+
     screen.finish();
 }

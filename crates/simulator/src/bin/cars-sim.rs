@@ -69,7 +69,9 @@ fn main() -> miette::Result<ExitCode> {
         .without_time()
         .with_target(false)
         .init();
+
     let summary = run(&args)?;
+
     Ok(if summary.end == Some(End::Aborted) {
         ExitCode::FAILURE
     } else {
@@ -87,6 +89,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
             set: args.set.clone(),
         },
     )?;
+
     // Before anything is made: a refusal leaves nothing behind.
     check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
     let folder = RunFolder::new(&args.out, &args.run);
@@ -104,16 +107,20 @@ fn run(args: &Args) -> miette::Result<Summary> {
     };
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;
     let queue = server.queue();
+
     // The queue is closed only when the run is over, and then there is nothing left to end.
     ctrlc::set_handler(move || drop(queue.send(Event::Terminate))).into_diagnostic()?;
+
     if let Some(file) = &args.operator_config {
         write_line(
             &folder.file(OPERATOR_CONFIG),
             &std::path::absolute(file).into_diagnostic()?.display(),
         )?;
     }
+
     write_line(&folder.file(ENDPOINT), &connectable(&args.listen))?;
     let outcome = server.run(scenario, &folder).into_diagnostic();
+
     for name in [ENDPOINT, OPERATOR_CONFIG]
         .map(|name| folder.file(name))
         .iter()
@@ -123,6 +130,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
             tracing::debug!(%error, "{} is gone already", name.display());
         }
     }
+
     outcome
 }
 

@@ -97,6 +97,7 @@ impl Network {
             .iter()
             .rev()
             .filter(|link| link.from == *from && link.to == *to);
+
         on_link.filter_map(what).next()
     }
 

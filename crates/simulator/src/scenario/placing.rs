@@ -57,12 +57,14 @@ impl PlacingError {
         if let Some(robot) = &self.robot {
             return format!("robots.{robot}");
         }
+
         let field = match self.error {
             HallError::ObstacleOffField { .. } => "obstacles",
             HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => "guests",
             HallError::OutOfRange { name, .. } if name.contains("guest") => "guest_speed_mps",
             _ => "field_m",
         };
+
         field.to_owned()
     }
 }
@@ -72,6 +74,7 @@ impl std::fmt::Display for PlacingError {
         let Some(robot) = &self.robot else {
             return self.error.fmt(f);
         };
+
         match (&self.error, &self.other) {
             (HallError::RobotOnRobot { at, .. }, Some(other)) => {
                 write!(f, "robot {robot} at {at} m overlaps robot {other}")

@@ -168,6 +168,7 @@ impl Scenario {
             let span = self.duration.as_ref().map(Spanned::span);
             return Err(FileError::at(source, span, "more than a billion ticks"));
         }
+
         let field = self.field.as_ref().map(Spanned::get_ref);
         let (speed, duration) = self.guest_courses(source)?;
         let sensing_range_m = positive(
@@ -243,7 +244,9 @@ impl Scenario {
             faults,
             ..scenario
         };
+
         check_hall(&scenario, source, self.guests.as_ref().map(Spanned::span))?;
+
         Ok(scenario)
     }
 
@@ -273,6 +276,7 @@ impl Scenario {
             mode: drawn.mode.0,
             max: drawn.max.0,
         };
+
         Ok((speed, shape(lasting, duration.map(Spanned::span))?))
     }
 }
@@ -296,6 +300,7 @@ fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError
         crate::files::check_log_name(name.get_ref())
             .map_err(|error| FileError::at(source, Some(name.span()), &error.to_string()))?;
     }
+
     Ok(Record {
         log: raw.log.unwrap_or(standard.log),
         log_name: raw.log_name.map_or(standard.log_name, Spanned::into_inner),
@@ -340,6 +345,7 @@ fn robots(
             return Err(refuse(&format!("a second robot called {}", robot.name)));
         }
     }
+
     Ok(robots)
 }
 
@@ -358,10 +364,12 @@ fn positive<T>(
     let Some(spanned) = value else {
         return Ok(default);
     };
+
     let value = number(spanned.get_ref());
     if value > 0.0 && value.is_finite() {
         return Ok(value);
     }
+
     Err(FileError::at(
         source,
         Some(spanned.span()),
@@ -411,6 +419,7 @@ impl From<&checked::Scenario> for Scenario {
             mode: Time(mode),
             max: Time(max),
         };
+
         Self {
             seed: Some(Spanned::new(0..0, scenario.seed)),
             tick: spanned(Time(scenario.tick_s)),

@@ -19,6 +19,7 @@ impl Scenario {
             mode: shape.mode(),
             max: shape.max(),
         };
+
         Setup {
             seed: self.seed,
             duration_s: self.duration_s(),
@@ -47,9 +48,11 @@ impl Scenario {
         let mut errors = Errors::default();
         let mut scenario = self.clone();
         scenario.seed = setup.seed;
+
         if let Err(error) = config::seed::check(setup.seed) {
             errors.add("seed", error.to_string());
         }
+
         let ticks = (setup.duration_s / self.tick_s).round();
         errors.unless((1.0..=MAX_TICKS).contains(&ticks), "duration_s", || {
             format!(
@@ -57,6 +60,7 @@ impl Scenario {
                 self.tick_s
             )
         });
+
         scenario.ticks = ticks as u64;
         scenario.field_m = setup.field_m;
         let mut triangular = |range: &Range, field: &str| {
@@ -72,6 +76,7 @@ impl Scenario {
             duration_s: duration_s.unwrap_or(self.guests.duration_s),
         };
         scenario.obstacles.clone_from(&setup.obstacles);
+
         for (name, robot) in &mut scenario.robots {
             match setup.robots.get(name) {
                 Some(at) => robot.at = *at,
@@ -81,6 +86,7 @@ impl Scenario {
                 ),
             }
         }
+
         for name in setup
             .robots
             .keys()
@@ -91,16 +97,20 @@ impl Scenario {
                 "no robot of this run has this name".to_owned(),
             );
         }
+
         scenario.record.log = setup.log_file.enabled;
+
         match files::check_log_name(&setup.log_file.name) {
             Ok(()) => scenario.record.log_name.clone_from(&setup.log_file.name),
             Err(error) => errors.add("log_file.name", error.to_string()),
         }
+
         if errors.0.is_empty()
             && let Err(error) = placing::check(&scenario)
         {
             errors.add(&error.field(), error.to_string());
         }
+
         if errors.0.is_empty() {
             Ok(scenario)
         } else {
@@ -124,6 +134,7 @@ impl Scenario {
         if own == other {
             return Ok(self);
         }
+
         Err(format!(
             "the robots of this run are {other}; those of the scenario are {own}. Start another launch for it"
         ))

@@ -61,6 +61,7 @@ impl NetworkSummary {
     /// Counts an event.
     pub(super) fn count(&mut self, simulation: &Simulation, tick: Tick, event: &Event) {
         let now_s = simulation.time_s(tick);
+
         match event {
             Event::CommandSent { from, to, .. } => self.link(from, to).sent += 1,
             Event::CommandDelivered { from, to, .. } => {
@@ -113,6 +114,7 @@ impl NetworkSummary {
                 &mut self.cuts[last]
             }
         };
+
         if queries {
             cut.detected_after_s.get_or_insert(from_s - cut.from_s);
         }
@@ -131,6 +133,7 @@ impl NetworkSummary {
                 aged.insert(key(asker, target));
             }
         }
+
         let fresh = self
             .links
             .iter_mut()

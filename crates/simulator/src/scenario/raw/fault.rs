@@ -45,6 +45,7 @@ pub(super) fn check(
             "more than 10000 faults",
         ));
     }
+
     let mut faults = Vec::new();
     for entry in raw {
         let span = entry.span();
@@ -53,7 +54,9 @@ pub(super) fn check(
                 .map_err(|reason| FileError::at(source, Some(span), &reason))?,
         );
     }
+
     faults.sort_by_key(|fault| fault.at);
+
     Ok(faults)
 }
 
@@ -67,10 +70,12 @@ fn one(
     if !robots.contains_key(&robot) {
         return Err(format!("no robot of this scenario is called {robot}"));
     }
+
     let at = ticks(raw.at.0, tick_s);
     if at < 1 {
         return Err("a fault begins after the first tick".to_owned());
     }
+
     let end = match (raw.until, raw.lasting) {
         (Some(_), Some(_)) => {
             return Err("`until` is simulated time, `for` is wall clock: say one".to_owned());
@@ -82,11 +87,13 @@ fn one(
         (None, Some(_)) => return Err("`for` is more than zero and at most an hour".to_owned()),
         (None, None) => FaultEnd::Never,
     };
+
     if let FaultEnd::At(until) = end
         && until <= at
     {
         return Err("it ends before it begins: `until` comes after `at`".to_owned());
     }
+
     // Where the clock waits for a robot, simulated time stands still until it is back.
     let needs_wall = raw.kind != FaultKind::Slow && lateness.of(&robot) == OnLate::Wait;
     if needs_wall && !matches!(end, FaultEnd::After(_)) {
@@ -94,6 +101,7 @@ fn one(
             "the clock waits for {robot} for ever: say `for` (wall clock), or on_late = \"continue\""
         ));
     }
+
     // Where the clock goes on without a robot, the wall clock would decide in which tick it is back.
     let goes_on = lateness.of(&robot) == OnLate::Continue;
     if goes_on && matches!(end, FaultEnd::After(_)) {
@@ -102,6 +110,7 @@ fn one(
              not give the same run; say `until` (simulated time)"
         ));
     }
+
     Ok(Fault {
         robot,
         kind: raw.kind,
@@ -119,6 +128,7 @@ impl FaultTable {
             FaultEnd::Never => (None, None),
         };
         let robot = Spanned::new(0..0, fault.robot.clone());
+
         Self {
             robot,
             kind: fault.kind,

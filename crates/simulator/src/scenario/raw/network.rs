@@ -96,6 +96,7 @@ pub(super) fn check(
     let Some(raw) = raw else {
         return Ok(Network::default());
     };
+
     let (span, raw) = (raw.span(), raw.into_inner());
     if raw.links.len().max(raw.partitions.len()) > MAX_ENTRIES {
         return Err(FileError::at(
@@ -104,6 +105,7 @@ pub(super) fn check(
             "more than 10000 links or partitions",
         ));
     }
+
     let checker = Checker {
         source,
         robots,
@@ -120,6 +122,7 @@ pub(super) fn check(
         .partitions
         .into_iter()
         .map(|partition| checker.partition(partition));
+
     Ok(Network {
         commands,
         queries,
@@ -199,6 +202,7 @@ impl Checker<'_> {
             Triangular::new(min.0, mode.0, max.0)
                 .map_err(|error| refuse(&format!("delay: {error}")))
         };
+
         Ok(Channel {
             loss: probability("loss", raw.loss, 0.0)?,
             duplication: probability("duplication", raw.duplication, 0.0)?,
@@ -217,15 +221,18 @@ impl Checker<'_> {
             .collect::<Result<_, _>>()?;
         let mut named: Vec<&RobotName> = groups.iter().flatten().collect();
         named.sort();
+
         if let Some(twice) = named.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(self.refuse(span, &format!("{} is in two groups", twice[0])));
         }
+
         if groups.iter().filter(|group| !group.is_empty()).count() < 2 {
             return Err(self.refuse(
                 span,
                 "a partition needs two groups, for example [[\"Butler\"], [\"Leguin\"]]",
             ));
         }
+
         let (from, until) = (
             self.tick(&span, raw.from)?,
             raw.until.map(|time| self.tick(&span, time)),
@@ -234,6 +241,7 @@ impl Checker<'_> {
         if until.is_some_and(|until| until <= from) {
             return Err(self.refuse(span, "it ends before it begins: `until` comes after `from`"));
         }
+
         let cuts = raw
             .cuts
             .unwrap_or_else(|| vec![Cuts::Commands, Cuts::Queries]);
@@ -243,8 +251,10 @@ impl Checker<'_> {
                 "it cuts nothing: name \"commands\", \"queries\" or both",
             ));
         }
+
         let is_cut = |what| cuts.contains(&what);
         let (commands, queries) = (is_cut(Cuts::Commands), is_cut(Cuts::Queries));
+
         Ok(Partition {
             groups,
             from,
@@ -269,6 +279,7 @@ impl NetworkTable {
         if *network == Network::default() {
             return None;
         }
+
         let spanned = |channel| Spanned::new(0..0, ChannelTable::from(channel));
         let link = |link: &Link| LinkTable {
             from: Spanned::new(0..0, link.from.clone()),
@@ -315,6 +326,7 @@ impl NetworkTable {
                 .map(|entry| Spanned::new(0..0, partition(entry)))
                 .collect(),
         };
+
         Some(Spanned::new(0..0, table))
     }
 }
@@ -329,6 +341,7 @@ impl From<Channel> for ChannelTable {
             })
         };
         let said = |value: f64| (value > 0.0).then_some(value);
+
         Self {
             loss: said(channel.loss),
             duplication: said(channel.duplication),
