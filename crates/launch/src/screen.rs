@@ -294,7 +294,6 @@ impl Painter {
         }
 
         let (head, text) = line.split_at(line.len() - record.text.len());
-
         format!("{}{text}\n", color(self.color_of(&record.source), head))
     }
 

@@ -45,7 +45,6 @@ impl Robot {
         );
 
         let folder = Path::new(out).join("Rosie");
-
         Self { lab, folder }
     }
 

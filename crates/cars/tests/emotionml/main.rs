@@ -659,7 +659,7 @@ fn what_cannot_be_exported_is_refused_with_a_reason() {
         refusal.contains("there is no run nope") && refusal.contains("help:"),
         "{refusal}"
     );
-    assert!(lab.refusal(&[]).contains("no run is known in"));
+    assert!(lab.refusal(&[]).contains("there is no run in"));
 
     std::fs::create_dir(lab.path("bare")).unwrap();
     assert!(
