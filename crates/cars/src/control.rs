@@ -1,9 +1,5 @@
 //! Commands for a run in progress: `cars ctl`, `cars query`, `cars command` and `cars log`.
 
-use std::path::PathBuf;
-use std::process::ExitCode;
-use std::sync::mpsc::sync_channel;
-use std::time::Duration;
 use bus::{Bus, Reply, Role};
 use clap::{Args, Subcommand, ValueEnum};
 use config::units::Time;
@@ -15,6 +11,10 @@ use protocol::messages::{Command, Control, ControlAnswer, LogRecord, OnLate, Pre
 use protocol::{Message, RobotName, RunName, decode, encode};
 use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
 use simulator::{RunFolder, Scenario};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
 
 /// How long to wait for the simulator or a robot.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -229,18 +229,15 @@ pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
         }
         ControlAnswer::Done(status) => print!("{}", describe(&status)),
         ControlAnswer::Setup(answer) => print!("{}", answer.scenario),
-        ControlAnswer::Refused { explanation, .. } => return Err(miette!("refused: {explanation}")),
+        ControlAnswer::Refused { explanation, .. } => {
+            return Err(miette!("refused: {explanation}"));
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// Gets the simulator's answer to a control request.
-fn ask(
-    bus: &Bus,
-    keys: &Keys,
-    run: &RunRef,
-    control: &Control,
-) -> miette::Result<ControlAnswer> {
+fn ask(bus: &Bus, keys: &Keys, run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
     let patience = if matches!(control, Control::Step { .. }) {
         STEP_PATIENCE
     } else {
@@ -335,7 +332,8 @@ pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     bus.close();
 
     let run = args.run.run()?;
-    let reply = reply.ok_or_else(|| miette!("no robot called {} answers in run {run}", args.robot))?;
+    let reply =
+        reply.ok_or_else(|| miette!("no robot called {} answers in run {run}", args.robot))?;
     let answer: serde_json::Value = serde_json::from_slice(&payload(reply)?).into_diagnostic()?;
 
     // Epoch and tick around the value are for programs.

@@ -44,7 +44,13 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
     let export = Export::open(&folder, args.robot)?;
     let mut out = open_output(args.output.as_deref(), export.path())?;
     match export.write(&mut out, view) {
-        Ok(()) => Ok(ExitCode::SUCCESS),
+        Ok(notes) => {
+            // The document may be on its way to another program, so the notes go to the standard error.
+            for note in notes {
+                eprintln!("note: {note}");
+            }
+            Ok(ExitCode::SUCCESS)
+        }
         // The reader has closed its end of the pipe, as `head` does.
         Err(ExportError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => {
             Ok(ExitCode::SUCCESS)

@@ -154,7 +154,11 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
         cars: &cars,
     };
     let place = folder.canonicalize().into_diagnostic()?;
-    for (name, text) in [skeleton.program].iter().chain(skeleton.more).chain(&COMMON) {
+    for (name, text) in [skeleton.program]
+        .iter()
+        .chain(skeleton.more)
+        .chain(&COMMON)
+    {
         write(&place.join(name), &template.fill(text))?;
     }
     if args.lang == Language::Rust {
