@@ -72,6 +72,7 @@ pub(crate) fn conform(args: &ConformArgs) -> ExitCode {
         ExitCode::FAILURE
     }
 }
+
 fn check(args: &ConformArgs) -> miette::Result<Report> {
     let setting = setting(args)?;
     let (program, arguments) = args

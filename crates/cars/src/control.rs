@@ -261,6 +261,7 @@ fn ask(bus: &Bus, keys: &Keys, run: &RunRef, control: &Control) -> miette::Resul
 fn payload(reply: Reply) -> miette::Result<Vec<u8>> {
     reply.result.map_err(|reason| miette!("refused: {reason}"))
 }
+
 /// The status of a run as lines of text.
 fn describe(status: &Status) -> String {
     let mut text = headline(status);

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use config::units::Time;
-use launch::{Launch, LaunchOptions, Link, Outcome, Planned, What, code_of};
+use launch::{Launch, LaunchOptions, Outcome, Planned, ProcessLink, What, code_of};
 use miette::miette;
 use simulator::RunFolder;
 
@@ -50,7 +50,7 @@ pub(crate) struct LaunchArgs {
     /// Endpoint by which a process reaches the simulator, and the network namespace in which it runs. Set by `cars net
     /// play`.
     #[arg(long = "link", value_name = "PROCESS=ENDPOINT[@NAMESPACE]")]
-    links: Vec<Link>,
+    links: Vec<ProcessLink>,
     /// Folder of certificates that `cars secure init` made, instead of the launch file's.
     #[arg(long, value_name = "DIR")]
     secure: Option<PathBuf>,

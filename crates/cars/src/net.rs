@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
-use launch::net::{self, Flow, Order, Plan, Proxy, Shape, address};
+use launch::net::{self, Flow, LinkOrder, Plan, Proxy, Shape, address};
 use miette::{IntoDiagnostic, WrapErr};
 use protocol::RobotName;
 
@@ -119,7 +119,7 @@ fn play_plan(proxy: &Proxy, plan: &Plan, closes: bool) {
 fn obey_input(proxy: &Proxy, closes: bool) -> miette::Result<()> {
     for line in std::io::stdin().lock().lines() {
         let line = line.into_diagnostic()?;
-        match line.parse::<Order>() {
+        match line.parse::<LinkOrder>() {
             Ok(order) => {
                 proxy.set(closing(order.apply(proxy.shape()), closes));
                 println!("{}", proxy.shape());

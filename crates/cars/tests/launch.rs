@@ -201,7 +201,7 @@ fn what_is_started_by_somebody_else_is_printed_and_not_started() {
     let output = folder.cars(&["--connect-port", "7999"]).output().unwrap();
     let stderr = text(&output.stderr);
 
-    assert!(stderr.contains("Butler is yours to start"), "{stderr}");
+    assert!(stderr.contains("start Butler yourself"), "{stderr}");
     assert!(
         stderr.contains("CARS_CONNECT=tcp/127.0.0.1:7999 CARS_RUN=launch LEVEL='two words'"),
         "{stderr}"

@@ -32,11 +32,13 @@ impl Diagnostic for FileError {
             .as_ref()
             .map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
     }
+
     fn source_code(&self) -> Option<&dyn SourceCode> {
         self.place
             .as_ref()
             .map(|place| &place.source as &dyn SourceCode)
     }
+
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let label = self.place.as_ref().map(|place| place.label.clone());
         label.map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)

@@ -40,6 +40,7 @@ pub struct Export {
     first: Snapshot,
     only: Option<RobotName>,
 }
+
 /// Why a document is incomplete. It then has no end tag, so no program takes it for a complete one.
 #[derive(Debug)]
 pub enum ExportError {
@@ -120,6 +121,7 @@ impl Export {
         Ok(notes)
     }
 }
+
 fn check_robot(only: Option<&RobotName>, first: &Snapshot) -> miette::Result<()> {
     let Some(only) = only else {
         return Ok(());

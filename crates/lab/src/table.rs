@@ -40,6 +40,7 @@ pub fn heading(summary: &Summary) -> String {
     );
     text
 }
+
 /// One row for each robot; a cell may have several lines.
 #[must_use]
 pub fn rows(summary: &Summary) -> Vec<[String; 5]> {
@@ -92,6 +93,7 @@ fn shares(times_s: &BTreeMap<String, f64>, entered: Option<&BTreeMap<String, u64
     }
     lines.join("\n")
 }
+
 fn bar(share: f64) -> String {
     let eighths = (share.clamp(0.0, 1.0) * (BAR * 8) as f64).round() as usize;
     let partial = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'];

@@ -10,7 +10,7 @@ use protocol::messages::{CommandText, Performative};
 use protocol::{Event, RobotName};
 use simulator::Scenario;
 use simulator::diagnostic::{FileError, Source};
-use simulator::medium::{Decision, Medium, Underway};
+use simulator::medium::{Decision, Medium, SentCommand};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";
@@ -36,8 +36,8 @@ fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap()
 }
 
-fn command(from: &str, to: &str, seq: u64) -> Underway {
-    Underway {
+fn command(from: &str, to: &str, seq: u64) -> SentCommand {
+    SentCommand {
         to: name(to),
         from: name(from),
         seq,

@@ -647,7 +647,7 @@ fn a_last_line_that_broke_off_is_left_out_and_any_other_is_an_error() {
     );
     assert!(
         lab.refusal(&["timeless"])
-            .contains("a tick of 0 s cannot be")
+            .contains("a tick cannot last 0 s")
     );
 }
 

@@ -68,6 +68,7 @@ enum Scale {
     /// The intensity of the episode, tick by tick.
     Trace,
 }
+
 impl Kind {
     fn element(self) -> &'static str {
         match self {
@@ -198,6 +199,7 @@ impl<W: Write> Document<W> {
             ("duration", duration_ms.to_string()),
         ]
     }
+
     /// Writes the vocabularies and the end tag. Returns notes about episodes that were left out.
     pub(super) fn end(mut self) -> io::Result<Vec<String>> {
         let mut emotions = Vec::new();

@@ -85,6 +85,7 @@ impl Trace {
             }
         }
     }
+
     /// The numbers, one a tick.
     pub(super) fn values(&self) -> Option<&[f64]> {
         self.0.as_deref()
@@ -132,6 +133,7 @@ impl Episode {
         self.last = tick;
     }
 }
+
 /// The episodes in progress.
 #[derive(Debug, Default)]
 pub(super) struct Episodes {
@@ -142,6 +144,7 @@ pub(super) struct Episodes {
     /// What the document cannot express, for people.
     pub(super) notes: Vec<String>,
 }
+
 impl Episodes {
     /// Adds the state of a robot in a tick. Returns the episode that it ends.
     ///
@@ -169,6 +172,7 @@ impl Episodes {
         *before = robot;
         ended
     }
+
     /// The episodes in progress at the end of the run, by robot.
     pub(super) fn end(self) -> impl Iterator<Item = Episode> {
         self.robots.into_values().filter_map(|(_, episode)| episode)
@@ -199,6 +203,7 @@ fn begin(tick: Tick, before: &RobotState, robot: &RobotState) -> Option<Episode>
     let has_emotion = robot.has_emotion();
     has_emotion.then(|| Episode::begin(tick, before.clone(), robot.clone()))
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,6 +249,7 @@ mod tests {
             intensity,
         )
     }
+
     #[test]
     fn an_episode_lasts_as_long_as_the_emotion() {
         let found = episodes(vec![

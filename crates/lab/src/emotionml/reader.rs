@@ -50,6 +50,7 @@ pub(super) struct Reader {
     /// What the record lacks, for people.
     notes: Vec<String>,
 }
+
 impl Reader {
     /// Opens the recording of a run, or its events.
     ///
@@ -72,6 +73,7 @@ impl Reader {
             "{folder} has neither {RECORDING} nor {EVENTS}"
         ))
     }
+
     fn recording(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
         let header: RecordingHeader = lines.first()?;
         let mut notes = Vec::new();
@@ -86,6 +88,7 @@ impl Reader {
 
         Self::begin(lines, facts, None, notes)
     }
+
     fn events(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
         let Line {
             event: Event::Init { seed, tick_s, .. },
@@ -177,6 +180,7 @@ impl Reader {
         self.due += 1;
         Ok(Some(snapshot))
     }
+
     fn read(&mut self) -> miette::Result<Option<Snapshot>> {
         let Some(replay) = &mut self.replay else {
             let recorded: Option<RecordedTick> = self.lines.next()?;
@@ -261,6 +265,7 @@ impl Replay {
         self.robots.entry(name).or_insert(empty)
     }
 }
+
 /// The name of a run is that of its folder.
 fn name(folder: &RunFolder) -> miette::Result<RunName> {
     let path = folder.path().canonicalize().into_diagnostic()?;
@@ -287,6 +292,7 @@ fn parameters(folder: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<RobotName
     }
     parameters
 }
+
 /// A file with one JSON value a line.
 struct Lines {
     reader: BufReader<File>,
@@ -296,6 +302,7 @@ struct Lines {
     /// Whether the last line has no end: it is being written, or the run was interrupted while writing it.
     is_incomplete: bool,
 }
+
 impl Lines {
     fn open(path: PathBuf) -> miette::Result<Self> {
         let file = File::open(&path)

@@ -123,6 +123,7 @@ pub(super) fn text(raw: &str) -> String {
         })
         .collect()
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -155,6 +155,7 @@ impl Experiment {
         }
         done
     }
+
     fn scenario(&self, options: &Options, unit: &Unit<'_>) -> miette::Result<Scenario> {
         let mut set = options.set.clone();
         set.extend(unit.arm.set.iter().cloned());

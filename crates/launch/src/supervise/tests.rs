@@ -8,7 +8,7 @@ use nix::unistd::Pid;
 
 use super::super::plan::CommandLine;
 use super::super::restart::Restart;
-use super::super::screen::{Look, Screen};
+use super::super::screen::{Screen, ScreenOptions};
 use super::*;
 
 /// Longer than any test may take.
@@ -67,13 +67,13 @@ impl Hall {
                 self.planned.clone(),
                 self.folder.path(),
                 self.grace,
-                screen.tell(),
+                screen.handle(),
             );
             let queue = supervisor.queue();
             let running = tokio::spawn(supervisor.run());
             Self::ready(self.folder.path(), ready).await;
             for signal in signals {
-                queue.send(Event::Asked(*signal)).unwrap();
+                queue.send(SupervisorEvent::Asked(*signal)).unwrap();
             }
             running.await.unwrap()
         });
@@ -90,8 +90,8 @@ fn runtime() -> tokio::runtime::Runtime {
         .unwrap()
 }
 
-fn quiet() -> Look {
-    Look {
+fn quiet() -> ScreenOptions {
+    ScreenOptions {
         names: Vec::new(),
         is_quiet: true,
         has_colors_out: false,
@@ -344,7 +344,7 @@ fn nobody_is_left_behind_when_the_launcher_gives_up_in_the_middle() {
                 hall.planned.clone(),
                 hall.folder.path(),
                 grace,
-                screen.tell(),
+                screen.handle(),
             );
             tokio::spawn(supervisor.run());
             Hall::ready(hall.folder.path(), &["deaf"]).await;

@@ -10,7 +10,7 @@ use toml::Spanned;
 use world::Triangular;
 
 use super::super::checked::RobotSpec;
-use super::super::network::{Burst, Channel, Link, Network, Partition, ticks};
+use super::super::network::{Burst, Channel, LinkRule, Network, Partition, ticks};
 use super::range::Range;
 
 /// Longest time for which a command can be held back: whoever sends it must be able to repeat it until then.
@@ -145,9 +145,9 @@ impl Checker<'_> {
         Err(self.refuse(span, &format!("no robot of this scenario is called {name}")))
     }
 
-    fn link(&self, raw: LinkTable) -> Result<Link, FileError> {
+    fn link(&self, raw: LinkTable) -> Result<LinkRule, FileError> {
         let (commands, queries) = (self.commands(raw.commands)?, self.queries(raw.queries)?);
-        Ok(Link {
+        Ok(LinkRule {
             from: self.known(raw.from)?,
             to: self.known(raw.to)?,
             commands,
@@ -281,7 +281,7 @@ impl NetworkTable {
         }
 
         let spanned = |channel| Spanned::new(0..0, ChannelTable::from(channel));
-        let link = |link: &Link| LinkTable {
+        let link = |link: &LinkRule| LinkTable {
             from: Spanned::new(0..0, link.from.clone()),
             to: Spanned::new(0..0, link.to.clone()),
             commands: link.commands.map(spanned),
