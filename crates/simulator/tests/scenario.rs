@@ -148,7 +148,7 @@ fn a_fault_ends_by_the_wall_clock_only_where_the_clock_waits() {
         let by_wall = with("on_late = \"continue\"", kind, "for = \"1 s\"");
         let error = shown(&by_wall.unwrap_err());
         assert!(
-            error.contains("goes on without A") && error.contains("say `until`"),
+            error.contains("continues without A") && error.contains("say `until`"),
             "{kind}: {error}"
         );
     }
