@@ -88,7 +88,8 @@ impl Certificates {
         let is_ours = has_ca || folder.join(SIMULATOR).join(CONFIG).exists();
         let entries = folder.read_dir();
         let is_empty = !entries.is_ok_and(|mut entries| entries.next().is_some());
-        if !is_empty && !(self.replaces && is_ours) {
+        let is_free = is_empty || (self.replaces && is_ours);
+        if !is_free {
             let help = if is_ours {
                 "--force makes new files; all earlier certificates are then useless"
             } else {

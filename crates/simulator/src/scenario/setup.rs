@@ -43,7 +43,7 @@ impl Scenario {
 
         scenario.seed = setup.seed;
         if let Err(error) = config::seed::check(setup.seed) {
-            errors.add("seed", error);
+            errors.add("seed", &error);
         }
 
         let ticks = (setup.duration_s / self.tick_s).round();
@@ -53,7 +53,7 @@ impl Scenario {
             let reason = format!(
                 "the duration must be at least one tick of {tick_s} s and at most a billion"
             );
-            errors.add("duration_s", reason);
+            errors.add("duration_s", &reason);
         }
 
         scenario.field_m = setup.field_m;
@@ -64,14 +64,14 @@ impl Scenario {
         scenario.record.log = setup.log_file.enabled;
         match files::check_log_name(&setup.log_file.name) {
             Ok(()) => scenario.record.log_name.clone_from(&setup.log_file.name),
-            Err(error) => errors.add("log_file.name", error),
+            Err(error) => errors.add("log_file.name", &error),
         }
 
         // Placing needs valid fields.
         if errors.0.is_empty()
             && let Err(error) = placing::check(&scenario)
         {
-            errors.add(&error.field(), error);
+            errors.add(&error.field(), &error);
         }
 
         if errors.0.is_empty() {
@@ -95,14 +95,14 @@ impl Scenario {
         for (name, robot) in &mut self.robots {
             match setup.robots.get(name) {
                 Some(at) => robot.at = *at,
-                None => errors.add(&format!("robots.{name}"), "its location is missing"),
+                None => errors.add(&format!("robots.{name}"), &"its location is missing"),
             }
         }
 
         for name in setup.robots.keys() {
             if !self.robots.contains_key(name) {
                 let reason = "no robot of this run has this name";
-                errors.add(&format!("robots.{name}"), reason);
+                errors.add(&format!("robots.{name}"), &reason);
             }
         }
     }
@@ -145,7 +145,7 @@ fn range(shape: &Triangular) -> Range {
 struct Errors(Vec<FieldError>);
 
 impl Errors {
-    fn add(&mut self, field: &str, reason: impl ToString) {
+    fn add(&mut self, field: &str, reason: &dyn std::fmt::Display) {
         self.0.push(FieldError {
             field: field.to_owned(),
             reason: reason.to_string(),
@@ -157,7 +157,7 @@ impl Errors {
         match Triangular::new(range.min, range.mode, range.max) {
             Ok(distribution) => Some(distribution),
             Err(error) => {
-                self.add(field, error);
+                self.add(field, &error);
                 None
             }
         }
