@@ -156,7 +156,7 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
     let missed = events.iter().filter(|event| event["event"] == "missed");
     assert!(
         missed.clone().all(|event| event["robot"] == "Leguin"),
-        "nobody else missed anything"
+        "only the cut robot missed ticks"
     );
     assert!(
         missed.count() as u64 >= joined - lost,

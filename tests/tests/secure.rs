@@ -118,7 +118,7 @@ impl Castle {
         castle
     }
 
-    /// A further session with somebody's certificate: a stolen key, or a robot that does what it should not.
+    /// A further session with a participant's certificate: a stolen key, or a robot that misbehaves.
     fn enter(&self, participant: &str) -> Bus {
         open(&self.endpoint, Some(&config(&self.folder, participant))).unwrap()
     }
@@ -149,7 +149,7 @@ impl Castle {
         })
     }
 
-    /// Plays the rest, and compares the record with that of a run that nobody disturbed.
+    /// Plays the rest, and compares the record with that of an undisturbed run.
     fn finish_unharmed(mut self) {
         self.control(&Control::Start);
         self.launch.finish();
@@ -201,7 +201,7 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
         "WAIT"
     );
 
-    // By its address alone nobody gets in, and is told what is missing.
+    // The address alone does not suffice, and the error names what is missing.
     let (_, text) = lab.fails(&[
         "ctl",
         "stop",
@@ -263,7 +263,7 @@ fn nobody_enters_without_a_certificate_of_this_authority() {
         let opened = open(endpoint, config.as_ref());
         assert!(
             opened.is_err(),
-            "{endpoint} let somebody in with {config:?}"
+            "{endpoint} accepted a session with {config:?}"
         );
     }
 

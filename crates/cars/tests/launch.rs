@@ -1,4 +1,4 @@
-//! `cars launch` as a process: what it prints, how it ends, and that it leaves nobody behind. Shells play simulator
+//! `cars launch` as a process: what it prints, how it ends, and that it leaves no process behind. Shells play simulator
 //! and robots; nothing here needs the bus.
 
 #![allow(

@@ -64,10 +64,13 @@ fn add_states(
     tick: Tick,
 ) {
     for (name, performance) in performances {
-        let (Some(report), Some(location)) = (simulation.report(name), simulation.location(name))
-        else {
+        let Some(report) = simulation.report(name) else {
             continue;
         };
+        let Some(location) = simulation.location(name) else {
+            continue;
+        };
+
         performance.states.push(PublicState {
             epoch: report.epoch,
             tick,

@@ -192,8 +192,11 @@ fn the_command_line_changes_a_scenario() {
 
     let unknown = shown(&load(&["guest.count=7"]).unwrap_err());
     assert!(unknown.contains("unknown field `guest`"), "{unknown}");
-    let nobody = shown(&load(&["robot.Vonda.class=X"]).unwrap_err());
-    assert!(nobody.contains("called or numbered \"Vonda\""), "{nobody}");
+    let unknown = shown(&load(&["robot.Vonda.class=X"]).unwrap_err());
+    assert!(
+        unknown.contains("called or numbered \"Vonda\""),
+        "{unknown}"
+    );
 }
 
 #[test]

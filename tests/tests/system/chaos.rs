@@ -1,4 +1,4 @@
-//! Processes are killed and stopped and their links cut at random, drawn from a seed: nothing hangs, nobody is left behind,
+//! Processes are killed and stopped and their links cut at random, drawn from a seed: nothing hangs, no process is left behind,
 //! the record is whole and names whom it happened to. A short version runs always; `CARS_CHAOS=200` plays as many events as
 //! it says, `CARS_CHAOS_SEED` others.
 
@@ -33,7 +33,7 @@ enum Blow {
 /// The link of a robot: a proxy that obeys.
 struct Cable {
     proxy: Child,
-    /// What it says; kept, because a program that nobody listens to ends.
+    /// Its output, which must be read: a program with a closed pipe ends.
     _said: BufReader<ChildStdout>,
     endpoint: String,
     /// When it is to be whole again.
@@ -227,7 +227,7 @@ fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
         let (mut launch, mut cables) = start(&lab, &run, *n);
         let mut chance = stream(seed, &run);
         let struck = strike(&run, &mut cables, events / launches, &mut chance);
-        // The clock still goes, whoever is missing.
+        // The clock still runs, whichever robots are missing.
         let tick = || status(&lab, &run).unwrap()["tick"].as_u64().unwrap();
         let reached = tick();
         eventually("further ticks", || (tick() > reached + 10).then_some(()));
@@ -299,7 +299,7 @@ fn a_robot_that_is_cut_off_while_the_run_is_initialized_returns() {
     assert!(acted[0] >= joined[1], "it acted: {acted:?}");
 }
 
-/// Every line is whole, every tick is there once and in order, and everybody who was struck is named.
+/// Every line is complete, every tick is there once and in order, and every robot with a fault is named.
 fn check_record(lab: &Lab, run: &str, struck: &BTreeSet<String>) {
     let bytes = lab.bytes(run);
     assert!(bytes.ends_with(b"\n"));

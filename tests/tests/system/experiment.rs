@@ -371,7 +371,7 @@ fn t12_who_blocks_leguin_frustrates_butler_who_intercepts_and_else_he_does_not()
     }
 
     let share = share_intercepted(&["guests.count=0"]);
-    println!("nobody in front of Leguin: {share:.3} of the exchanges begun from INTERCEPT");
+    println!("no guest in front of Leguin: {share:.3} of the exchanges begun from INTERCEPT");
     assert!(share <= 0.05, "{share}");
 }
 
@@ -611,7 +611,7 @@ fn shown<'a>(page: &'a str, file: &str) -> &'a str {
     block.split_once("```").unwrap().0
 }
 
-/// Vera, whom `crates/robots/tests/new_robot.rs` plays in memory, as somebody starts her who follows the page.
+/// Vera, whom `crates/robots/tests/new_robot.rs` plays in memory, started as the page describes.
 #[test]
 fn the_robot_of_the_documentation_runs_as_a_process() {
     let (lab, page) = (

@@ -768,7 +768,7 @@ fn a_huge_run_is_exported_as_it_is_read() {
     assert!(child.wait().unwrap().success());
 }
 
-/// A document of nobody's making that keeps all rules and uses all parts.
+/// A document written by hand that keeps all rules and uses all parts.
 const SOUND: &str = r##"<?xml version="1.0" encoding="UTF-8"?>
 <emotionml version="1.0" xmlns="http://www.w3.org/2009/10/emotionml" dimension-set="http://www.w3.org/TR/emotion-voc/xml#fsre-dimensions">
   <info>a <b xmlns="urn:other"/></info>

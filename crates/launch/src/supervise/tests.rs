@@ -117,7 +117,7 @@ fn shell(name: &str, script: &str) -> Planned {
     }
 }
 
-/// Whether the process whose number is in a file is still there; one that nobody has reaped yet is not.
+/// Whether the process with this id is running. A zombie is not.
 fn is_alive(pid: &str) -> bool {
     let pid: i32 = pid.trim().parse().expect("a process wrote its number");
     let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
@@ -311,7 +311,7 @@ fn asked_once_all_are_ended_also_one_that_is_stopped() {
 
     assert!(
         begun.elapsed() < Duration::from_secs(10),
-        "nobody had to be killed"
+        "a process had to be killed"
     );
     assert_eq!(
         (outcome.failure, outcome.asked),
@@ -334,7 +334,7 @@ fn asked_twice_all_are_killed_at_once() {
 }
 
 #[test]
-fn nobody_is_left_behind_when_the_launcher_gives_up_in_the_middle() {
+fn no_process_is_left_behind_when_the_launcher_panics() {
     let hall = Hall::new(FOREVER).with(shell("Butler", DEAF));
     let screen = Screen::open(quiet());
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {

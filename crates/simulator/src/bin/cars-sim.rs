@@ -43,7 +43,7 @@ struct Args {
     /// Changes of the scenario, for example `guests.count=50`.
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<Override>,
-    /// Wait for `start` once everybody is there.
+    /// Wait for `start` once all robots have joined.
     #[arg(long)]
     paused: bool,
     /// A configuration file of the middleware instead of the built-in settings.
@@ -52,8 +52,8 @@ struct Args {
     /// The operator's configuration file of a secured run: `cars ctl` and others find it by the run's folder.
     #[arg(long, value_name = "FILE")]
     operator_config: Option<PathBuf>,
-    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the run
-    /// and pose as any robot.
+    /// Listen where other machines can connect, without certificates. Any program that connects there can control the run
+    /// and take the place of any robot.
     #[arg(long)]
     insecure: bool,
 }
