@@ -79,6 +79,20 @@ const OVER_PIPES: &str = "\
 `docs/protocol.md` of the CARS project, \"Robots over stdin and stdout\", lists what a robot can send in a tick besides the
 line `done`: queries and commands to other robots, requests for the bodies near it, and random numbers.";
 
+impl Skeleton {
+    /// A robot over standard input and output that needs no build.
+    fn over_pipes(language: &'static str, file: &'static str, text: &'static str) -> Self {
+        Self {
+            language,
+            program: (file, text),
+            more: &[],
+            command: "",
+            build: "",
+            hint: OVER_PIPES,
+        }
+    }
+}
+
 impl Language {
     fn skeleton(self) -> Skeleton {
         match self {
@@ -103,29 +117,22 @@ impl Language {
                 hint: "`sdk/python/README.md` of the CARS project documents what a robot can do in a tick.",
             },
             Self::C => Skeleton {
-                language: "C",
-                program: ("robot.c", include_str!("new/c/robot.c")),
-                more: &[],
-                command: r#"["cars", "exec", "--", "./robot"]"#,
                 // A fused multiply-add rounds once instead of twice, so results would differ between machines.
                 build: "cc -std=c11 -O2 -ffp-contract=off -Wall -Wextra -o @FOLDER@/robot @FOLDER@/robot.c -lm",
-                hint: OVER_PIPES,
+                command: r#"["cars", "exec", "--", "./robot"]"#,
+                ..Skeleton::over_pipes("C", "robot.c", include_str!("new/c/robot.c"))
             },
             Self::Bash => Skeleton {
-                language: "Bash",
-                program: ("robot.sh", include_str!("new/bash/robot.sh")),
-                more: &[],
                 command: r#"["cars", "exec", "--", "./robot.sh"]"#,
-                build: "",
-                hint: OVER_PIPES,
+                ..Skeleton::over_pipes("Bash", "robot.sh", include_str!("new/bash/robot.sh"))
             },
             Self::Node => Skeleton {
-                language: "JavaScript (Node.js)",
-                program: ("robot.mjs", include_str!("new/node/robot.mjs")),
-                more: &[],
                 command: r#"["cars", "exec", "--", "./robot.mjs"]"#,
-                build: "",
-                hint: OVER_PIPES,
+                ..Skeleton::over_pipes(
+                    "JavaScript (Node.js)",
+                    "robot.mjs",
+                    include_str!("new/node/robot.mjs"),
+                )
             },
         }
     }
