@@ -31,6 +31,7 @@ fn figure_6(seed: u64) -> Option<Hall> {
             return Some(hall);
         }
     }
+
     None
 }
 
@@ -58,12 +59,14 @@ fn draw(hall: &Hall) -> String {
             "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{side:.1}\" height=\"{side:.1}\" fill=\"#222\"/>"
         ));
     }
+
     for at in world.guests() {
         let (x, y, r) = (at.x * SCALE, y(at.y), side / 2.0);
         put(format!(
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r:.1}\" fill=\"#b9e3bd\" stroke=\"#3d8b46\"/>"
         ));
     }
+
     for (index, name) in hall.simulation.names().iter().enumerate() {
         let (at, r, name) = (hall.at(name.as_str()), side / 2.0, name.as_str());
         let (x, y) = (at.x * SCALE, y(at.y));
@@ -93,5 +96,6 @@ fn draw(hall: &Hall) -> String {
             ));
         }
     }
+
     svg + "</svg>\n"
 }

@@ -13,6 +13,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [connect, key] = arguments.as_slice() else {
         return Err("put ENDPOINT KEY < MESSAGE".into());
     };
+
     let mut message = Vec::new();
     std::io::stdin().read_to_end(&mut message)?;
     let bus = Bus::open(
@@ -22,7 +23,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         },
         None,
     )?;
+
     bus.put(key, message)?;
     bus.close();
+
     Ok(())
 }

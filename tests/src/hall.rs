@@ -1,4 +1,4 @@
-//! The hall in this process, tick by tick, where a test must see what no record shows: who is where.
+//! The hall in this process, tick by tick, for tests that need the locations of robots, which are not in the record.
 
 use std::path::Path;
 
@@ -21,16 +21,16 @@ pub struct Hall {
 /// A shipped scenario with changes.
 #[must_use]
 pub fn scenario(file: &str, seed: u64, set: &[&str]) -> Scenario {
-    let set = set
-        .iter()
-        .map(|change| change.parse().expect("a legal change"))
-        .collect();
+    let set = set.iter();
+    let set = set.map(|change| change.parse().expect("a legal change"));
     let changes = Changes {
         seed: Some(seed),
         duration_s: None,
-        set,
+        set: set.collect(),
     };
+
     let file = root().join(Path::new(file));
+
     Scenario::load(&file, &changes).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
 }
 
@@ -49,12 +49,10 @@ impl Hall {
         Self { simulation, robots }
     }
 
-    /// One tick; returns what happened.
+    /// Runs one tick; returns its events.
     pub fn step(&mut self) -> Vec<Event> {
-        self.simulation
-            .step(&mut self.robots)
-            .expect("only tick 0 can fail")
-            .events
+        let record = self.simulation.step(&mut self.robots);
+        record.expect("only tick 0 can fail").events
     }
 
     /// Simulated time, seconds.
@@ -63,45 +61,34 @@ impl Hall {
         self.simulation.time_s(self.simulation.tick())
     }
 
-    /// Where a robot is.
+    /// Location of a robot.
     #[must_use]
     pub fn at(&self, robot: &str) -> Point {
-        self.simulation
-            .location(&name(robot))
-            .expect("it is of the roster")
+        let location = self.simulation.location(&name(robot));
+        location.expect("it is in the roster")
     }
 
-    /// A robot's emotion.
+    /// Emotion of a robot; empty before its first report.
     #[must_use]
     pub fn emotion(&self, robot: &str) -> String {
-        self.simulation
-            .report(&name(robot))
-            .map(|report| report.emotion_state.clone())
-            .unwrap_or_default()
+        let report = self.simulation.report(&name(robot));
+        report.map_or_else(String::new, |report| report.emotion_state.clone())
     }
 
-    /// A robot's behavior.
+    /// Behavior of a robot; empty before its first report.
     #[must_use]
     pub fn behavior(&self, robot: &str) -> String {
-        self.simulation
-            .report(&name(robot))
-            .map(|report| report.behavior_state.clone())
-            .unwrap_or_default()
+        let report = self.simulation.report(&name(robot));
+        report.map_or_else(String::new, |report| report.behavior_state.clone())
     }
 
-    /// A number that a robot publishes.
+    /// A state variable of a robot that is a number.
     #[must_use]
     pub fn number(&self, robot: &str, variable: &str) -> f64 {
-        let variables = self
-            .simulation
-            .state_variables(&name(robot))
-            .expect("it has reported");
-        let value = variables
-            .get(variable)
-            .unwrap_or_else(|| panic!("{robot} does not publish {variable}"));
-        value
-            .as_f64()
-            .unwrap_or_else(|| panic!("{variable} of {robot} is no number"))
+        let variables = self.simulation.state_variables(&name(robot));
+        let value = variables.expect("it has reported").get(variable);
+        let number = value.and_then(protocol::messages::Variable::as_f64);
+        number.unwrap_or_else(|| panic!("{robot} does not publish a number {variable}"))
     }
 }
 

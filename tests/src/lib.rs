@@ -1,4 +1,4 @@
-//! What the whole-system tests stand on: the real programs, their folders, their processes.
+//! Support for whole-system tests: the real programs, their folders, their processes.
 
 #![expect(
     clippy::unwrap_used,
@@ -13,13 +13,13 @@ pub mod network;
 pub mod processes;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use processes::Running;
 
-/// Longest that anything here may take before it counts as hung.
+/// Longest wait of a test.
 pub const PATIENCE: Duration = Duration::from_secs(90);
 
 /// Root of the project.
@@ -31,8 +31,8 @@ pub fn root() -> PathBuf {
         .to_owned()
 }
 
-/// Cargo without the variables that it sets for a test's own package: build scripts that read them would run again, and
-/// half of the tree would be compiled again.
+/// Cargo without the variables that it sets for the package of a test: build scripts that read them would run again, and
+/// half of the workspace would be compiled again.
 #[must_use]
 pub fn cargo() -> Command {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
@@ -44,6 +44,7 @@ pub fn cargo() -> Command {
             cargo.env_remove(name);
         }
     }
+
     cargo
 }
 
@@ -51,13 +52,14 @@ pub fn cargo() -> Command {
 #[must_use]
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
+
     PROGRAMS.get_or_init(|| {
         // The test itself is `target/{profile}/deps/…`.
         let own = std::env::current_exe().unwrap();
         let folder = own.parent().and_then(Path::parent).unwrap().to_owned();
         let mut build = cargo();
-        // With the features that `cargo test --workspace` gives dependencies, or these would be compiled again: those of
-        // all packages, and, because examples may use them, of what tests depend on. The tests themselves are not built.
+        // All packages and examples, so that dependencies have the same features as in `cargo test --workspace` and are
+        // not compiled again.
         build
             .current_dir(root())
             .args(["build", "--workspace", "--bins", "--examples", "--quiet"]);
@@ -72,7 +74,7 @@ pub fn programs() -> &'static Path {
     })
 }
 
-/// A place of its own for the runs of one test, and the means to execute them.
+/// A temporary folder for the runs of one test.
 pub struct Lab {
     folder: tempfile::TempDir,
 }
@@ -92,7 +94,7 @@ impl Lab {
         }
     }
 
-    /// Where its runs are kept.
+    /// The folder of its runs.
     #[must_use]
     pub fn out(&self) -> &Path {
         self.folder.path()
@@ -105,7 +107,7 @@ impl Lab {
         file
     }
 
-    /// The `cars` program in this lab, from the project's root.
+    /// The program `cars` with `--out` set to this lab, in the project's root.
     #[must_use]
     pub fn cars(&self, args: &[&str]) -> Command {
         let mut command = Command::new(programs().join("cars"));
@@ -117,52 +119,39 @@ impl Lab {
             .stdin(Stdio::null())
             .env_remove("CARS_RUN")
             .env_remove("CARS_CONNECT");
+
         command
     }
 
-    /// Runs `cars` to its end and returns what it printed; it must succeed.
+    /// Runs `cars`, which must succeed, and returns its standard output.
     pub fn ok(&self, args: &[&str]) -> String {
         let output = self.cars(args).output().unwrap();
-        let (out, err) = (
-            String::from_utf8_lossy(&output.stdout),
-            String::from_utf8_lossy(&output.stderr),
-        );
-        assert!(
-            output.status.success(),
-            "cars {args:?}: {}\n{out}\n{err}",
-            output.status
-        );
-        out.into_owned()
+        let status = output.status;
+        let text = printed(&output);
+        assert!(status.success(), "cars {args:?}: {status}\n{text}");
+
+        String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// Runs `cars` to its end and returns its exit status and all that it printed; it must fail.
+    /// Runs `cars`, which must fail, and returns its exit status and its output.
     pub fn fails(&self, args: &[&str]) -> (i32, String) {
         let output = self.cars(args).output().unwrap();
-        let text = format!(
-            "{}{}",
-            String::from_utf8_lossy(&output.stdout),
-            String::from_utf8_lossy(&output.stderr)
-        );
+        let text = printed(&output);
         assert!(!output.status.success(), "cars {args:?} succeeded:\n{text}");
         (output.status.code().unwrap_or(-1), text)
     }
 
-    /// Runs `cars` with exactly these arguments and returns its exit status and all that it printed.
+    /// Runs `cars` with exactly these arguments and returns its exit status and its output.
     pub fn cars_without_out(&self, args: &[&str]) -> (i32, String) {
         let output = Command::new(programs().join("cars"))
             .current_dir(root())
             .args(args)
             .output()
             .unwrap();
-        let text = format!(
-            "{}{}",
-            String::from_utf8_lossy(&output.stdout),
-            String::from_utf8_lossy(&output.stderr)
-        );
-        (output.status.code().unwrap_or(-1), text)
+        (output.status.code().unwrap_or(-1), printed(&output))
     }
 
-    /// Starts `cars` and leaves it running. `run` is the name of the run, which finds its processes again.
+    /// Starts `cars` without waiting for its end. `run` is the name of the run, by which its processes are found.
     pub fn start(&self, run: &str, args: &[&str]) -> Running {
         let mut command = self.cars(args);
         command.args(["--run", run]);
@@ -175,7 +164,7 @@ impl Lab {
         self.out().join(run).join(name)
     }
 
-    /// The events of a run, byte for byte.
+    /// The bytes of a run's events.
     #[must_use]
     pub fn bytes(&self, run: &str) -> Vec<u8> {
         let file = self.file(run, "events.jsonl");
@@ -198,35 +187,39 @@ impl Lab {
     }
 }
 
-/// Asserts that two runs are the same, and shows the first event that differs if not.
-pub fn assert_same(a: (&str, &[u8]), b: (&str, &[u8])) {
-    if a.1 == b.1 {
-        return;
-    }
-    let lines = |bytes: &[u8]| {
-        String::from_utf8_lossy(bytes)
-            .lines()
-            .map(str::to_owned)
-            .collect::<Vec<_>>()
-    };
-    let (left, right) = (lines(a.1), lines(b.1));
-    let at = left
-        .iter()
-        .zip(&right)
-        .position(|(l, r)| l != r)
-        .unwrap_or(left.len().min(right.len()));
-    panic!(
-        "{} and {} differ from line {} on:\n  {}\n  {}",
-        a.0,
-        b.0,
-        at + 1,
-        left.get(at).map_or("(end)", String::as_str),
-        right.get(at).map_or("(end)", String::as_str)
-    );
+/// Standard output and standard error of a program.
+fn printed(output: &Output) -> String {
+    let streams = [&output.stdout, &output.stderr];
+    streams.map(|text| String::from_utf8_lossy(text)).concat()
 }
 
-/// Runs checks side by side, each in a thread of its own, and fails with the names of those that failed. For checks that
-/// mostly wait: the test harness runs no more tests at a time than the machine has processors.
+/// Asserts that two runs, given by name and events, are the same. Shows the first event that differs.
+pub fn assert_same(a: (&str, &[u8]), b: (&str, &[u8])) {
+    let (a, a_bytes) = a;
+    let (b, b_bytes) = b;
+    if a_bytes == b_bytes {
+        return;
+    }
+
+    let a_text = String::from_utf8_lossy(a_bytes);
+    let b_text = String::from_utf8_lossy(b_bytes);
+    let mut a_lines = a_text.lines();
+    let mut b_lines = b_text.lines();
+    for number in 1.. {
+        let line = a_lines.next();
+        let other = b_lines.next();
+        assert!(
+            line == other,
+            "{a} and {b} differ from line {number} on:\n  {}\n  {}",
+            line.unwrap_or("(end)"),
+            other.unwrap_or("(end)")
+        );
+        assert!(line.is_some(), "{a} and {b} differ in the ends of lines");
+    }
+}
+
+/// Runs checks at the same time, each on a thread of its own, and fails with the names of those that failed. It is for
+/// checks that mostly wait, because the test harness runs only as many tests at a time as there are processors.
 pub fn side_by_side(checks: &[(&str, &(dyn Fn() + Sync))]) {
     let mut failed = Vec::new();
     std::thread::scope(|scope| {
@@ -241,10 +234,11 @@ pub fn side_by_side(checks: &[(&str, &(dyn Fn() + Sync))]) {
             }
         }
     });
+
     assert!(failed.is_empty(), "{failed:?} failed; see above");
 }
 
-/// Waits until `ready` gives something, and fails if it never does.
+/// Waits until `ready` returns a value; fails after [`PATIENCE`].
 pub fn eventually<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
     let begun = Instant::now();
     loop {

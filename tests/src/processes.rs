@@ -1,4 +1,4 @@
-//! Real processes: found, stopped, killed, measured.
+//! Finds, signals and measures real processes.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use nix::unistd::Pid;
 
 use crate::{PATIENCE, eventually};
 
-/// A program that runs, with all that it has printed so far.
+/// A running program and its output so far.
 pub struct Running {
     child: Child,
     run: String,
@@ -31,6 +31,7 @@ impl Running {
         let printed = Arc::default();
         collect(child.stdout.take(), &printed);
         collect(child.stderr.take(), &printed);
+
         Self {
             child,
             run: run.to_owned(),
@@ -39,32 +40,26 @@ impl Running {
         }
     }
 
-    /// All that it has printed.
+    /// Its output so far.
     #[must_use]
     pub fn printed(&self) -> String {
         let lines = self.printed.lock().expect("no reader panics");
         lines.iter().map(|(_, line)| format!("{line}\n")).collect()
     }
 
-    /// Waits until it prints a line that contains `text`, and returns when that was.
+    /// Waits for a line of output that contains `text`; returns its time.
     pub fn prints(&mut self, text: &str) -> Instant {
         self.prints_after(text, None)
     }
 
-    /// The same, but only what it prints after a moment counts.
+    /// Waits for a line of output after a time; returns its time.
     pub fn prints_after(&mut self, text: &str, after: Option<Instant>) -> Instant {
-        let printed = self.printed.clone();
         let begun = Instant::now();
         loop {
-            let found = printed
-                .lock()
-                .expect("no reader panics")
-                .iter()
-                .find(|(at, line)| after.is_none_or(|after| *at > after) && line.contains(text))
-                .map(|(at, _)| *at);
-            if let Some(at) = found {
+            if let Some(at) = self.find_printed(text, after) {
                 return at;
             }
+
             let is_over = self.child.try_wait().expect("it is our child").is_some();
             assert!(
                 !is_over && begun.elapsed() < PATIENCE,
@@ -75,9 +70,20 @@ impl Running {
         }
     }
 
-    /// Waits for its end.
+    fn find_printed(&self, text: &str, after: Option<Instant>) -> Option<Instant> {
+        let lines = self.printed.lock().expect("no reader panics");
+        for (at, line) in lines.iter() {
+            if after.is_none_or(|after| *at > after) && line.contains(text) {
+                return Some(*at);
+            }
+        }
+        None
+    }
+
+    /// Waits for its exit.
     pub fn wait(&mut self) -> ExitStatus {
         let begun = Instant::now();
+
         loop {
             if let Some(status) = self.child.try_wait().expect("it is our child") {
                 return status;
@@ -91,7 +97,7 @@ impl Running {
         }
     }
 
-    /// Waits for its end, which must be a success.
+    /// Waits for its exit, which must be a success.
     pub fn finish(&mut self) {
         let status = self.wait();
         assert!(status.success(), "{status}:\n{}", self.printed());
@@ -103,29 +109,28 @@ impl Running {
         self.child.id()
     }
 
-    /// Sends the program itself a signal.
+    /// Sends a signal to the program.
     pub fn signal(&self, signal: Signal) {
         send(self.child.id(), signal);
     }
 
-    /// The process of the run whose program is called `program`, once it is there.
+    /// Waits for the process of the run with this program.
     #[must_use]
     pub fn process(&self, program: &str) -> u32 {
         eventually(program, || {
-            find(&self.run)
-                .into_iter()
-                .find(|(_, name)| name == program)
-                .map(|(pid, _)| pid)
+            let processes = find(&self.run);
+            let found = processes.into_iter().find(|(_, name)| name == program)?;
+            Some(found.0)
         })
     }
 
-    /// The run's processes: those that carry its name in their environment or arguments, with their programs' names.
+    /// The processes of the run: those with its name in their environment or arguments, and the names of their programs.
     #[must_use]
     pub fn processes(&self) -> Vec<(u32, String)> {
         find(&self.run)
     }
 
-    /// Processor time that the run's processes have used so far, seconds.
+    /// Processor time of the run's processes so far, seconds.
     #[must_use]
     pub fn cpu_s(&self) -> f64 {
         find(&self.run).iter().map(|(pid, _)| cpu_s(*pid)).sum()
@@ -143,9 +148,11 @@ impl Drop for Running {
 }
 
 fn collect(from: Option<impl Read + Send + 'static>, into: &Arc<Mutex<Vec<(Instant, String)>>>) {
-    let (Some(from), into) = (from, into.clone()) else {
+    let Some(from) = from else {
         return;
     };
+
+    let into = into.clone();
     std::thread::spawn(move || {
         for line in BufReader::new(from).lines().map_while(Result::ok) {
             into.lock()
@@ -159,78 +166,77 @@ fn pid_of(pid: u32) -> Pid {
     Pid::from_raw(i32::try_from(pid).expect("process ids are small"))
 }
 
-/// Sends a process a signal.
+/// Sends a signal to a process.
 pub fn send(pid: u32, signal: Signal) {
     kill(pid_of(pid), signal).expect("the process is there");
 }
 
-/// Processes whose environment or arguments carry the name of a run. A test gives its runs names that no other has.
+/// Processes with the name of a run in their environment or arguments. Each test has its own names of runs.
 #[must_use]
 pub fn find(run: &str) -> Vec<(u32, String)> {
-    let is_of_run = |pid: u32| {
-        let read = |file: &str| std::fs::read(format!("/proc/{pid}/{file}")).unwrap_or_default();
-        let holds = |bytes: Vec<u8>, text: String| {
-            bytes
-                .windows(text.len())
-                .any(|part| part == text.as_bytes())
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir("/proc").expect("this is Linux").flatten() {
+        let name = entry.file_name();
+        let Some(pid) = name.to_str().and_then(|name| name.parse().ok()) else {
+            continue;
         };
-        let arguments = |separator| format!("--run{separator}{run}\0");
-        holds(read("environ"), format!("CARS_RUN={run}\0"))
-            || holds(read("cmdline"), arguments('='))
-            || holds(read("cmdline"), arguments('\0'))
-    };
-    let pids = std::fs::read_dir("/proc").expect("this is Linux").flatten();
-    let pids = pids.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
-    let own = std::process::id();
-    let alive =
-        |pid: &u32| stat(*pid).is_some_and(|stat| stat.first().is_some_and(|state| state != "Z"));
-    pids.filter(|pid| *pid != own && is_of_run(*pid) && alive(pid))
-        .map(|pid| (pid, program(pid)))
-        .collect()
+        if pid != std::process::id() && is_of_run(pid, run) && is_alive(pid) {
+            found.push((pid, program(pid)));
+        }
+    }
+    found
 }
 
-/// The process of a run that runs the robot called `robot`, if it is there.
+fn is_of_run(pid: u32, run: &str) -> bool {
+    contains(pid, "environ", &format!("CARS_RUN={run}\0"))
+        || contains(pid, "cmdline", &format!("--run={run}\0"))
+        || contains(pid, "cmdline", &format!("--run\0{run}\0"))
+}
+
+/// Whether a file of a process in `/proc` contains a text.
+fn contains(pid: u32, file: &str, text: &str) -> bool {
+    let bytes = std::fs::read(format!("/proc/{pid}/{file}")).unwrap_or_default();
+    let mut parts = bytes.windows(text.len());
+    parts.any(|part| part == text.as_bytes())
+}
+
+/// Whether a process exists and is not a zombie.
+fn is_alive(pid: u32) -> bool {
+    let stat = stat(pid).unwrap_or_default();
+    stat.first().is_some_and(|state| state != "Z")
+}
+
+/// The process of a run with the robot called `robot`.
 #[must_use]
 pub fn named(run: &str, robot: &str) -> Option<u32> {
     let argument = format!("--name\0{robot}\0");
-    let is_robot = |pid: u32| {
-        let arguments = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        arguments
-            .windows(argument.len())
-            .any(|part| part == argument.as_bytes())
-    };
-    find(run)
-        .into_iter()
-        .find(|(pid, _)| is_robot(*pid))
-        .map(|(pid, _)| pid)
+    let mut pids = find(run).into_iter().map(|(pid, _)| pid);
+    pids.find(|pid| contains(*pid, "cmdline", &argument))
 }
 
+/// The name of a process's program.
 fn program(pid: u32) -> String {
     let target = std::fs::read_link(format!("/proc/{pid}/exe")).unwrap_or_default();
-    target
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned())
-        .unwrap_or_default()
+    let name = target.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// The fields of `/proc/PID/stat` from the state on.
 fn stat(pid: u32) -> Option<Vec<String>> {
     let text = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    Some(
-        text.rsplit_once(')')?
-            .1
-            .split_whitespace()
-            .map(str::to_owned)
-            .collect(),
-    )
+    let (_, fields) = text.rsplit_once(')')?;
+    Some(fields.split_whitespace().map(str::to_owned).collect())
 }
 
 fn cpu_s(pid: u32) -> f64 {
-    // proc(5): utime and stime are fields 14 and 15, in clock ticks of 10 ms.
-    let field = |stat: &[String], i: usize| {
-        stat.get(i)
-            .and_then(|text| text.parse::<f64>().ok())
-            .unwrap_or(0.0)
+    let Some(stat) = stat(pid) else {
+        return 0.0;
     };
-    stat(pid).map_or(0.0, |stat| (field(&stat, 11) + field(&stat, 12)) / 100.0)
+
+    // proc(5): utime and stime are fields 14 and 15, in clock ticks of 10 ms.
+    let mut ticks = 0.0;
+    for field in stat.iter().skip(11).take(2) {
+        ticks += field.parse::<f64>().unwrap_or(0.0);
+    }
+    ticks / 100.0
 }

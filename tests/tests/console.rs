@@ -219,6 +219,7 @@ impl Page {
     /// The next message for which `is_wanted` holds.
     fn until(&mut self, is_wanted: impl Fn(&Value) -> bool) -> Value {
         let started = Instant::now();
+
         loop {
             let message = self.receive().unwrap();
             if is_wanted(&message) {
@@ -528,6 +529,7 @@ fn missing_tools() -> Option<String> {
     if !Path::new("/usr/bin/chromium").exists() {
         return Some("there is no /usr/bin/chromium; `apt-get install chromium`".to_owned());
     }
+
     let python = Command::new("python3")
         .args(["-c", "import pytest, playwright.sync_api"])
         .output();

@@ -68,6 +68,7 @@ fn damage() -> impl Strategy<Value = Damage> {
         1 => "\\PC{0,20}",
         1 => Just(format!("\"{}\"", "x".repeat(10_000))),
     ];
+
     prop_oneof![
         1 => any::<Index>().prop_map(Damage::DropLine),
         1 => any::<Index>().prop_map(Damage::RepeatLine),
@@ -93,6 +94,7 @@ impl Damage {
             };
             lines.iter().enumerate().map(changed).collect::<String>()
         };
+
         let in_pair = |at: &Index, change: &dyn Fn(&str, &str) -> String| match pairs.as_slice() {
             [] => text.to_owned(),
             pairs => with_line(*at.get(pairs), &|line| {
@@ -100,6 +102,7 @@ impl Damage {
                 change(key, value)
             }),
         };
+
         match self {
             _ if lines.is_empty() => text.to_owned(),
             Self::DropLine(at) => with_line(at.index(lines.len()), &|_| String::new()),
@@ -139,6 +142,7 @@ fn damaged(folder: &str) -> impl Strategy<Value = String> + use<> {
         .map(|file| std::fs::read_to_string(file).unwrap())
         .collect();
     let damages = prop::collection::vec(damage(), 1..5);
+
     (prop::sample::select(texts), damages).prop_map(|(text, damages)| {
         damages
             .iter()
@@ -169,7 +173,9 @@ proptest! {
 #[test]
 fn the_program_survives_damaged_files() {
     const FILES: usize = 300;
+
     let folder = tempfile::tempdir().unwrap();
+
     for (kind, others) in [("launch", "configs"), ("configs", "launch")] {
         // Launch files find their scenarios beside them, and scenarios their robots' parameters.
         for name in [kind, others, "configs/robots"] {

@@ -118,6 +118,7 @@ fn a_cut_changes_nothing(via: &str, cut_s: u64) {
 fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
     let (lab, run) = (Lab::new(), format!("lost-{via}-{cut_s}"));
     let plan = plan(&lab, cut_s, "\"cut\"");
+
     // Twenty ticks a second: the run is still under way when the link has healed.
     let duration = format!("{} s", 10 * (cut_s + 6));
     let set = [
@@ -137,6 +138,7 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
         "back {:?} after healing",
         back - healed
     );
+
     player.finish();
     let events = lab.events(&run);
     let tick_of = |what: &str| {
@@ -150,16 +152,18 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
     let (lost, joined) = (tick_of("lost"), tick_of("joined"));
     println!("{via}, {cut_s} s: lost at tick {lost}, back at tick {joined}");
     assert!(lost > 0 && lost < joined);
+
     let missed = events.iter().filter(|event| event["event"] == "missed");
     assert!(
         missed.clone().all(|event| event["robot"] == "Leguin"),
-        "nobody else missed anything"
+        "only the cut robot missed ticks"
     );
     assert!(
         missed.count() as u64 >= joined - lost,
         "every tick without her is recorded"
     );
     assert_eq!(lab.summary(&run)["robots"]["Leguin"]["returns"], 1);
+
     nothing_is_left(&run, &player);
 }
 
@@ -177,6 +181,7 @@ fn links_cut_for_5_s_and_30_s_change_nothing_or_lose_a_robot_that_returns() {
             a_cut_loses_a_robot_that_returns("proxy", 30);
         }),
     ];
+
     if has_namespaces("cuts") {
         checks.extend::<[(&str, &(dyn Fn() + Sync)); 4]>([
             ("namespaces, 5 s, wait", &|| {
@@ -193,6 +198,7 @@ fn links_cut_for_5_s_and_30_s_change_nothing_or_lose_a_robot_that_returns() {
             }),
         ]);
     }
+
     side_by_side(&checks);
 }
 
@@ -202,6 +208,7 @@ fn links_cut_for_5_s_and_30_s_change_nothing_or_lose_a_robot_that_returns() {
 fn the_partition_of_a_scenario_is_played_on_real_links() {
     let (lab, run) = (Lab::new(), "partition-on-links");
     let file = "launch/partition.toml";
+
     // From 120 s to 240 s at this speed: from 2 s to 4 s of the wall clock.
     let mut player = lab.start(
         run,
@@ -231,10 +238,12 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
         "--set",
         "network.partition=[]",
     ]);
+
     assert_same(
         ("cut on real links", &lab.bytes(run)),
         ("never cut", &lab.bytes("whole")),
     );
+
     nothing_is_left(run, &player);
 }
 
@@ -244,6 +253,7 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
     if !has_namespaces("several") {
         return;
     }
+
     let (lab, run) = (Lab::new(), "several");
     let fault = |robot| {
         format!("[[link_fault]]\nrobot = \"{robot}\"\nat = \"1 s\"\nfor = \"6 s\"\ndo = \"cut\"\n")
@@ -272,6 +282,7 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
         &[&args, [plan.to_str().unwrap()].as_slice(), &set].concat(),
     );
     let healed = player.prints("the link of Vonda is whole");
+
     for robot in ["Leguin       is back", "Vonda        is back"] {
         let back = player
             .prints_after(robot, Some(healed - ROOM))
@@ -279,6 +290,7 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
         println!("{robot} {back:?} after healing");
         assert!(back < HEALED + ROOM, "{robot} {back:?} after healing");
     }
+
     player.finish();
     let events = lab.events(run);
     let missed = |robot: &str| {
@@ -287,8 +299,10 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
             .filter(|event| event["event"] == "missed" && event["robot"] == robot)
             .count()
     };
+
     assert!(missed("Leguin") > 0 && missed("Vonda") > 0);
     assert_eq!(missed("Butler"), 0, "his link was whole");
+
     nothing_is_left(run, &player);
 }
 
@@ -305,6 +319,7 @@ fn a_slow_a_narrow_and_a_closed_link_change_nothing() {
         assert_same((run, &lab.bytes(run)), ("fast", &lab.bytes("fast")));
         nothing_is_left(run, &player);
     };
+
     side_by_side(&[
         ("slow", &|| {
             check("slow", "{ delay = \"20 ms\", jitter = \"10 ms\" }");
@@ -321,6 +336,7 @@ fn an_interrupted_play_leaves_nothing_behind() {
     } else {
         &["proxy"]
     };
+
     for via in vias {
         let (lab, run) = (Lab::new(), format!("stop-{via}"));
         let plan = plan(&lab, 60, "\"cut\"");
@@ -350,6 +366,7 @@ fn a_plan_that_cannot_be_played_is_refused_before_anything_starts() {
         "--run",
         "never",
     ]);
+
     assert!(
         text.contains("delay 20ms") && text.contains("--via proxy"),
         "{text}"
@@ -361,9 +378,11 @@ fn a_plan_that_cannot_be_played_is_refused_before_anything_starts() {
 fn across_three_hosts(test: &str, router: impl FnOnce(&Row, &Lab) -> Command) {
     let (lab, row) = (Lab::new(), Row::new(test, 3));
     let mut router = Running::start(router(&row, &lab), test, lab.out().join("router"));
+
     // The documented file, with the one line changed that it says must be.
     let text = std::fs::read_to_string(root().join("configs/zenoh/simulator.json5")).unwrap();
     assert!(text.contains("192.0.2.1"), "the file names the router");
+
     let config = lab.write("simulator.json5", &text.replace("192.0.2.1", "10.78.0.2"));
     let mut simulator = row.on(0, &programs().join("cars-sim"));
     simulator.args([
@@ -374,6 +393,7 @@ fn across_three_hosts(test: &str, router: impl FnOnce(&Row, &Lab) -> Command) {
         test,
         "--out",
     ]);
+
     simulator
         .arg(lab.out())
         .arg("--zenoh-config")
@@ -408,10 +428,12 @@ fn across_three_hosts(test: &str, router: impl FnOnce(&Row, &Lab) -> Command) {
         "--duration",
         "60 s",
     ]);
+
     assert_same(
         ("across three hosts", &lab.bytes(test)),
         ("in one process", &lab.bytes("here")),
     );
+
     router.signal(Signal::SIGTERM);
     router.wait();
 }
@@ -421,6 +443,7 @@ fn a_run_across_three_hosts_gives_the_same_record() {
     if !has_namespaces("router") {
         return;
     }
+
     across_three_hosts("hosts", |row, _| {
         let mut router = row.on(1, &programs().join("cars"));
         router.args([
@@ -444,6 +467,7 @@ fn a_run_across_three_hosts_by_zenohd_gives_the_same_record() {
             "there is no zenohd here (cargo install zenohd); `cars router` was tried instead",
         );
     }
+
     if has_namespaces("zenohd") {
         across_three_hosts("zenohd", |row, _| {
             let mut router = row.on(1, Path::new("zenohd"));
@@ -470,6 +494,7 @@ fn image() -> Result<(), String> {
             Err(format!("docker {}: {error}", args.join(" ")))
         }
     };
+
     docker(&["info"]).map_err(|error| format!("no docker engine answers: {error}"))?;
     let context = tempfile::tempdir().unwrap();
     std::fs::create_dir(context.path().join("bin")).unwrap();
@@ -478,6 +503,7 @@ fn image() -> Result<(), String> {
         context.path().join("Dockerfile"),
     )
     .unwrap();
+
     for program in [
         "cars",
         "cars-sim",
@@ -492,6 +518,7 @@ fn image() -> Result<(), String> {
         )
         .unwrap();
     }
+
     docker(&[
         "build",
         "-q",
@@ -505,6 +532,7 @@ fn image() -> Result<(), String> {
 #[test]
 fn containers_cut_for_5_s_change_nothing() {
     const TEST: &str = "containers";
+
     if Command::new("docker-compose")
         .arg("version")
         .output()
@@ -519,9 +547,11 @@ fn containers_cut_for_5_s_change_nothing() {
             "there is no docker-compose here (Debian: apt install docker.io docker-compose)",
         );
     }
+
     if let Err(reason) = image() {
         return skip(TEST, &reason);
     }
+
     // The runs of containers are kept in ./runs, so this lab is the current folder, with its own launch and scenario.
     let lab = Lab::new();
     copy_folder(&root().join("configs"), &lab.out().join("configs"));
@@ -560,6 +590,7 @@ fn containers_cut_for_5_s_change_nothing() {
         "the clock went on {:?} after healing",
         went_on - healed
     );
+
     player.finish();
     lab.ok(&["run", scenario.to_str().unwrap(), "--run", "uncut"]);
     let record = std::fs::read(lab.out().join("runs/boxes/events.jsonl")).unwrap();
@@ -607,6 +638,7 @@ fn the_compose_files_are_valid() {
             file.to_str().unwrap(),
         ],
     ];
+
     for tool in tools {
         let is_there = match tool[1] {
             "compose" => Command::new("docker").args(["compose", "version"]).output(),
@@ -622,6 +654,7 @@ fn the_compose_files_are_valid() {
             return;
         }
     }
+
     lacks_tool(
         "docker-compose.yml",
         "nothing to check it with (Debian: apt install docker-compose; or pip install check-jsonschema)",

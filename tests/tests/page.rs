@@ -42,6 +42,7 @@ fn table(page: &str, header: &str) -> Vec<Vec<String>> {
     };
     let rows: Vec<Vec<String>> = rows.skip(2).map(cells).collect();
     assert!(!rows.is_empty(), "there is no table with {header:?}");
+
     rows
 }
 
@@ -56,6 +57,7 @@ fn sources(folder: &Path) -> String {
             text += &std::fs::read_to_string(&path).unwrap();
         }
     }
+
     text
 }
 
@@ -107,6 +109,7 @@ fn the_sections_have_the_names_that_others_link_to() {
         "versions",
         "test-vectors",
     ];
+
     assert_eq!(sections, expected);
 }
 
@@ -149,6 +152,7 @@ fn the_rules_are_there_once_each() {
         "number.finite",
         "number.integers",
     ];
+
     let page: &'static str = page().leak();
     let found: Vec<&str> = page
         .split("**`")
@@ -326,6 +330,7 @@ fn the_variables_are_those_of_a_robot_program() {
         );
         count += 1;
     }
+
     assert!(count >= 4, "{count}");
 }
 
@@ -388,8 +393,10 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
         shown.insert(schema);
         before = rest;
     }
+
     // The messages that robots put and receive are from recorded runs.
     assert!(recorded >= 9, "{recorded}");
+
     for schema in [
         "clock",
         "news",
@@ -442,6 +449,7 @@ fn the_transcripts_are_messages() {
             count += 1;
         }
     }
+
     assert!(count > 500, "{count}");
 }
 
@@ -452,6 +460,7 @@ fn the_random_streams_are_those_of_the_code() {
     let vectors = std::fs::read_to_string(root().join("docs/vectors/streams.json")).unwrap();
     let vectors: Vec<Value> = serde_json::from_str(&vectors).unwrap();
     assert_eq!(rows.len(), vectors.len());
+
     for row in rows {
         let (seed, name) = (row[0].parse().unwrap(), code(&row[1]));
         assert_eq!(row[2], stream(seed, name).next_u64().to_string(), "{name}");
@@ -484,5 +493,6 @@ fn the_links_lead_somewhere() {
             None => assert!(root().join("docs").join(link).exists(), "{link}"),
         }
     }
+
     assert!(count > 40, "{count}");
 }

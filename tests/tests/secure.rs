@@ -33,7 +33,9 @@ fn certificates(lab: &Lab, folder: &str) -> PathBuf {
         "--robots",
         "Butler,Leguin,Vonda",
     ]);
+
     assert_eq!(code, 0, "{text}");
+
     folder
 }
 
@@ -93,7 +95,9 @@ impl Castle {
                 .ok()
                 .map(|text| text.trim().to_owned())
         });
+
         assert!(endpoint.starts_with("tls/127.0.0.1:"), "{endpoint}");
+
         let operator = open(&endpoint, Some(&config(&folder, "operator"))).unwrap();
         let run = RunName::new(run).unwrap();
         let keys = Keys::new(&run);
@@ -106,13 +110,15 @@ impl Castle {
             keys,
             operator,
         };
+
         eventually("tick 0", || {
             (castle.status().phase == protocol::messages::Phase::Ready).then_some(())
         });
+
         castle
     }
 
-    /// A further session with somebody's certificate: a stolen key, or a robot that does what it should not.
+    /// A further session with a participant's certificate: a stolen key, or a robot that misbehaves.
     fn enter(&self, participant: &str) -> Bus {
         open(&self.endpoint, Some(&config(&self.folder, participant))).unwrap()
     }
@@ -143,7 +149,7 @@ impl Castle {
         })
     }
 
-    /// Plays the rest, and compares the record with that of a run that nobody disturbed.
+    /// Plays the rest, and compares the record with that of an undisturbed run.
     fn finish_unharmed(mut self) {
         self.control(&Control::Start);
         self.launch.finish();
@@ -151,6 +157,7 @@ impl Castle {
             .lab
             .ok(&["run", HALL, "--duration", "60 s", "--run", "undisturbed"]);
         assert!(!undisturbed.is_empty());
+
         let run = self.run.as_str();
         assert_same(
             ("secured", &self.lab.bytes(run)),
@@ -181,6 +188,7 @@ impl Heard {
 fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
     let castle = Castle::new("secure-same");
     let lab = &castle.lab;
+
     // Whoever launched it needs to say nothing more: the run's folder tells where and how.
     lab.ok(&["ctl", "step", "30", "--run", "secure-same"]);
     assert!(
@@ -192,7 +200,8 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
             .trim(),
         "WAIT"
     );
-    // By its address alone nobody gets in, and is told what is missing.
+
+    // The address alone does not suffice, and the error names what is missing.
     let (_, text) = lab.fails(&[
         "ctl",
         "stop",
@@ -201,7 +210,9 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
         "--connect",
         &castle.endpoint,
     ]);
+
     assert!(flat(&text).contains("wants a certificate"), "{text}");
+
     // A robot is no operator.
     let leguin = config(&castle.folder, "Leguin").display().to_string();
     lab.fails(&[
@@ -212,8 +223,10 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
         "--zenoh-config",
         &leguin,
     ]);
+
     let (folder, run) = (castle.launch.folder.clone(), castle.run.clone());
     castle.finish_unharmed();
+
     for file in ["endpoint", "operator_config"] {
         assert!(
             !folder.join(file).exists(),
@@ -238,6 +251,7 @@ fn nobody_enters_without_a_certificate_of_this_authority() {
             .unwrap()
             .replace("enable_mtls: true", "enable_mtls: false"),
     );
+
     for (endpoint, config) in [
         (&castle.endpoint, None),
         (&castle.endpoint, Some(no_certificate)),
@@ -249,9 +263,10 @@ fn nobody_enters_without_a_certificate_of_this_authority() {
         let opened = open(endpoint, config.as_ref());
         assert!(
             opened.is_err(),
-            "{endpoint} let somebody in with {config:?}"
+            "{endpoint} accepted a session with {config:?}"
         );
     }
+
     castle.finish_unharmed();
 }
 
@@ -259,6 +274,7 @@ fn nobody_enters_without_a_certificate_of_this_authority() {
 fn no_robot_passes_for_the_simulator() {
     let lab = Lab::new();
     let folder = certificates(&lab, "certificates");
+
     // Leguin's certificate, where the simulator's should be.
     let own = std::fs::read_to_string(config(&folder, "Leguin")).unwrap();
     let forged = lab.write("forged.json5", &own.replace("connect_", "listen_"));
@@ -472,6 +488,7 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
 #[test]
 fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
     const FLOOD: u64 = 100_000;
+
     let castle = Castle::new("secure-flood");
     let keys = castle.keys.clone();
     let thief = castle.enter("Leguin");
@@ -483,7 +500,9 @@ fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
     });
     let stepped = castle.control(&Control::Step { n: 60 });
     assert!(stepped.tick <= 60, "{stepped:?}");
+
     flooding.join().unwrap();
+
     // Where the simulator does not keep up, it is the flooder that loses its connection, and some of its messages.
     let counted = eventually("the count", || {
         let ignored = castle.status().ignored;
@@ -496,7 +515,9 @@ fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
             .copied()
             .filter(|count| *count >= FLOOD / 10)
     });
+
     assert!(counted <= FLOOD);
+
     println!(
         "{counted} of {FLOOD} messages counted after {:.1} s",
         begun.elapsed().as_secs_f64()
@@ -507,6 +528,7 @@ fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
 #[test]
 fn silent_connections_keep_no_robot_out() {
     const SILENT: usize = 150;
+
     let lab = Lab::new();
     let folder = certificates(&lab, "certificates");
     let root = system_tests::root();
@@ -529,6 +551,7 @@ fn silent_connections_keep_no_robot_out() {
     let silent: Vec<TcpStream> = (0..SILENT)
         .map(|_| TcpStream::connect(address).unwrap())
         .collect();
+
     // At the worst moment: now all of them are being given up.
     std::thread::sleep(Duration::from_millis(2050));
     let begun = Instant::now();
@@ -545,6 +568,7 @@ fn silent_connections_keep_no_robot_out() {
         took.as_secs_f64()
     );
     assert!(took < Duration::from_secs(10), "it took {took:?} to join");
+
     leguin.finish();
     launch.finish();
     drop(silent);

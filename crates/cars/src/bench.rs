@@ -1,13 +1,15 @@
-//! `cars bench`: ticks per second of the project's barriers, interleaved in one sitting with what the same machine does
-//! without the project: a bare zenoh star, and a raw TCP barrier.
+//! `cars bench`: ticks per second of the lock-step, and of two floors on the same machine in the same sitting: a bare zenoh
+//! star and a raw TCP barrier.
 
-mod floors;
 mod lockstep;
 mod programs;
+mod results;
 pub(crate) mod robot;
 pub(crate) mod star;
+mod subject;
 mod table;
 pub(crate) mod tcp;
+mod workload;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -16,20 +18,15 @@ use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use simulator::scenario::{Changes, Scenario};
 
-use floors::{CROWD, HallPlace, Subject};
 use programs::Programs;
-
-/// Size of the clock that the floors send out, bytes; about as long as a real one.
-const CLOCK_BYTES: usize = 64;
-/// Size of the report that comes back, bytes; about as long as a real one.
-const REPORT_BYTES: usize = 300;
-/// Fewest ticks of one measurement: with less, starting and ending would be measured as well.
-const MIN_TICKS: u64 = 300;
+use results::Results;
+use subject::{CROWD, HallPlace, Subject};
+use workload::Workload;
 
 /// `cars bench`.
 #[derive(Debug, Args)]
 pub(crate) struct BenchArgs {
-    /// How often everything is measured, in turn.
+    /// Number of rounds; each round measures every subject once.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
     rounds: u64,
     /// Numbers of robot processes for the bare lock-step and its floor.
@@ -40,7 +37,7 @@ pub(crate) struct BenchArgs {
         value_parser = clap::value_parser!(u64).range(1..=1000)
     )]
     robots: Vec<u64>,
-    /// The hall that is measured.
+    /// Scenario of the hall.
     #[arg(
         long,
         default_value = "configs/hors_doeuvres.toml",
@@ -53,56 +50,28 @@ pub(crate) struct BenchArgs {
     /// A folder with another build of cars, cars-sim, cars-butler and cars-leguin, to compare this build with.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
-    /// Measure only what has this text in its name, and its floors.
+    /// Measure only the subjects with this text in their names, and their floors.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
 }
 
-/// Everything that measurements share.
-struct Bench<'a> {
-    /// Scenario of the hall.
-    hall_file: &'a Path,
-    /// The same, as this build reads it.
-    hall: Scenario,
-    /// Ticks of a measurement with two processes.
-    ticks: u64,
-    /// Where scenarios and runs are kept until the end.
-    scratch: &'a Path,
-}
-
-impl Bench<'_> {
-    /// Ticks of a measurement with so many processes: all measurements take about as long.
-    fn ticks_with(&self, processes: usize) -> u64 {
-        (2 * self.ticks / processes as u64).max(MIN_TICKS)
-    }
-}
-
-/// Results of one subject, ticks per second, by round.
-struct Results {
-    subject: Subject,
-    /// With this build.
-    here: Vec<f64>,
-    /// With the build that it is compared with.
-    there: Vec<f64>,
-}
-
-/// Measures everything in turn, as often as asked for, and prints a table.
+/// Measures every subject in each round and prints a table.
 pub(crate) fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
     let scratch = std::env::temp_dir().join(format!("cars-bench-{}", std::process::id()));
     std::fs::create_dir_all(&scratch)
         .into_diagnostic()
         .wrap_err_with(|| format!("making {}", scratch.display()))?;
-    let outcome = measure(args, &scratch);
+    let outcome = measure_all(args, &scratch);
     std::fs::remove_dir_all(&scratch).into_diagnostic()?;
 
     table::print(&outcome?);
     Ok(ExitCode::SUCCESS)
 }
 
-fn measure(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Results>> {
+fn measure_all(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Results>> {
     let here = Programs::of_this_build()?;
     let there = args.against.as_deref().map(Programs::of).transpose()?;
-    let bench = Bench {
+    let workload = Workload {
         hall_file: &args.scenario,
         hall: Scenario::load(&args.scenario, &Changes::default())?,
         ticks: args.ticks,
@@ -110,70 +79,66 @@ fn measure(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Results>> {
     };
 
     let mut all = Vec::new();
-    for subject in plan(args, bench.hall.robots.len())? {
-        all.push(Results {
-            subject,
-            here: Vec::new(),
-            there: Vec::new(),
-        });
+    for subject in plan(args, workload.hall.robots.len())? {
+        all.push(Results::of(subject));
     }
 
     for round in 0..args.rounds {
         for results in &mut all {
-            eprintln!(
-                "round {} of {}: {}",
-                round + 1,
-                args.rounds,
-                results.subject
-            );
-            measure_once(&bench, results, &here, there.as_ref(), round % 2 == 1)?;
+            let number = round + 1;
+            eprintln!("round {number} of {}: {}", args.rounds, results.subject);
+            let is_other_first = round % 2 == 1;
+            measure_once(&workload, results, &here, there.as_ref(), is_other_first)?;
         }
     }
     Ok(all)
 }
 
-/// Measures a subject once with each build. Which build is first changes from round to round: the second one finds
-/// a machine that the first one has warmed.
+/// Measures a subject once with each build. Which build is first alternates between rounds, because the second one runs
+/// on a machine that the first one has warmed up.
 fn measure_once(
-    bench: &Bench<'_>,
+    workload: &Workload<'_>,
     results: &mut Results,
     here: &Programs,
     there: Option<&Programs>,
     is_other_first: bool,
 ) -> miette::Result<()> {
-    let there = there.filter(|_| results.subject.is_of_the_project());
+    let subject = results.subject;
+    let there = there.filter(|_| subject.runs_the_project());
     if let Some(there) = there.filter(|_| is_other_first) {
-        results.there.push(results.subject.measure(bench, there)?);
+        results.there.push(measure(subject, workload, there)?);
     }
-    results.here.push(results.subject.measure(bench, here)?);
+    results.here.push(measure(subject, workload, here)?);
     if let Some(there) = there.filter(|_| !is_other_first) {
-        results.there.push(results.subject.measure(bench, there)?);
+        results.there.push(measure(subject, workload, there)?);
     }
     Ok(())
 }
 
-/// What is measured, each subject after its floors.
-fn plan(args: &BenchArgs, robots_of_hall: usize) -> miette::Result<Vec<Subject>> {
-    let mut wanted = Vec::new();
-    for robots in &args.robots {
-        let robots = usize::try_from(*robots).into_diagnostic()?;
-        wanted.push(Subject::Lockstep { robots });
+/// Ticks per second of a subject with the programs of one build.
+fn measure(subject: Subject, workload: &Workload<'_>, programs: &Programs) -> miette::Result<f64> {
+    match subject {
+        Subject::Tcp { processes } => tcp::measure(processes, workload.ticks_with(processes)),
+        Subject::Star { clients } => star::measure(clients, workload.ticks_with(clients)),
+        Subject::Lockstep { robots } => lockstep::bare(workload, programs, robots),
+        Subject::Crowd { robots } => lockstep::crowd(workload, programs, robots),
+        Subject::Hall { place, .. } => match place {
+            HallPlace::Processes => lockstep::hall(workload, programs),
+            HallPlace::OneProcess => lockstep::hall_in_one_process(workload, programs),
+        },
     }
-    wanted.push(Subject::Crowd { robots: CROWD });
-    for place in [HallPlace::Processes, HallPlace::OneProcess] {
-        wanted.push(Subject::Hall {
-            robots: robots_of_hall,
-            place,
-        });
-    }
+}
 
+/// The subjects to measure, each after its floors and once.
+fn plan(args: &BenchArgs, robots_of_hall: usize) -> miette::Result<Vec<Subject>> {
+    let mut wanted = all_subjects(args, robots_of_hall)?;
     if let Some(text) = &args.only {
         wanted.retain(|subject| subject.to_string().contains(text));
     }
     if wanted.is_empty() {
         return Err(miette!(
             help = "leave --only out to see the names of all subjects",
-            "nothing has this text in its name"
+            "no subject has this text in its name"
         ));
     }
 
@@ -184,6 +149,23 @@ fn plan(args: &BenchArgs, robots_of_hall: usize) -> miette::Result<Vec<Subject>>
         }
     }
     Ok(plan)
+}
+
+fn all_subjects(args: &BenchArgs, robots_of_hall: usize) -> miette::Result<Vec<Subject>> {
+    let mut subjects = Vec::new();
+    for robots in &args.robots {
+        let robots = usize::try_from(*robots).into_diagnostic()?;
+        subjects.push(Subject::Lockstep { robots });
+    }
+
+    subjects.push(Subject::Crowd { robots: CROWD });
+    for place in [HallPlace::Processes, HallPlace::OneProcess] {
+        subjects.push(Subject::Hall {
+            robots: robots_of_hall,
+            place,
+        });
+    }
+    Ok(subjects)
 }
 
 #[cfg(test)]
@@ -209,7 +191,9 @@ mod tests {
     fn every_subject_comes_once_and_after_its_floors() {
         let names = names(&[]);
         assert_eq!(names.len(), 1 + 4 + 4 + 1 + 2, "{names:?}");
+
         let place = |name: &str| names.iter().position(|other| other == name).unwrap();
+
         for (floor, subject) in [
             ("raw TCP barrier, 2 processes", "zenoh star, 2 clients"),
             ("zenoh star, 2 clients", "bare lock-step, 2 robots"),
@@ -225,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_takes_its_floor_along() {
+    fn only_the_subjects_asked_for_and_their_floors_are_measured() {
         assert_eq!(
             names(&["--only", "16 robots"]),
             ["zenoh star, 16 clients", "bare lock-step, 16 robots"]

@@ -1,4 +1,4 @@
-//! `cars check`: reads scenario and launch files as a run would, and runs nothing.
+//! `cars check`: reads scenario and launch files as a run does, and runs nothing.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ pub(crate) struct CheckArgs {
     files: Vec<PathBuf>,
 }
 
-/// Checks every file, also after a bad one.
+/// Checks every file, also after an error.
 pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
     let mut are_all_good = true;
     for path in &args.files {
@@ -28,26 +28,28 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
             }
         }
     }
-    Ok(if are_all_good {
-        ExitCode::SUCCESS
+
+    if are_all_good {
+        Ok(ExitCode::SUCCESS)
     } else {
-        ExitCode::FAILURE
-    })
+        Ok(ExitCode::FAILURE)
+    }
 }
 
-/// What a file says, in one line.
+/// The content of a file in one line.
 fn describe(path: &Path) -> Result<String, FileError> {
+    let changes = Changes::default();
     if !is_launch_file(path)? {
-        return Ok(content(&Scenario::load(path, &Changes::default())?));
+        let scenario = Scenario::load(path, &changes)?;
+        return Ok(content(&scenario));
     }
+
     let file = LaunchFile::load(path)?;
-    let scenario = file.load_scenario(&Changes::default())?;
+    let scenario = file.load_scenario(&changes)?;
     file.check_robots(&scenario)?;
-    Ok(format!(
-        "{}, {}",
-        count(file.processes.len(), "process", "processes"),
-        content(&scenario)
-    ))
+
+    let processes = count(file.processes.len(), "process", "processes");
+    Ok(format!("{processes}, {}", content(&scenario)))
 }
 
 fn content(scenario: &Scenario) -> String {

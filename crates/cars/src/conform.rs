@@ -1,4 +1,4 @@
-//! `cars conform`: checks one robot, in whatever language, against the rules of the protocol.
+//! `cars conform`: checks a robot program in any language against the rules of the protocol.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -12,15 +12,15 @@ use simulator::Scenario;
 
 /// `cars conform`.
 ///
-/// Plays simulator to the robot that COMMAND starts, several times, and checks the rules of docs/protocol.md one by one.
+/// Starts the robot COMMAND several times, acts as its simulator, and checks the rules of docs/protocol.md one by one.
 /// Exit status: 0 all passed, 1 some failed, 2 nothing could be checked.
 #[derive(Debug, Args)]
 pub(crate) struct ConformArgs {
-    /// The name that the robot must ask for; without it any name will do.
+    /// Name under which the robot must join; without it any name is accepted.
     #[arg(long)]
     name: Option<RobotName>,
-    /// A scenario, or a launch file whose scenario is meant: its parameters, field and roster. The other robots behave as
-    /// they do in it.
+    /// A scenario, or a launch file with one, for parameters, field and roster. The other robots behave as in a run of this
+    /// scenario.
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// Report in the Test Anything Protocol (the default).
@@ -29,7 +29,7 @@ pub(crate) struct ConformArgs {
     /// Report as JSON.
     #[arg(long)]
     json: bool,
-    /// Check this rule only; may be repeated.
+    /// Check only this rule; may be repeated.
     #[arg(long = "rule", value_name = "NAME", value_parser = parse_rule)]
     rules: Vec<Rule>,
     /// Ticks of the longer checks.
@@ -44,33 +44,49 @@ pub(crate) struct ConformArgs {
 }
 
 fn parse_rule(name: &str) -> Result<Rule, String> {
-    let names = || conform::RULES.map(|rule| rule.name).join(", ");
-    Rule::named(name).ok_or_else(|| format!("there is no such rule; the rules are {}", names()))
+    Rule::named(name).ok_or_else(|| {
+        let names = conform::RULES.map(|rule| rule.name).join(", ");
+        format!("there is no such rule; the rules are {names}")
+    })
 }
 
-/// Checks a robot.
+/// Checks a robot and prints the report.
 pub(crate) fn conform(args: &ConformArgs) -> ExitCode {
-    match check(args) {
-        Ok(report) => {
-            if args.json {
-                println!("{:#}", report.to_json());
-            } else {
-                print!("{}", report.to_tap());
-            }
-            if report.is_passed() {
-                ExitCode::SUCCESS
-            } else {
-                ExitCode::FAILURE
-            }
-        }
+    let report = match check(args) {
+        Ok(report) => report,
         Err(error) => {
             eprintln!("{error:?}");
-            ExitCode::from(2)
+            return ExitCode::from(2);
         }
+    };
+
+    if args.json {
+        println!("{:#}", report.to_json());
+    } else {
+        print!("{}", report.to_tap());
+    }
+
+    if report.is_passed() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
     }
 }
 
 fn check(args: &ConformArgs) -> miette::Result<Report> {
+    let setting = setting(args)?;
+    let (program, arguments) = args
+        .command
+        .split_first()
+        .ok_or_else(|| miette!("no command is given"))?;
+    let mut command = Command::new(program);
+    command.args(arguments);
+
+    conform::check(&command, &setting, &args.rules).map_err(|error| miette!("{program}: {error}"))
+}
+
+/// The setting of the checks: the default one, with what the command line and its scenario change.
+fn setting(args: &ConformArgs) -> miette::Result<Setting> {
     let mut setting = Setting {
         name: args.name.clone(),
         ..Setting::default()
@@ -78,26 +94,23 @@ fn check(args: &ConformArgs) -> miette::Result<Report> {
     if let Some(ticks) = args.ticks {
         setting.ticks = ticks;
     }
+
     if let Some(file) = &args.scenario {
-        stage(&mut setting, &launch::scenario_file(file)?)?;
+        take_scenario(&mut setting, &launch::scenario_file(file)?)?;
     }
-    // What the user says goes first.
+
+    // Commands of the command line come before those of the scenario.
     for role in setting.cast.values_mut() {
         role.hears.splice(0..0, args.says.iter().cloned());
     }
+
     setting.commands.splice(0..0, args.says.iter().cloned());
-    let (program, arguments) = args
-        .command
-        .split_first()
-        .ok_or_else(|| miette!("no command is given"))?;
-    let mut command = Command::new(program);
-    command.args(arguments);
-    conform::check(&command, &setting, &args.rules).map_err(|error| miette!("{program}: {error}"))
+    Ok(setting)
 }
 
-/// Field and roster of a scenario. What the other robots do, and what they command, is what they do when the scenario is
-/// run in this process; robots of classes that cannot run here stand still.
-fn stage(setting: &mut Setting, file: &Path) -> miette::Result<()> {
+/// Takes field, roster and parameters from a scenario. The states and commands of the other robots are those of a run of
+/// the scenario in this process; if a class cannot run here, the other robots stand still.
+fn take_scenario(setting: &mut Setting, file: &Path) -> miette::Result<()> {
     let scenario = Scenario::load(file, &Changes::default())?;
     setting.seed = scenario.seed;
     setting.tick_s = scenario.tick_s;

@@ -1,8 +1,4 @@
-//! A run in progress, from a shell: its buttons, the calls between robots, its log.
-
-use std::path::PathBuf;
-use std::process::ExitCode;
-use std::time::Duration;
+//! Commands for a run in progress: `cars ctl`, `cars query`, `cars command` and `cars log`.
 
 use bus::{Bus, Reply, Role};
 use clap::{Args, Subcommand, ValueEnum};
@@ -15,27 +11,32 @@ use protocol::messages::{Command, Control, ControlAnswer, LogRecord, OnLate, Pre
 use protocol::{Message, RobotName, RunName, decode, encode};
 use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
 use simulator::{RunFolder, Scenario};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
 
-/// How long to try to reach a run.
+/// How long to wait for the simulator or a robot.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// A step may take as long as its ticks take.
+/// How long to wait for a step, which takes as long as its ticks.
 const STEP_PATIENCE: Duration = Duration::from_secs(3600);
-/// Lines of the past that `log -f` begins with.
+/// Number of past lines that `log -f` begins with.
 const TAIL: usize = 10;
 
-/// Which run is meant.
+/// Options that name the run and how to reach it.
 #[derive(Debug, Args)]
 pub(crate) struct RunRef {
-    /// The run; without it the one that was started last.
+    /// Name of the run; without it the latest run.
     #[arg(long, global = true, env = "CARS_RUN")]
     run: Option<RunName>,
-    /// Where its simulator listens; without it, as its folder says.
+    /// Where its simulator listens; without it, the endpoint in the folder of the run.
     #[arg(long, global = true, env = "CARS_CONNECT", value_name = "ENDPOINT")]
     connect: Option<String>,
     /// Where run folders are made.
     #[arg(long, global = true, default_value = "runs", value_name = "DIR")]
     out: PathBuf,
-    /// Configuration file for a secured run, for example that of the operator; without it, as its folder says.
+    /// Configuration file for a secured run, for example that of the operator; without it, the one named in the folder of
+    /// the run.
     #[arg(long, global = true, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
 }
@@ -45,14 +46,16 @@ impl RunRef {
         if let Some(run) = &self.run {
             return Ok(run.clone());
         }
+
         let link = self.out.join(LATEST);
         let target = std::fs::read_link(&link).map_err(|_| {
             miette!(
                 help = "name it with --run, or start one with `cars launch`",
-                "no run is known in {}",
+                "there is no run in {}",
                 self.out.display()
             )
         })?;
+
         RunName::new(&target.to_string_lossy()).into_diagnostic()
     }
 
@@ -64,20 +67,23 @@ impl RunRef {
         if let Some(connect) = &self.connect {
             return Ok(connect.clone());
         }
-        let (run, file) = (self.run()?, self.folder()?.file(ENDPOINT));
+
+        let run = self.run()?;
+        let file = self.folder()?.file(ENDPOINT);
         let text = std::fs::read_to_string(&file).map_err(|_| {
             let help =
-                "start one with `cars launch`, or say where its simulator listens with --connect";
+                "start one with `cars launch`, or give the endpoint of its simulator with --connect";
             miette!(
                 help = help,
                 "run {run} is not in progress: there is no {}",
                 file.display()
             )
         })?;
+
         Ok(text.trim().to_owned())
     }
 
-    /// What is needed to be let in: as said, or as the folder of the run says if it is found by its folder.
+    /// The configuration file: from the command line, or, for a run that is found by its folder, the one noted there.
     fn config(&self) -> miette::Result<Option<PathBuf>> {
         if self.zenoh_config.is_some() || self.connect.is_some() {
             return Ok(self.zenoh_config.clone());
@@ -87,15 +93,14 @@ impl RunRef {
     }
 
     fn open(&self) -> miette::Result<(Bus, Keys)> {
-        let (connect, config) = (self.endpoint()?, self.config()?);
         let role = Role::Client {
-            connect,
+            connect: self.endpoint()?,
             patience: PATIENCE,
         };
-        Ok((
-            Bus::open(&role, config.as_ref()).into_diagnostic()?,
-            Keys::new(&self.run()?),
-        ))
+        let config = self.config()?;
+        let bus = Bus::open(&role, config.as_ref()).into_diagnostic()?;
+
+        Ok((bus, Keys::new(&self.run()?)))
     }
 }
 
@@ -103,7 +108,7 @@ impl RunRef {
 #[derive(Debug, Args)]
 pub(crate) struct CtlArgs {
     #[command(subcommand)]
-    button: Button,
+    request: Request,
     #[command(flatten)]
     run: RunRef,
     /// Print the answer as JSON.
@@ -112,8 +117,8 @@ pub(crate) struct CtlArgs {
 }
 
 #[derive(Debug, Subcommand)]
-enum Button {
-    /// Back to tick 0, with the same processes.
+enum Request {
+    /// Return to tick 0 with the same processes.
     Init {
         /// Another seed.
         #[arg(long)]
@@ -123,9 +128,9 @@ enum Button {
     Start,
     /// Hold the clock.
     Pause,
-    /// Grant ticks one by one.
+    /// Grant a number of ticks, then hold the clock.
     Step {
-        /// How many.
+        /// Number of ticks.
         #[arg(default_value_t = 1)]
         n: u64,
     },
@@ -138,19 +143,19 @@ enum Button {
     },
     /// Change what the clock does about robots that are late.
     Late {
-        /// What it does.
+        /// The new rule.
         #[arg(value_enum)]
         on_late: Option<LateMode>,
-        /// For this robot only; without it for all that have no rule of their own.
+        /// The rule of this robot only; without it the rule of all robots without one of their own.
         #[arg(long)]
         robot: Option<RobotName>,
-        /// After how long without a report a robot is late, wall clock, for example "2 s".
+        /// Time without a report after which a robot is late, wall clock, for example "2 s".
         #[arg(long, value_name = "TIME")]
         deadline: Option<Time>,
     },
-    /// Say how things stand.
+    /// Print tick, phase and robots.
     Status,
-    /// Back to tick 0 with another scenario for the same robots.
+    /// Return to tick 0 with another scenario for the same robots.
     Load {
         /// The scenario file.
         file: PathBuf,
@@ -162,15 +167,25 @@ enum Button {
 /// What the clock does about a robot that is late.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum LateMode {
-    /// Hold, and say for whom.
+    /// Hold the clock and name the robot.
     Wait,
-    /// Go on without it.
+    /// Continue without the robot.
     Continue,
     /// End the run.
     Abort,
 }
 
-impl Button {
+impl From<LateMode> for OnLate {
+    fn from(mode: LateMode) -> Self {
+        match mode {
+            LateMode::Wait => Self::Wait,
+            LateMode::Continue => Self::Continue,
+            LateMode::Abort => Self::Abort,
+        }
+    }
+}
+
+impl Request {
     fn control(&self) -> miette::Result<Control> {
         Ok(match self {
             Self::Init { seed } => Control::Init {
@@ -188,15 +203,11 @@ impl Button {
                 deadline,
             } => Control::Late {
                 robot: robot.clone(),
-                on_late: on_late.map(|mode| match mode {
-                    LateMode::Wait => OnLate::Wait,
-                    LateMode::Continue => OnLate::Continue,
-                    LateMode::Abort => OnLate::Abort,
-                }),
+                on_late: on_late.map(OnLate::from),
                 deadline_s: deadline.map(|deadline| deadline.0),
             },
             Self::Status => Control::Status,
-            // Resolved here, where the files are that it names.
+            // The simulator cannot read the files that the scenario names, so they are read here.
             Self::Load { file } => Control::Load {
                 scenario: Scenario::load(file, &Changes::default())?.to_toml()?,
             },
@@ -205,90 +216,66 @@ impl Button {
     }
 }
 
-/// Presses a button of a run in progress.
+/// Sends a request to the simulator of a run and prints its answer.
 pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
-    let status = match ask(&args.run, &args.button.control()?)? {
-        ControlAnswer::Done(status) => *status,
-        ControlAnswer::Setup(answer) => {
-            print!("{}", answer.scenario);
-            return Ok(ExitCode::SUCCESS);
+    let control = args.request.control()?;
+    let (bus, keys) = args.run.open()?;
+    let answer = ask(&bus, &keys, &args.run, &control);
+    bus.close();
+
+    match answer? {
+        ControlAnswer::Done(status) if args.json => {
+            println!("{}", serde_json::to_string(&status).into_diagnostic()?);
         }
-        refusal @ ControlAnswer::Refused { .. } => return Err(refused(&refusal)),
-    };
-    if args.json {
-        println!("{}", serde_json::to_string(&status).into_diagnostic()?);
-    } else {
-        print!("{}", describe(&status));
+        ControlAnswer::Done(status) => print!("{}", describe(&status)),
+        ControlAnswer::Setup(answer) => print!("{}", answer.scenario),
+        ControlAnswer::Refused { explanation, .. } => {
+            return Err(miette!("refused: {explanation}"));
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Why what was asked for was not done.
-fn refused(answer: &ControlAnswer) -> miette::Report {
-    match answer {
-        ControlAnswer::Refused { explanation, .. } => miette!("refused: {explanation}"),
-        _ => miette!("the simulator answers something else than was asked"),
-    }
-}
-
-/// Asks the simulator for something.
-fn ask(run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
-    let (bus, keys) = run.open()?;
-    let answer = ask_over(&bus, &keys, run, control);
-    bus.close();
-    answer
-}
-
-/// The same over a session that is open.
-fn ask_over(
-    bus: &Bus,
-    keys: &Keys,
-    run: &RunRef,
-    control: &Control,
-) -> miette::Result<ControlAnswer> {
+/// Gets the simulator's answer to a control request.
+fn ask(bus: &Bus, keys: &Keys, run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
     let patience = if matches!(control, Control::Step { .. }) {
         STEP_PATIENCE
     } else {
         PATIENCE
     };
-    let answer = bus
-        .get_within(&keys.control(), "", Some(encode(control)), patience)
+
+    let key = keys.control();
+    let reply = bus
+        .get_within(&key, "", Some(encode(control)), patience)
         .into_diagnostic()?;
-    let bytes = bytes_of(
-        answer,
-        &format!("no simulator of run {} answers", run.run()?),
-    )?;
-    decode(&keys.control(), "simulator", &bytes).into_diagnostic()
+    let run = run.run()?;
+    let reply = reply.ok_or_else(|| miette!("no simulator of run {run} answers"))?;
+
+    decode(&key, "simulator", &payload(reply)?).into_diagnostic()
 }
 
-fn bytes_of(answer: Option<Reply>, nobody: &str) -> miette::Result<Vec<u8>> {
-    let answer = answer.ok_or_else(|| miette!("{nobody}"))?;
-    answer.result.map_err(|reason| miette!("refused: {reason}"))
+/// The payload of a reply.
+///
+/// # Errors
+/// The reason of an error reply.
+fn payload(reply: Reply) -> miette::Result<Vec<u8>> {
+    reply.result.map_err(|reason| miette!("refused: {reason}"))
 }
 
+/// The status of a run as lines of text.
 fn describe(status: &Status) -> String {
-    let speed = status
-        .speed
-        .map_or("max".to_owned(), |speed| format!("{speed}x"));
-    let mut text = format!(
-        "{} {}  tick {}  {:.1} of {:.1} s  speed {speed}  seed {}  epoch {}\n",
-        status.run,
-        status.phase,
-        status.tick,
-        status.time_s,
-        status.duration_s,
-        status.seed,
-        status.epoch
-    );
+    let mut text = headline(status);
     if status.pending_steps > 0 {
         text += &format!("{} steps are pending\n", status.pending_steps);
     }
+
     for awaited in &status.awaiting {
         text += &format!(
             "waiting for {} since {:.1} s: it {}\n",
             awaited.name, awaited.since_s, awaited.because
         );
     }
+
     for robot in &status.robots {
         let presence = match robot.presence {
             Presence::Here => "present",
@@ -300,82 +287,90 @@ fn describe(status: &Status) -> String {
             robot.name, robot.generation
         );
     }
+
     for (reason, count) in &status.ignored {
         text += &format!("ignored {count} messages: {reason}\n");
     }
+
     text
+}
+
+fn headline(status: &Status) -> String {
+    let speed = status
+        .speed
+        .map_or("max".to_owned(), |speed| format!("{speed}x"));
+    format!(
+        "{} {}  tick {}  {:.1} of {:.1} s  speed {speed}  seed {}  epoch {}\n",
+        status.run,
+        status.phase,
+        status.tick,
+        status.time_s,
+        status.duration_s,
+        status.seed,
+        status.epoch
+    )
 }
 
 /// `cars query`.
 #[derive(Debug, Args)]
 pub(crate) struct QueryArgs {
-    /// Whom to ask.
+    /// Name of the robot.
     robot: RobotName,
-    /// What to ask; without it everything.
+    /// The query; without it the whole state.
     #[arg(value_parser = QUERIES, default_value = None)]
     what: Option<String>,
     #[command(flatten)]
     run: RunRef,
 }
 
-/// Asks a robot of a run in progress what the other robots may ask it.
+/// Queries a robot of a run in progress, as another robot can, and prints the answer.
 pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     let (bus, keys) = args.run.open()?;
     let what = args.what.as_deref().unwrap_or(STATE);
-    let answer = bus
+    let reply = bus
         .get(&keys.query(&args.robot, what), "", None)
         .into_diagnostic()?;
     bus.close();
-    let bytes = bytes_of(
-        answer,
-        &format!(
-            "no robot called {} answers in run {}",
-            args.robot,
-            args.run.run()?
-        ),
-    )?;
-    let answer: serde_json::Value = serde_json::from_slice(&bytes).into_diagnostic()?;
-    // The value is what was asked for; the tick around it is for programs.
+
+    let run = args.run.run()?;
+    let reply =
+        reply.ok_or_else(|| miette!("no robot called {} answers in run {run}", args.robot))?;
+    let answer: serde_json::Value = serde_json::from_slice(&payload(reply)?).into_diagnostic()?;
+
+    // Epoch and tick around the value are for programs.
     let value = answer.get("value").unwrap_or(&answer);
     match value.as_str() {
         Some(text) => println!("{text}"),
         None => println!("{}", serde_json::to_string_pretty(value).into_diagnostic()?),
     }
+
     Ok(ExitCode::SUCCESS)
 }
 
 /// `cars command`.
 #[derive(Debug, Args)]
 pub(crate) struct CommandArgs {
-    /// Whom to send it to.
+    /// Name of the robot that receives the command.
     robot: RobotName,
-    /// What it says, for example `refill`.
+    /// Text of the command, for example `refill`.
     command: String,
     #[command(flatten)]
     run: RunRef,
 }
 
-/// Sends a command from outside the roster; it takes effect at the next tick boundary and is part of the record.
+/// Sends a command from the operator. It takes effect at the next tick boundary and is part of the record.
 pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
     let (bus, keys) = args.run.open()?;
-    let command = Command {
-        command: args.command.clone(),
-        ..Command::default()
-    };
-    command
-        .check()
-        .map_err(|error| miette!("{}: {}", error.field, error.reason))?;
-    let key = keys.command(&args.robot, &RobotName::operator());
-    bus.put(&key, encode(&command)).into_diagnostic()?;
+    put_command(args, &bus, &keys)?;
 
-    // On one session the command arrives before the question after it: who answers this has the command.
-    let answer = ask_over(&bus, &keys, &args.run, &Control::Status);
+    // Samples of one session arrive in order, so a simulator that answers this get has received the command.
+    let answer = ask(&bus, &keys, &args.run, &Control::Status);
     bus.close();
+
     let ControlAnswer::Done(status) = answer? else {
         return Err(miette!("the simulator does not answer with its status"));
     };
-    let is_known = status.robots.iter().any(|robot| robot.name == args.robot);
-    if !is_known {
+    if !status.robots.iter().any(|robot| robot.name == args.robot) {
         return Err(miette!(
             "refused: no robot of this run is called {}",
             args.robot
@@ -386,6 +381,19 @@ pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
         args.robot, args.command, status.tick
     );
     Ok(ExitCode::SUCCESS)
+}
+
+fn put_command(args: &CommandArgs, bus: &Bus, keys: &Keys) -> miette::Result<()> {
+    let command = Command {
+        command: args.command.clone(),
+        ..Command::default()
+    };
+    command
+        .check()
+        .map_err(|error| miette!("{}: {}", error.field, error.reason))?;
+
+    let key = keys.command(&args.robot, &RobotName::operator());
+    bus.put(&key, encode(&command)).into_diagnostic()
 }
 
 /// `cars log`.
@@ -403,32 +411,42 @@ pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
     let file = args.run.folder()?.log();
     let past = std::fs::read_to_string(&file)
         .map_err(|error| miette!("cannot read {}: {error}", file.display()));
-    if !args.follow {
+
+    if args.follow {
+        follow(&args.run, &past.unwrap_or_default())?;
+    } else {
         print!("{}", past?);
-        return Ok(ExitCode::SUCCESS);
     }
-    let (bus, keys) = args.run.open()?;
-    let (lines, received) = std::sync::mpsc::sync_channel(1024);
-    let gone = lines.clone();
-    let subscribed = bus.subscribe(&keys.log(), move |key, bytes| {
-        // A reader that is too slow misses lines rather than hold the run; the file has them all.
-        if let Ok(line) = decode::<LogRecord>(key, "simulator", bytes) {
-            let _ = lines.try_send(Some(line));
-        }
-    });
-    let watched = bus.liveliness(&keys.alive_sim(), move |_, is_there| {
-        if !is_there {
-            let _ = gone.send(None);
-        }
-    });
-    let _declared = (subscribed.into_diagnostic()?, watched.into_diagnostic()?);
-    let past = past.unwrap_or_default();
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints the end of the past log, then every line that the simulator puts until its token is undeclared.
+fn follow(run: &RunRef, past: &str) -> miette::Result<()> {
+    let (bus, keys) = run.open()?;
+    let (lines, received) = sync_channel(1024);
+    let end = lines.clone();
+    let _log = bus
+        .subscribe(&keys.log(), move |key, bytes| {
+            // A reader that is too slow misses lines instead of holding up the run; the file has all lines.
+            if let Ok(line) = decode::<LogRecord>(key, "simulator", bytes) {
+                let _is_full = lines.try_send(Some(line));
+            }
+        })
+        .into_diagnostic()?;
+    let _token = bus
+        .liveliness(&keys.alive_sim(), move |_, is_declared| {
+            if !is_declared {
+                let _has_ended = end.send(None);
+            }
+        })
+        .into_diagnostic()?;
+
     let all: Vec<&str> = past.lines().collect();
-    all.iter()
-        .skip(all.len().saturating_sub(TAIL))
-        .for_each(|line| println!("{line}"));
+    for line in all.iter().skip(all.len().saturating_sub(TAIL)) {
+        println!("{line}");
+    }
     while let Ok(Some(line)) = received.recv() {
         println!("{}", log_line(&line));
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

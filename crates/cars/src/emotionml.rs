@@ -1,4 +1,4 @@
-//! `cars emotionml`: what the robots of a run felt, as EmotionML 1.0.
+//! `cars emotionml`: exports the emotions of a run's robots as EmotionML 1.0.
 
 use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
@@ -15,16 +15,16 @@ use simulator::recorder::LATEST;
 /// `cars emotionml`.
 #[derive(Debug, Args)]
 pub(crate) struct EmotionmlArgs {
-    /// A run by its name, or the folder of a run; without it the run that was started last.
+    /// Name or folder of a run; without it the latest run.
     #[arg(default_value = LATEST)]
     run: PathBuf,
-    /// Only what this robot felt.
+    /// Export the emotions of this robot only.
     #[arg(long, value_name = "NAME")]
     robot: Option<RobotName>,
-    /// Name emotions and action tendencies by what is nearest in W3C's vocabularies, instead of the robots' own names.
+    /// Use the nearest terms of W3C's vocabularies instead of the robots' own names of emotions and action tendencies.
     #[arg(long)]
     standard: bool,
-    /// Where to write the document; without it to the terminal.
+    /// File of the document; without it the standard output.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Where run folders are made.
@@ -40,11 +40,18 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
     } else {
         View::Own
     };
+
     let export = Export::open(&folder, args.robot)?;
     let mut out = open_output(args.output.as_deref(), export.path())?;
     match export.write(&mut out, view) {
-        Ok(()) => Ok(ExitCode::SUCCESS),
-        // The reader of the document has seen enough of it.
+        Ok(notes) => {
+            // The document may be on its way to another program, so the notes go to the standard error.
+            for note in notes {
+                eprintln!("note: {note}");
+            }
+            Ok(ExitCode::SUCCESS)
+        }
+        // The reader has closed its end of the pipe, as `head` does.
         Err(ExportError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => {
             Ok(ExitCode::SUCCESS)
         }
@@ -53,19 +60,22 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
     }
 }
 
-/// The folder of the run: under `--out` by its name, or where it is said to be.
+/// The folder of the run: by its name under `--out`, or by its path.
 fn find(args: &EmotionmlArgs) -> miette::Result<RunFolder> {
     if let Some(folder) = lab::folder::find(&args.out, &args.run) {
         return Ok(folder);
     }
+
     let run = args.run.display();
     let out = args.out.display();
+
     if args.run == Path::new(LATEST) {
         return Err(miette!(
             help = "name one, or start one with `cars run`",
-            "no run is known in {out}"
+            "there is no run in {out}"
         ));
     }
+
     Err(miette!(
         help = "give a run's name, with --out where its folder is elsewhere, or its folder",
         "there is no run {run}, neither in {out} nor as a folder"
@@ -76,16 +86,19 @@ fn open_output(output: Option<&Path>, source: &Path) -> miette::Result<Box<dyn W
     let Some(output) = output else {
         return Ok(Box::new(BufWriter::new(std::io::stdout())));
     };
+
     let is_source = output
         .canonicalize()
         .is_ok_and(|path| source.canonicalize().is_ok_and(|own| own == path));
     if is_source {
         return Err(miette!(
-            "{} is what is to be exported; choose another --output",
+            "{} is the record of the run; choose another --output",
             output.display()
         ));
     }
+
     let file = File::create(output)
         .map_err(|error| miette!("cannot write {}: {error}", output.display()))?;
+
     Ok(Box::new(BufWriter::new(file)))
 }

@@ -1,4 +1,4 @@
-//! `cars exec`: any program as a robot.
+//! `cars exec`: runs any program as a robot.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -18,7 +18,7 @@ pub(crate) struct ExecArgs {
     command: Vec<OsString>,
 }
 
-/// `cars exec-start`, which `cars exec` starts instead of the program itself.
+/// `cars exec-start`, which `cars exec` starts in place of the program.
 #[derive(Debug, Args)]
 pub(crate) struct StartArgs {
     /// Process id of `cars exec`.
@@ -49,7 +49,7 @@ pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
     }
 }
 
-/// Becomes the program that `cars exec` runs.
+/// Replaces this process by the program that `cars exec` runs.
 pub(crate) fn start(args: &StartArgs) -> ExitCode {
     let Err(error) = become_program(args.parent, &args.command);
     eprintln!("{error}");

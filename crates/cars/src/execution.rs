@@ -1,4 +1,4 @@
-//! Options that `launch`, `run` and `net play` have in common.
+//! Options shared by `launch`, `run` and `net play`.
 
 use std::path::PathBuf;
 
@@ -15,13 +15,13 @@ pub(crate) struct ExecutionArgs {
     /// Name of the run, and of its folder; without it the file's name.
     #[arg(long, value_name = "NAME")]
     pub(crate) run: Option<RunName>,
-    /// Seed, or `random` to draw one; it is recorded either way.
+    /// Seed, or `random` to draw one; the record contains it either way.
     #[arg(long, value_name = "N|random", value_parser = parse_seed)]
     pub(crate) seed: Option<u64>,
     /// Simulated time, for example "600 s".
     #[arg(long, value_name = "TIME")]
     pub(crate) duration: Option<Time>,
-    /// Simulated seconds per second, or `max` for as fast as it goes.
+    /// Simulated seconds per second, or `max` for as fast as possible.
     #[arg(long, value_name = "FACTOR|max")]
     pub(crate) speed: Option<Speed>,
     /// Where run folders are made.
@@ -42,7 +42,7 @@ fn parse_seed(text: &str) -> Result<u64, String> {
     seed::check(number).map_err(|error| error.to_string())
 }
 
-/// A seed drawn by the system; from here on it is part of the run's record.
+/// Draws a seed from the operating system. The run records it, so the run can be repeated.
 fn draw_seed() -> Result<u64, String> {
     let mut bytes = [0; 8];
     let read = std::fs::File::open("/dev/urandom")
@@ -52,7 +52,7 @@ fn draw_seed() -> Result<u64, String> {
 }
 
 impl ExecutionArgs {
-    /// The same as the library has it.
+    /// The options as the `launch` crate takes them.
     pub(crate) fn options(self) -> RunOptions {
         RunOptions {
             run: self.run,

@@ -1,4 +1,4 @@
-//! `cars experiment`: experiments that ship with the project, repeated over seeds, as tables with confidence intervals.
+//! `cars experiment`: runs the shipped experiments over many seeds and prints tables with confidence intervals.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,16 +23,16 @@ pub(crate) struct ExperimentArgs {
 
 #[derive(Debug, Subcommand)]
 enum Shipped {
-    /// Lose commands, and see which team stops working: without emotions, with a timer, with emotions, with both.
+    /// Lose commands and compare teams without emotions, with a timer, with emotions, and with both.
     ///
     /// The problem of Murphy, Lisetti et al. 2002: two robots that depend on each other deadlock when one message is
-    /// lost, unless something makes them act.
+    /// lost, unless a timer or an emotion makes them act.
     Deadlock(DeadlockArgs),
-    /// Cut the two robots off from each other for a while, commands and queries, and see which team works on and recovers.
+    /// Block commands and queries between the two robots for a time and compare how the teams work on and recover.
     Partition(PartitionArgs),
 }
 
-/// What all experiments have in common.
+/// Options of all experiments.
 #[derive(Debug, Args)]
 struct Common {
     /// Scenario with a Butler and a Leguin.
@@ -42,16 +42,16 @@ struct Common {
         value_name = "FILE"
     )]
     scenario: PathBuf,
-    /// Runs of each arm and condition, with the seeds 1, 2, 3 and so on.
+    /// Number of runs of each arm and condition, with the seeds 1, 2, 3 and so on.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u64).range(MIN_SAMPLE..=100_000))]
     seeds: u64,
     /// Simulated time of each run.
     #[arg(long, default_value = "600 s", value_name = "TIME")]
     duration: Time,
-    /// Runs at the same time; without it as many as there are processors. The result does not depend on it.
+    /// Number of runs at the same time; without it the number of processors. The result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
     jobs: Option<u64>,
-    /// A further change of the scenario, in every arm, for example `guests.count=50`.
+    /// A change of the scenario in every arm, for example `guests.count=50`.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<Override>,
     /// Print JSON: every run and every estimate.
@@ -62,7 +62,7 @@ struct Common {
 /// `cars experiment deadlock`.
 #[derive(Debug, Args)]
 pub(crate) struct DeadlockArgs {
-    /// Probabilities with which a command is lost.
+    /// Probabilities of losing a command.
     #[arg(long, value_delimiter = ',', default_value = "0,0.1,0.25,0.5,1", value_parser = probability)]
     loss: Vec<f64>,
     #[command(flatten)]
@@ -72,10 +72,10 @@ pub(crate) struct DeadlockArgs {
 /// `cars experiment partition`.
 #[derive(Debug, Args)]
 pub(crate) struct PartitionArgs {
-    /// When the link is cut.
+    /// Beginning of the partition.
     #[arg(long, default_value = "120 s", value_name = "TIME")]
     from: Time,
-    /// For how long.
+    /// Durations of the partition.
     #[arg(
         long,
         value_delimiter = ',',
@@ -95,7 +95,7 @@ fn probability(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("{text:?} is not a probability, a number from 0 to 1"))
 }
 
-/// Plays an experiment.
+/// Runs an experiment and prints its estimates.
 pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
     let (experiment, common) = match args.experiment {
         Shipped::Deadlock(args) => args.experiment()?,
@@ -104,10 +104,9 @@ pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
     let is_json = common.json;
     let options = common.options();
 
-    let bar = ProgressBar::new(experiment.runs(&options));
-    bar.set_style(
-        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?,
-    );
+    let style =
+        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?;
+    let bar = ProgressBar::new(experiment.runs(&options)).with_style(style);
     let outcomes = experiment.play(&options, &|| bar.inc(1))?;
     bar.finish_and_clear();
 
@@ -168,20 +167,17 @@ impl Common {
     }
 }
 
-/// The estimates as a table, with one line for each arm under each condition.
+/// The estimates as a table with one line for each arm under each condition.
 fn render(experiment: &Experiment, cells: &[Cell]) -> tabled::Table {
     let mut table = Builder::default();
+    let columns = experiment.measures.iter();
+    let columns = columns.filter_map(|measure| measure.column.clone());
     let mut head = vec![experiment.factor.name.clone(), "arm".to_owned()];
-    head.extend(
-        experiment
-            .measures
-            .iter()
-            .filter_map(|measure| measure.column.clone()),
-    );
+    head.extend(columns);
     table.push_record(head);
-
     let mut above = None;
     for cell in cells {
+        // A condition is named in its first line only.
         let is_new = above.replace(&cell.condition) != Some(&cell.condition);
         let condition = if is_new { cell.condition.as_str() } else { "" };
         let mut row = vec![condition.to_owned(), cell.arm.clone()];

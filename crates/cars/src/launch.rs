@@ -1,11 +1,11 @@
-//! `cars launch`: the processes of a launch file, from their start to their end.
+//! `cars launch`: starts the processes of a launch file and supervises them to their end.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use config::units::Time;
-use launch::{Launch, LaunchOptions, Link, Outcome, Planned, What, code_of};
+use launch::{Launch, LaunchOptions, Outcome, Planned, ProcessLink, What, code_of};
 use miette::miette;
 use simulator::RunFolder;
 
@@ -18,18 +18,18 @@ pub(crate) struct LaunchArgs {
     /// The launch file.
     #[arg(required_unless_present = "roster")]
     file: Option<PathBuf>,
-    /// A plain list of robots instead, one class a line, as the CARSConfig.txt of the first CARS.
+    /// A list of robots instead of a launch file, one class a line, as in CARSConfig.txt of the first CARS.
     #[arg(long, value_name = "FILE", conflicts_with = "file")]
     roster: Option<PathBuf>,
     #[command(flatten)]
     execution: ExecutionArgs,
-    /// Print what would be started, and start nothing.
+    /// Print the commands without starting them.
     #[arg(long)]
     dry_run: bool,
-    /// Print the launch as a file for another launcher.
+    /// Print a file for another launcher.
     #[arg(long, value_name = "FORMAT", conflicts_with = "dry_run")]
     export: Option<Format>,
-    /// Wait for `cars ctl start` once everybody is there.
+    /// Wait for `cars ctl start` once all robots have joined.
     #[arg(long)]
     paused: bool,
     /// Open the console in a browser.
@@ -44,26 +44,26 @@ pub(crate) struct LaunchArgs {
     /// Port of the loopback interface at which the simulator listens; without it a free one.
     #[arg(long, value_name = "PORT", conflicts_with = "listen")]
     connect_port: Option<u16>,
-    /// Where the simulator listens. Where other machines could connect, only secured, or with --insecure.
+    /// Where the simulator listens. An address that other machines can reach needs --secure or --insecure.
     #[arg(long, value_name = "ENDPOINT")]
     listen: Option<String>,
-    /// How a process of the file reaches the simulator, if not directly: by another endpoint, and from within a network
-    /// namespace. `cars net play` says it.
+    /// Endpoint by which a process reaches the simulator, and the network namespace in which it runs. Set by `cars net
+    /// play`.
     #[arg(long = "link", value_name = "PROCESS=ENDPOINT[@NAMESPACE]")]
-    links: Vec<Link>,
+    links: Vec<ProcessLink>,
     /// Folder of certificates that `cars secure init` made, instead of the launch file's.
     #[arg(long, value_name = "DIR")]
     secure: Option<PathBuf>,
-    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the run
-    /// and pose as any robot.
+    /// Listen where other machines can connect, without certificates. Any program that connects there can control the run
+    /// and take the place of any robot.
     #[arg(long, conflicts_with = "secure")]
     insecure: bool,
-    /// How long a process has to end by itself before it is killed.
+    /// How long a process may take to exit before it is killed.
     #[arg(long, value_name = "TIME", default_value = "3 s")]
     grace: Time,
 }
 
-/// Other launchers that can be written for.
+/// Launchers that `--export` writes for.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Format {
     /// A docker-compose.yml with one service for each process.
@@ -72,7 +72,7 @@ enum Format {
 
 /// Launches a launch file or a roster.
 pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
-    // The observer is on the bus, too; and what is chosen here goes for all processes.
+    // Before the observer opens its session. The launched processes inherit the setting.
     bus::runtime::use_one_thread();
 
     let is_dry_run = args.dry_run;
@@ -116,6 +116,7 @@ impl LaunchArgs {
             is_insecure: self.insecure,
             grace: self.grace,
         };
+
         Ok((what, options))
     }
 }
@@ -131,15 +132,17 @@ fn print_plan(planned: Vec<Planned>) {
     }
 }
 
-/// Prints what came of the run; returns the exit status that reports it.
+/// Prints the summary of the run, or its failure; returns the exit status.
 fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> miette::Result<ExitCode> {
     if !is_quiet && let Some(summary) = lab::folder::read_summary(folder)? {
         table::print(&summary, folder.path());
     }
+
     if let Some(failure) = &outcome.failure {
         eprintln!("{failure}");
         return Ok(ExitCode::from(failure.code));
     }
+
     match outcome.asked {
         Some(signal) => Ok(ExitCode::from(code_of(signal))),
         None => Ok(ExitCode::SUCCESS),

@@ -46,24 +46,24 @@ enum Subcommands {
     Check(check::CheckArgs),
     /// Control a run in progress: init, start, pause, step, stop, speed, status.
     Ctl(control::CtlArgs),
-    /// Ask a robot of a run in progress something, for example `cars query Leguin emotion_state`.
+    /// Query a robot of a run in progress, for example `cars query Leguin emotion_state`.
     Query(control::QueryArgs),
     /// Send a robot of a run in progress a command, for example `cars command Leguin refill`.
     Command(control::CommandArgs),
     /// Show the log of a run; `-f` follows one in progress.
     Log(control::LogArgs),
-    /// Export what the robots of a run felt as EmotionML 1.0.
+    /// Export the emotions of the robots of a run as EmotionML 1.0.
     Emotionml(emotionml::EmotionmlArgs),
-    /// Check a robot, in whatever language, against the rules of the protocol.
+    /// Check a robot, written in any language, against the rules of the protocol.
     Conform(conform::ConformArgs),
-    /// Real links with real faults: cut, slow, narrow. Nothing of it is reproducible but the record.
+    /// Faults of real links: cut, delay, bandwidth. The record is reproducible, the timing is not.
     #[command(subcommand)]
     Net(net::NetCommand),
-    /// Forward between a simulator and robots on different machines, and do nothing else.
+    /// Forward between a simulator and robots on different machines.
     Router(router::RouterArgs),
-    /// Make certificates and access control for a roster, for runs that strangers could reach.
+    /// Make certificates and access control for a roster, for runs on a network that others can reach.
     Secure(secure::SecureArgs),
-    /// Measure: ticks per second of the lock-step and of the hall, beside a bare zenoh star and a raw TCP barrier.
+    /// Measure ticks per second of the lock-step and of the hall, beside a bare zenoh star and a raw TCP barrier.
     Bench(bench::BenchArgs),
     /// Print shell completions.
     Completions {
@@ -84,17 +84,26 @@ enum Subcommands {
 
 fn main() -> miette::Result<ExitCode> {
     let cli = Cli::parse();
+    init_tracing();
+    dispatch(cli.subcommand)
+}
+
+fn init_tracing() {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| "warn,zenoh=error".into());
+
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .without_time()
         .init();
-    match cli.subcommand {
+}
+
+/// Calls the subcommand; the hidden ones follow the public ones.
+fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
+    match subcommand {
         Subcommands::Launch(args) => launch::launch(args),
         Subcommands::Exec(args) => exec::exec(&args),
-        Subcommands::ExecStart(args) => Ok(exec::start(&args)),
         Subcommands::New(args) => new::new(&args),
         Subcommands::Run(args) => run::run(args),
         Subcommands::Experiment(args) => experiment::experiment(args),
@@ -109,13 +118,15 @@ fn main() -> miette::Result<ExitCode> {
         Subcommands::Router(args) => router::router(&args),
         Subcommands::Secure(args) => secure::secure(args),
         Subcommands::Bench(args) => bench::bench(&args),
-        Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
-        Subcommands::BenchEcho(args) => bench::tcp::echo(&args),
-        Subcommands::BenchStar(args) => bench::star::router(&args),
-        Subcommands::BenchStarClient(args) => bench::star::client(&args),
         Subcommands::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "cars", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)
         }
+
+        Subcommands::ExecStart(args) => Ok(exec::start(&args)),
+        Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
+        Subcommands::BenchEcho(args) => bench::tcp::echo(&args),
+        Subcommands::BenchStar(args) => bench::star::router(&args),
+        Subcommands::BenchStarClient(args) => bench::star::client(&args),
     }
 }

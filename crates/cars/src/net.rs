@@ -1,4 +1,4 @@
-//! `cars net`: faults of real links.
+//! `cars net`: plays faults on real links.
 
 use std::collections::BTreeSet;
 use std::io::BufRead;
@@ -8,19 +8,19 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
-use launch::net::{self, Flow, Order, Plan, Proxy, Shape, address};
+use launch::net::{self, Flow, LinkOrder, Plan, Proxy, Shape, address};
 use miette::{IntoDiagnostic, WrapErr};
 use protocol::RobotName;
 
 use crate::execution::ExecutionArgs;
 
-/// What `cars net` does.
+/// Subcommands of `cars net`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum NetCommand {
-    /// Forward TCP from one address to another, and break it on request. Commands are read from the standard input:
-    /// `cut`, `close`, `heal`, `delay 50ms [10ms]` (with jitter), `bandwidth 64000` (bits per second), `status`.
+    /// Forward TCP from one address to another, with faults on request. Orders are read from the standard input: `cut`,
+    /// `close`, `heal`, `delay 50ms [10ms]` (with jitter), `bandwidth 64000` (bits per second), `status`.
     Proxy(ProxyArgs),
-    /// Launch a launch file over links of its own for each process, and play a plan of faults on them.
+    /// Launch a launch file with a link of its own for each process, and play a plan of faults on the links.
     Play(PlayArgs),
 }
 
@@ -33,13 +33,13 @@ pub(crate) struct ProxyArgs {
     /// Where the simulator listens, for example `tcp/127.0.0.1:7447`.
     #[arg(long, value_name = "ENDPOINT", value_parser = address)]
     to: SocketAddr,
-    /// Faults to play, from the first connection on.
+    /// Plan of faults; its times begin with the first connection.
     #[arg(long, value_name = "FILE", requires = "robot")]
     plan: Option<PathBuf>,
-    /// Whose faults of the plan.
+    /// Robot of the plan whose faults are played.
     #[arg(long, value_name = "NAME")]
     robot: Option<RobotName>,
-    /// Close connections where `cut` is said, instead of holding what they carry.
+    /// Close connections at a cut instead of holding their bytes.
     #[arg(long)]
     close: bool,
 }
@@ -49,11 +49,11 @@ pub(crate) struct ProxyArgs {
 pub(crate) struct PlayArgs {
     /// The launch file.
     file: PathBuf,
-    /// The plan of faults; its times are of the wall clock, from the moment when the clock of the run first ran. Without
-    /// one, the partitions of the scenario itself are played, and not simulated in addition.
+    /// Plan of faults; its times are wall clock, from the first tick of the run. Without one, the partitions of the
+    /// scenario are played on the links instead of being simulated.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// What the links are.
+    /// Kind of link.
     #[arg(long)]
     via: Via,
     #[command(flatten)]
@@ -63,18 +63,18 @@ pub(crate) struct PlayArgs {
     launch_args: Vec<String>,
 }
 
-/// What links are made of.
+/// Kinds of links.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum Via {
-    /// A TCP proxy for each process: cut, close, delay, jitter, bandwidth. Needs nothing.
+    /// A TCP proxy for each process: cut, close, delay, jitter, bandwidth. Needs no privileges.
     Proxy,
-    /// A network namespace for each process and a virtual cable to it: cut. Needs root and `ip` (iproute2).
+    /// A network namespace for each process, connected by a veth pair: cut. Needs root and `ip` (iproute2).
     Namespaces,
     /// A container for each process: cut, by `docker network disconnect`. Needs docker and the image `cars:local`.
     Compose,
 }
 
-/// Runs one of the commands.
+/// Runs a subcommand.
 pub(crate) fn net(command: NetCommand) -> miette::Result<ExitCode> {
     match command {
         NetCommand::Proxy(args) => proxy(args),
@@ -82,32 +82,44 @@ pub(crate) fn net(command: NetCommand) -> miette::Result<ExitCode> {
     }
 }
 
-/// Forwards until the process is ended, and does what the plan and the standard input order.
+/// Forwards until the process is killed; carries out the plan and the orders of the standard input.
 fn proxy(args: ProxyArgs) -> miette::Result<ExitCode> {
     let closes = args.close;
     let plan = match args.plan.zip(args.robot) {
         Some((file, robot)) => Some(Plan::load(&file, &BTreeSet::from([robot]))?),
         None => None,
     };
+
     let proxy = Proxy::start(args.listen, args.to)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot listen at {}", args.listen))?;
+    let proxy = Arc::new(proxy);
     println!("listening at {}, on to {}", proxy.address(), args.to);
 
-    let proxy = Arc::new(proxy);
     if let Some(plan) = plan {
         let proxy = proxy.clone();
-        std::thread::spawn(move || {
-            proxy.play(&plan, |shape, at| {
-                proxy.set(closing(shape, closes));
-                println!("{:.3} s: {}", at.as_secs_f64(), proxy.shape());
-            });
-        });
+        std::thread::spawn(move || play_plan(&proxy, &plan, closes));
     }
+    obey_input(&proxy, closes)?;
 
+    // The standard input has ended; the shape stays as it is until the process is killed.
+    loop {
+        std::thread::park();
+    }
+}
+
+fn play_plan(proxy: &Proxy, plan: &Plan, closes: bool) {
+    proxy.play(plan, |shape, at| {
+        proxy.set(closing(shape, closes));
+        println!("{:.3} s: {}", at.as_secs_f64(), proxy.shape());
+    });
+}
+
+/// Carries out the orders of the standard input to its end.
+fn obey_input(proxy: &Proxy, closes: bool) -> miette::Result<()> {
     for line in std::io::stdin().lock().lines() {
         let line = line.into_diagnostic()?;
-        match line.parse::<Order>() {
+        match line.parse::<LinkOrder>() {
             Ok(order) => {
                 proxy.set(closing(order.apply(proxy.shape()), closes));
                 println!("{}", proxy.shape());
@@ -115,12 +127,10 @@ fn proxy(args: ProxyArgs) -> miette::Result<ExitCode> {
             Err(error) => eprintln!("{error}"),
         }
     }
-    // No more orders can come: the last ones hold until the process is ended.
-    loop {
-        std::thread::park();
-    }
+    Ok(())
 }
 
+/// The shape with a cut turned into closed connections if `closes`.
 fn closing(shape: Shape, closes: bool) -> Shape {
     let flow = if closes && shape.flow == Flow::Cut {
         Flow::Closed
@@ -132,17 +142,19 @@ fn closing(shape: Shape, closes: bool) -> Shape {
 
 /// Plays a plan of faults on the links of a launch.
 fn play(args: PlayArgs) -> miette::Result<ExitCode> {
+    let via = match args.via {
+        Via::Proxy => net::Via::Proxy,
+        Via::Namespaces => net::Via::Namespaces,
+        Via::Compose => net::Via::Compose,
+    };
     let play = net::Play {
         file: args.file,
         plan: args.plan,
-        via: match args.via {
-            Via::Proxy => net::Via::Proxy,
-            Via::Namespaces => net::Via::Namespaces,
-            Via::Compose => net::Via::Compose,
-        },
+        via,
         options: args.execution.options(),
         launch_args: args.launch_args,
     };
     let code = net::play(&play, |line| eprintln!("{line}"))?;
+
     Ok(ExitCode::from(code))
 }

@@ -1,4 +1,4 @@
-//! `cars new`: a skeleton of a robot that can be launched at once, and changed from there.
+//! `cars new`: makes the skeleton of a robot, which can be launched without changes.
 
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
@@ -18,21 +18,21 @@ pub(crate) struct NewArgs {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// A robot of your own, with a scenario and a launch file: a folder of its name.
+    /// A folder with a robot program, a scenario and a launch file.
     Robot(RobotArgs),
 }
 
 #[derive(Debug, Args)]
 struct RobotArgs {
-    /// Its name, as in the roster of the scenario.
+    /// Name of the robot and of its folder.
     name: RobotName,
-    /// The language that it is written in.
+    /// Programming language.
     #[arg(long, value_name = "LANGUAGE")]
     lang: Language,
-    /// Where its folder is made.
+    /// Where the folder is made.
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// The folder of the CARS project, whose SDK a robot in Rust or Python uses; without it the one that this program was
+    /// The folder of the CARS project, for robots that use its SDK (Rust, Python); without it the one that this program was
     /// built from.
     #[arg(long, value_name = "DIR")]
     cars: Option<PathBuf>,
@@ -52,28 +52,46 @@ enum Language {
     Node,
 }
 
-/// What differs between languages.
+/// What differs between languages. The texts contain placeholders, see [`Template`].
 struct Skeleton {
-    /// As people call the language.
+    /// Name of the language.
     language: &'static str,
-    /// The file that is the robot, and its text.
+    /// Name and text of the robot's source file.
     program: (&'static str, &'static str),
-    /// Further files.
+    /// Names and texts of further files.
     more: &'static [(&'static str, &'static str)],
     /// `command` of the launch file.
     command: &'static str,
-    /// What comes before the launch.
+    /// Command that builds the robot; empty if there is nothing to build.
     build: &'static str,
     /// Where to go on.
     hint: &'static str,
 }
 
-const LAUNCH: &str = include_str!("new/launch.toml");
-const SCENARIO: &str = include_str!("new/scenario.toml");
-const README: &str = include_str!("new/README.md");
+/// Files of every skeleton: name and text.
+const COMMON: [(&str, &str); 3] = [
+    ("launch.toml", include_str!("new/launch.toml")),
+    ("scenario.toml", include_str!("new/scenario.toml")),
+    ("README.md", include_str!("new/README.md")),
+];
+/// Where to go on with a robot over standard input and output.
 const OVER_PIPES: &str = "\
-What can be said in a tick besides the line `done` (queries to other robots, commands to them, what is near, chance) is in
-`docs/protocol.md` of the CARS project, \"Robots over stdin and stdout\".";
+`docs/protocol.md` of the CARS project, \"Robots over stdin and stdout\", lists what a robot can send in a tick besides the
+line `done`: queries and commands to other robots, requests for the bodies near it, and random numbers.";
+
+impl Skeleton {
+    /// A robot over standard input and output that needs no build.
+    fn over_pipes(language: &'static str, file: &'static str, text: &'static str) -> Self {
+        Self {
+            language,
+            program: (file, text),
+            more: &[],
+            command: "",
+            build: "",
+            hint: OVER_PIPES,
+        }
+    }
+}
 
 impl Language {
     fn skeleton(self) -> Skeleton {
@@ -88,7 +106,7 @@ impl Language {
                 command: r#"["./target/release/@PACKAGE@"]"#,
                 build: "cargo build --release --manifest-path @FOLDER@/Cargo.toml",
                 hint: "`docs/new-robot.md` of the CARS project makes a robot with an emotion of its own;\n\
-                       `cargo doc --open -p robot` says what a robot can do in a tick.",
+                       `cargo doc --open -p robot` documents what a robot can do in a tick.",
             },
             Self::Python => Skeleton {
                 language: "Python",
@@ -96,32 +114,25 @@ impl Language {
                 more: &[],
                 command: r#"["./robot.py"]"#,
                 build: "pip install @CARS@/sdk/python",
-                hint: "`sdk/python/README.md` of the CARS project says what a robot can do in a tick.",
+                hint: "`sdk/python/README.md` of the CARS project documents what a robot can do in a tick.",
             },
             Self::C => Skeleton {
-                language: "C",
-                program: ("robot.c", include_str!("new/c/robot.c")),
-                more: &[],
-                command: r#"["cars", "exec", "--", "./robot"]"#,
-                // A product and a sum that are rounded once would be another number on some machines.
+                // A fused multiply-add rounds once instead of twice, so results would differ between machines.
                 build: "cc -std=c11 -O2 -ffp-contract=off -Wall -Wextra -o @FOLDER@/robot @FOLDER@/robot.c -lm",
-                hint: OVER_PIPES,
+                command: r#"["cars", "exec", "--", "./robot"]"#,
+                ..Skeleton::over_pipes("C", "robot.c", include_str!("new/c/robot.c"))
             },
             Self::Bash => Skeleton {
-                language: "Bash",
-                program: ("robot.sh", include_str!("new/bash/robot.sh")),
-                more: &[],
                 command: r#"["cars", "exec", "--", "./robot.sh"]"#,
-                build: "",
-                hint: OVER_PIPES,
+                ..Skeleton::over_pipes("Bash", "robot.sh", include_str!("new/bash/robot.sh"))
             },
             Self::Node => Skeleton {
-                language: "JavaScript (Node.js)",
-                program: ("robot.mjs", include_str!("new/node/robot.mjs")),
-                more: &[],
                 command: r#"["cars", "exec", "--", "./robot.mjs"]"#,
-                build: "",
-                hint: OVER_PIPES,
+                ..Skeleton::over_pipes(
+                    "JavaScript (Node.js)",
+                    "robot.mjs",
+                    include_str!("new/node/robot.mjs"),
+                )
             },
         }
     }
@@ -131,7 +142,7 @@ impl Language {
     }
 }
 
-/// Makes a skeleton.
+/// Makes a skeleton and prints the next steps.
 pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
     let What::Robot(args) = &args.what;
     let folder = args.out.join(args.name.as_str());
@@ -140,87 +151,103 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
     } else {
         PathBuf::new()
     };
+    make_folder(&args.out, &folder)?;
+
     let skeleton = args.lang.skeleton();
-    std::fs::create_dir_all(&args.out)
+    let template = Template {
+        skeleton: &skeleton,
+        name: args.name.as_str(),
+        folder: shown(&folder),
+        cars: &cars,
+    };
+    let place = folder.canonicalize().into_diagnostic()?;
+    for (name, text) in [skeleton.program]
+        .iter()
+        .chain(skeleton.more)
+        .chain(&COMMON)
+    {
+        write(&place.join(name), &template.fill(text))?;
+    }
+    if args.lang == Language::Rust {
+        copy_lock(&cars, &place)?;
+    }
+
+    let language = skeleton.language;
+    println!("{} is a robot in {language}. Next:\n", folder.display());
+    let readme = folder.join("README.md");
+    println!("{}\n\nand read {}", template.steps(), readme.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Makes the folder of the robot, which must not exist.
+fn make_folder(out: &Path, folder: &Path) -> miette::Result<()> {
+    std::fs::create_dir_all(out)
         .into_diagnostic()
-        .wrap_err_with(|| format!("making {}", args.out.display()))?;
-    std::fs::create_dir(&folder).map_err(|error| match error.kind() {
+        .wrap_err_with(|| format!("making {}", out.display()))?;
+
+    std::fs::create_dir(folder).map_err(|error| match error.kind() {
         std::io::ErrorKind::AlreadyExists => {
             let help = "nothing is overwritten: choose another name or another --out, or remove it";
             miette!(help = help, "{} is there already", folder.display())
         }
         _ => miette!("{} cannot be made: {error}", folder.display()),
-    })?;
-
-    let place = args
-        .out
-        .canonicalize()
-        .into_diagnostic()?
-        .join(args.name.as_str());
-    let package = format!(
-        "cars-{}",
-        args.name.as_str().to_lowercase().replace('.', "-")
-    );
-    let launch = format!("cars launch {}/launch.toml", shown(&folder));
-    let steps: Vec<&str> = [skeleton.build, launch.as_str()]
-        .into_iter()
-        .filter(|step| !step.is_empty())
-        .collect();
-    let steps = steps.join("\n");
-    let fill = |text: &str| {
-        let command_and_steps = text.replace("@COMMAND@", skeleton.command);
-        let text = command_and_steps.replace("@STEPS@", &format!("```sh\n{steps}\n```"));
-        text.replace("@LANGUAGE@", skeleton.language)
-            .replace("@FILE@", skeleton.program.0)
-            .replace("@HINT@", skeleton.hint)
-            .replace("@FOLDER@", &shown(&folder))
-            .replace("@PACKAGE@", &package)
-            .replace(
-                "@ROBOT_CRATE@",
-                &format!("{:?}", cars.join("crates/robot").display().to_string()),
-            )
-            .replace("@CARS@", &cars.display().to_string())
-            .replace("@NAME@", args.name.as_str())
-    };
-    let common = [
-        ("launch.toml", LAUNCH),
-        ("scenario.toml", SCENARIO),
-        ("README.md", README),
-    ];
-    for (name, text) in [skeleton.program]
-        .iter()
-        .chain(skeleton.more)
-        .chain(&common)
-    {
-        write(&place.join(name), &fill(text))?;
-    }
-    if args.lang == Language::Rust {
-        // The versions of everything that the simulator was built with.
-        let lock = std::fs::read_to_string(cars.join("Cargo.lock"))
-            .into_diagnostic()
-            .wrap_err("the project's Cargo.lock")?;
-        write(&place.join("Cargo.lock"), &lock)?;
-    }
-    println!(
-        "{} is a robot in {}. Next:\n",
-        folder.display(),
-        skeleton.language
-    );
-    println!(
-        "{}\n\nand read {}",
-        fill(&steps),
-        folder.join("README.md").display()
-    );
-    Ok(ExitCode::SUCCESS)
+    })
 }
 
-/// A folder as a shell reads it.
+/// Copies the lock file of the project: the robot is built with the same versions as the simulator.
+fn copy_lock(cars: &Path, place: &Path) -> miette::Result<()> {
+    let lock = std::fs::read_to_string(cars.join("Cargo.lock"))
+        .into_diagnostic()
+        .wrap_err("the project's Cargo.lock")?;
+    write(&place.join("Cargo.lock"), &lock)
+}
+
+/// The values of the placeholders in the files of a skeleton.
+struct Template<'a> {
+    skeleton: &'a Skeleton,
+    /// Name of the robot.
+    name: &'a str,
+    /// Its folder, quoted for a shell.
+    folder: String,
+    /// The folder of the CARS project; empty for languages without an SDK.
+    cars: &'a Path,
+}
+
+impl Template<'_> {
+    /// The commands that build and launch the robot, a line each.
+    fn steps(&self) -> String {
+        let launch = format!("cars launch {}/launch.toml", self.folder);
+        if self.skeleton.build.is_empty() {
+            return launch;
+        }
+
+        self.fill(&format!("{}\n{launch}", self.skeleton.build))
+    }
+
+    fn fill(&self, text: &str) -> String {
+        let package = self.name.to_lowercase().replace('.', "-");
+        let robot_crate = self.cars.join("crates/robot").display().to_string();
+        let mut text = text.replace("@COMMAND@", self.skeleton.command);
+        if text.contains("@STEPS@") {
+            text = text.replace("@STEPS@", &format!("```sh\n{}\n```", self.steps()));
+        }
+
+        text.replace("@LANGUAGE@", self.skeleton.language)
+            .replace("@FILE@", self.skeleton.program.0)
+            .replace("@HINT@", self.skeleton.hint)
+            .replace("@FOLDER@", &self.folder)
+            .replace("@PACKAGE@", &format!("cars-{package}"))
+            .replace("@ROBOT_CRATE@", &format!("{robot_crate:?}"))
+            .replace("@CARS@", &self.cars.display().to_string())
+            .replace("@NAME@", self.name)
+    }
+}
+
+/// A path quoted for a shell.
 fn shown(folder: &Path) -> String {
-    let text = folder
-        .strip_prefix(".")
-        .unwrap_or(folder)
-        .display()
-        .to_string();
+    let path = folder.strip_prefix(".").unwrap_or(folder);
+    let text = path.display().to_string();
+
     let is_plain = text
         .chars()
         .all(|c| c.is_ascii_alphanumeric() || "-_./".contains(c));
@@ -239,6 +266,7 @@ fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
         .canonicalize()
         .ok()
         .filter(|folder| folder.join("crates/robot/Cargo.toml").is_file());
+
     found.ok_or_else(|| {
         let help = "give the folder that you have cloned: --cars DIR";
         miette!(
@@ -249,19 +277,20 @@ fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
     })
 }
 
-/// Writes a file; what begins as a script can be run.
+/// Writes a file; a script is made executable.
 fn write(file: &Path, text: &str) -> miette::Result<()> {
-    let writing = || -> std::io::Result<()> {
-        if let Some(folder) = file.parent() {
-            std::fs::create_dir_all(folder)?;
-        }
-        std::fs::write(file, text)?;
-        if text.starts_with("#!") {
-            std::fs::set_permissions(file, Permissions::from_mode(0o755))?;
-        }
-        Ok(())
-    };
-    writing()
+    try_write(file, text)
         .into_diagnostic()
         .wrap_err_with(|| format!("writing {}", file.display()))
+}
+
+fn try_write(file: &Path, text: &str) -> std::io::Result<()> {
+    if let Some(folder) = file.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    std::fs::write(file, text)?;
+    if text.starts_with("#!") {
+        std::fs::set_permissions(file, Permissions::from_mode(0o755))?;
+    }
+    Ok(())
 }

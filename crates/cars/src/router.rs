@@ -1,5 +1,5 @@
-//! `cars router`: forwards between a simulator and robots on different machines. It is a session of the same middleware
-//! with the same settings as `zenohd` with `configs/zenoh/router.json5`, for machines where there is no `zenohd`.
+//! `cars router`: forwards between a simulator and robots on different machines. It is the equivalent of `zenohd` with
+//! `configs/zenoh/router.json5`, for machines without `zenohd`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -11,51 +11,50 @@ use miette::IntoDiagnostic;
 /// `cars router`.
 #[derive(Debug, Args)]
 pub(crate) struct RouterArgs {
-    /// Where the simulator, robots and other routers reach this one, for example `tcp/192.0.2.1:7447`.
+    /// Where the simulator, robots and other routers connect, for example `tcp/192.0.2.1:7447`.
     #[arg(
         long,
         value_name = "ENDPOINT",
         required_unless_present = "zenoh_config"
     )]
     listen: Vec<String>,
-    /// Another router that this one reaches.
+    /// Another router to connect to.
     #[arg(long, value_name = "ENDPOINT")]
     connect: Vec<String>,
     /// A configuration file of the middleware instead of the built-in settings.
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
-    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the runs
-    /// behind it and pose as any robot.
+    /// Listen where other machines can connect, without certificates. Any program that connects there can control the runs
+    /// behind it and take the place of any robot.
     #[arg(long)]
     insecure: bool,
 }
 
-/// Forwards until it is told to end.
+/// Forwards until a signal ends it.
 pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
     let endpoints = args.listen.iter().chain(&args.connect);
     bus::runtime::use_router_threads(endpoints.map(String::as_str), args.zenoh_config.as_deref());
 
     let (end, ended) = std::sync::mpsc::sync_channel(1);
-    // A second signal finds the queue full and changes nothing.
     ctrlc::set_handler(move || {
+        // A second signal finds the queue full and changes nothing.
         let _asked_already = end.try_send(());
     })
     .into_diagnostic()?;
+
     let role = Role::Relay {
         listen: args.listen.clone(),
         connect: args.connect.clone(),
         trusts_network: args.insecure,
     };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
-    println!(
-        "forwarding at {}",
-        if args.listen.is_empty() {
-            "what the file says".to_owned()
-        } else {
-            args.listen.join(", ")
-        }
-    );
+    if args.listen.is_empty() {
+        println!("forwarding at the endpoints of the configuration file");
+    } else {
+        println!("forwarding at {}", args.listen.join(", "));
+    }
     ended.recv().into_diagnostic()?;
     bus.close();
+
     Ok(ExitCode::SUCCESS)
 }

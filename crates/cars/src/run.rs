@@ -1,4 +1,4 @@
-//! `cars run`: a scenario in this process.
+//! `cars run`: runs a scenario in this process.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,7 +15,7 @@ pub(crate) use lab::run::execute;
 /// `cars run`.
 #[derive(Debug, Args)]
 pub(crate) struct RunArgs {
-    /// A scenario file, or a launch file whose scenario is meant.
+    /// A scenario file, or a launch file, whose scenario is run.
     file: PathBuf,
     #[command(flatten)]
     execution: ExecutionArgs,
@@ -33,7 +33,7 @@ pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
         let help = "play it with `cars launch`, or leave them out with --set 'fault=[]'";
         return Err(miette!(
             help = help,
-            "the scenario has faults of processes, and here are none"
+            "the scenario has faults of processes, and `cars run` starts no processes"
         ));
     }
 

@@ -7,7 +7,7 @@ use simulator::Summary;
 use tabled::builder::Builder;
 use tabled::settings::Style;
 
-/// Prints what came of a run.
+/// Prints the summary of a run.
 pub(crate) fn print(summary: &Summary, folder: &Path) {
     let mut table = Builder::default();
     table.push_record(HEAD);

@@ -1,4 +1,4 @@
-//! Errors in files that people write: file, line, caret, and what to do.
+//! Errors in configuration files: file, line, caret, and help.
 
 use std::fs::File;
 use std::io::Read;
@@ -7,10 +7,10 @@ use std::path::Path;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
-/// Longest file that is read: an endless one must not fill the memory.
+/// Longest file, bytes, so that an endless one cannot exhaust the memory.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
-/// A file that cannot be used, and where in it the reason stands.
+/// A file that cannot be used, with the place of the error.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
 pub struct FileError {
@@ -19,7 +19,7 @@ pub struct FileError {
     place: Option<Box<Place>>,
 }
 
-/// Where in a text an error stands.
+/// The place of an error in a text.
 #[derive(Debug)]
 struct Place {
     source: NamedSource<String>,
@@ -32,11 +32,13 @@ impl Diagnostic for FileError {
             .as_ref()
             .map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
     }
+
     fn source_code(&self) -> Option<&dyn SourceCode> {
         self.place
             .as_ref()
             .map(|place| &place.source as &dyn SourceCode)
     }
+
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let label = self.place.as_ref().map(|place| place.label.clone());
         label.map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)
@@ -44,7 +46,7 @@ impl Diagnostic for FileError {
 }
 
 impl FileError {
-    /// An error that has no place in a text.
+    /// An error without a place in a text.
     #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
         Self {
@@ -60,7 +62,7 @@ impl FileError {
         Self::new(format!("cannot read {}: {error}", path.display()))
     }
 
-    /// An error at a place of a text.
+    /// An error at a place in a text.
     #[must_use]
     pub fn at(source: &Source, span: Option<Range<usize>>, message: &str) -> Self {
         let place = Place {
@@ -74,30 +76,29 @@ impl FileError {
         }
     }
 
-    /// The error in one line, for where no file can be shown: the line it is at, and the reason.
+    /// The error in one line, without the file: the number of the line and the reason.
     #[must_use]
     pub fn in_words(&self) -> String {
         let Some(place) = &self.place else {
             return self.message.clone();
         };
-        let before = place
-            .source
-            .inner()
-            .get(..place.label.offset())
-            .unwrap_or_default();
+
+        let text = place.source.inner();
+        let before = text.get(..place.label.offset()).unwrap_or_default();
         let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
         let reason = place.label.label().unwrap_or(&self.message);
+
         format!("line {line}: {reason}")
     }
 
-    /// The same about a file that another one names.
+    /// The error of a file that another file names.
     #[must_use]
     pub fn named_by(mut self, name: &str) -> Self {
         self.message = format!("{}, named by {name}", self.message);
         self
     }
 
-    /// What to do about it.
+    /// The error with a help text.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
@@ -105,12 +106,12 @@ impl FileError {
     }
 }
 
-/// A text with the name under which people know it.
+/// A text and its name.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// Usually a path.
+    /// Name in errors, usually a path.
     pub name: String,
-    /// What it says.
+    /// The text.
     pub text: String,
 }
 
@@ -118,25 +119,16 @@ impl Source {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read, or is longer than anybody writes.
+    /// [`FileError`] if it cannot be read, or is longer than 16 MiB.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let unreadable = |error: std::io::Error| FileError::unreadable(path, &error);
-        let mut text = String::new();
-        let file = File::open(path).map_err(unreadable)?;
-        file.take(MAX_FILE_BYTES + 1)
-            .read_to_string(&mut text)
-            .map_err(unreadable)?;
+        let text = read_limited(path).map_err(|error| FileError::unreadable(path, &error))?;
+        let name = path.display().to_string();
         if text.len() as u64 > MAX_FILE_BYTES {
-            let text = format!(
-                "cannot read {}: it is longer than {MAX_FILE_BYTES} bytes",
-                path.display()
-            );
-            return Err(FileError::new(text));
+            let reason = format!("it is longer than {MAX_FILE_BYTES} bytes");
+            return Err(FileError::new(format!("cannot read {name}: {reason}")));
         }
-        Ok(Self {
-            name: path.display().to_string(),
-            text,
-        })
+
+        Ok(Self { name, text })
     }
 
     /// Reads a TOML text into a type that refuses unknown keys.
@@ -147,4 +139,12 @@ impl Source {
         toml::from_str(&self.text)
             .map_err(|error| FileError::at(self, error.span(), error.message()))
     }
+}
+
+/// Reads one byte more than allowed, so that a longer file is noticed.
+fn read_limited(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    let mut limited = File::open(path)?.take(MAX_FILE_BYTES + 1);
+    limited.read_to_string(&mut text)?;
+    Ok(text)
 }

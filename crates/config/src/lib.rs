@@ -1,5 +1,5 @@
-//! What scenario files, launch files and experiment files share: quantities with units, errors that show file, line and
-//! caret, seeds, speeds, and overrides of single values.
+//! Shared parts of scenario, launch and experiment files: quantities with units, errors with file, line and caret, seeds,
+//! speeds, and overrides of single values.
 
 pub mod diagnostic;
 pub mod overrides;

@@ -2,18 +2,18 @@
 
 use crate::diagnostic::{FileError, Source};
 
-/// What the command line changes of a scenario file.
+/// Changes of a scenario file by the command line.
 #[derive(Debug, Clone, Default)]
 pub struct Changes {
-    /// Another seed.
+    /// Seed, instead of the file's.
     pub seed: Option<u64>,
-    /// Another duration, simulated seconds.
+    /// Duration, instead of the file's, simulated seconds.
     pub duration_s: Option<f64>,
     /// `path=value` pairs.
     pub set: Vec<Override>,
 }
 
-/// One change: where in the file, and what to write there.
+/// One change: a path in the file and its new value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Override {
     path: Vec<String>,
@@ -23,55 +23,61 @@ pub struct Override {
 impl std::str::FromStr for Override {
     type Err = String;
 
-    /// Reads `path=value`. The path's parts are joined by `.`; an element of a list is found by its `name` or by its
-    /// position from 0: `robot.Butler.params.refiller=Vonda`. The value is written as in a scenario file; what is no
-    /// TOML value is a text.
+    /// Parses `path=value`. The parts of the path are joined by `.`; an element of a list is named by its `name` or its index
+    /// from 0, as in `robot.Butler.params.refiller=Vonda`. A value that is not TOML is a text.
     fn from_str(text: &str) -> Result<Self, String> {
         let (path, value) = text
             .split_once('=')
             .ok_or_else(|| format!("{text:?} is not of the form path=value"))?;
         let path: Vec<String> = path.trim().split('.').map(str::to_owned).collect();
+
         if path.iter().any(String::is_empty) {
             return Err(format!("{text:?}: a part of the path is empty"));
         }
+
         if let Some(part) = path.iter().find(|part| !is_key(part)) {
             return Err(format!(
                 "{text:?} is not of the form path=value: {part:?} is not a key"
             ));
         }
-        let parsed = toml::from_str::<toml::Table>(&format!("value = {value}"));
-        let parsed = parsed.ok().and_then(|mut table| table.remove("value"));
+
         Ok(Self {
             path,
-            value: parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned())),
+            value: parse_value(value),
         })
     }
 }
 
-/// Whether a part of a path is a key of TOML that needs no quotes, as all keys of our files and names of robots are.
+fn parse_value(text: &str) -> toml::Value {
+    let parsed = toml::from_str::<toml::Table>(&format!("value = {text}"));
+    let value = parsed.ok().and_then(|mut table| table.remove("value"));
+    value.unwrap_or_else(|| toml::Value::String(text.trim().to_owned()))
+}
+
+/// Whether a part of a path is a bare key of TOML. All keys of our files and all names of robots are.
 fn is_key(part: &str) -> bool {
     part.chars()
         .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-'))
 }
 
 impl std::fmt::Display for Override {
-    /// As it is read again, by another process of the same run.
+    /// Formats the change so that another process can parse it.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}={}", self.path.join("."), self.value)
     }
 }
 
 impl Changes {
-    /// Whether the file stays as it is.
+    /// Whether there are no changes.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.seed.is_none() && self.duration_s.is_none() && self.set.is_empty()
     }
 
-    /// The file with the changes made, as a text of its own.
+    /// The text of the file with the changes.
     ///
     /// # Errors
-    /// [`FileError`] if the file is not TOML, or names the change whose path leads nowhere.
+    /// [`FileError`] if the file is not TOML, or has no place for a change.
     pub fn apply(&self, source: &Source) -> Result<Source, FileError> {
         let mut root: toml::Table = source.parse()?;
         for change in &self.set {
@@ -112,6 +118,7 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
         *at = value.clone();
         return Ok(());
     };
+
     let next = match at {
         toml::Value::Table(table) if rest.is_empty() => {
             table.insert(first.clone(), value.clone());
@@ -127,16 +134,17 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
             ));
         }
     };
+
     set(next, rest, value)
 }
 
 fn element<'a>(list: &'a mut [toml::Value], which: &str) -> Result<&'a mut toml::Value, String> {
-    let is_named =
-        |value: &toml::Value| value.get("name").and_then(toml::Value::as_str) == Some(which);
-    let index = list
-        .iter()
-        .position(is_named)
-        .or_else(|| which.parse().ok().filter(|index| *index < list.len()));
+    let named = list.iter().position(|value| {
+        let name = value.get("name").and_then(toml::Value::as_str);
+        name == Some(which)
+    });
+    let index = named.or_else(|| which.parse().ok());
+
     let len = list.len();
     let found = index.and_then(|index| list.get_mut(index));
     found.ok_or_else(|| format!("none of the {len} elements is called or numbered {which:?}"))

@@ -1,4 +1,4 @@
-//! Which numbers are seeds. A run is drawn from its seed, so the number must mean the same in every language.
+//! Valid seeds. A seed must be the same number in every language.
 
 use protocol::random::MAX_SEED;
 

@@ -1,4 +1,4 @@
-//! How fast the clock of a run goes.
+//! Speed of the clock.
 
 use std::str::FromStr;
 
@@ -14,7 +14,7 @@ pub struct SpeedError(String);
 impl FromStr for Speed {
     type Err = SpeedError;
 
-    /// Reads `max`, or a finite number above zero, which may end in `x`.
+    /// Parses `max`, or a finite number above zero, which may end in `x`.
     fn from_str(text: &str) -> Result<Self, SpeedError> {
         if text == "max" {
             return Ok(Self(None));
@@ -29,7 +29,7 @@ impl FromStr for Speed {
 }
 
 impl std::fmt::Display for Speed {
-    /// As [`Speed::from_str`] reads it.
+    /// Formats the speed so that [`Speed::from_str`] can parse it.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.0 {
             Some(factor) => write!(f, "{factor}"),
@@ -52,6 +52,7 @@ mod tests {
             assert_eq!(text.parse(), Ok(speed));
             assert_eq!(speed.to_string().parse(), Ok(speed));
         }
+
         for text in ["0", "-1", "inf", "NaN", "fast", ""] {
             assert!(text.parse::<Speed>().is_err(), "{text:?}");
         }

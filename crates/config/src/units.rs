@@ -1,8 +1,8 @@
-//! Quantities with units, as people write them: `"50 ft"`, `"2 ft/s"`, `"0.5 s"`. Inside everything is SI.
+//! Quantities with units, such as `"50 ft"`, `"2 ft/s"` and `"0.5 s"`, which are converted to SI.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What a unit measures, and how much of the SI unit it is.
+/// Units with their dimensions and their values in SI units.
 const UNITS: [(&str, Dimension, f64); 13] = [
     ("m", Dimension::Length, 1.0),
     ("cm", Dimension::Length, 0.01),
@@ -44,22 +44,21 @@ impl Dimension {
     }
 }
 
-/// Reads a number with a unit: its value in SI units and what it measures. `None` if the text is something else.
+/// Parses a number with a unit. Returns its value in SI units and its dimension; `None` if the text is not a quantity.
 #[must_use]
 pub fn quantity(text: &str) -> Option<(f64, Dimension)> {
     let text = text.trim();
     let split =
         text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E')))?;
     let (number, unit) = text.split_at(split);
-    let number: f64 = number
-        .parse()
-        .ok()
-        .filter(|number: &f64| number.is_finite())?;
+    let number: f64 = number.parse().ok()?;
+    if !number.is_finite() {
+        return None;
+    }
+
     let unit = unit.trim();
-    UNITS
-        .iter()
-        .find(|(name, ..)| *name == unit)
-        .map(|(_, dimension, factor)| (number * factor, *dimension))
+    let (_, dimension, factor) = UNITS.iter().find(|(name, ..)| *name == unit)?;
+    Some((number * factor, *dimension))
 }
 
 macro_rules! quantity_type {
@@ -81,15 +80,18 @@ macro_rules! quantity_type {
         impl<'de> Deserialize<'de> for $type {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
                 struct Visitor;
+
                 impl serde::de::Visitor<'_> for Visitor {
                     type Value = $type;
                     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                         f.write_str($dimension.name())
                     }
+
                     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<$type, E> {
                         text.parse().map_err(E::custom)
                     }
                 }
+
                 deserializer.deserialize_str(Visitor)
             }
         }

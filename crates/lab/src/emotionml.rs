@@ -1,19 +1,17 @@
-//! What the robots of a run felt, as EmotionML 1.0 (W3C Recommendation, 22 May 2014), for the tools of
-//! people who study emotions.
+//! Exports the emotions of a run's robots as EmotionML 1.0 (W3C Recommendation, 22 May 2014).
 //!
 //! One `<emotion>` is one episode: the longest span of ticks in which a robot is in one emotion state. An `<emotion>` has
-//! one set for each kind of descriptor, so that a name of this project and a name of W3C's vocabularies cannot both be
-//! categories of it, and a second `<emotion>` with the same times would count every episode twice. So there are two views
-//! of a run, with the same episodes under the same ids: the default speaks in the robots' own words, which the document
-//! declares, each with what is nearest to it; [`View::Standard`] speaks in W3C's vocabularies alone.
+//! one vocabulary for each kind of descriptor, so it cannot hold a category of this project beside one of W3C's, and a
+//! second `<emotion>` with the same times would count every episode twice. There are therefore two views of a run, with
+//! the same episodes under the same ids. [`View::Own`] uses the robots' own names, which the document declares together
+//! with the nearest terms of W3C; [`View::Standard`] uses W3C's vocabularies only.
 //!
-//! The run is read tick by tick and written episode by episode. What stays in memory is the episodes in progress: two
-//! numbers a tick of each.
+//! The run is read tick by tick and written episode by episode. Only the episodes in progress are in memory, two numbers a
+//! tick of each.
 
 mod document;
 mod episode;
-mod notes;
-mod source;
+mod reader;
 mod terms;
 
 use std::io::Write;
@@ -25,25 +23,25 @@ use simulator::RunFolder;
 
 use document::Document;
 use episode::Episodes;
-use source::{Moment, Source};
+use reader::{Reader, Snapshot};
 
-/// Whose words a document is in.
+/// The vocabularies of a document.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum View {
     /// The robots' own names of emotions and action tendencies, declared by the document.
     Own,
-    /// What is nearest to them in W3C's vocabularies.
+    /// The nearest terms of W3C's vocabularies.
     Standard,
 }
 
 /// A run that is being exported.
 pub struct Export {
-    source: Source,
-    first: Moment,
+    reader: Reader,
+    first: Snapshot,
     only: Option<RobotName>,
 }
 
-/// Why a document stays incomplete; it then lacks its end, so that it cannot be taken for the whole.
+/// Why a document is incomplete. It then has no end tag, so no program takes it for a complete one.
 #[derive(Debug)]
 pub enum ExportError {
     /// The record of the run cannot be used.
@@ -70,13 +68,14 @@ impl Export {
     /// # Errors
     /// If there is no record, or it holds no such robot.
     pub fn open(folder: &RunFolder, only: Option<RobotName>) -> miette::Result<Self> {
-        let mut source = Source::open(folder)?;
-        let first = source
+        let mut reader = Reader::open(folder)?;
+        let first = reader
             .next()?
-            .ok_or_else(|| miette!("{} holds no tick yet", source.path().display()))?;
+            .ok_or_else(|| miette!("{} holds no tick yet", reader.path().display()))?;
         check_robot(only.as_ref(), &first)?;
+
         Ok(Self {
-            source,
+            reader,
             first,
             only,
         })
@@ -85,60 +84,58 @@ impl Export {
     /// The file that is exported.
     #[must_use]
     pub fn path(&self) -> &Path {
-        self.source.path()
+        self.reader.path()
     }
 
-    /// Writes the document.
+    /// Writes the document. Returns notes for people about what it leaves out, a sentence each.
     ///
     /// # Errors
     /// [`ExportError`] if the record cannot be read to its end, or the document cannot be written.
-    pub fn write(self, out: &mut impl Write, view: View) -> Result<(), ExportError> {
-        let Self {
-            mut source,
-            first,
-            only,
-        } = self;
-        let roster = first
-            .robots
-            .iter()
-            .map(|robot| robot.name.clone())
-            .collect();
-        let facts = source.facts().clone();
+    pub fn write(mut self, out: &mut impl Write, view: View) -> Result<Vec<String>, ExportError> {
+        let names = self.first.robots.iter().map(|robot| robot.name.clone());
+        let roster = names.collect();
+        let facts = self.reader.facts().clone();
         let mut document = Document::begin(&mut *out, facts, roster, view == View::Standard)?;
 
         let mut episodes = Episodes::default();
-        let mut moment = Some(first);
-        while let Some(Moment { tick, robots }) = moment {
-            for seen in robots {
-                if only.as_ref().is_some_and(|only| *only != seen.name) {
+        let mut snapshot = Some(self.first);
+        while let Some(Snapshot { tick, robots }) = snapshot {
+            for robot in robots {
+                if self.only.as_ref().is_some_and(|only| *only != robot.name) {
                     continue;
                 }
-                if let Some(ended) = episodes.see(tick, seen) {
+                if let Some(ended) = episodes.add(tick, robot) {
                     document.emotion(&ended)?;
                 }
             }
-            moment = source.next()?;
+            snapshot = self.reader.next()?;
         }
 
+        let mut notes = self.reader.into_notes();
+        notes.append(&mut episodes.notes);
         for ended in episodes.end() {
             document.emotion(&ended)?;
         }
-        document.end()?;
-        Ok(out.flush()?)
+        notes.extend(document.end()?);
+        out.flush()?;
+        Ok(notes)
     }
 }
 
-fn check_robot(only: Option<&RobotName>, first: &Moment) -> miette::Result<()> {
+fn check_robot(only: Option<&RobotName>, first: &Snapshot) -> miette::Result<()> {
     let Some(only) = only else {
         return Ok(());
     };
+
     let mut names = Vec::new();
     for robot in &first.robots {
         names.push(robot.name.as_str());
     }
+
     if names.contains(&only.as_str()) {
         return Ok(());
     }
+
     Err(miette!(
         "no robot of this run is called {only}; there are {}",
         names.join(", ")

@@ -1,4 +1,4 @@
-//! Experiments: one scenario, played in several arms under several conditions, over many seeds. An experiment is a file
+//! Experiments: one scenario in several arms under several conditions over many seeds. An experiment is a file
 //! ([`Experiment::load`]); two ship with the project.
 
 mod file;

@@ -1,5 +1,5 @@
-//! What is done with runs: executing a scenario in this process ([`run`]), reading a run's folder ([`folder`]), repeating
-//! runs and comparing them ([`experiment`], [`statistics`]), and writing what came of them ([`table`], [`emotionml`]).
+//! Work with runs: executing a scenario in this process ([`run`]), reading a run's folder ([`folder`]), repeating runs and
+//! comparing them ([`experiment`], [`statistics`]), and presenting results ([`table`], [`emotionml`]).
 
 pub mod emotionml;
 pub mod experiment;

@@ -1,25 +1,24 @@
-//! What the robots of a scenario do when it is played in this process.
-
-use std::collections::{BTreeMap, BTreeSet};
+//! States and commands of the robots of a scenario, from a run in this process.
 
 use miette::IntoDiagnostic;
 use protocol::messages::PublicState;
 use protocol::{Event, RobotName, RunName, Tick};
 use simulator::{Scenario, Simulation, TickRecord};
+use std::collections::BTreeMap;
 
 use crate::run::play;
 
-/// What one robot did.
+/// States and received commands of one robot.
 #[derive(Debug, Clone, Default)]
 pub struct Performance {
-    /// Its states, tick by tick, as far as it was asked to be kept.
+    /// Its state in each tick, up to the tick given to [`performances`].
     pub states: Vec<PublicState>,
-    /// Commands that were sent to it, each once, in the order in which they first were.
+    /// Commands sent to it, without duplicates, in the order of their first use.
     pub commands: Vec<String>,
 }
 
-/// Plays a scenario and keeps what its robots did, with their states up to tick `ticks`. `None` if a robot is of a class
-/// that cannot run in this process.
+/// Plays a scenario and returns the commands to its robots, and their states up to tick `ticks`. `None` if a class of
+/// robots cannot run in this process.
 ///
 /// # Errors
 /// If the scenario cannot be played.
@@ -27,34 +26,26 @@ pub fn performances(
     scenario: Scenario,
     ticks: Tick,
 ) -> miette::Result<Option<BTreeMap<RobotName, Performance>>> {
-    let classes: BTreeSet<&str> = scenario
-        .robots
-        .values()
-        .map(|spec| spec.class.as_str())
-        .collect();
-    if classes.iter().any(|class| robots::make(class).is_none()) {
-        return Ok(None);
-    }
-
-    let mut performances: BTreeMap<RobotName, Performance> = BTreeMap::new();
-    for name in scenario.robots.keys() {
+    let mut performances = BTreeMap::new();
+    for (name, spec) in &scenario.robots {
+        if robots::make(&spec.class).is_none() {
+            return Ok(None);
+        }
         performances.insert(name.clone(), Performance::default());
     }
+
     let run = RunName::new("conform").into_diagnostic()?;
     play(scenario, &run, |simulation, record| {
-        keep(&mut performances, ticks, simulation, record);
+        add_commands(&mut performances, record);
+        if record.tick <= ticks {
+            add_states(&mut performances, simulation, record.tick);
+        }
         Ok(())
     })?;
     Ok(Some(performances))
 }
 
-/// Keeps what happened in a tick.
-fn keep(
-    performances: &mut BTreeMap<RobotName, Performance>,
-    ticks: Tick,
-    simulation: &Simulation,
-    record: &TickRecord,
-) {
+fn add_commands(performances: &mut BTreeMap<RobotName, Performance>, record: &TickRecord) {
     for event in &record.events {
         let Event::CommandSent { to, command, .. } = event else {
             continue;
@@ -65,18 +56,24 @@ fn keep(
             performance.commands.push(command.clone());
         }
     }
+}
 
-    if record.tick > ticks {
-        return;
-    }
+fn add_states(
+    performances: &mut BTreeMap<RobotName, Performance>,
+    simulation: &Simulation,
+    tick: Tick,
+) {
     for (name, performance) in performances {
-        let (Some(report), Some(location)) = (simulation.report(name), simulation.location(name))
-        else {
+        let Some(report) = simulation.report(name) else {
             continue;
         };
+        let Some(location) = simulation.location(name) else {
+            continue;
+        };
+
         performance.states.push(PublicState {
             epoch: report.epoch,
-            tick: record.tick,
+            tick,
             location,
             speed_mps: report.speed_mps,
             direction_rad: report.direction_rad,

@@ -1,20 +1,20 @@
-//! A scenario in this process: the same simulation and the same robots as a launch, without a network.
+//! Runs a scenario in this process: the same simulation and the same robots as a launch, without a network.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use miette::{IntoDiagnostic, miette};
-use protocol::RunName;
 use protocol::messages::End;
+use protocol::{RobotName, RunName};
 use robot::{LocalHost, Robot};
 use simulator::{Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
 
-/// Runs a scenario to its end and records it in a folder that [`RunFolder::create`] made; `speed` is in simulated seconds
-/// per second, `None` as fast as possible.
+/// Runs a scenario to its end and records it in a folder that [`RunFolder::create`] made. `speed` is in simulated seconds
+/// per second; `None` is as fast as possible.
 ///
 /// # Errors
-/// If a robot cannot run in this process, if a robot ends the run, or if the record cannot be written.
+/// If a robot cannot run in this process, a robot ends the run, or the record cannot be written.
 pub fn execute(
     scenario: Scenario,
     run: &RunName,
@@ -30,16 +30,23 @@ pub fn execute(
         };
         recorder.write(simulation, record)?;
         if let Some(speed) = speed {
-            let due = Duration::try_from_secs_f64(simulation.time_s(simulation.tick()) / speed);
-            std::thread::sleep(due.unwrap_or(Duration::MAX).saturating_sub(begun.elapsed()));
+            wait_until(begun, simulation.time_s(simulation.tick()) / speed);
         }
         Ok(())
     })?;
+
     let recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
+
     Ok(recorder.finish(&simulation)?)
 }
 
-/// Plays a scenario to its end in this process and shows every tick to `each`, the end of the run included.
+/// Sleeps until this many seconds after `begun`.
+fn wait_until(begun: Instant, due_s: f64) {
+    let due = Duration::try_from_secs_f64(due_s).unwrap_or(Duration::MAX);
+    std::thread::sleep(due.saturating_sub(begun.elapsed()));
+}
+
+/// Plays a scenario to its end in this process and calls `each` after every tick and after the end of the run.
 ///
 /// # Errors
 /// As [`execute`], and the first error of `each`.
@@ -69,10 +76,10 @@ pub struct Local {
 }
 
 impl Local {
-    /// Sets a scenario up with the shipped robots.
+    /// Creates the simulation of a scenario and its robots.
     ///
     /// # Errors
-    /// If the scenario cannot be set up, or a robot cannot run in this process.
+    /// If the scenario cannot be set up, or a class of robots cannot run in this process.
     pub fn new(scenario: Scenario, run: &RunName) -> miette::Result<Self> {
         let robots = make_robots(&scenario, Path::new("the scenario"))?;
         let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
@@ -91,15 +98,16 @@ impl Local {
     }
 }
 
-/// One robot of the right class for each name of the roster; `file` is named in the error.
+/// Creates the robots of a scenario by their classes; `file` is named in the error.
 ///
 /// # Errors
-/// If a class is not one of those that can run in this process.
+/// If a class cannot run in this process.
 pub fn make_robots(
     scenario: &Scenario,
     file: &Path,
-) -> miette::Result<BTreeMap<protocol::RobotName, Box<dyn Robot>>> {
-    let make = |(name, spec): (&protocol::RobotName, &simulator::scenario::RobotSpec)| {
+) -> miette::Result<BTreeMap<RobotName, Box<dyn Robot>>> {
+    let mut robots = BTreeMap::new();
+    for (name, spec) in &scenario.robots {
         let robot = robots::make(&spec.class).ok_or_else(|| {
             miette!(
                 help = "a robot of another kind runs as a process of its own: name it in a launch file and use `cars launch`",
@@ -109,7 +117,7 @@ pub fn make_robots(
                 robots::CLASSES.join(", ")
             )
         })?;
-        Ok((name.clone(), robot))
-    };
-    scenario.robots.iter().map(make).collect()
+        robots.insert(name.clone(), robot);
+    }
+    Ok(robots)
 }

@@ -1,15 +1,15 @@
-//! What a sample tells of the mean it was drawn around.
+//! Confidence intervals of means.
 
 /// A mean with the half width of its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Estimate {
     /// Mean of the sample.
     pub mean: f64,
-    /// The interval is `mean` plus and minus this (Student's t).
+    /// The interval is `mean` ± this (Student's t).
     pub half_width: f64,
 }
 
-/// Fewest values of which an interval says anything, and for which the quantile below is exact to three digits.
+/// Fewest values of a useful interval; with fewer, the quantile below would not be exact to three digits.
 pub const MIN_SAMPLE: u64 = 8;
 
 impl Estimate {
@@ -18,11 +18,8 @@ impl Estimate {
     pub fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
-        let variance = values
-            .iter()
-            .map(|value| (value - mean) * (value - mean))
-            .sum::<f64>()
-            / (n - 1.0);
+        let squares = values.iter().map(|value| (value - mean) * (value - mean));
+        let variance = squares.sum::<f64>() / (n - 1.0);
         Self {
             mean,
             half_width: student_975(n - 1.0) * (variance / n).sqrt(),
@@ -63,28 +60,29 @@ mod tests {
             (31.0, 2.040),
             (100.0, 1.984),
         ] {
-            assert!(
-                (student_975(df) - t).abs() < 1e-3,
-                "{df}: {}",
-                student_975(df)
-            );
+            let found = student_975(df);
+            assert!((found - t).abs() < 1e-3, "{df}: {found}");
         }
     }
 
     #[test]
     fn an_interval_covers_the_true_mean_as_often_as_it_says() {
         let mut stream = protocol::random::stream(1, "statistics");
-        let covers = (0..4000).filter(|_| {
-            // A sum of twelve is near enough to normal; its mean is 6.
-            let mut draw = || {
-                (0..12)
-                    .map(|_| protocol::random::unit(&mut stream))
-                    .sum::<f64>()
-            };
-            let estimate = Estimate::of(&(0..8).map(|_| draw()).collect::<Vec<_>>());
-            (estimate.mean - 6.0).abs() <= estimate.half_width
-        });
-        let share = covers.count() as f64 / 4000.0;
+        let mut covered = 0;
+        for _ in 0..4000 {
+            let mut values = [0.0; 8];
+            for value in &mut values {
+                // A sum of twelve uniform numbers is close enough to normal; its mean is 6.
+                let uniform = (0..12).map(|_| protocol::random::unit(&mut stream));
+                *value = uniform.sum();
+            }
+
+            let estimate = Estimate::of(&values);
+            if (estimate.mean - 6.0).abs() <= estimate.half_width {
+                covered += 1;
+            }
+        }
+        let share = f64::from(covered) / 4000.0;
         assert!((0.935..0.965).contains(&share), "{share}");
     }
 

@@ -1,4 +1,4 @@
-//! The summary of a run as the cells of a table.
+//! The table at the end of a run: a row for each robot.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +6,14 @@ use protocol::messages::End;
 use simulator::Summary;
 use simulator::summary::RobotSummary;
 
-/// Cells of a full bar.
+/// Width of a full bar, characters.
 const BAR: usize = 10;
-/// A robot that held the clock this long at a time, seconds of wall clock, is named.
+/// A robot is named if the clock waited this long for it at a time, seconds of wall clock.
 const NOTICED_S: f64 = 0.5;
 /// Heads of the columns of [`rows`].
 pub const HEAD: [&str; 5] = ["robot", "emotion", "behavior", "commands", "moves"];
 
-/// How the run ended, how long it took, and what it was, in two lines.
+/// End, duration, seed and digest of the run in two lines.
 #[must_use]
 pub fn heading(summary: &Summary) -> String {
     let end = match summary.end {
@@ -22,19 +22,18 @@ pub fn heading(summary: &Summary) -> String {
         Some(End::Aborted) => "aborted",
         None => "unfinished",
     };
-    let elapsed_s = summary.wall.elapsed_s;
-    let time_s = summary.time_s;
 
-    let mut text = format!(
-        "{} {end} after {time_s:.1} s ({} ticks)",
-        summary.run, summary.ticks
-    );
+    let run = &summary.run;
+    let ticks = summary.ticks;
+    let time_s = summary.time_s;
+    let mut text = format!("{run} {end} after {time_s:.1} s ({ticks} ticks)");
+
+    let elapsed_s = summary.wall.elapsed_s;
     if elapsed_s > 0.0 {
-        text += &format!(
-            " in {elapsed_s:.1} s, {:.0} times real time",
-            time_s / elapsed_s
-        );
+        let ratio = time_s / elapsed_s;
+        text += &format!(" in {elapsed_s:.1} s, {ratio:.0} times real time");
     }
+
     text += &format!(
         "\nseed {}  guests {}  digest {}\n",
         summary.seed, summary.guests, summary.digest
@@ -55,10 +54,11 @@ pub fn rows(summary: &Summary) -> Vec<[String; 5]> {
             moves(robot),
         ]);
     }
+
     rows
 }
 
-/// The robots for which the clock was held long enough for a person to notice, a line each.
+/// A line for each robot for which the clock waited long enough for a person to notice.
 #[must_use]
 pub fn held_up(summary: &Summary) -> Vec<String> {
     let mut lines = Vec::new();
@@ -70,35 +70,28 @@ pub fn held_up(summary: &Summary) -> Vec<String> {
             ));
         }
     }
+
     lines
 }
 
-/// Shares of the time, the largest first: a bar, per cent, and how often it was entered.
+/// Shares of the time, the largest first: a bar, the percentage, and the number of times that the state was entered.
 fn shares(times_s: &BTreeMap<String, f64>, entered: Option<&BTreeMap<String, u64>>) -> String {
     let total_s: f64 = times_s.values().sum();
-    let mut sorted: Vec<(&String, f64)> = times_s
-        .iter()
-        .map(|(state, time_s)| (state, *time_s))
-        .collect();
-    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let width = sorted
-        .iter()
-        .map(|(state, _)| state.len())
-        .max()
-        .unwrap_or(0);
-    let line = |(state, time_s): &(&String, f64)| {
+    let width = times_s.keys().map(String::len).max().unwrap_or(0);
+    let mut sorted: Vec<(&String, &f64)> = times_s.iter().collect();
+    sorted.sort_by(|a, b| b.1.total_cmp(a.1));
+
+    let mut lines = Vec::new();
+    for (state, time_s) in sorted {
         let share = if total_s > 0.0 { time_s / total_s } else { 0.0 };
-        let count = entered
-            .and_then(|entered| entered.get(*state))
-            .map(|count| format!(" {count:>4}x"));
-        format!(
-            "{state:<width$} {} {:>3.0} %{}",
-            bar(share),
-            share * 100.0,
-            count.unwrap_or_default()
-        )
-    };
-    sorted.iter().map(line).collect::<Vec<_>>().join("\n")
+        let percent = share * 100.0;
+        let mut line = format!("{state:<width$} {} {percent:>3.0} %", bar(share));
+        if let Some(count) = entered.and_then(|entered| entered.get(state)) {
+            line += &format!(" {count:>4}x");
+        }
+        lines.push(line);
+    }
+    lines.join("\n")
 }
 
 fn bar(share: f64) -> String {
@@ -114,16 +107,13 @@ fn bar(share: f64) -> String {
 }
 
 fn commands(robot: &RobotSummary) -> String {
-    let mut lines: Vec<String> = robot
-        .sent
-        .iter()
-        .map(|(command, count)| format!("{count} {command}"))
-        .collect();
+    let mut lines = Vec::new();
+    for (command, count) in &robot.sent {
+        lines.push(format!("{count} {command}"));
+    }
     lines.push(format!("{} received", robot.received));
-    for (count, what) in [(robot.dropped, "lost on the way")] {
-        if count > 0 {
-            lines.push(format!("{count} {what}"));
-        }
+    if robot.dropped > 0 {
+        lines.push(format!("{} lost on the way", robot.dropped));
     }
     lines.join("\n")
 }

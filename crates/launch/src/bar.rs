@@ -1,4 +1,4 @@
-//! The progress bar: how far the run is, and, while the clock is held, for whom and for how long.
+//! The progress bar: simulated time and speed, and while the clock is held, the robots it waits for.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -6,35 +6,32 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use protocol::messages::{Awaited, Phase, Status, WorldFrame};
 
-/// Redraws per second at most.
+/// Most redraws per second.
 const REDRAWS_HZ: u8 = 10;
-/// The speed that is shown is the mean over this time.
+/// Window of the speed, which is a mean.
 const SPEED_WINDOW: Duration = Duration::from_secs(2);
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Progress {
+    /// Simulated time, s.
     time_s: f64,
+    /// Simulated duration of the run, s.
     duration_s: f64,
     phase: Phase,
+    /// Robots for which the clock is held.
     awaiting: Vec<Awaited>,
+    /// When it was received.
     at: Instant,
 }
 
 impl From<WorldFrame> for Progress {
     fn from(frame: WorldFrame) -> Self {
-        let WorldFrame {
-            time_s,
-            duration_s,
-            phase,
-            awaiting,
-            ..
-        } = frame;
         Self {
-            time_s,
-            duration_s,
-            phase,
-            awaiting,
+            time_s: frame.time_s,
+            duration_s: frame.duration_s,
+            phase: frame.phase,
+            awaiting: frame.awaiting,
             at: Instant::now(),
         }
     }
@@ -42,18 +39,11 @@ impl From<WorldFrame> for Progress {
 
 impl From<Status> for Progress {
     fn from(status: Status) -> Self {
-        let Status {
-            time_s,
-            duration_s,
-            phase,
-            awaiting,
-            ..
-        } = status;
         Self {
-            time_s,
-            duration_s,
-            phase,
-            awaiting,
+            time_s: status.time_s,
+            duration_s: status.duration_s,
+            phase: status.phase,
+            awaiting: status.awaiting,
             at: Instant::now(),
         }
     }
@@ -76,11 +66,14 @@ impl Bar {
         } else {
             "{bar:24} {wide_msg}"
         };
+
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
+
         bar.set_message("starting");
         bar.force_draw();
+
         Self {
             bar,
             progress: None,
@@ -89,41 +82,38 @@ impl Bar {
         }
     }
 
-    /// Whether the clock waits for somebody.
+    /// Whether the clock waits for a robot.
     pub(super) fn is_held(&self) -> bool {
-        self.progress
-            .as_ref()
-            .is_some_and(|progress| !progress.awaiting.is_empty())
+        let progress = self.progress.as_ref();
+        progress.is_some_and(|progress| !progress.awaiting.is_empty())
     }
 
-    /// Shows where the run is now; without news, for how long it has been held.
-    pub(super) fn update(&mut self, news: Option<Progress>) {
+    /// Redraws the bar; without a newer progress, only the time for which the clock has been held changes.
+    pub(super) fn update(&mut self, newer: Option<Progress>) {
         let was_held = self.is_held();
-        if let Some(news) = news {
-            self.speed.add(&news);
-            self.progress = Some(news);
+        if let Some(newer) = newer {
+            self.speed.add(&newer);
+            self.progress = Some(newer);
         }
         let Some(progress) = &self.progress else {
             return;
         };
-        let millis = |seconds: f64| (seconds * 1000.0) as u64;
+
         self.bar.update(|state| {
             state.set_len(millis(progress.duration_s).max(1));
             state.set_pos(millis(progress.time_s));
         });
-        self.bar.set_message(message(
-            progress,
-            self.speed.factor(),
-            Instant::now(),
-            self.has_colors,
-        ));
-        // Nothing may follow for a long time: the last thing to say must not fall to the limit on redraws.
+        let factor = self.speed.factor();
+        let message = message(progress, factor, Instant::now(), self.has_colors);
+        self.bar.set_message(message);
+
+        // No update may follow for a long time, so this one must not be dropped by the limit on redraws.
         if was_held || self.is_held() || progress.phase != Phase::Running {
             self.bar.force_draw();
         }
     }
 
-    /// Writes something else, with the bar out of its way.
+    /// Hides the bar during `write`.
     pub(super) fn aside(&self, write: impl FnOnce()) {
         self.bar.suspend(write);
     }
@@ -134,81 +124,82 @@ impl Bar {
 }
 
 fn message(progress: &Progress, factor: Option<f64>, now: Instant, has_colors: bool) -> String {
-    let Progress {
-        time_s,
-        duration_s,
-        phase,
-        ..
-    } = progress;
-    let percent = if *duration_s > 0.0 {
+    let phase = progress.phase;
+    let time = describe_time(progress.time_s, progress.duration_s);
+    match held(&progress.awaiting, now.duration_since(progress.at)) {
+        Some(held) if has_colors => return format!("{time}  \u{1b}[33m{held}\u{1b}[0m"),
+        Some(held) => return format!("{time}  {held}"),
+        None => {}
+    }
+
+    match factor.filter(|_| phase == Phase::Running) {
+        Some(factor) => format!("{time}  {phase}  {factor:.1} x real time"),
+        None => format!("{time}  {phase}"),
+    }
+}
+
+fn describe_time(time_s: f64, duration_s: f64) -> String {
+    let percent = if duration_s > 0.0 {
         (100.0 * time_s / duration_s).floor()
     } else {
         100.0
     };
-    let place = format!("{percent:>3} %  {time_s:.1} of {duration_s:.1} s");
-    if let Some(held) = held(&progress.awaiting, now.duration_since(progress.at)) {
-        return if has_colors {
-            format!("{place}  \u{1b}[33m{held}\u{1b}[0m")
-        } else {
-            format!("{place}  {held}")
-        };
-    }
-    match factor.filter(|_| *phase == Phase::Running) {
-        Some(factor) => format!("{place}  {phase}  {factor:.1} x real time"),
-        None => format!("{place}  {phase}"),
-    }
+    format!("{percent:>3} %  {time_s:.1} of {duration_s:.1} s")
 }
 
-/// Robots that are named one by one; of more it is said how many.
+fn millis(seconds: f64) -> u64 {
+    (seconds * 1000.0) as u64
+}
+
+/// Most robots that are named; the others are counted.
 const MAX_NAMED: usize = 4;
 
-/// For whom the clock waits, why, and since when; `seen_ago` is the age of what is known.
-fn held(awaiting: &[Awaited], seen_ago: Duration) -> Option<String> {
-    let longest_s = awaiting
-        .iter()
-        .map(|awaited| awaited.since_s)
-        .reduce(f64::max)?;
-    let for_s = (longest_s + seen_ago.as_secs_f64()).floor();
-    let name = |awaited: &Awaited| format!("{} ({})", awaited.name, awaited.because);
-    let mut names: Vec<String> = awaiting.iter().take(MAX_NAMED).map(name).collect();
+/// The robots for which the clock waits, why, and for how long; `age` is that of the information.
+fn held(awaiting: &[Awaited], age: Duration) -> Option<String> {
+    let times_s = awaiting.iter().map(|awaited| awaited.since_s);
+    let longest_s = times_s.reduce(f64::max)?;
+    let for_s = (longest_s + age.as_secs_f64()).floor();
+
+    let mut names = Vec::new();
+    for awaited in awaiting.iter().take(MAX_NAMED) {
+        names.push(format!("{} ({})", awaited.name, awaited.because));
+    }
     if awaiting.len() > MAX_NAMED {
         names.push(format!("{} more", awaiting.len() - MAX_NAMED));
     }
-    Some(format!(
-        "held for {for_s} s: waiting for {}",
-        names.join(", ")
-    ))
+
+    let names = names.join(", ");
+    Some(format!("held for {for_s} s: waiting for {names}"))
 }
 
-/// Simulated seconds per second, as achieved lately.
+/// Recent simulated seconds per second.
 #[derive(Debug, Default)]
 struct Speedometer {
     samples: VecDeque<(Instant, f64)>,
 }
 
 impl Speedometer {
-    fn add(&mut self, news: &Progress) {
-        let Progress { at, time_s, .. } = *news;
-        let is_new_epoch = self
-            .samples
-            .back()
-            .is_some_and(|(_, before_s)| time_s < *before_s);
-        // What the clock does while it is held says nothing of how fast it goes.
-        if is_new_epoch || news.phase != Phase::Running || !news.awaiting.is_empty() {
+    fn add(&mut self, progress: &Progress) {
+        let time_s = progress.time_s;
+        let last = self.samples.back();
+        let is_new_epoch = last.is_some_and(|(_, before_s)| time_s < *before_s);
+
+        // Times at which the clock is held do not count.
+        if is_new_epoch || progress.phase != Phase::Running || !progress.awaiting.is_empty() {
             self.samples.clear();
         }
-        while self
-            .samples
-            .front()
-            .is_some_and(|(then, _)| at.duration_since(*then) > SPEED_WINDOW)
+
+        while let Some((oldest, _)) = self.samples.front()
+            && progress.at.duration_since(*oldest) > SPEED_WINDOW
         {
             self.samples.pop_front();
         }
-        self.samples.push_back((at, time_s));
+        self.samples.push_back((progress.at, time_s));
     }
 
     fn factor(&self) -> Option<f64> {
-        let ((from, from_s), (to, to_s)) = (self.samples.front()?, self.samples.back()?);
+        let (from, from_s) = self.samples.front()?;
+        let (to, to_s) = self.samples.back()?;
         let elapsed_s = to.duration_since(*from).as_secs_f64();
         (elapsed_s > 0.1).then(|| (to_s - from_s) / elapsed_s)
     }
@@ -232,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bar_says_how_far_and_how_fast() {
+    fn the_bar_shows_time_and_speed() {
         let progress = progress(Vec::new());
         assert_eq!(
             message(&progress, Some(19.96), progress.at, false),
@@ -241,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bar_says_for_whom_the_clock_is_held_why_and_for_how_long() {
+    fn the_bar_shows_the_robots_for_which_the_clock_is_held() {
         let name = RobotName::new("Leguin").unwrap();
         let progress = progress(vec![Awaited {
             name,
@@ -254,21 +245,19 @@ mod tests {
     }
 
     #[test]
-    fn the_speed_is_that_of_late() {
-        let (mut speed, begin) = (Speedometer::default(), Instant::now());
+    fn the_speed_is_a_recent_mean() {
+        let mut speed = Speedometer::default();
+        let begin = Instant::now();
         for tenth in 0..100_u32 {
             let factor = if tenth < 50 { 1.0 } else { 20.0 };
-            let (at, time_s) = (
-                begin + Duration::from_millis(100) * tenth,
-                f64::from(tenth) * 0.1 * factor,
-            );
             speed.add(&Progress {
-                at,
-                time_s,
+                at: begin + Duration::from_millis(100) * tenth,
+                time_s: f64::from(tenth) * 0.1 * factor,
                 ..progress(Vec::new())
             });
         }
         assert!((speed.factor().unwrap() - 20.0).abs() < 1e-6);
+
         speed.add(&Progress {
             time_s: 0.0,
             ..progress(Vec::new())

@@ -1,7 +1,6 @@
-//! The same launch as containers: one service for each process.
+//! Exports a launch as a compose file: one service for each process.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
 use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
@@ -15,55 +14,55 @@ use config::Speed;
 
 /// Image of all services.
 const IMAGE: &str = "cars:local";
-/// Addresses of the private network. Fixed ones: looking up a name delays the noticing of a failure, and the healing,
-/// by ten seconds.
+/// Prefix of the addresses in the private network. They are fixed, because looking up names would delay the detection of a
+/// failure, and the reconnection, by ten seconds.
 const NETWORK: &str = "172.30.77";
-/// The simulator's place in it; the others follow.
+/// Host number of the simulator; those of the other services follow.
 const FIRST_HOST: usize = 10;
-/// Most services that find an address.
+/// Most services with an address in the network.
 const MAX_SERVICES: usize = 240;
 const PORT: u16 = 7447;
 /// Port of the console.
 const CONSOLE_PORT: u16 = 7007;
 
-/// Explains the file to those who meet it first.
+/// Comment at the beginning of the file.
 const HEAD: &str = "\
 # Made by `cars launch --export compose`: one service for each process of a launch file.
 #
-# The image has the binaries that are built here; docker/Dockerfile says how. Then
+# The image has the binaries that are built here, see docker/Dockerfile. Then
 #     docker-compose up --exit-code-from simulator
-# plays the run and leaves its folder in ./runs. The services reach each other, and nobody else reaches them but a
-# browser on this machine: the console's log shows the address.
+# plays the run and leaves its folder in ./runs. The network of the services is private; only the console can be reached,
+# by a browser on this machine at the address in the console's log.
 ";
 
-/// Writes the compose file of a launch file; paths in it are relative to the folder it is put in, the current one.
+/// The compose file of a launch file. Its paths are relative to the current folder, where it has to be written.
 pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<String, FileError> {
     if file.processes.len() > MAX_SERVICES {
         return Err(FileError::new(format!(
             "more than {MAX_SERVICES} processes do not fit into one network"
         )));
     }
+
     let mut text = format!("{HEAD}\nservices:\n");
     simulator_service(&mut text, file, run, speed)?;
+
     for (index, process) in file.processes.iter().enumerate() {
         robot_service(&mut text, process, run, FIRST_HOST + 1 + index);
     }
+
     if let Some(console) = &file.console {
-        console_service(
-            &mut text,
-            console,
-            run,
-            FIRST_HOST + 1 + file.processes.len(),
-        );
+        let host = FIRST_HOST + 1 + file.processes.len();
+        console_service(&mut text, console, run, host);
     }
-    let _infallible = write!(
-        text,
+
+    text += &format!(
         "networks:\n  cars:\n    internal: true\n    ipam:\n      config:\n        - subnet: {NETWORK}.0/24\n"
     );
     if file.console.is_some() {
-        // A private network publishes nothing; the browser comes in by another one.
+        // An internal network publishes no ports; the browser connects through another one.
         text += "  browser: {}\n";
     }
+
     Ok(text)
 }
 
@@ -73,41 +72,36 @@ fn simulator_service(
     run: &RunName,
     speed: Speed,
 ) -> Result<(), FileError> {
-    let no_file = || FileError::new(format!("{} names no file", file.scenario.display()));
-    let scenario = file
-        .scenario
-        .file_name()
-        .and_then(|name| name.to_str())
-        .ok_or_else(no_file)?;
+    let path = &file.scenario;
+    let scenario = path.file_name().and_then(|name| name.to_str());
+    let scenario = scenario
+        .ok_or_else(|| FileError::new(format!("{} is not the path of a file", path.display())))?;
+
     let mut command = file.simulator.command.clone();
     command.extend([
         format!("/configs/{scenario}"),
         format!("--run={run}"),
         format!("--listen=tcp/0.0.0.0:{PORT}"),
-        // Everybody in the private network is trusted, and nobody else reaches it.
+        // Only the services of this file are in the private network.
         "--insecure".to_owned(),
         "--out=/runs".to_owned(),
         format!("--speed={speed}"),
     ]);
+
     let mut env = file.simulator.env.clone();
     env.entry(RUNTIME_VARIABLE.to_owned())
         .or_insert_with(|| ONE_THREAD.to_owned());
     let mut service = Service::begin(text, SIMULATOR, &command);
     service.map("environment", env.iter());
-    let folder = file.scenario.parent().unwrap_or(Path::new(""));
-    service.list(
-        "volumes",
-        &[
-            format!("{}:/configs:ro", here(folder)),
-            "./runs:/runs".to_owned(),
-        ],
-    );
+    let configs = here(path.parent().unwrap_or(Path::new("")));
+    let volumes = [format!("{configs}:/configs:ro"), "./runs:/runs".to_owned()];
+    service.list("volumes", &volumes);
     service.end(FIRST_HOST);
     Ok(())
 }
 
-/// The console, for a browser on the same machine. It is bound to more than loopback in its container, so its address
-/// has a token; the log of the service shows it.
+/// The console, for a browser on the same machine. In its container it listens at all interfaces, so its address has a
+/// token, which the log of the service shows.
 fn console_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
     let mut command = process.command.clone();
     command.retain(|word| !word.starts_with("--bind"));
@@ -115,21 +109,17 @@ fn console_service(text: &mut String, process: &Process, run: &RunName, host: us
     let mut service = Service::begin(text, CONSOLE, &command);
     service.map("environment", guest_env(process, run).iter());
     service.list("depends_on", &[SIMULATOR.to_owned()]);
-    service.list(
-        "ports",
-        &[format!("127.0.0.1:{CONSOLE_PORT}:{CONSOLE_PORT}")],
-    );
+    let port = format!("127.0.0.1:{CONSOLE_PORT}:{CONSOLE_PORT}");
+    service.list("ports", &[port]);
     service.end_in(host, "      browser: {}\n");
 }
 
 /// Environment of a service that connects to the simulator.
 fn guest_env(process: &Process, run: &RunName) -> BTreeMap<String, String> {
     let mut env = process.env.clone();
+    let endpoint = format!("tcp/{NETWORK}.{FIRST_HOST}:{PORT}");
     env.insert("CARS_RUN".to_owned(), run.to_string());
-    env.insert(
-        "CARS_CONNECT".to_owned(),
-        format!("tcp/{NETWORK}.{FIRST_HOST}:{PORT}"),
-    );
+    env.insert("CARS_CONNECT".to_owned(), endpoint);
     env.entry(RUNTIME_VARIABLE.to_owned())
         .or_insert_with(|| ONE_THREAD.to_owned());
     env
@@ -140,23 +130,25 @@ fn robot_service(text: &mut String, process: &Process, run: &RunName, host: usiz
     let mut service = Service::begin(text, &process.name.to_lowercase(), &command);
     service.map("environment", guest_env(process, run).iter());
     service.list("depends_on", &[SIMULATOR.to_owned()]);
+
     match process.restart {
         Restart::Never => {}
         Restart::OnFailure => service.line("restart: on-failure:5"),
         Restart::Always => service.line("restart: unless-stopped"),
     }
+
     if process.is_extern {
-        // Not started with the others; `docker-compose --profile extern up` does.
+        // Started only by `docker-compose --profile extern up`.
         service.list("profiles", &["extern".to_owned()]);
     }
+
     service.end(host);
 }
 
-/// A folder as compose reads it: `./configs`, and not the name of a volume.
+/// A folder for compose, which would take a relative path without `./` for the name of a volume.
 fn here(folder: &Path) -> String {
-    let is_anchored =
-        folder.is_absolute() || folder.components().next() == Some(Component::ParentDir);
-    let path = if is_anchored {
+    let begins_above = folder.components().next() == Some(Component::ParentDir);
+    let path = if folder.is_absolute() || begins_above {
         folder.to_owned()
     } else {
         PathBuf::from(".").join(folder)
@@ -164,18 +156,18 @@ fn here(folder: &Path) -> String {
     path.display().to_string().trim_end_matches('/').to_owned()
 }
 
-/// One service of the file. Writing to a text cannot fail.
+/// One service of the file.
 struct Service<'a> {
     text: &'a mut String,
 }
 
 impl<'a> Service<'a> {
     fn begin(text: &'a mut String, name: &str, command: &[String]) -> Self {
-        *text += &format!("  {name}:\n    image: {IMAGE}\n");
         let words: Vec<String> = command.iter().map(|word| quote(word)).collect();
-        let service = Self { text };
-        *service.text += &format!("    command: [{}]\n    init: true\n", words.join(", "));
-        service
+        let words = words.join(", ");
+        *text += &format!("  {name}:\n    image: {IMAGE}\n");
+        *text += &format!("    command: [{words}]\n    init: true\n");
+        Self { text }
     }
 
     fn line(&mut self, line: &str) {
@@ -184,36 +176,42 @@ impl<'a> Service<'a> {
 
     fn list(&mut self, key: &str, values: &[String]) {
         self.line(&format!("{key}:"));
-        values
-            .iter()
-            .for_each(|value| *self.text += &format!("      - {}\n", quote(value)));
+        for value in values {
+            *self.text += &format!("      - {}\n", quote(value));
+        }
     }
 
     fn map<'b>(&mut self, key: &str, values: impl Iterator<Item = (&'b String, &'b String)>) {
         self.line(&format!("{key}:"));
-        values.for_each(|(name, value)| *self.text += &format!("      {name}: {}\n", quote(value)));
+        for (name, value) in values {
+            *self.text += &format!("      {name}: {}\n", quote(value));
+        }
     }
 
     fn end(self, host: usize) {
         self.end_in(host, "");
     }
 
-    /// The end of a service that is in other networks, too.
+    /// Ends a service that is also in other networks.
     fn end_in(self, host: usize, others: &str) {
         let own = format!("      cars:\n        ipv4_address: {NETWORK}.{host}\n");
         *self.text += &format!("    networks:\n{own}{others}\n");
     }
 }
 
-/// A text for YAML, whatever is in it; `$` would begin a variable of compose.
+/// Words that YAML does not read as texts.
+const LITERALS: [&str; 9] = ["yes", "no", "true", "false", "on", "off", "null", "y", "n"];
+
+/// Quotes a text for YAML if necessary. `$` is doubled, because it begins a variable in compose files.
 fn quote(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=".contains(c);
+    let mut characters = word.chars();
+    let is_plain = characters.all(|c| c.is_ascii_alphanumeric() || "-_./=".contains(c));
     let is_word = word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '/' || c == '.');
-    let is_literal = ["yes", "no", "true", "false", "on", "off", "null", "y", "n"];
-    if is_word && word.chars().all(is_plain) && !is_literal.contains(&word.to_lowercase().as_str())
-    {
+    let is_literal = LITERALS.contains(&word.to_lowercase().as_str());
+    if is_plain && is_word && !is_literal {
         return word.to_owned();
     }
+
     let escaped = serde_json::Value::from(word.replace('$', "$$"));
     escaped.to_string()
 }
@@ -232,6 +230,7 @@ mod tests {
         let text = export(&file, &run, file.speed.unwrap()).unwrap();
         let committed = std::fs::read_to_string(root.join("docker-compose.yml")).unwrap();
         let how = "cars launch launch/hors_doeuvres.toml --export compose > docker-compose.yml";
+
         assert_eq!(
             text, committed,
             "make it anew, at the top of the project: {how}"

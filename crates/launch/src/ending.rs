@@ -1,4 +1,4 @@
-//! How processes end, in words and in numbers.
+//! The end of processes as text and as exit status.
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
@@ -8,53 +8,51 @@ use nix::sys::signal::Signal;
 
 /// Exit status of shells where a command cannot be run.
 const CANNOT_RUN: u8 = 126;
-/// Exit statuses above this one name signals.
+/// Exit status of a process killed by signal `n` is this number plus `n`, as in shells.
 const SIGNALS: u8 = 128;
 
 /// How a process ended.
 #[derive(Debug)]
 pub(crate) enum Ended {
-    /// It ran and is over.
+    /// It has exited.
     Exited(ExitStatus),
-    /// It never ran; the reason.
+    /// It could not be started, for this reason.
     NotStarted(String),
 }
 
 impl Ended {
-    /// Whether it ended other than with exit status 0.
+    /// Whether it did not exit with status 0.
     pub(super) fn has_failed(&self) -> bool {
         !matches!(self, Self::Exited(status) if status.success())
     }
 
-    /// The exit status that says so: its own, or 128 and its signal.
+    /// The exit status that reports it: its own, or 128 plus its signal.
     pub(super) fn code(&self) -> u8 {
-        match self {
-            Self::NotStarted(_) => CANNOT_RUN,
-            Self::Exited(status) => {
-                let signal = status.signal().and_then(|signal| u8::try_from(signal).ok());
-                let own = status.code().and_then(|code| u8::try_from(code).ok());
-                signal
-                    .map(|signal| SIGNALS.saturating_add(signal))
-                    .or(own)
-                    .unwrap_or(1)
-            }
+        let status = match self {
+            Self::NotStarted(_) => return CANNOT_RUN,
+            Self::Exited(status) => status,
+        };
+
+        if let Some(signal) = status.signal() {
+            return SIGNALS.saturating_add(u8::try_from(signal).unwrap_or_default());
         }
+        let code = status.code().and_then(|code| u8::try_from(code).ok());
+        code.unwrap_or(1)
     }
 }
 
 impl std::fmt::Display for Ended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::NotStarted(reason) => write!(f, "did not start ({reason})"),
-            Self::Exited(status) => match status.signal().map(Signal::try_from) {
-                Some(Ok(signal)) => write!(f, "was ended by {signal}"),
-                Some(Err(_)) => write!(f, "was ended by a signal"),
-                None => write!(
-                    f,
-                    "ended with exit status {}",
-                    status.code().unwrap_or_default()
-                ),
-            },
+        let status = match self {
+            Self::NotStarted(reason) => return write!(f, "did not start ({reason})"),
+            Self::Exited(status) => status,
+        };
+
+        let code = status.code().unwrap_or_default();
+        match status.signal().map(Signal::try_from) {
+            Some(Ok(signal)) => write!(f, "was ended by {signal}"),
+            Some(Err(_)) => write!(f, "was ended by a signal"),
+            None => write!(f, "ended with exit status {code}"),
         }
     }
 }
@@ -62,13 +60,13 @@ impl std::fmt::Display for Ended {
 /// A failure that ended a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failure {
-    /// Who failed, and how.
+    /// Name of the process and how it ended.
     pub text: String,
     /// Exit status of the launch.
     pub code: u8,
-    /// The last lines of its error output.
+    /// The last lines of the process's error output.
     pub tail: Vec<String>,
-    /// Its log.
+    /// Path of the process's log.
     pub log: PathBuf,
 }
 
@@ -79,14 +77,14 @@ impl std::fmt::Display for Failure {
             0 => writeln!(f, "it wrote no errors")?,
             _ => writeln!(f, "the last lines that it wrote as errors:")?,
         }
-        self.tail
-            .iter()
-            .try_for_each(|line| writeln!(f, "  {line}"))?;
+        for line in &self.tail {
+            writeln!(f, "  {line}")?;
+        }
         write!(f, "its log: {}", self.log.display())
     }
 }
 
-/// Exit status of a process that was asked to end by a signal.
+/// Exit status of a process that a signal has ended.
 #[must_use]
 pub fn code_of(signal: Signal) -> u8 {
     SIGNALS.saturating_add(u8::try_from(signal as i32).unwrap_or_default())

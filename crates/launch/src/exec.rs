@@ -1,5 +1,5 @@
-//! Any program as a robot. This process speaks the protocol for the program, and JSON Lines with it over its standard
-//! input and output (`docs/protocol.md`, "Robots over stdin and stdout").
+//! Runs any program as a robot. This process implements the protocol and exchanges JSON Lines with the program over its
+//! standard input and output (`docs/protocol.md`, "Robots over stdin and stdout").
 
 mod line;
 mod program;
@@ -7,7 +7,7 @@ mod proxy;
 mod start;
 
 use std::ffi::OsString;
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
@@ -22,45 +22,45 @@ use program::{ASKING, END_PATIENCE, Program};
 use proxy::Proxy;
 pub use start::{StartError, start};
 
-/// A signal that goes to a group of processes ends the program at once and reaches us, too: within this time.
+/// How long to wait for a signal that has killed the program: a signal to the process group reaches this process, too.
 const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
-/// How a program that was run as a robot came to its end.
+/// How the run of a program as a robot ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Ended {
-    /// With the run.
+    /// The run is over.
     WithRun,
-    /// By a signal to this process; the exit status that reports it.
+    /// A signal has ended this process; the exit status that reports it.
     BySignal(u8),
-    /// The robot gave up, for this reason.
+    /// The robot has given up, for this reason.
     Failed(String),
 }
 
-/// Runs a program as the robot `name` until the run, or the program, ends.
+/// Runs a program as the robot `name` until the run or the program ends.
 ///
-/// To be called before this process has other threads: it blocks the signals that ask to end.
+/// It must be called before this process has other threads, because it blocks the signals to end.
 ///
 /// # Errors
 /// If the program cannot be started.
 pub fn exec(name: &RobotName, options: HostOptions, command: &[OsString]) -> miette::Result<Ended> {
-    // Before any other thread is there, so that these signals come to the thread that waits for them. The program does
-    // not inherit this.
+    // All later threads inherit the mask, so only the thread in `listen` receives these signals. The program does not
+    // inherit it.
     let asking: SigSet = ASKING.into_iter().collect();
     asking.thread_block().into_diagnostic()?;
 
     let stopper = Arc::new(OnceLock::new());
-    let (program, heard) = Program::start(name, command, stopper.clone())?;
+    let (program, events) = Program::start(name, command, stopper.clone())?;
     let asked = listen(asking, &program, stopper.clone());
-    let proxy = Box::new(Proxy::new(program.clone(), heard));
+    let proxy = Box::new(Proxy::new(program.clone(), events));
     let outcome = Host::connect(vec![(name.clone(), proxy)], options).and_then(|host| {
         let stopper = stopper.get_or_init(|| host.stopper());
         if program.status().is_some() {
-            stopper.stop(); // It was over before its end could be reported.
+            stopper.stop(); // It exited before the stopper was set.
         }
         host.run()
     });
 
-    let patience = if program.was_asked_to_end() {
+    let patience = if program.was_ended_by_signal() {
         SAME_SIGNAL
     } else {
         Duration::ZERO
@@ -70,41 +70,46 @@ pub fn exec(name: &RobotName, options: HostOptions, command: &[OsString]) -> mie
         return Ok(Ended::BySignal(code_of(signal)));
     }
 
-    let reason = match outcome {
+    match outcome {
         Ok(end) => {
             program.end(end.into());
-            return Ok(Ended::WithRun);
+            Ok(Ended::WithRun)
         }
-        Err(HostError::Stopped) => format!(
-            "{name} gives up: {}",
-            program.account_or("its program is over")
-        ),
-        Err(error) => error.to_string(),
-    };
-    program.end(EndReason::Failed);
-    Ok(Ended::Failed(reason))
+        Err(error) => {
+            let reason = match error {
+                HostError::Stopped => {
+                    let reason = program.explain_end("its program is over");
+                    format!("{name} gives up: {reason}")
+                }
+                error => error.to_string(),
+            };
+            program.end(EndReason::Failed);
+            Ok(Ended::Failed(reason))
+        }
+    }
 }
 
-/// Waits for a signal that asks to end, in a thread of its own: the robot leaves the run, and then the program ends.
+/// Waits for a signal to end on a thread of its own: the robot leaves the run, then the program is ended.
 fn listen(
     asking: SigSet,
     program: &Arc<Program>,
     stopper: Arc<OnceLock<Stopper>>,
 ) -> Receiver<Signal> {
-    let (tell, asked): (SyncSender<Signal>, _) = std::sync::mpsc::sync_channel(1);
+    let (sender, asked) = sync_channel(1);
     let program = program.clone();
     std::thread::spawn(move || {
         let Ok(signal) = asking.wait() else { return };
-        let _over = tell.send(signal);
+        let _over = sender.send(signal);
         program.interrupt();
         match stopper.get() {
             Some(stopper) => {
                 stopper.stop();
                 std::thread::sleep(END_PATIENCE);
             }
-            None => program.end(EndReason::Interrupted), // Still on its way into the run.
+            None => program.end(EndReason::Interrupted), // The robot has not joined yet.
         }
-        // Whatever still hangs: a robot that is asked to end ends.
+
+        // The main thread has not ended the process in time, so it hangs.
         program.kill();
         std::process::exit(code_of(signal).into());
     });

@@ -1,5 +1,5 @@
-//! The launch file: which processes run together. It is read as it is written, then checked and turned into what it
-//! means; what is wrong is shown where it stands.
+//! The launch file: the processes of a run. It is read as written, then checked and converted. Errors show the place in the
+//! file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -16,50 +16,49 @@ use toml::Spanned;
 
 use super::restart::Restart;
 
-/// Name under which the simulator's process is known; no other process may have it.
+/// Name of the simulator's process, reserved for it.
 pub(crate) const SIMULATOR: &str = "simulator";
-/// Name under which the console's process is known; no other process may have it.
+/// Name of the console's process, reserved for it.
 pub(crate) const CONSOLE: &str = "console";
 /// Program of the console.
 const CONSOLE_PROGRAM: &str = "cars-console";
-/// Program of the simulator, unless the file says otherwise.
+/// Program of the simulator, unless the file names another one.
 const SIMULATOR_PROGRAM: &str = "cars-sim";
-/// First wait before a restart, unless the file says otherwise.
+/// First wait before a restart, unless the file has another one.
 const BACKOFF: Duration = Duration::from_secs(1);
 
 /// A launch file, checked.
 #[derive(Debug, Clone)]
 pub struct LaunchFile {
-    /// The text, to show where something stands.
+    /// The text, for errors that show a place in it.
     pub source: Source,
-    /// Folder that relative paths are relative to.
+    /// Folder to which paths are relative.
     pub folder: PathBuf,
-    /// The scenario file, found from the current directory.
+    /// The scenario file, relative to the current directory.
     pub scenario: PathBuf,
     scenario_span: Option<Range<usize>>,
-    /// How fast the clock goes.
+    /// Speed of the clock.
     pub speed: Option<Speed>,
-    /// The folder of certificates that secures the run, found from the current directory.
+    /// The folder of certificates of a secured run, relative to the current directory.
     pub secure: Option<PathBuf>,
-    /// The simulator's own process.
+    /// The simulator's process.
     pub simulator: Process,
-    /// The console's process, unless it is not wanted.
+    /// The console's process, if it is enabled.
     pub console: Option<Process>,
-    /// The robots' processes, in the order of the file.
+    /// The robots' processes in the order of the file.
     pub processes: Vec<Process>,
 }
 
-/// Whether this is a launch file: it names its scenario, and a scenario file does not.
+/// Whether this is a launch file and not a scenario file: only a launch file has the key `scenario`.
 ///
 /// # Errors
 /// [`FileError`] if it cannot be read, or is not TOML.
 pub fn is_launch_file(path: &Path) -> Result<bool, FileError> {
-    Ok(Source::read(path)?
-        .parse::<toml::Table>()?
-        .contains_key("scenario"))
+    let table: toml::Table = Source::read(path)?.parse()?;
+    Ok(table.contains_key("scenario"))
 }
 
-/// The scenario that a file is about: that of a launch file, or the file itself.
+/// The scenario file of a launch file, or the file itself if it is a scenario.
 ///
 /// # Errors
 /// [`FileError`] if it cannot be read, or is a launch file with an error.
@@ -78,20 +77,20 @@ pub struct Process {
     pub name: String,
     /// Program and its first arguments; never empty.
     pub command: Vec<String>,
-    /// Where the command stands in the file.
+    /// Place of the command in the file.
     pub span: Option<Range<usize>>,
     /// The robots that it runs.
     pub robots: Vec<RobotName>,
     robots_span: Option<Range<usize>>,
     /// Environment in addition to the launcher's.
     pub env: BTreeMap<String, String>,
-    /// What to do when it ends before the run does.
+    /// Whether it is restarted when it exits before the end of the run.
     pub restart: Restart,
-    /// Wait before the first restart; it doubles from there.
+    /// Wait before the first restart; each further wait is twice as long.
     pub backoff: Duration,
     /// Whether its failure ends the run.
     pub is_required: bool,
-    /// Whether somebody else starts it.
+    /// Whether the user starts it, instead of the launcher.
     pub is_extern: bool,
 }
 
@@ -109,7 +108,7 @@ struct RawFile {
     processes: Vec<RawProcess>,
 }
 
-/// As people write it: a number, or `"max"`.
+/// A speed as written in the file.
 #[derive(Debug, Deserialize)]
 #[serde(untagged, expecting = "a speed is a number above zero, or \"max\"")]
 enum RawSpeed {
@@ -179,47 +178,38 @@ impl LaunchFile {
     /// Reads the text of a launch file; `folder` is where its relative paths begin.
     pub(crate) fn parse(source: Source, folder: &Path) -> Result<Self, FileError> {
         let raw: RawFile = source.parse()?;
-        let speed = raw
-            .speed
-            .map(|speed| check_speed(&source, &speed))
-            .transpose()?;
+        let mut speed = None;
+        if let Some(raw) = raw.speed {
+            speed = Some(check_speed(&source, &raw)?);
+        }
         let simulator = check_simulator(&source, raw.simulator)?;
         let console = raw.console.enabled.then(|| console(raw.console));
-        let mut names = BTreeSet::from([SIMULATOR, CONSOLE].map(str::to_owned));
-        let mut processes = Vec::new();
-        for process in raw.processes {
-            let (span, process) = (process.name.span(), check_process(&source, process)?);
-            if !names.insert(process.name.clone()) {
-                return Err(second_process(&source, span, &process.name));
-            }
-            processes.push(process);
-        }
-        let scenario_span = Some(raw.scenario.span());
-        let scenario = tidy(&folder.join(raw.scenario.into_inner()));
-        let secure = raw.secure.map(|secure| tidy(&folder.join(secure)));
-        let folder = folder.to_owned();
+        let processes = check_processes(&source, raw.processes)?;
+
         Ok(Self {
             source,
-            folder,
-            scenario,
-            scenario_span,
+            folder: folder.to_owned(),
+            scenario_span: Some(raw.scenario.span()),
+            scenario: tidy(&folder.join(raw.scenario.into_inner())),
             speed,
-            secure,
+            secure: raw.secure.map(|secure| tidy(&folder.join(secure))),
             simulator,
             console,
             processes,
         })
     }
 
-    /// What a plain roster means: one process for each robot, its program called after its class.
+    /// The launch of a roster: one process for each robot, with the program of its class.
     pub(crate) fn of_roster(roster: &Path, source: Source, scenario: &Scenario) -> Self {
-        let process = |(name, spec): (&RobotName, &simulator::scenario::RobotSpec)| Process {
-            robots: vec![name.clone()],
-            ..Process::new(
-                name.as_str(),
-                vec![format!("cars-{}", spec.class.to_lowercase())],
-            )
-        };
+        let mut processes = Vec::new();
+        for (name, spec) in &scenario.robots {
+            let program = format!("cars-{}", spec.class.to_lowercase());
+            processes.push(Process {
+                robots: vec![name.clone()],
+                ..Process::new(name.as_str(), vec![program])
+            });
+        }
+
         Self {
             source,
             folder: roster.parent().unwrap_or(Path::new("")).to_owned(),
@@ -229,67 +219,65 @@ impl LaunchFile {
             secure: None,
             simulator: Process::new(SIMULATOR, vec![SIMULATOR_PROGRAM.to_owned()]),
             console: Some(console(RawConsole::default())),
-            processes: scenario.robots.iter().map(process).collect(),
+            processes,
         }
     }
 
-    /// The scenario, with changes.
+    /// Reads the scenario, with changes.
     ///
     /// # Errors
-    /// [`FileError`] of the scenario file, which also names this one.
+    /// [`FileError`] of the scenario file, which also names the launch file.
     pub fn load_scenario(&self, changes: &Changes) -> Result<Scenario, FileError> {
         Scenario::load(&self.scenario, changes).map_err(|error| error.named_by(&self.source.name))
     }
 
-    /// Checks the file against its scenario: every robot is run by exactly one process.
+    /// Checks that every robot of the scenario is run by exactly one process.
     ///
     /// # Errors
-    /// [`FileError`] at the process, or at the scenario, that has to change.
+    /// [`FileError`] at the process or at the scenario.
     pub fn check_robots(&self, scenario: &Scenario) -> Result<(), FileError> {
         let mut run_by: BTreeMap<&RobotName, &str> = BTreeMap::new();
         for process in &self.processes {
             for robot in &process.robots {
-                let refuse =
-                    |reason: &str| FileError::at(&self.source, process.robots_span.clone(), reason);
                 if !scenario.robots.contains_key(robot) {
-                    return Err(refuse(&format!("the scenario has no robot {robot}"))
-                        .with_help(roster(scenario)));
+                    let text = format!("the scenario has no robot {robot}");
+                    return Err(self.refuse(process, &text, &roster(scenario)));
                 }
                 if let Some(other) = run_by.insert(robot, &process.name) {
                     let text = format!("robot {robot} is run by process {other} already");
-                    return Err(
-                        refuse(&text).with_help("every robot is run by exactly one process")
-                    );
+                    let help = "every robot is run by exactly one process";
+                    return Err(self.refuse(process, &text, help));
                 }
             }
         }
-        match scenario
-            .robots
-            .keys()
-            .find(|robot| !run_by.contains_key(robot))
-        {
-            None => Ok(()),
-            Some(robot) => Err(self.nobody_runs(robot, &scenario.robots[robot].class)),
-        }
-    }
 
-    /// Checks that every process of a secured run can show who it is.
-    pub(crate) fn check_certificates(&self) -> Result<(), FileError> {
-        match self
-            .processes
-            .iter()
-            .find(|process| process.robots.len() > 1)
-        {
-            None => Ok(()),
-            Some(process) => {
-                let text = "several robots in one process cannot take part in a secured run";
-                let help = "a certificate is that of one robot: give each a process of its own";
-                Err(FileError::at(&self.source, process.robots_span.clone(), text).with_help(help))
+        for (robot, spec) in &scenario.robots {
+            if !run_by.contains_key(robot) {
+                return Err(self.not_run(robot, &spec.class));
             }
         }
+        Ok(())
     }
 
-    fn nobody_runs(&self, robot: &RobotName, class: &str) -> FileError {
+    /// Checks that no process of a secured run has several robots: each robot has a certificate of its own.
+    pub(crate) fn check_certificates(&self) -> Result<(), FileError> {
+        for process in &self.processes {
+            if process.robots.len() > 1 {
+                let text = "several robots in one process cannot take part in a secured run";
+                let help = "each robot has a certificate of its own: give each one a process";
+                return Err(self.refuse(process, text, help));
+            }
+        }
+        Ok(())
+    }
+
+    /// An error at the robots of a process.
+    fn refuse(&self, process: &Process, text: &str, help: &str) -> FileError {
+        let span = process.robots_span.clone();
+        FileError::at(&self.source, span, text).with_help(help)
+    }
+
+    fn not_run(&self, robot: &RobotName, class: &str) -> FileError {
         let text = format!("robot {robot} of this scenario is run by no process");
         let program = class.to_lowercase();
         FileError::at(&self.source, self.scenario_span.clone(), &text).with_help(format!(
@@ -324,21 +312,37 @@ fn roster(scenario: &Scenario) -> String {
     }
 }
 
+fn check_processes(source: &Source, raw: Vec<RawProcess>) -> Result<Vec<Process>, FileError> {
+    let mut names = BTreeSet::from([SIMULATOR, CONSOLE].map(str::to_owned));
+    let mut processes = Vec::new();
+    for process in raw {
+        let span = process.name.span();
+        let process = check_process(source, process)?;
+        if !names.insert(process.name.clone()) {
+            return Err(second_process(source, span, &process.name));
+        }
+        processes.push(process);
+    }
+    Ok(processes)
+}
+
 fn second_process(source: &Source, span: Range<usize>, name: &str) -> FileError {
-    if name == SIMULATOR {
-        return FileError::at(source, Some(span), "this name is the simulator's own")
-            .with_help("to change how the simulator starts, write a table [simulator]");
-    }
-    if name == CONSOLE {
-        return FileError::at(source, Some(span), "this name is the console's own")
-            .with_help("to change how the console starts, write a table [console]");
-    }
-    FileError::at(
-        source,
-        Some(span),
-        &format!("a second process called {name}"),
-    )
-    .with_help("each process has a name of its own: its log is called after it")
+    let (text, help) = match name {
+        SIMULATOR => (
+            "this name is the simulator's own".to_owned(),
+            "to change how the simulator starts, write a table [simulator]",
+        ),
+        CONSOLE => (
+            "this name is the console's own".to_owned(),
+            "to change how the console starts, write a table [console]",
+        ),
+        name => (
+            format!("a second process called {name}"),
+            "each process has its own name, which its log has, too",
+        ),
+    };
+
+    FileError::at(source, Some(span), &text).with_help(help)
 }
 
 fn check_simulator(source: &Source, raw: RawSimulator) -> Result<Process, FileError> {
@@ -347,6 +351,7 @@ fn check_simulator(source: &Source, raw: RawSimulator) -> Result<Process, FileEr
         Some(command) => check_command(source, command)?,
         None => vec![SIMULATOR_PROGRAM.to_owned()],
     };
+
     Ok(Process {
         span,
         env: raw.env,
@@ -365,26 +370,28 @@ fn console(raw: RawConsole) -> Process {
 }
 
 fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError> {
-    let span = raw.name.span();
-    // A process is named like a robot, and mostly as its robot: the name is that of a file, too.
-    let name = RobotName::new(raw.name.get_ref());
-    let name =
-        name.map_err(|error| FileError::at(source, Some(span.clone()), &error.to_string()))?;
-    let robots_span = Some(raw.robots.as_ref().map_or(span, Spanned::span));
-    let backoff = raw
-        .backoff
-        .map(|backoff| check_backoff(source, &backoff))
-        .transpose()?;
-    let command_span = raw.command.span();
+    let name_span = raw.name.span();
+
+    // The rules of robot names make the name of a process fit for its log file.
+    let name = RobotName::new(raw.name.get_ref())
+        .map_err(|error| FileError::at(source, Some(name_span.clone()), &error.to_string()))?;
+    let robots_span = raw.robots.as_ref().map_or(name_span, Spanned::span);
+    let robots = match raw.robots {
+        Some(robots) => robots.into_inner(),
+        None => vec![name.clone()],
+    };
+    let backoff = match raw.backoff {
+        Some(backoff) => check_backoff(source, &backoff)?,
+        None => BACKOFF,
+    };
+
     Ok(Process {
-        span: Some(command_span),
-        robots: raw
-            .robots
-            .map_or_else(|| vec![name.clone()], Spanned::into_inner),
-        robots_span,
+        span: Some(raw.command.span()),
+        robots,
+        robots_span: Some(robots_span),
         env: raw.env,
         restart: raw.restart,
-        backoff: backoff.unwrap_or(BACKOFF),
+        backoff,
         is_required: raw.required,
         is_extern: raw.r#extern,
         ..Process::new(name.as_str(), check_command(source, raw.command)?)
@@ -393,12 +400,9 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
 
 fn check_command(source: &Source, command: Spanned<Vec<String>>) -> Result<Vec<String>, FileError> {
     if command.get_ref().first().is_none_or(String::is_empty) {
-        return Err(FileError::at(
-            source,
-            Some(command.span()),
-            "a command names at least a program",
-        )
-        .with_help("for example: command = [\"cars-butler\"]"));
+        let text = "a command names at least a program";
+        let help = "for example: command = [\"cars-butler\"]";
+        return Err(FileError::at(source, Some(command.span()), text).with_help(help));
     }
     Ok(command.into_inner())
 }
@@ -413,25 +417,30 @@ fn check_speed(source: &Source, speed: &Spanned<RawSpeed>) -> Result<Speed, File
 }
 
 fn check_backoff(source: &Source, backoff: &Spanned<Time>) -> Result<Duration, FileError> {
-    let time = Duration::try_from_secs_f64(backoff.get_ref().0)
-        .ok()
-        .filter(|time| !time.is_zero());
-    time.ok_or_else(|| FileError::at(source, Some(backoff.span()), "a back-off is more than zero"))
+    match Duration::try_from_secs_f64(backoff.get_ref().0) {
+        Ok(time) if !time.is_zero() => Ok(time),
+        _ => {
+            let span = Some(backoff.span());
+            Err(FileError::at(source, span, "a back-off is more than zero"))
+        }
+    }
 }
 
-/// The same path without detours: `launch/../configs/x` is `configs/x`.
+/// Removes `.` and `..` where possible: `launch/../configs/x` becomes `configs/x`.
 fn tidy(path: &Path) -> PathBuf {
     use std::path::Component;
+
     let mut tidied = PathBuf::new();
     for part in path.components() {
         let is_below = matches!(tidied.components().next_back(), Some(Component::Normal(_)));
-        // Where a folder is a link, `..` leads elsewhere than it looks.
+        // The parent of a symbolic link is not the folder that contains the link.
         if part == Component::ParentDir && is_below && !tidied.is_symlink() {
             tidied.pop();
         } else if part != Component::CurDir {
             tidied.push(part);
         }
     }
+
     tidied
 }
 

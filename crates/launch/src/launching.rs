@@ -1,4 +1,4 @@
-//! One launch, from its file to the end of its processes.
+//! A launch: from its file to the exit of its processes.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -15,28 +15,28 @@ use simulator::{RunFolder, Scenario, roster};
 use super::compose;
 use super::endpoint;
 use super::file::{self, LaunchFile};
-use super::link::Link;
+use super::link::ProcessLink;
 use super::observe::{Observer, Watch};
 use super::options::RunOptions;
 use super::plan::{self, Execution, Planned};
-use super::screen::{Look, Screen};
+use super::screen::{Screen, ScreenOptions};
 use super::secure::Secured;
 use super::signals;
 use super::supervise::{Outcome, Supervisor};
 
-/// Ports that are tried, where another process is faster to listen at a free one.
+/// Number of ports to try: another process may bind a free port before the simulator does.
 const PORTS: usize = 3;
 
-/// What is launched.
+/// Where the processes of a launch are listed.
 #[derive(Debug, Clone)]
 pub enum What {
     /// A launch file.
     File(PathBuf),
-    /// A plain list of robots, one class a line.
+    /// A list of robots, one class a line.
     Roster(PathBuf),
 }
 
-/// How it is launched.
+/// Options of a launch.
 #[derive(Debug, Clone)]
 pub struct LaunchOptions {
     /// Options of the execution.
@@ -51,30 +51,46 @@ pub struct LaunchOptions {
     pub is_quiet: bool,
     /// Port of the loopback interface at which the simulator listens; without it a free one.
     pub connect_port: Option<u16>,
-    /// Where the simulator listens, instead of at the loopback interface.
+    /// Endpoint of the simulator, instead of a port of the loopback interface.
     pub listen: Option<String>,
-    /// How single processes reach the simulator, if not directly.
-    pub links: Vec<Link>,
+    /// Links of single processes to the simulator, if not direct.
+    pub links: Vec<ProcessLink>,
     /// Folder of certificates, instead of the launch file's.
     pub secure: Option<PathBuf>,
-    /// Whether every process that can reach the simulator is trusted.
+    /// Whether the simulator may listen without certificates where other machines can connect.
     pub is_insecure: bool,
-    /// How long a process has to end by itself before it is killed.
+    /// How long a process may take to exit before it is killed.
     pub grace: Time,
 }
 
-/// What is launched.
+/// A launch that has been read and checked.
 pub struct Launch {
     what: What,
     options: LaunchOptions,
     file: LaunchFile,
-    /// With the command line's changes.
+    /// The scenario with the changes of the command line.
     scenario: Scenario,
     run: RunName,
     secured: Option<Secured>,
 }
 
 impl What {
+    fn load(&self, changes: &Changes) -> Result<(LaunchFile, Scenario), FileError> {
+        match self {
+            Self::Roster(path) => {
+                let source = Source::read(path)?;
+                let scenario = roster_scenario(&source, changes)?;
+                let file = LaunchFile::of_roster(path, source, &scenario);
+                Ok((file, scenario))
+            }
+            Self::File(path) => {
+                let file = LaunchFile::load(path)?;
+                let scenario = file.load_scenario(changes)?;
+                Ok((file, scenario))
+            }
+        }
+    }
+
     fn path(&self) -> &Path {
         match self {
             Self::File(path) | Self::Roster(path) => path,
@@ -83,27 +99,13 @@ impl What {
 }
 
 impl Launch {
-    /// Reads what is to be launched, and checks it.
+    /// Reads and checks the file and its scenario.
     ///
     /// # Errors
-    /// [`FileError`] of the file or its scenario, and what is missing for a secured run.
+    /// [`FileError`] of the file or its scenario; a missing certificate of a secured run.
     pub fn load(what: What, options: LaunchOptions) -> miette::Result<Self> {
-        let changes = options.run.changes();
-        let file;
-        let scenario;
-        match &what {
-            What::Roster(path) => {
-                let source = Source::read(path)?;
-                scenario = roster_scenario(&source, &changes)?;
-                file = LaunchFile::of_roster(path, source, &scenario);
-            }
-            What::File(path) => {
-                file = LaunchFile::load(path)?;
-                scenario = file.load_scenario(&changes)?;
-            }
-        }
+        let (file, scenario) = what.load(&options.run.changes())?;
         file.check_robots(&scenario)?;
-
         let run = options.run.run_name(what.path()).into_diagnostic()?;
         let secured = secured(&options, &file)?;
         Ok(Self {
@@ -119,7 +121,7 @@ impl Launch {
     /// The launch as a compose file.
     ///
     /// # Errors
-    /// If containers cannot play it.
+    /// If the launch is secured, or is a roster.
     pub fn export(&self) -> miette::Result<String> {
         if let What::Roster(roster) = &self.what {
             let help = "write a launch file, with a scenario that the containers can read";
@@ -129,14 +131,16 @@ impl Launch {
                 roster.display()
             ));
         }
+
         if self.secured.is_some() {
-            let help = "export it without `secure`: the containers have a network of their own";
+            let help = "export it without `secure`: the containers have a private network";
             return Err(miette!(help = help, "a secured launch cannot be exported"));
         }
+
         Ok(compose::export(&self.file, &self.run, self.speed())?)
     }
 
-    /// What would be started.
+    /// The processes with their command lines.
     ///
     /// # Errors
     /// If there is no endpoint for the simulator, or a program is not found.
@@ -157,22 +161,18 @@ impl Launch {
             opens_browser: self.options.opens_browser,
         };
         let mut planned = plan::plan(&self.file, &execution)?;
-        self.options
-            .links
-            .iter()
-            .try_for_each(|link| link.lay(&mut planned))?;
+        for link in &self.options.links {
+            link.apply(&mut planned)?;
+        }
         Ok(planned)
     }
 
     fn speed(&self) -> Speed {
-        self.options
-            .run
-            .speed
-            .or(self.file.speed)
-            .unwrap_or(Speed(None))
+        let speed = self.options.run.speed.or(self.file.speed);
+        speed.unwrap_or(Speed(None))
     }
 
-    /// Where the simulator is to listen.
+    /// The endpoint at which the simulator will listen.
     fn endpoint(&self) -> miette::Result<String> {
         if let Some(endpoint) = &self.options.listen {
             let config = self.simulator_config();
@@ -180,66 +180,60 @@ impl Launch {
                 .into_diagnostic()?;
             return Ok(endpoint.clone());
         }
-        let free = || {
-            endpoint::free_port()
+
+        let port = match self.options.connect_port {
+            Some(port) => port,
+            None => endpoint::free_port()
                 .into_diagnostic()
-                .wrap_err("no free port of the loopback interface")
+                .wrap_err("no free port of the loopback interface")?,
         };
-        let port = self.options.connect_port.map_or_else(free, Ok)?;
         Ok(endpoint::loopback(port, self.secured.is_some()))
     }
 
-    /// The configuration file that the simulator gets: that of a secured run, or what the environment says.
+    /// The configuration file of the simulator: that of a secured run, or the one in its environment.
     fn simulator_config(&self) -> Option<PathBuf> {
-        let secured = self
-            .secured
-            .as_ref()
-            .map(|secured| secured.config_of(file::SIMULATOR));
-        secured
-            .or_else(|| {
-                self.file
-                    .simulator
-                    .env
-                    .get(plan::ZENOH_CONFIG)
-                    .map(PathBuf::from)
-            })
-            .or_else(inherited)
+        if let Some(secured) = &self.secured {
+            return Some(secured.config_of(file::SIMULATOR));
+        }
+
+        let own = self.file.simulator.env.get(plan::ZENOH_CONFIG);
+        own.map(PathBuf::from).or_else(inherited_config)
     }
 
-    /// The configuration file that the launcher itself uses to watch.
+    /// The configuration file of the launcher's own session.
     fn observer_config(&self) -> Option<PathBuf> {
-        self.secured
-            .as_ref()
-            .map(Secured::operator)
-            .or_else(inherited)
+        match &self.secured {
+            Some(secured) => Some(secured.operator()),
+            None => inherited_config(),
+        }
     }
 
-    /// Plays the run to its end. `notice` receives what happens before the processes start.
+    /// Plays the run to its end. `notice` receives lines for people before the processes start.
     ///
     /// # Errors
-    /// If the run's folder cannot be made, or the processes cannot be supervised. That a process failed is part of the
+    /// If the run's folder cannot be made, or the processes cannot be supervised. The failure of a process is part of the
     /// outcome.
     pub fn play(&self, mut notice: impl FnMut(&str)) -> miette::Result<(Outcome, RunFolder)> {
-        // A port that was free may be taken when the simulator comes to it.
+        // A free port may be taken before the simulator binds it.
         let may_choose = self.options.listen.is_none() && self.options.connect_port.is_none();
         let mut ports_left = if may_choose { PORTS } else { 1 };
         loop {
             let endpoint = self.endpoint()?;
             let planned = self.plan(&endpoint)?;
-            // The simulator takes the lock over.
             let (folder, lock) = self.options.run.folder(&self.run, &self.scenario)?;
-            drop(lock);
+            drop(lock); // The simulator takes it.
             clear_logs(&folder);
             if !self.options.is_quiet {
                 self.announce(&endpoint, &folder, &mut notice);
             }
+
             let outcome = self.supervise(planned, &endpoint, &folder)?;
             ports_left -= 1;
             if ports_left == 0 || outcome.failure.is_none() || !endpoint::is_taken(&endpoint) {
                 return Ok((outcome, folder));
             }
             notice(&format!(
-                "somebody else listens at {endpoint}: trying another port"
+                "another process listens at {endpoint}: trying another port"
             ));
         }
     }
@@ -256,6 +250,7 @@ impl Launch {
                 robots.join(", ")
             ));
         }
+
         notice(&format!(
             "run {} at {endpoint}, recorded in {}",
             self.run,
@@ -263,7 +258,7 @@ impl Launch {
         ));
     }
 
-    /// Runs the processes to their end, with an observer beside them.
+    /// Runs the processes to their end, with an observer that feeds the terminal and the supervisor.
     fn supervise(
         &self,
         planned: Vec<Planned>,
@@ -273,35 +268,34 @@ impl Launch {
         let grace = Duration::try_from_secs_f64(self.options.grace.0)
             .into_diagnostic()
             .wrap_err("--grace")?;
-        let look = Look::here(
-            planned.iter().map(|planned| planned.name.clone()).collect(),
-            self.options.is_quiet,
-        );
+        let names = planned.iter().map(|planned| planned.name.clone()).collect();
+        let look = ScreenOptions::here(names, self.options.is_quiet);
         let wants_world = look.has_bar;
         let screen = Screen::open(look);
-        let (run, tell) = (self.run.clone(), screen.tell());
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
             .into_diagnostic()?;
-        let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.tell());
-        let faults = (!self.scenario.faults.is_empty()).then(|| supervisor.queue());
-        let is_needed = !self.options.is_quiet || faults.is_some();
-        let (endpoint, config) = (connectable(endpoint), self.observer_config());
-        let watch = || Watch {
-            run,
-            endpoint,
-            config,
+
+        let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.handle());
+        let has_faults = !self.scenario.faults.is_empty();
+        let watch = Watch {
+            run: self.run.clone(),
+            endpoint: connectable(endpoint),
+            config: self.observer_config(),
             wants_world,
-            tell,
-            faults,
+            screen: screen.handle(),
+            faults: has_faults.then(|| supervisor.queue()),
         };
-        let observer = is_needed.then(|| Observer::start(watch()));
-        let running = async {
-            signals::listen(&supervisor.queue())?;
-            std::io::Result::Ok(supervisor.run().await)
-        };
-        let outcome = runtime.block_on(running).into_diagnostic()?;
+        let is_needed = !self.options.is_quiet || has_faults;
+        let observer = is_needed.then(|| Observer::start(watch));
+        let outcome = runtime
+            .block_on(async {
+                signals::listen(&supervisor.queue())?;
+                std::io::Result::Ok(supervisor.run().await)
+            })
+            .into_diagnostic()?;
+
         if let Some(observer) = observer {
             observer.finish();
         }
@@ -310,40 +304,38 @@ impl Launch {
     }
 }
 
-/// The certificates with which a launch is secured, if it is: those of the command line, or of the file.
+/// The certificates of a secured launch: those of the command line, or of the file.
 fn secured(options: &LaunchOptions, file: &LaunchFile) -> miette::Result<Option<Secured>> {
     let Some(folder) = options.secure.as_ref().or(file.secure.as_ref()) else {
         return Ok(None);
     };
+
     file.check_certificates()?;
-    let robots = file
-        .processes
-        .iter()
-        .flat_map(|process| process.robots.iter().map(RobotName::as_str));
+    let robots = file.processes.iter().flat_map(|process| &process.robots);
+    let robots = robots.map(RobotName::as_str);
     let console = file.console.iter().map(|_| file::CONSOLE);
     Secured::find(folder, robots.chain(console)).map(Some)
 }
 
-/// What the environment says to every program of the project.
-fn inherited() -> Option<PathBuf> {
+/// The configuration file in the environment, which every program of the project reads.
+fn inherited_config() -> Option<PathBuf> {
     std::env::var_os(plan::ZENOH_CONFIG).map(PathBuf::from)
 }
 
-/// Logs of an earlier run with this name; a log that cannot be removed is added to.
+/// Removes the logs of an earlier run with this name. The new logs are appended to those that cannot be removed.
 fn clear_logs(folder: &RunFolder) {
-    for log in std::fs::read_dir(folder.file(LOGS))
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
-        let _kept = std::fs::remove_file(log.path());
+    let Ok(logs) = std::fs::read_dir(folder.file(LOGS)) else {
+        return;
+    };
+    for log in logs.flatten() {
+        let _is_appended_to = std::fs::remove_file(log.path());
     }
 }
 
-/// The scenario of a roster with the command line's changes.
+/// The scenario of a roster with the changes of the command line.
 fn roster_scenario(roster: &Source, changes: &Changes) -> Result<Scenario, FileError> {
     let text = roster::scenario_of(roster)?;
-    // It names no files, so there is no folder to look for them in.
+    // A roster names no files, so no folder is needed.
     let folder = Path::new("");
     if changes.is_empty() {
         Scenario::parse(&text, folder)

@@ -1,5 +1,5 @@
-//! What is done with processes: launch files and their supervision ([`Launch`]), any program as a robot ([`exec`]), real
-//! links with real faults ([`net`]), and certificates for runs that other machines can reach ([`Certificates`]).
+//! Work with processes: launch files and their supervision ([`Launch`]), any program as a robot ([`exec`]), faults of real
+//! links ([`net`]), and certificates for runs that other machines can reach ([`Certificates`]).
 
 mod bar;
 mod compose;
@@ -26,7 +26,7 @@ mod tail;
 pub use ending::{Failure, code_of};
 pub use file::{LaunchFile, Process, is_launch_file, scenario_file};
 pub use launching::{Launch, LaunchOptions, What};
-pub use link::{Link, LinkError};
+pub use link::{LinkError, ProcessLink};
 pub use options::RunOptions;
 pub use plan::{CommandLine, Part, Planned};
 pub use restart::Restart;

@@ -1,16 +1,16 @@
-//! Bytes of a pipe as lines for a terminal.
+//! Splits the bytes of a pipe into lines for a terminal.
 
-/// Longest line that is shown in one piece, bytes.
+/// Longest line, bytes; a longer one is split.
 const MAX_LINE: usize = 4096;
 
-/// Splits what comes in pieces into lines.
+/// Splits pieces of a stream into lines.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     rest: Vec<u8>,
 }
 
 impl Lines {
-    /// Takes the next bytes; calls `each` for every line that is complete.
+    /// Adds bytes and calls `each` for every complete line.
     pub(crate) fn push(&mut self, bytes: &[u8], mut each: impl FnMut(String)) {
         for piece in bytes.split_inclusive(|byte| *byte == b'\n') {
             self.rest.extend_from_slice(piece);
@@ -20,7 +20,7 @@ impl Lines {
         }
     }
 
-    /// The pipe is at its end; so is its last line.
+    /// Calls `each` for the last line if it has no end.
     pub(crate) fn finish(&mut self, mut each: impl FnMut(String)) {
         if !self.rest.is_empty() {
             each(self.take());
@@ -35,17 +35,9 @@ impl Lines {
     }
 }
 
-/// A text from outside without what would steer a terminal.
+/// Replaces terminal control sequences in untrusted text.
 pub(crate) fn harmless(text: &str) -> String {
-    text.chars()
-        .map(|c| {
-            if c.is_control() {
-                char::REPLACEMENT_CHARACTER
-            } else {
-                c
-            }
-        })
-        .collect()
+    text.replace(char::is_control, "\u{fffd}")
 }
 
 #[cfg(test)]
@@ -53,16 +45,17 @@ mod tests {
     use super::*;
 
     fn lines(pieces: &[&[u8]]) -> Vec<String> {
-        let (mut lines, mut got) = (Lines::default(), Vec::new());
-        pieces
-            .iter()
-            .for_each(|piece| lines.push(piece, |line| got.push(line)));
-        lines.finish(|line| got.push(line));
-        got
+        let mut lines = Lines::default();
+        let mut found = Vec::new();
+        for piece in pieces {
+            lines.push(piece, |line| found.push(line));
+        }
+        lines.finish(|line| found.push(line));
+        found
     }
 
     #[test]
-    fn lines_are_lines_however_the_pipe_cuts_them() {
+    fn lines_do_not_depend_on_the_pieces() {
         assert_eq!(
             lines(&[b"on", b"e\ntwo\r\n\nth", b"ree"]),
             ["one", "two", "", "three"]
@@ -72,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn an_endless_line_is_shown_in_pieces() {
+    fn an_endless_line_is_split() {
         let piece = [b'x'; MAX_LINE];
         assert_eq!(lines(&[&piece, &piece, b"y\n"]).len(), 3);
     }

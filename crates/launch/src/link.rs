@@ -1,4 +1,4 @@
-//! How a process reaches the simulator, where that is not directly.
+//! Indirect links of processes to the simulator: through a proxy, or from within a network namespace.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -7,14 +7,14 @@ use config::FileError;
 
 use super::plan::{Part, Planned};
 
-/// The way of one process to the simulator: `PROCESS=ENDPOINT[@NAMESPACE]`.
+/// The link of one process to the simulator: `PROCESS=ENDPOINT[@NAMESPACE]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Link {
+pub struct ProcessLink {
     /// Name of the process in the launch file.
     pub process: String,
-    /// Where it connects, for example `tcp/127.0.0.1:7500`.
+    /// Endpoint to which it connects, for example `tcp/127.0.0.1:7500`.
     pub endpoint: String,
-    /// The network namespace that it lives in, as `ip netns` knows it.
+    /// Network namespace in which it runs, by its name for `ip netns`.
     pub namespace: Option<String>,
 }
 
@@ -23,62 +23,60 @@ pub struct Link {
 #[error("{0:?} is not of the form PROCESS=ENDPOINT[@NAMESPACE]")]
 pub struct LinkError(String);
 
-impl FromStr for Link {
+impl FromStr for ProcessLink {
     type Err = LinkError;
 
     fn from_str(text: &str) -> Result<Self, LinkError> {
-        let bad = || LinkError(text.to_owned());
-        let (process, rest) = text.split_once('=').ok_or_else(bad)?;
-        let (endpoint, namespace) = rest
-            .split_once('@')
-            .map_or((rest, None), |(endpoint, name)| (endpoint, Some(name)));
+        let (process, rest) = text
+            .split_once('=')
+            .ok_or_else(|| LinkError(text.to_owned()))?;
+        let (endpoint, namespace) = match rest.split_once('@') {
+            Some((endpoint, namespace)) => (endpoint, Some(namespace)),
+            None => (rest, None),
+        };
+
         if process.is_empty() || endpoint.is_empty() || namespace.is_some_and(str::is_empty) {
-            return Err(bad());
+            return Err(LinkError(text.to_owned()));
         }
-        let namespace = namespace.map(str::to_owned);
         Ok(Self {
             process: process.to_owned(),
             endpoint: endpoint.to_owned(),
-            namespace,
+            namespace: namespace.map(str::to_owned),
         })
     }
 }
 
-impl std::fmt::Display for Link {
+impl std::fmt::Display for ProcessLink {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}={}", self.process, self.endpoint)?;
-        self.namespace
-            .iter()
-            .try_for_each(|namespace| write!(f, "@{namespace}"))
+        match &self.namespace {
+            Some(namespace) => write!(f, "@{namespace}"),
+            None => Ok(()),
+        }
     }
 }
 
-impl Link {
-    /// Makes the process take this way.
-    pub(super) fn lay(&self, planned: &mut [Planned]) -> Result<(), FileError> {
-        let is_meant = |planned: &&mut Planned| {
-            planned.part != Part::Simulator && planned.name == self.process
-        };
-        let Some(found) = planned.iter_mut().find(is_meant) else {
-            let text = format!(
-                "--link {self}: the launch file has no process {}",
-                self.process
-            );
-            return Err(
-                FileError::new(text).with_help("a link is that of a process of the launch file")
-            );
-        };
+impl ProcessLink {
+    /// Changes the command line of the process so that it uses this link.
+    pub(super) fn apply(&self, planned: &mut [Planned]) -> Result<(), FileError> {
+        let name = &self.process;
+        let mut processes = planned.iter_mut();
+        let found = processes
+            .find(|planned| planned.part != Part::Simulator && planned.name == *name)
+            .ok_or_else(|| {
+                let text = format!("--link {self}: the launch file has no process {name}");
+                FileError::new(text).with_help("a link names a process of the launch file")
+            })?;
+
         let command = &mut found.command;
-        command
-            .env
-            .insert("CARS_CONNECT".to_owned(), self.endpoint.clone());
+        let endpoint = self.endpoint.clone();
+        command.env.insert("CARS_CONNECT".to_owned(), endpoint);
+
         if let Some(namespace) = &self.namespace {
             let program = std::mem::replace(&mut command.program, PathBuf::from("ip"));
-            let within = ["netns", "exec", namespace].map(str::to_owned);
-            command.args.splice(
-                0..0,
-                within.into_iter().chain([program.display().to_string()]),
-            );
+            let program = program.display().to_string();
+            let prefix = ["netns", "exec", namespace, &program].map(str::to_owned);
+            command.args.splice(0..0, prefix);
         }
         Ok(())
     }
@@ -94,10 +92,10 @@ mod tests {
             "Leguin=tcp/127.0.0.1:7500",
             "Leguin=tcp/10.77.0.1:7447@cars-1-l0",
         ] {
-            assert_eq!(text.parse::<Link>().unwrap().to_string(), text);
+            assert_eq!(text.parse::<ProcessLink>().unwrap().to_string(), text);
         }
         for text in ["Leguin", "=tcp/1:1", "Leguin=", "Leguin=tcp/1:1@"] {
-            assert!(text.parse::<Link>().is_err(), "{text:?}");
+            assert!(text.parse::<ProcessLink>().is_err(), "{text:?}");
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Faults of real links. The simulated network between robots (`[network]` of a scenario) is reproducible and is what
-//! experiments are made with; this is for seeing that the real one may break, too, and nothing but time is lost.
+//! Faults of real links. Experiments use the simulated network between robots (`[network]` of a scenario), which is
+//! reproducible. Faults of real links test that a run survives them and loses nothing but time.
 
 mod compose;
 mod gate;
@@ -13,4 +13,4 @@ mod shape;
 pub use plan::Plan;
 pub use play::{Play, Via, play};
 pub use proxy::{AddressError, Proxy, address};
-pub use shape::{Flow, Order, OrderError, Shape};
+pub use shape::{Flow, LinkOrder, OrderError, Shape};

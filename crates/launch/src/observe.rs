@@ -1,6 +1,7 @@
-//! The launcher as an observer of the run: it watches as anybody could, and takes part in nothing.
+//! The launcher as an observer of the run: it subscribes like any observer and takes no part in ticks.
 
 use std::path::PathBuf;
+use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::Duration;
 
@@ -11,36 +12,36 @@ use protocol::{RunName, decode, encode};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::bar::Progress;
-use super::screen::Tell;
-use super::supervise::{self, Done};
+use super::screen::ScreenHandle;
+use super::supervise::{FaultsDone, SupervisorEvent};
 
-/// How long to try to reach the simulator: as long as a robot does.
+/// How long to try to reach the simulator; as long as robots do.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Robots that are not there this long after the start are worth a word.
+/// How long to wait before reporting robots that have not joined.
 const GATHERING: Duration = Duration::from_secs(1);
 
-/// What to watch.
+/// What to observe, and where to report it.
 pub(super) struct Watch {
     pub(super) run: RunName,
     pub(super) endpoint: String,
-    /// How an operator is let into a secured run.
+    /// The operator's configuration file for a secured run.
     pub(super) config: Option<PathBuf>,
-    /// Whether pictures of the field are wanted, for the progress bar.
+    /// Whether to subscribe to frames, for the progress bar.
     pub(super) wants_world: bool,
-    pub(super) tell: Tell,
-    /// Where the faults that the scenario has in store for processes are handed over; `None` if it has none.
-    pub(super) faults: Option<UnboundedSender<supervise::Event>>,
+    pub(super) screen: ScreenHandle,
+    /// The supervisor's queue, for faults of processes; `None` if the scenario has none.
+    pub(super) faults: Option<UnboundedSender<SupervisorEvent>>,
 }
 
-/// An observer at work.
+/// A running observer.
 pub(super) struct Observer {
-    /// Closed when the simulator's last words have come, or the observer never came to hear any.
+    /// Closed when the simulator's token is undeclared, or the observer could not connect.
     ended: Receiver<()>,
 }
 
 impl Observer {
-    /// Begins to watch, as soon as the simulator is there. The bus has threads of its own, and reaching it takes
-    /// time: so this has, too. It ends with the process.
+    /// Starts to observe as soon as the simulator is reached. Connecting blocks, so it happens on a thread of its own,
+    /// which ends with the process.
     pub(super) fn start(watch: Watch) -> Self {
         let (end, ended) = std::sync::mpsc::channel();
         std::thread::spawn(move || match watch.open(end) {
@@ -48,13 +49,14 @@ impl Observer {
                 std::thread::park();
             },
             Err(error) => watch
-                .tell
-                .notice(format!("the run cannot be watched: {error}")),
+                .screen
+                .notice(format!("the run cannot be observed: {error}")),
         });
+
         Self { ended }
     }
 
-    /// Waits until everything that the simulator said has been shown, but not for long.
+    /// Waits a short time until everything that the simulator has put is shown.
     pub(super) fn finish(&self) {
         let _in_time = self.ended.recv_timeout(Duration::from_millis(500));
     }
@@ -68,92 +70,112 @@ impl Watch {
         };
         let bus = Bus::open(&role, self.config.as_ref())?;
         let keys = Keys::new(&self.run);
-        let tell = self.tell.clone();
-        let mut declared = vec![bus.subscribe(&keys.log(), move |key, bytes| {
-            match decode::<LogRecord>(key, "the simulator", bytes) {
-                Ok(record) => tell.log(record),
-                Err(error) => tracing::warn!("{error}"),
-            }
-        })?];
+        let mut declared = vec![self.subscribe_log(&bus, &keys)?];
         if self.wants_world {
-            let tell = self.tell.clone();
-            declared.push(bus.subscribe(&keys.world(), move |key, bytes| {
-                match decode::<WorldFrame>(key, "the simulator", bytes) {
-                    Ok(frame) => tell.progress(Progress::from(frame)),
-                    Err(error) => tracing::warn!("{error}"),
-                }
-            })?);
+            declared.push(self.subscribe_world(&bus, &keys)?);
         }
-        declared.extend(
-            self.faults
-                .as_ref()
-                .map(|queue| hear_faults(&bus, &keys, queue.clone()))
-                .transpose()?,
-        );
-        // Dropping the sender is the message.
-        let end = std::sync::Mutex::new(Some(end));
-        declared.push(bus.liveliness(&keys.alive_sim(), move |_, is_there| {
-            if !is_there && let Ok(mut end) = end.lock() {
-                end.take();
-            }
-        })?);
+        if let Some(queue) = &self.faults {
+            declared.push(subscribe_faults(&bus, &keys, queue.clone())?);
+        }
+        declared.push(watch_token(&bus, &keys, end)?);
+
         if self.wants_world {
             self.catch_up(&bus, &keys)?;
         }
         Ok((bus, declared))
     }
 
-    /// Asks how things stand: what was said before this observer came is not said again.
+    fn subscribe_log(&self, bus: &Bus, keys: &Keys) -> Result<Declared, BusError> {
+        let screen = self.screen.clone();
+        bus.subscribe(&keys.log(), move |key, bytes| {
+            match decode::<LogRecord>(key, "the simulator", bytes) {
+                Ok(record) => screen.log(record),
+                Err(error) => tracing::warn!("{error}"),
+            }
+        })
+    }
+
+    fn subscribe_world(&self, bus: &Bus, keys: &Keys) -> Result<Declared, BusError> {
+        let screen = self.screen.clone();
+        bus.subscribe(&keys.world(), move |key, bytes| {
+            match decode::<WorldFrame>(key, "the simulator", bytes) {
+                Ok(frame) => screen.progress(Progress::from(frame)),
+                Err(error) => tracing::warn!("{error}"),
+            }
+        })
+    }
+
+    /// Gets the status, because frames put before this observer subscribed do not arrive.
     fn catch_up(&self, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
-        if self.ask(bus, keys)? == Some(Phase::Gathering) {
+        if self.show_status(bus, keys)? == Some(Phase::Gathering) {
             std::thread::sleep(GATHERING);
-            self.ask(bus, keys)?;
+            self.show_status(bus, keys)?;
         }
         Ok(())
     }
 
-    fn ask(&self, bus: &Bus, keys: &Keys) -> Result<Option<Phase>, BusError> {
+    /// Shows the progress of the run; returns its phase if the simulator answers.
+    fn show_status(&self, bus: &Bus, keys: &Keys) -> Result<Option<Phase>, BusError> {
         let Some(answer) = bus.get(&keys.control(), "", Some(encode(&Control::Status)))? else {
             return Ok(None);
         };
+
         let Ok(body) = answer.result else {
             return Ok(None);
         };
         let Ok(ControlAnswer::Done(status)) = decode(&answer.key, "the simulator", &body) else {
             return Ok(None);
         };
+
         let phase = status.phase;
-        self.tell.progress(Progress::from(*status));
+        self.screen.progress(Progress::from(*status));
+
         Ok(Some(phase))
     }
 }
 
-/// Hands over what the scenario has in store for processes, and answers when it has been done.
-fn hear_faults(
+/// Drops `end` when the simulator's token is undeclared, which wakes [`Observer::finish`].
+fn watch_token(bus: &Bus, keys: &Keys, end: Sender<()>) -> Result<Declared, BusError> {
+    let end = Mutex::new(Some(end));
+    bus.liveliness(&keys.alive_sim(), move |_, is_declared| {
+        if !is_declared && let Ok(mut end) = end.lock() {
+            end.take();
+        }
+    })
+}
+
+/// Queues the faults of processes for the supervisor, and answers the simulator when they have been carried out.
+fn subscribe_faults(
     bus: &Bus,
     keys: &Keys,
-    queue: UnboundedSender<supervise::Event>,
+    queue: UnboundedSender<SupervisorEvent>,
 ) -> Result<Declared, BusError> {
-    let (asking, control) = (bus.clone(), keys.control());
+    let session = bus.clone();
+    let control = keys.control();
     bus.subscribe(&keys.faults(), move |key, bytes| {
         let order = match decode::<FaultOrder>(key, "the simulator", bytes) {
             Ok(order) => order,
             Err(error) => return tracing::warn!("{error}"),
         };
-        let (asking, control) = (asking.clone(), control.clone());
-        let done = move || {
-            let done = Control::FaultsDone {
-                epoch: order.epoch,
-                tick: order.tick,
-            };
-            // On a thread of its own: the answer takes as long as the simulator takes.
-            std::thread::spawn(move || {
-                if let Err(error) = asking.get(&control, "", Some(encode(&done))) {
-                    tracing::warn!("{error}");
-                }
-            });
+
+        let answer = Control::FaultsDone {
+            epoch: order.epoch,
+            tick: order.tick,
         };
-        // The supervisor is gone only when the launch is over.
-        let _over = queue.send(supervise::Event::Faults(order.orders, Done(Box::new(done))));
+        let session = session.clone();
+        let control = control.clone();
+        let done = FaultsDone(Box::new(move || get_later(session, control, answer)));
+
+        // The queue is closed only when the launch is over.
+        let _over = queue.send(SupervisorEvent::Faults(order.orders, done));
     })
+}
+
+/// Sends a control request on a thread of its own: the caller must not wait for the simulator.
+fn get_later(session: Bus, key: String, control: Control) {
+    std::thread::spawn(move || {
+        if let Err(error) = session.get(&key, "", Some(encode(&control))) {
+            tracing::warn!("{error}");
+        }
+    });
 }

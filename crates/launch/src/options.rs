@@ -1,4 +1,4 @@
-//! What `cars launch`, `cars run` and `cars net play` let a user choose about one execution.
+//! Options of one execution, shared by `cars launch`, `cars run` and `cars net play`.
 
 use std::path::{Path, PathBuf};
 
@@ -14,11 +14,11 @@ use simulator::{RunFolder, Scenario};
 pub struct RunOptions {
     /// Name of the run and of its folder; without it the name of the file.
     pub run: Option<RunName>,
-    /// Another seed than the scenario's.
+    /// Seed, instead of the scenario's.
     pub seed: Option<u64>,
-    /// Another duration than the scenario's, simulated time.
+    /// Simulated duration, instead of the scenario's.
     pub duration: Option<Time>,
-    /// How fast the clock goes.
+    /// Speed of the clock.
     pub speed: Option<Speed>,
     /// Where run folders are made.
     pub out: PathBuf,
@@ -27,7 +27,7 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// What these options change of a scenario.
+    /// The changes of the scenario in these options.
     #[must_use]
     pub fn changes(&self) -> Changes {
         Changes {
@@ -37,7 +37,7 @@ impl RunOptions {
         }
     }
 
-    /// The same options as arguments of another `cars launch`.
+    /// The options as arguments of another `cars launch`.
     #[must_use]
     pub fn to_args(&self, run: &RunName) -> Vec<String> {
         let mut args = vec![
@@ -45,16 +45,16 @@ impl RunOptions {
             format!("--out={}", self.out.display()),
         ];
         args.extend(self.seed.map(|seed| format!("--seed={seed}")));
-        args.extend(
-            self.duration
-                .map(|duration| format!("--duration={} s", duration.0)),
-        );
+        if let Some(Time(duration_s)) = self.duration {
+            args.push(format!("--duration={duration_s} s"));
+        }
         args.extend(self.speed.map(|speed| format!("--speed={speed}")));
         args.extend(self.set.iter().map(|change| format!("--set={change}")));
+
         args
     }
 
-    /// Name of the run: as given, or as the file is called.
+    /// Name of the run: as given, or the stem of the file.
     ///
     /// # Errors
     /// [`BadName`] if the name of the file cannot be that of a run.
@@ -66,8 +66,8 @@ impl RunOptions {
         RunName::new(stem.unwrap_or("run"))
     }
 
-    /// Makes the folder of the run, with the resolved scenario in it, and points `latest` at it. The process that writes
-    /// the record keeps the lock.
+    /// Makes the folder of the run with the resolved scenario, and points the link `latest` to it. The process that writes
+    /// the record must keep the lock.
     ///
     /// # Errors
     /// [`config::FileError`] as [`RunFolder::create`].

@@ -1,4 +1,4 @@
-//! What is started: the launch file with every program found and every argument in place.
+//! Command lines of a launch: every program is located and every argument added.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,17 +16,17 @@ use super::restart::Restart;
 use crate::secure::Secured;
 use config::Speed;
 
-/// Variable that tells every program of the project a configuration file of the middleware.
+/// Environment variable with a zenoh configuration file; every program of the project reads it.
 pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
 
 /// A command line with its environment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandLine {
-    /// The program's path.
+    /// Path of the program.
     pub program: PathBuf,
-    /// Its arguments.
+    /// Arguments of the program.
     pub args: Vec<String>,
-    /// In addition to the launcher's own.
+    /// Environment in addition to the launcher's.
     pub env: BTreeMap<String, String>,
 }
 
@@ -35,50 +35,50 @@ pub struct CommandLine {
 pub struct Planned {
     /// Name on the terminal and of its log.
     pub name: String,
-    /// What is started.
+    /// Command line and environment.
     pub command: CommandLine,
-    /// What happens when it ends before the run does.
+    /// Whether it is restarted when it exits before the end of the run.
     pub restart: Restart,
-    /// Wait before the first restart; it doubles from there.
+    /// Wait before the first restart; each further wait is twice as long.
     pub backoff: Duration,
     /// Whether its failure ends the run.
     pub is_required: bool,
-    /// Whether somebody else starts it.
+    /// Whether the user starts it, instead of the launcher.
     pub is_extern: bool,
-    /// What it is for.
+    /// Its part in the run.
     pub part: Part,
     /// The robots that it runs.
     pub robots: Vec<RobotName>,
 }
 
-/// What a process is for.
+/// The part of a process in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// The run is over when it is.
+    /// The run ends with it.
     Simulator,
-    /// It runs robots, and leaves when it hears that the run is over.
+    /// It runs robots, and exits when the run is over.
     Robots,
-    /// It watches, and is told to end when the run is over.
+    /// It observes, and receives SIGTERM when the run is over.
     Observer,
 }
 
-/// What a run is called and where it happens.
+/// Name, endpoint and folders of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Execution<'a> {
     pub(super) run: &'a RunName,
-    /// Where the simulator listens.
+    /// Endpoint of the simulator.
     pub(super) endpoint: &'a str,
-    /// Certificates, for a secured run.
+    /// Certificates of a secured run.
     pub(super) secured: Option<&'a Secured>,
-    /// Whether everybody who can reach the simulator is trusted.
+    /// Whether the simulator may listen without certificates where other machines can connect.
     pub(super) is_insecure: bool,
     /// Where run folders are made.
     pub(super) out: &'a Path,
     pub(super) speed: Speed,
     pub(super) is_paused: bool,
-    /// Whether the console is wanted.
+    /// Whether the console is started.
     pub(super) has_console: bool,
-    /// Whether it is to open a browser.
+    /// Whether the console opens a browser.
     pub(super) opens_browser: bool,
 }
 
@@ -87,32 +87,28 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
     let places = Places::new(&file.folder);
     let mut planned = vec![simulator(file, execution, &places)?];
     for process in &file.processes {
-        let command = guest(
-            file,
-            process,
-            name_args(&process.robots),
-            execution,
-            &places,
-        )?;
+        let args = name_args(&process.robots);
+        let command = client(file, process, args, execution, &places)?;
         planned.push(prepare(process, command));
     }
+
     if let Some(process) = file.console.as_ref().filter(|_| execution.has_console) {
-        let args = execution
-            .opens_browser
-            .then(|| "--open".to_owned())
-            .into_iter()
-            .collect();
-        let command = guest(file, process, args, execution, &places)?;
+        let mut args = Vec::new();
+        if execution.opens_browser {
+            args.push("--open".to_owned());
+        }
+        let command = client(file, process, args, execution, &places)?;
         planned.push(Planned {
             part: Part::Observer,
             ..prepare(process, command)
         });
     }
+
     Ok(planned)
 }
 
 /// The command line of a process that connects to the simulator.
-fn guest(
+fn client(
     file: &LaunchFile,
     process: &Process,
     args: Vec<String>,
@@ -122,38 +118,38 @@ fn guest(
     let mut env = process.env.clone();
     env.insert("CARS_RUN".to_owned(), execution.run.to_string());
     env.insert("CARS_CONNECT".to_owned(), connectable(execution.endpoint));
-    // A process is let in as its robot; only the console is none.
+
+    // A process has the certificate of its robot; the console has one of its own.
     let name = if process.name == CONSOLE {
         Some(CONSOLE)
     } else {
         process.robots.first().map(RobotName::as_str)
     };
-    if let (Some(secured), Some(name)) = (execution.secured, name) {
-        env.entry(ZENOH_CONFIG.to_owned())
-            .or_insert_with(|| secured.config_of(name).display().to_string());
+
+    if let Some(secured) = execution.secured
+        && let Some(name) = name
+    {
+        let config = secured.config_of(name).display().to_string();
+        env.entry(ZENOH_CONFIG.to_owned()).or_insert(config);
     }
     let program = program(file, process, &process.command[0], places)?;
     let args = with_own_args(&process.command[1..], args);
     let args = locate_inner(file, process, args, places)?;
+
     Ok(CommandLine { program, args, env })
 }
 
-/// The arguments of a process with those that the launcher adds: what stands after a `--` is not the process's own.
+/// Adds arguments of the launcher to those of a process, before a `--`: what follows belongs to another program.
 pub(super) fn with_own_args(command: &[String], own: Vec<String>) -> Vec<String> {
-    let end = command
-        .iter()
-        .position(|arg| arg == "--")
-        .unwrap_or(command.len());
-    command[..end]
-        .iter()
-        .cloned()
-        .chain(own)
-        .chain(command[end..].iter().cloned())
-        .collect()
+    let end = command.iter().position(|arg| arg == "--");
+    let end = end.unwrap_or(command.len());
+    let mut args = command.to_vec();
+    args.splice(end..end, own);
+    args
 }
 
-/// A program after a `--`, as in `cars exec -- ./robot.sh`, is a path from the launch file's folder if it has a `/`, as
-/// the process's own program is.
+/// Locates a program after a `--`, as in `cars exec -- ./robot.sh`. Like the process's own program, it is relative to the
+/// launch file's folder if it contains a `/`.
 fn locate_inner(
     file: &LaunchFile,
     process: &Process,
@@ -164,15 +160,18 @@ fn locate_inner(
     if let Some(inner) = inner.filter(|inner| inner.contains('/')) {
         *inner = program(file, process, inner, places)?.display().to_string();
     }
+
     Ok(args)
 }
 
-/// How a program is told which robots it runs.
+/// Arguments with the names of a process's robots.
 pub(super) fn name_args(robots: &[RobotName]) -> Vec<String> {
-    robots
-        .iter()
-        .flat_map(|robot| ["--name".to_owned(), robot.to_string()])
-        .collect()
+    let mut args = Vec::new();
+    for robot in robots {
+        args.push("--name".to_owned());
+        args.push(robot.to_string());
+    }
+    args
 }
 
 fn simulator(
@@ -182,7 +181,7 @@ fn simulator(
 ) -> Result<Planned, FileError> {
     let process = &file.simulator;
     let scenario = RunFolder::new(execution.out, execution.run).file(SCENARIO);
-    let mut args: Vec<String> = process.command.iter().skip(1).cloned().collect();
+    let mut args = process.command[1..].to_vec();
     args.extend([
         scenario.display().to_string(),
         format!("--run={}", execution.run),
@@ -190,38 +189,38 @@ fn simulator(
         format!("--out={}", execution.out.display()),
         format!("--speed={}", execution.speed),
     ]);
+
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
     args.extend(execution.is_insecure.then(|| "--insecure".to_owned()));
+
     let mut env = process.env.clone();
     if let Some(secured) = execution.secured {
-        env.insert(
-            ZENOH_CONFIG.to_owned(),
-            secured.config_of(SIMULATOR).display().to_string(),
-        );
-        args.push(format!(
-            "--operator-config={}",
-            secured.operator().display()
-        ));
+        let config = secured.config_of(SIMULATOR).display().to_string();
+        env.insert(ZENOH_CONFIG.to_owned(), config);
+        let operator = secured.operator();
+        args.push(format!("--operator-config={}", operator.display()));
     }
     let program = program(file, process, &process.command[0], places)?;
     let command = CommandLine { program, args, env };
+
     Ok(Planned {
         part: Part::Simulator,
         ..prepare(process, command)
     })
 }
 
+/// A planned process that runs robots.
 fn prepare(process: &Process, mut command: CommandLine) -> Planned {
     let runtime = bus::runtime::RUNTIME_VARIABLE;
     let chosen = std::env::var(runtime).unwrap_or_else(|_| bus::runtime::ONE_THREAD.to_owned());
     command.env.entry(runtime.to_owned()).or_insert(chosen);
+
     if !process.is_extern {
-        // Its output goes into a file, too, and files have no colors.
-        command
-            .env
-            .entry("NO_COLOR".to_owned())
-            .or_insert_with(|| "1".to_owned());
+        // The output goes to a log file, too.
+        let no_color = command.env.entry("NO_COLOR".to_owned());
+        no_color.or_insert_with(|| "1".to_owned());
     }
+
     Planned {
         name: process.name.clone(),
         command,
@@ -234,7 +233,7 @@ fn prepare(process: &Process, mut command: CommandLine) -> Planned {
     }
 }
 
-/// The program of a process. What somebody else starts need not be here.
+/// Locates a program of a process. A program that the user starts need not exist here.
 fn program(
     file: &LaunchFile,
     process: &Process,
@@ -244,39 +243,48 @@ fn program(
     match places.find(name) {
         Ok(program) => Ok(program),
         Err(_) if process.is_extern => Ok(PathBuf::from(name)),
-        Err(NotFound(searched)) => {
-            let help = format!(
-                "looked for {}\nthe programs of this project are built by `cargo build --release`",
-                searched.join(",\nand ")
-            );
-            let text = format!("there is no program {name}");
-            Err(match process.span.clone() {
-                None if process.name == SIMULATOR => FileError::new(text),
-                None => FileError::new(format!("{text}, which process {} is to run", process.name)),
-                span => FileError::at(&file.source, span, &text),
-            }
-            .with_help(help))
-        }
+        Err(not_found) => Err(missing_program(file, process, name, &not_found)),
     }
 }
 
+fn missing_program(
+    file: &LaunchFile,
+    process: &Process,
+    name: &str,
+    NotFound(searched): &NotFound,
+) -> FileError {
+    let text = format!("there is no program {name}");
+    let error = match process.span.clone() {
+        None if process.name == SIMULATOR => FileError::new(text),
+        None => FileError::new(format!("{text} for process {}", process.name)),
+        span => FileError::at(&file.source, span, &text),
+    };
+
+    let searched = searched.join(",\nand ");
+    error.with_help(format!(
+        "looked for it {searched}\nthe programs of this project are built by `cargo build --release`"
+    ))
+}
+
 impl std::fmt::Display for CommandLine {
-    /// As a line for a shell.
+    /// The command line for a shell.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         for (name, value) in &self.env {
             write!(f, "{name}={} ", quote(value))?;
         }
         f.write_str(&quote(&self.program.display().to_string()))?;
-        self.args
-            .iter()
-            .try_for_each(|arg| write!(f, " {}", quote(arg)))
+        for arg in &self.args {
+            write!(f, " {}", quote(arg))?;
+        }
+        Ok(())
     }
 }
 
-/// A word for a shell.
+/// Quotes a word for a shell if necessary.
 fn quote(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
+    let mut characters = word.chars();
+    let is_plain = characters.all(|c| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c));
+    if is_plain && !word.is_empty() {
         return word.to_owned();
     }
     format!("'{}'", word.replace('\'', r"'\''"))
@@ -288,9 +296,27 @@ mod tests {
 
     use super::*;
 
+    fn words(text: &str) -> Vec<String> {
+        text.split(' ').map(str::to_owned).collect()
+    }
+
+    fn parse(text: &str) -> LaunchFile {
+        let source = Source {
+            name: "launch.toml".to_owned(),
+            text: text.to_owned(),
+        };
+        LaunchFile::parse(source, Path::new("/usr/../bin")).unwrap()
+    }
+
+    /// Arguments of the first process.
+    fn located(file: &LaunchFile) -> Result<Vec<String>, FileError> {
+        let process = &file.processes[0];
+        let args = process.command[1..].to_vec();
+        locate_inner(file, process, args, &Places::new(&file.folder))
+    }
+
     #[test]
-    fn what_stands_after_two_dashes_is_not_told_the_robots_name() {
-        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    fn arguments_of_the_launcher_precede_two_dashes() {
         let with_name = |text| with_own_args(&words(text), words("--name Rosie")).join(" ");
         assert_eq!(
             with_name("exec -- ./robot.sh -- -v"),
@@ -303,27 +329,15 @@ mod tests {
     fn a_program_after_two_dashes_is_found_from_the_launch_file() {
         let text = "scenario = \"x.toml\"\n[[process]]\nname = \"Rosie\"\n\
                     command = [\"sh\", \"-c\", \"./sh\", \"--\", \"./sh\", \"./sh\"]";
-        let file = |text: &str| {
-            let source = Source {
-                name: "launch.toml".to_owned(),
-                text: text.to_owned(),
-            };
-            LaunchFile::parse(source, Path::new("/usr/../bin")).unwrap()
-        };
-        let located = |file: &LaunchFile| {
-            let (process, places) = (&file.processes[0], Places::new(&file.folder));
-            locate_inner(file, process, process.command[1..].to_vec(), &places)
-        };
         assert_eq!(
-            located(&file(text)).unwrap(),
+            located(&parse(text)).unwrap(),
             ["-c", "./sh", "--", "/usr/../bin/sh", "./sh"]
         );
-        let wrong = located(&file(
-            &text.replace("\"--\", \"./sh\"", "\"--\", \"./nobody\""),
-        ))
-        .unwrap_err();
+
+        let text = text.replace("\"--\", \"./sh\"", "\"--\", \"./none\"");
+        let wrong = located(&parse(&text)).unwrap_err();
         let wrong = format!("{:?}", miette::Report::from(wrong));
-        assert!(wrong.contains("there is no program ./nobody"), "{wrong}");
+        assert!(wrong.contains("there is no program ./none"), "{wrong}");
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! One process: its group, its output, its end. Nothing of a group outlives its leader, and no group outlives the
-//! launcher's own tasks.
+//! One process: its group, its output, its end. The rest of a group is killed when its leader exits, and every group is
+//! killed when the launcher's task ends.
 
 use std::fs::File;
 use std::io::Write;
@@ -15,10 +15,10 @@ use tokio::io::{AsyncRead, AsyncReadExt};
 
 use super::lines::Lines;
 use super::plan::CommandLine;
-use super::screen::Tell;
+use super::screen::ScreenHandle;
 use super::tail::Tail;
 
-/// Longest wait for the rest of the output of a process that is over, should somebody else hold its pipes.
+/// Longest wait for the rest of the output of an exited process, in case another process holds its pipes.
 const REST_OF_OUTPUT: Duration = Duration::from_millis(500);
 
 /// A process group, by its leader.
@@ -26,13 +26,13 @@ const REST_OF_OUTPUT: Duration = Duration::from_millis(500);
 pub(super) struct Group(Pid);
 
 impl Group {
-    /// Sends a signal to every process of the group; a group that is gone needs none.
+    /// Sends a signal to every process of the group, if there is one left.
     pub(super) fn signal(self, signal: Signal) {
         let _gone = killpg(self.0, signal);
     }
 }
 
-/// Kills what is left of a group when dropped: at the end of its leader, or of the launcher, however that comes.
+/// Kills the rest of a group on drop: after its leader has exited, or when the launcher ends, also by a panic.
 #[derive(Debug)]
 struct KillGroup(Group);
 
@@ -45,10 +45,10 @@ impl Drop for KillGroup {
 /// Where the output of a process goes.
 #[derive(Debug, Clone)]
 pub(super) struct Output {
-    pub(super) tell: Tell,
-    /// Its place among the processes.
+    pub(super) screen: ScreenHandle,
+    /// Index of the process.
     pub(super) index: usize,
-    /// Its log.
+    /// Path of its log.
     pub(super) log: PathBuf,
     pub(super) tail: Tail,
 }
@@ -60,8 +60,8 @@ pub(super) struct Started {
     kill: KillGroup,
 }
 
-/// Starts a process as the leader of a group of its own, so that a signal reaches whatever it starts in turn and
-/// Ctrl-C on the terminal reaches nobody but the launcher.
+/// Starts a process as the leader of a group of its own: signals to the group reach its descendants, and Ctrl-C on the
+/// terminal reaches only the launcher.
 pub(super) fn start(command: &CommandLine) -> std::io::Result<Started> {
     let mut wrapped = CommandWrap::with_new(&command.program, |inner| {
         inner.args(&command.args).envs(&command.env);
@@ -70,13 +70,13 @@ pub(super) fn start(command: &CommandLine) -> std::io::Result<Started> {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
     });
-    let child = wrapped
-        .wrap(ProcessGroup::leader())
-        .wrap(KillOnDrop)
-        .spawn()?;
+    let wrapped = wrapped.wrap(ProcessGroup::leader()).wrap(KillOnDrop);
+    let child = wrapped.spawn()?;
+
     let pid = child.id().and_then(|id| i32::try_from(id).ok());
     let pid = pid.ok_or_else(|| std::io::Error::other("the system gave no process id"))?;
     let group = Group(Pid::from_raw(pid));
+
     Ok(Started {
         group,
         child,
@@ -85,35 +85,39 @@ pub(super) fn start(command: &CommandLine) -> std::io::Result<Started> {
 }
 
 impl Started {
-    /// Waits for the end of the process and of its output.
+    /// Waits for the exit of the process and the end of its output.
     pub(super) async fn run(mut self, output: Output) -> std::io::Result<ExitStatus> {
         let file = Arc::new(open_log(&output.log)?);
-        let out = self
-            .child
-            .stdout()
-            .take()
-            .map(|pipe| tokio::spawn(copy(pipe, file.clone(), output.clone(), false)));
-        let err = self
-            .child
-            .stderr()
-            .take()
-            .map(|pipe| tokio::spawn(copy(pipe, file, output, true)));
+        let mut copies = Vec::new();
+        if let Some(pipe) = self.child.stdout().take() {
+            copies.push(tokio::spawn(copy(
+                pipe,
+                file.clone(),
+                output.clone(),
+                false,
+            )));
+        }
+        if let Some(pipe) = self.child.stderr().take() {
+            copies.push(tokio::spawn(copy(pipe, file, output, true)));
+        }
         let status = self.child.wait().await;
-        // What the leader left behind would hold the pipes, and the run.
+
+        // Processes that the leader left behind would keep the pipes open.
         drop(self.kill);
-        for copying in [out, err].into_iter().flatten() {
+        for copying in copies {
             let _given_up = tokio::time::timeout(REST_OF_OUTPUT, copying).await;
         }
+
         status
     }
 }
 
-/// Opened to append, so that two pipes, and a restarted process, write one after the other.
+/// Opens the log to append: two pipes write to it, and so does a restarted process.
 fn open_log(path: &Path) -> std::io::Result<File> {
     File::options().create(true).append(true).open(path)
 }
 
-/// Copies a pipe: as it is to the log, by lines to the terminal.
+/// Copies a pipe: bytes to the log, lines to the terminal.
 async fn copy(mut pipe: impl AsyncRead + Unpin, log: Arc<File>, output: Output, is_error: bool) {
     let mut buffer = vec![0; 16 * 1024];
     let mut lines = Lines::default();
@@ -130,5 +134,5 @@ fn show(output: &Output, line: String, is_error: bool) {
     if is_error {
         output.tail.push(line.clone());
     }
-    output.tell.output(output.index, line, is_error);
+    output.screen.output(output.index, line, is_error);
 }

@@ -1,17 +1,17 @@
-//! Where a program of a launch file is found.
+//! Locates the programs of a launch file.
 
 use std::path::{Path, PathBuf};
 
-/// Places that were searched in vain.
+/// A program was not found in these places.
 #[derive(Debug, PartialEq)]
 pub(super) struct NotFound(pub(super) Vec<String>);
 
-/// Where programs are looked for.
+/// Places to search for programs.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
-    /// Folder of the running executable: what was built together runs together.
+    /// Folder of this executable: programs of one build run together.
     pub(super) beside: Option<PathBuf>,
-    /// Folder of the launch file, for programs that are given by a path.
+    /// Folder of the launch file, for programs with a `/`.
     pub(super) launch_file: PathBuf,
     /// Folders of `PATH`.
     pub(super) path: Vec<PathBuf>,
@@ -29,43 +29,46 @@ impl Places {
         }
     }
 
-    /// The program's absolute path.
+    /// The absolute path of a program.
     pub(super) fn find(&self, program: &str) -> Result<PathBuf, NotFound> {
         if program.contains('/') {
             let file = self.launch_file.join(program);
-            let found = Some(&file)
-                .filter(|file| is_program(file))
-                .and_then(|file| std::path::absolute(file).ok());
-            return found.ok_or_else(|| {
-                NotFound(vec![format!(
-                    "at {} (from the launch file)",
-                    file.display()
-                )])
-            });
+            let place = format!("at {} (from the launch file)", file.display());
+            return absolute(&file).ok_or(NotFound(vec![place]));
         }
-        let beside = self.beside.iter().map(|folder| folder.join(program));
-        let mut candidates = beside.chain(self.path.iter().map(|folder| folder.join(program)));
-        let found = candidates
-            .find(|file| is_program(file))
-            .and_then(|file| std::path::absolute(file).ok());
-        found.ok_or_else(|| {
-            let beside = self
-                .beside
-                .iter()
-                .map(|folder| format!("in {} (beside this program)", folder.display()));
-            NotFound(
-                beside
-                    .chain(["in the folders of PATH".to_owned()])
-                    .collect(),
-            )
-        })
+
+        for folder in self.beside.iter().chain(&self.path) {
+            if let Some(found) = absolute(&folder.join(program)) {
+                return Ok(found);
+            }
+        }
+        Err(NotFound(self.searched()))
     }
+
+    fn searched(&self) -> Vec<String> {
+        let mut places = Vec::new();
+        if let Some(folder) = &self.beside {
+            places.push(format!("in {} (beside this program)", folder.display()));
+        }
+        places.push("in the folders of PATH".to_owned());
+        places
+    }
+}
+
+/// The absolute path of a file, if it is a program.
+fn absolute(file: &Path) -> Option<PathBuf> {
+    if !is_program(file) {
+        return None;
+    }
+    std::path::absolute(file).ok()
 }
 
 fn is_program(file: &Path) -> bool {
     use std::os::unix::fs::PermissionsExt;
-    file.metadata()
-        .is_ok_and(|metadata| metadata.is_file() && metadata.permissions().mode() & 0o111 != 0)
+    let Ok(metadata) = file.metadata() else {
+        return false;
+    };
+    metadata.is_file() && metadata.permissions().mode() & 0o111 != 0
 }
 
 #[cfg(test)]
@@ -79,13 +82,16 @@ mod tests {
             launch_file: "/usr/../bin".into(),
             path: vec!["/usr/bin".into()],
         };
+
         assert_eq!(places.find("sh").unwrap(), Path::new("/bin/sh"));
         assert_eq!(places.find("./sh").unwrap(), Path::new("/usr/../bin/sh"));
+
         let elsewhere = Places {
             beside: Some("/nowhere".into()),
             ..places.clone()
         };
         assert_eq!(elsewhere.find("sh").unwrap(), Path::new("/usr/bin/sh"));
+
         let NotFound(places) = places.find("no-such-program").unwrap_err();
         assert_eq!(
             places,

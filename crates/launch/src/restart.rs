@@ -1,25 +1,25 @@
-//! When a process that ended is started again.
+//! Restarts of processes that exit before the end of the run.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 
-/// What to do about a process that ends before the run does.
+/// Whether a process that exits before the end of the run is restarted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Restart {
-    /// Leave it.
+    /// It is not restarted.
     #[default]
     Never,
-    /// Start it again if it failed.
+    /// It is restarted after a failure.
     OnFailure,
-    /// Start it again.
+    /// It is restarted after every exit.
     Always,
 }
 
 impl Restart {
-    /// Whether a process that ended this way is started again.
+    /// Whether a process is restarted after a success or a failure.
     pub(super) fn applies(self, has_failed: bool) -> bool {
         match self {
             Self::Never => false,
@@ -29,14 +29,14 @@ impl Restart {
     }
 }
 
-/// This many restarts of one process within [`WINDOW`]; after that it is broken, not unlucky.
+/// Most restarts of one process within [`WINDOW`].
 pub(super) const BUDGET: usize = 5;
-/// Long enough that a process which fails after each longest back-off still runs out of its budget.
+/// Window of the budget. A process that fails after every wait exhausts its budget, even with the longest waits.
 const WINDOW: Duration = Duration::from_secs(600);
-/// Longest wait before a restart: a person watching still connects it with the failure.
+/// Longest wait before a restart, unless the first wait is longer.
 const MAX_BACKOFF: Duration = Duration::from_secs(30);
 
-/// How often a process may still be started again, and after which wait.
+/// The restarts that a process has left, and the wait before the next one.
 #[derive(Debug)]
 pub(super) struct Budget {
     backoff: Duration,
@@ -52,24 +52,19 @@ impl Budget {
         }
     }
 
-    /// Spends one restart: how long to wait before it and its number among the recent ones, or `None` if the budget is
-    /// used up.
+    /// Spends one restart. Returns the wait before it and its number among the recent ones, or `None` if the budget is
+    /// exhausted.
     pub(super) fn spend(&mut self, now: Instant) -> Option<(Duration, usize)> {
-        while self
-            .recent
-            .front()
-            .is_some_and(|then| now.duration_since(*then) > WINDOW)
-        {
-            self.recent.pop_front();
-        }
+        self.recent
+            .retain(|then| now.duration_since(*then) <= WINDOW);
         if self.recent.len() >= BUDGET {
             return None;
         }
+
         let doublings = u32::try_from(self.recent.len()).unwrap_or(u32::MAX);
-        let wait = self
-            .backoff
-            .saturating_mul(2_u32.saturating_pow(doublings))
-            .min(MAX_BACKOFF.max(self.backoff));
+        let factor = 2_u32.saturating_pow(doublings);
+        let longest = MAX_BACKOFF.max(self.backoff);
+        let wait = self.backoff.saturating_mul(factor).min(longest);
         self.recent.push_back(now);
         Some((wait, self.recent.len()))
     }
@@ -86,26 +81,22 @@ mod tests {
     }
 
     #[test]
-    fn the_wait_doubles_until_the_budget_is_used_up() {
+    fn the_wait_doubles_until_the_budget_is_exhausted() {
         let now = Instant::now();
-        assert_eq!(
-            waits_s(&mut Budget::new(Duration::from_secs(1)), now),
-            [1, 2, 4, 8, 16]
-        );
-        assert_eq!(
-            waits_s(&mut Budget::new(Duration::from_secs(10)), now),
-            [10, 20, 30, 30, 30]
-        );
+        let mut short = Budget::new(Duration::from_secs(1));
+        assert_eq!(waits_s(&mut short, now), [1, 2, 4, 8, 16]);
+
+        let mut long = Budget::new(Duration::from_secs(10));
+        assert_eq!(waits_s(&mut long, now), [10, 20, 30, 30, 30]);
     }
 
     #[test]
-    fn a_process_that_held_out_for_long_has_its_budget_back() {
+    fn the_budget_is_full_again_after_a_window_without_failures() {
         let mut budget = Budget::new(Duration::from_secs(1));
         let now = Instant::now();
         assert_eq!(waits_s(&mut budget, now).len(), BUDGET);
-        assert_eq!(
-            waits_s(&mut budget, now + WINDOW + Duration::from_secs(1)),
-            [1, 2, 4, 8, 16]
-        );
+
+        let later = now + WINDOW + Duration::from_secs(1);
+        assert_eq!(waits_s(&mut budget, later), [1, 2, 4, 8, 16]);
     }
 }

@@ -1,5 +1,5 @@
-//! What people see of a launch: lines and a progress bar. One thread writes; whoever has something to show hands it
-//! over and goes on, so that a slow terminal holds neither a robot nor the clock.
+//! The terminal of a launch: lines and a progress bar. One thread writes and all others only queue what is to be shown, so
+//! a slow terminal delays neither a robot nor the clock.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Arc;
@@ -14,13 +14,13 @@ use protocol::messages::{LogKind, LogRecord};
 use super::bar::{Bar, Progress};
 use super::lines::harmless;
 
-/// Lines that may wait for the terminal; more are counted and not shown. The run's folder has them all.
+/// Most lines in the queue; further ones are counted and not shown. The run's folder contains all lines.
 const MAX_WAITING: usize = 10_000;
-/// Lines that are written in one go.
+/// Most lines of one write.
 const BATCH: usize = 512;
-/// While the clock is held the bar says for how long, to the second.
+/// Interval of updates of the bar while the clock is held; it shows whole seconds.
 const HELD_INTERVAL: Duration = Duration::from_secs(1);
-/// Colors of sources, one after the other: readable on dark and on light.
+/// ANSI colors of sources in turn, readable on dark and on light backgrounds.
 const COLORS: [&str; 6] = ["36", "33", "35", "32", "34", "31"];
 
 /// Something to show.
@@ -32,10 +32,10 @@ enum Show {
     Finish,
 }
 
-/// How things are shown.
+/// How lines and the bar are shown.
 #[derive(Debug, Clone)]
-pub(super) struct Look {
-    /// Names of the processes, in their order.
+pub(super) struct ScreenOptions {
+    /// Names of the processes by index.
     pub(super) names: Vec<String>,
     /// Whether only warnings and errors are wanted.
     pub(super) is_quiet: bool,
@@ -47,13 +47,14 @@ pub(super) struct Look {
     pub(super) has_bar: bool,
 }
 
-impl Look {
-    /// As this process's terminal, if it has one, can show it.
+impl ScreenOptions {
+    /// Options for the standard streams of this process.
     pub(super) fn here(names: Vec<String>, is_quiet: bool) -> Self {
-        let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+        let no_color = std::env::var_os("NO_COLOR").unwrap_or_default();
         let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-        let may_color = !is_set("NO_COLOR") && !is_dumb;
+        let may_color = no_color.is_empty() && !is_dumb;
         let is_terminal = std::io::stderr().is_terminal();
+
         Self {
             names,
             is_quiet,
@@ -64,43 +65,44 @@ impl Look {
     }
 }
 
-/// Hands things over to be shown.
+/// Queues what is to be shown.
 #[derive(Debug, Clone)]
-pub(super) struct Tell {
+pub(super) struct ScreenHandle {
     queue: Sender<Show>,
     waiting: Arc<AtomicUsize>,
     dropped: Arc<AtomicUsize>,
     is_quiet: bool,
 }
 
-impl Tell {
+impl ScreenHandle {
     /// A line of the run's log.
     pub(super) fn log(&self, record: LogRecord) {
-        // The simulator's own error output says at once for whom the clock waits, and the bar for how long.
+        // The simulator's error output and the bar show late robots already.
         if record.kind != LogKind::Late {
-            self.if_there_is_room(Show::Log(record));
+            self.try_queue(Show::Log(record));
         }
     }
 
     /// A line that a process printed.
     pub(super) fn output(&self, index: usize, line: String, is_error: bool) {
         if is_error || !self.is_quiet {
-            self.if_there_is_room(Show::Output { index, line });
+            self.try_queue(Show::Output { index, line });
         }
     }
 
-    /// How far the run is.
+    /// Progress of the run.
     pub(super) fn progress(&self, progress: Progress) {
-        self.if_there_is_room(Show::Progress(progress));
+        self.try_queue(Show::Progress(progress));
     }
 
-    /// The launcher's own words; never dropped.
+    /// A line of the launcher; never dropped.
     pub(super) fn notice(&self, text: impl Into<String>) {
-        // Nobody is left to read it only when the launcher itself is at its end.
+        // The queue is closed only at the end of the launcher.
         let _unread = self.queue.send(Show::Notice(text.into()));
     }
 
-    fn if_there_is_room(&self, show: Show) {
+    /// Queues something unless the queue is full; counts what is dropped.
+    fn try_queue(&self, show: Show) {
         if self.waiting.fetch_add(1, Ordering::Relaxed) >= MAX_WAITING {
             self.waiting.fetch_sub(1, Ordering::Relaxed);
             self.dropped.fetch_add(1, Ordering::Relaxed);
@@ -110,15 +112,15 @@ impl Tell {
     }
 }
 
-/// The thread that writes.
+/// The thread that writes to the terminal.
 pub(super) struct Screen {
-    tell: Tell,
+    handle: ScreenHandle,
     thread: JoinHandle<()>,
 }
 
 impl Screen {
-    /// Begins to show things on standard output and the error output.
-    pub(super) fn open(look: Look) -> Self {
+    /// Starts the thread, which writes to the standard output and the standard error.
+    pub(super) fn open(look: ScreenOptions) -> Self {
         let bar = look.has_bar.then(|| Bar::new(look.has_colors_err));
         Self::to(
             look,
@@ -128,13 +130,12 @@ impl Screen {
         )
     }
 
-    fn to(look: Look, out: Writer, err: Writer, bar: Option<Bar>) -> Self {
+    fn to(look: ScreenOptions, out: Writer, err: Writer, bar: Option<Bar>) -> Self {
         let (queue, shows) = std::sync::mpsc::channel();
-        let (waiting, dropped) = (Arc::<AtomicUsize>::default(), Arc::<AtomicUsize>::default());
-        let tell = Tell {
+        let handle = ScreenHandle {
             queue,
-            waiting,
-            dropped,
+            waiting: Arc::default(),
+            dropped: Arc::default(),
             is_quiet: look.is_quiet,
         };
         let painter = Painter {
@@ -142,37 +143,38 @@ impl Screen {
             out,
             err,
             bar,
-            tell: tell.clone(),
+            handle: handle.clone(),
         };
+
         Self {
-            tell,
+            handle,
             thread: std::thread::spawn(move || painter.paint(&shows)),
         }
     }
 
-    /// Where to hand things over.
-    pub(super) fn tell(&self) -> Tell {
-        self.tell.clone()
+    /// A handle to queue what is to be shown.
+    pub(super) fn handle(&self) -> ScreenHandle {
+        self.handle.clone()
     }
 
-    /// Shows what is waiting, and ends.
+    /// Shows what is queued and ends the thread.
     pub(super) fn finish(self) {
-        let _gone = self.tell.queue.send(Show::Finish);
-        let _gone = self.thread.join();
+        let _has_ended = self.handle.queue.send(Show::Finish);
+        let _has_panicked = self.thread.join();
     }
 }
 
 type Writer = Box<dyn Write + Send>;
 
 struct Painter {
-    look: Look,
+    look: ScreenOptions,
     out: Writer,
     err: Writer,
     bar: Option<Bar>,
-    tell: Tell,
+    handle: ScreenHandle,
 }
 
-/// Text for one of the two outputs.
+/// Text for one of the two streams.
 struct Piece {
     is_out: bool,
     text: String,
@@ -184,18 +186,20 @@ impl Painter {
             let mut batch: Vec<Show> = self.next(shows).into_iter().collect();
             batch.extend(shows.try_iter().take(BATCH));
             let is_last = batch.iter().any(|show| matches!(show, Show::Finish));
-            self.batch(batch);
+
+            self.show(batch);
             if is_last {
                 break;
             }
         }
-        self.say_dropped();
+
+        self.report_dropped();
         if let Some(bar) = self.bar {
             bar.clear();
         }
     }
 
-    /// The next thing to show, or nothing once a second while the clock is held.
+    /// Waits for the next thing to show; returns `None` once a second while the clock is held.
     fn next(&self, shows: &Receiver<Show>) -> Option<Show> {
         if !self.bar.as_ref().is_some_and(Bar::is_held) {
             return Some(shows.recv().unwrap_or(Show::Finish));
@@ -207,34 +211,32 @@ impl Painter {
         }
     }
 
-    fn batch(&mut self, batch: Vec<Show>) {
+    /// Writes a batch: all lines first, then the newest progress.
+    fn show(&mut self, batch: Vec<Show>) {
         let mut pieces: Vec<Piece> = Vec::new();
         let mut progress = None;
         for show in batch {
             if !matches!(show, Show::Notice(_) | Show::Finish) {
-                self.tell.waiting.fetch_sub(1, Ordering::Relaxed);
+                self.handle.waiting.fetch_sub(1, Ordering::Relaxed);
             }
-            let (is_out, line) = match show {
-                Show::Log(record) => (true, self.log_line(&record)),
-                Show::Output { index, line } => (false, self.output_line(index, &line)),
-                Show::Notice(text) => (false, self.notice_line(&text)),
-                Show::Progress(newest) => {
-                    progress = Some(newest);
-                    continue;
+
+            match show {
+                Show::Log(record) => append(&mut pieces, true, self.log_line(&record)),
+                Show::Output { index, line } => {
+                    append(&mut pieces, false, self.output_line(index, &line));
                 }
-                Show::Finish => continue,
-            };
-            match pieces.last_mut() {
-                Some(piece) if piece.is_out == is_out => piece.text += &line,
-                _ => pieces.push(Piece { is_out, text: line }),
+                Show::Notice(text) => append(&mut pieces, false, self.notice_line(&text)),
+                Show::Progress(newest) => progress = Some(newest),
+                Show::Finish => {}
             }
         }
+
         self.write(&pieces);
         if let Some(bar) = &mut self.bar {
             bar.update(progress);
         }
-        if self.tell.waiting.load(Ordering::Relaxed) == 0 {
-            self.say_dropped();
+        if self.handle.waiting.load(Ordering::Relaxed) == 0 {
+            self.report_dropped();
         }
     }
 
@@ -242,65 +244,57 @@ impl Painter {
         if pieces.is_empty() {
             return;
         }
-        let (out, err) = (&mut self.out, &mut self.err);
-        let mut write = || {
-            for piece in pieces {
-                let to = if piece.is_out { &mut *out } else { &mut *err };
-                // A reader that has gone away (`| head`) does not end the run.
-                let _unread = to
-                    .write_all(piece.text.as_bytes())
-                    .and_then(|()| to.flush());
-            }
-        };
+
+        let out = &mut self.out;
+        let err = &mut self.err;
         match &self.bar {
-            Some(bar) => bar.aside(write),
-            None => write(),
+            Some(bar) => bar.aside(|| write(pieces, out, err)),
+            None => write(pieces, out, err),
         }
     }
 
-    fn say_dropped(&mut self) {
-        let count = self.tell.dropped.swap(0, Ordering::Relaxed);
-        if count > 0 {
-            let text =
-                format!("{count} lines came too fast to be shown; the run's folder has them all");
-            let text = self.notice_line(&text);
-            self.write(&[Piece {
-                is_out: false,
-                text,
-            }]);
+    fn report_dropped(&mut self) {
+        let count = self.handle.dropped.swap(0, Ordering::Relaxed);
+        if count == 0 {
+            return;
         }
+
+        let text = format!(
+            "{count} lines came too fast to be shown; the run's folder contains all of them"
+        );
+        let text = self.notice_line(&text);
+        self.write(&[Piece {
+            is_out: false,
+            text,
+        }]);
     }
 
     fn log_line(&self, record: &LogRecord) -> String {
-        // What a robot says is its own affair; what it does to a terminal is not.
+        // Robots must not control the terminal.
         let record = LogRecord {
             text: harmless(&record.text),
             source: harmless(&record.source),
             ..record.clone()
         };
         let line = log_line(&record);
+
         if !self.look.has_colors_out {
             return line + "\n";
         }
+
         let (head, text) = line.split_at(line.len() - record.text.len());
         format!("{}{text}\n", color(self.color_of(&record.source), head))
     }
 
     fn output_line(&self, index: usize, line: &str) -> String {
-        let width = self
-            .look
-            .names
-            .iter()
-            .map(String::len)
-            .max()
-            .unwrap_or_default();
-        let name = self.look.names.get(index).map_or("", String::as_str);
-        let head = format!("{name:<width$} |");
-        let head = if self.look.has_colors_err {
-            color(index, &head)
-        } else {
-            head
-        };
+        let names = &self.look.names;
+        let width = names.iter().map(String::len).max().unwrap_or_default();
+        let name = names.get(index).map_or("", String::as_str);
+        let mut head = format!("{name:<width$} |");
+        if self.look.has_colors_err {
+            head = color(index, &head);
+        }
+
         format!("{head} {line}\n")
     }
 
@@ -316,6 +310,23 @@ impl Painter {
     fn color_of(&self, source: &str) -> usize {
         let named = self.look.names.iter().position(|name| name == source);
         named.unwrap_or_else(|| source.bytes().map(usize::from).sum())
+    }
+}
+
+/// Appends a line to the last piece, or begins a new one if that belongs to the other stream.
+fn append(pieces: &mut Vec<Piece>, is_out: bool, line: String) {
+    match pieces.last_mut() {
+        Some(piece) if piece.is_out == is_out => piece.text += &line,
+        _ => pieces.push(Piece { is_out, text: line }),
+    }
+}
+
+fn write(pieces: &[Piece], out: &mut Writer, err: &mut Writer) {
+    for piece in pieces {
+        let to = if piece.is_out { &mut *out } else { &mut *err };
+        let written = to.write_all(piece.text.as_bytes());
+        // A closed pipe (`| head`) does not end the run.
+        let _unread = written.and_then(|()| to.flush());
     }
 }
 
@@ -337,6 +348,7 @@ mod tests {
             self.0.lock().unwrap().extend_from_slice(bytes);
             Ok(bytes.len())
         }
+
         fn flush(&mut self) -> std::io::Result<()> {
             Ok(())
         }
@@ -348,9 +360,9 @@ mod tests {
         }
     }
 
-    fn look(has_colors: bool) -> Look {
+    fn look(has_colors: bool) -> ScreenOptions {
         let names = ["simulator", "Leguin"].map(str::to_owned).to_vec();
-        Look {
+        ScreenOptions {
             names,
             is_quiet: false,
             has_colors_out: has_colors,
@@ -360,33 +372,35 @@ mod tests {
     }
 
     fn record(text: &str) -> LogRecord {
-        let (source, kind) = ("Leguin".to_owned(), LogKind::Say);
         LogRecord {
             epoch: 1,
             tick: 3,
             time_s: 1.5,
-            source,
-            kind,
+            source: "Leguin".to_owned(),
+            kind: LogKind::Say,
             text: text.to_owned(),
         }
     }
 
-    fn shown(look: Look, tell: impl FnOnce(&Tell)) -> (String, String) {
-        let (out, err) = (Buffer::default(), Buffer::default());
+    /// Standard output and standard error after `show`.
+    fn shown(look: ScreenOptions, show: impl FnOnce(&ScreenHandle)) -> (String, String) {
+        let out = Buffer::default();
+        let err = Buffer::default();
         let screen = Screen::to(look, Box::new(out.clone()), Box::new(err.clone()), None);
-        tell(&screen.tell());
+        show(&screen.handle());
         screen.finish();
         (out.text(), err.text())
     }
 
     #[test]
     fn lines_are_prefixed_and_aligned() {
-        let (out, err) = shown(look(false), |tell| {
-            tell.output(0, "ready".to_owned(), true);
-            tell.output(1, "here".to_owned(), false);
-            tell.log(record("going home"));
-            tell.notice("Leguin has left");
+        let (out, err) = shown(look(false), |screen| {
+            screen.output(0, "ready".to_owned(), true);
+            screen.output(1, "here".to_owned(), false);
+            screen.log(record("going home"));
+            screen.notice("Leguin has left");
         });
+
         assert_eq!(
             err,
             "simulator | ready\nLeguin    | here\nLeguin has left\n"
@@ -396,9 +410,9 @@ mod tests {
 
     #[test]
     fn colors_go_around_the_source_and_a_robot_cannot_steer_the_terminal() {
-        let (out, err) = shown(look(true), |tell| {
-            tell.output(1, "here".to_owned(), false);
-            tell.log(record("\u{1b}[2Jhello"));
+        let (out, err) = shown(look(true), |screen| {
+            screen.output(1, "here".to_owned(), false);
+            screen.log(record("\u{1b}[2Jhello"));
         });
         assert_eq!(err, "\u{1b}[33mLeguin    |\u{1b}[0m here\n");
         assert_eq!(
@@ -409,20 +423,18 @@ mod tests {
 
     #[test]
     fn quiet_shows_errors_only() {
-        let (_, err) = shown(
-            Look {
-                is_quiet: true,
-                ..look(false)
-            },
-            |tell| {
-                tell.output(1, "chatter".to_owned(), false);
-                tell.output(1, "trouble".to_owned(), true);
-            },
-        );
+        let quiet = ScreenOptions {
+            is_quiet: true,
+            ..look(false)
+        };
+        let (_, err) = shown(quiet, |screen| {
+            screen.output(1, "chatter".to_owned(), false);
+            screen.output(1, "trouble".to_owned(), true);
+        });
         assert_eq!(err, "Leguin    | trouble\n");
     }
 
-    /// Blocks until released, as a terminal that somebody has stopped.
+    /// Blocks until released, like a terminal after Ctrl-S.
     struct Stuck(Arc<Mutex<()>>);
 
     impl Write for Stuck {
@@ -430,14 +442,16 @@ mod tests {
             let _released = self.0.lock().unwrap();
             Ok(bytes.len())
         }
+
         fn flush(&mut self) -> std::io::Result<()> {
             Ok(())
         }
     }
 
     #[test]
-    fn a_terminal_that_is_stuck_costs_lines_and_nothing_else() {
-        let (terminal, err) = (Arc::new(Mutex::new(())), Buffer::default());
+    fn a_blocked_terminal_loses_lines_and_blocks_nothing_else() {
+        let terminal = Arc::new(Mutex::new(()));
+        let err = Buffer::default();
         let stop = terminal.lock().unwrap();
         let screen = Screen::to(
             look(false),
@@ -445,14 +459,14 @@ mod tests {
             Box::new(err.clone()),
             None,
         );
-        let tell = screen.tell();
-        (0..3 * MAX_WAITING).for_each(|_| tell.log(record("busy")));
+
+        for _ in 0..3 * MAX_WAITING {
+            screen.handle().log(record("busy"));
+        }
         drop(stop);
         screen.finish();
-        assert!(
-            err.text().contains("lines came too fast to be shown"),
-            "{}",
-            err.text()
-        );
+
+        let text = err.text();
+        assert!(text.contains("lines came too fast to be shown"), "{text}");
     }
 }

@@ -1,9 +1,10 @@
-//! Certificates, keys and configuration files for a roster, made in one go.
+//! Makes certificates, keys and configuration files for a roster.
 //!
-//! A certificate authority of its own signs one certificate for each participant and is forgotten: its key is never
-//! written, so nobody can issue another certificate. A changed roster gets everything anew.
+//! A certificate authority signs one certificate for each participant. Its key is never written, so no further certificate
+//! can be issued. A changed roster needs new certificates for all.
 
 use std::collections::BTreeSet;
+use std::fs::Permissions;
 use std::io::Write;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -22,36 +23,36 @@ use rcgen::{
 
 /// The certificate of the authority, in the folder itself.
 const CA: &str = "ca.pem";
-/// What each participant has in a folder of its own.
+/// Files of each participant, in a folder of its own.
 const CERTIFICATE: &str = "cert.pem";
 const KEY: &str = "key.pem";
 const CONFIG: &str = "zenoh.json5";
-/// Hosts that every simulator's certificate names.
+/// Hosts in every simulator's certificate.
 const LOCAL_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 const DAY: Duration = Duration::from_secs(86_400);
 
-/// What certificates are made for.
+/// The options of `cars secure init`.
 #[derive(Debug)]
 pub struct Certificates {
     /// The folder to make.
     pub folder: PathBuf,
     /// The robots that may take part.
     pub robots: Vec<RobotName>,
-    /// Further names or addresses by which the simulator's machine is reached.
+    /// Further names or addresses of the simulator's machine.
     pub hosts: Vec<String>,
-    /// How long the certificates are valid, days.
+    /// Validity of the certificates, days.
     pub days: u32,
-    /// The one run that they are for; without it any run.
+    /// The only run that the access control admits; without it any run.
     pub run: Option<RunName>,
-    /// Whether what an earlier call made there is replaced.
+    /// Whether the files of an earlier call are replaced.
     pub replaces: bool,
 }
 
 impl Certificates {
-    /// Makes what a secured run needs. Returns until when it is valid, in words.
+    /// Makes all files. Returns the end of their validity as text.
     ///
     /// # Errors
-    /// If a name is taken, if the folder holds something else, or if a file cannot be written.
+    /// If a name is taken, the folder has other content, or a file cannot be written.
     pub fn make(&self) -> miette::Result<String> {
         self.check_names()?;
         self.make_folder()?;
@@ -67,90 +68,88 @@ impl Certificates {
     }
 
     fn check_names(&self) -> miette::Result<()> {
-        // A folder is called after each, and some file systems do not tell `Butler` from `butler`.
+        // Each name is that of a folder, and some file systems ignore case.
         let mut taken: BTreeSet<String> = RESERVED.iter().map(|name| (*name).to_owned()).collect();
         taken.insert(CA.to_owned());
-        match self
-            .robots
-            .iter()
-            .find(|robot| !taken.insert(robot.as_str().to_lowercase()))
-        {
-            None => Ok(()),
-            Some(robot) => {
-                let help = "each participant has a folder called after it, and some are not robots";
-                Err(miette!(help = help, "the name {robot} is taken already"))
+
+        for robot in &self.robots {
+            if !taken.insert(robot.as_str().to_lowercase()) {
+                let help = "each participant has a folder of its name, and some are not robots";
+                return Err(miette!(help = help, "the name {robot} is taken already"));
             }
         }
+        Ok(())
     }
 
-    /// Makes the folder, readable by its owner alone.
+    /// Makes the folder, accessible only by its owner, and removes the files of an earlier call.
     fn make_folder(&self) -> miette::Result<()> {
         let folder = &self.folder;
-        let is_ours = [folder.join(CA), folder.join(SIMULATOR).join(CONFIG)]
-            .iter()
-            .any(|file| file.exists());
-        let is_empty = !folder
-            .read_dir()
-            .is_ok_and(|mut entries| entries.next().is_some());
+        let has_ca = folder.join(CA).exists();
+        let is_ours = has_ca || folder.join(SIMULATOR).join(CONFIG).exists();
+        let entries = folder.read_dir();
+        let is_empty = !entries.is_ok_and(|mut entries| entries.next().is_some());
         let is_free = is_empty || (self.replaces && is_ours);
         if !is_free {
             let help = if is_ours {
-                "--force makes everything anew; what was made before is then of no use any more"
+                "--force makes new files; all earlier certificates are then useless"
             } else {
-                "it holds something else: choose another folder"
+                "it has other content: choose another folder"
             };
-            return Err(miette!(
-                help = help,
-                "{} is there already",
-                folder.display()
-            ));
+            let folder = folder.display();
+            return Err(miette!(help = help, "{folder} is there already"));
         }
+
         make_private_folder(folder)?;
-        forget_participants(folder)
+        remove_earlier(folder)
     }
 
-    /// Makes all files. Returns until when they are valid.
+    /// Makes all files. Returns the end of their validity as text.
     fn make_files(&self) -> miette::Result<String> {
         let authority = Authority::new(self.days)?;
         let keys = self.run.as_ref().map_or_else(Keys::of_any_run, Keys::new);
-        let hosts: Vec<String> = LOCAL_HOSTS
-            .iter()
-            .map(|host| (*host).to_owned())
-            .chain(self.hosts.iter().cloned())
-            .collect();
+        let mut hosts = LOCAL_HOSTS.map(str::to_owned).to_vec();
+        hosts.extend(self.hosts.iter().cloned());
+
         authority.equip(&self.folder, SIMULATOR, hosts, |credentials| {
             simulator_config(&keys, &self.robots, credentials)
         })?;
+
         for name in self.clients() {
             authority.equip(&self.folder, name, Vec::new(), |credentials| {
                 client_config(name, credentials)
             })?;
         }
-        // Last: a folder with it is complete.
+
+        // The last file: a folder with it is complete.
         write_file(&self.folder.join(CA), &authority.issuer.pem(), 0o644)?;
+
         Ok(authority.validity)
     }
 }
 
-/// Who signs certificates, as long as this process lives.
+/// The certificate authority, which exists only in this process.
 struct Authority {
     issuer: CertifiedIssuer<'static, KeyPair>,
     from: SystemTime,
     until: SystemTime,
+    /// End of the validity as text.
     validity: String,
 }
 
 impl Authority {
     fn new(days: u32) -> miette::Result<Self> {
         let now = SystemTime::now();
-        // Clocks of two machines differ by something.
-        let (from, until) = (now - DAY / 24, now + DAY * days);
+        // One hour ago, because the clocks of machines differ.
+        let from = now - DAY / 24;
+        let until = now + DAY * days;
+
         let mut params = named("CARS certificate authority", from, until);
         params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
         params.key_usages = vec![KeyUsagePurpose::KeyCertSign];
         let validity = format!("{} (UTC)", params.not_after.date());
         let key = KeyPair::generate().into_diagnostic()?;
         let issuer = CertifiedIssuer::self_signed(params, key).into_diagnostic()?;
+
         Ok(Self {
             issuer,
             from,
@@ -159,8 +158,8 @@ impl Authority {
         })
     }
 
-    /// Makes the folder of a participant. One with hosts is a server, and one without a client: nobody but the
-    /// simulator can pass for the simulator.
+    /// Makes the folder of a participant. Only a certificate with hosts is that of a server, so no other participant can act
+    /// as the simulator.
     fn equip(
         &self,
         folder: &Path,
@@ -168,54 +167,61 @@ impl Authority {
         hosts: Vec<String>,
         config: impl FnOnce(&Credentials) -> String,
     ) -> miette::Result<()> {
-        let is_server = !hosts.is_empty();
-        let mut params = named(name, self.from, self.until);
-        params.subject_alt_names = CertificateParams::new(hosts)
-            .into_diagnostic()?
-            .subject_alt_names;
-        params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
-        params.extended_key_usages = vec![if is_server {
-            ExtendedKeyUsagePurpose::ServerAuth
-        } else {
-            ExtendedKeyUsagePurpose::ClientAuth
-        }];
         let key = KeyPair::generate().into_diagnostic()?;
-        let certificate = params.signed_by(&key, &self.issuer).into_diagnostic()?;
-        let (ca, certificate, key) = (self.issuer.pem(), certificate.pem(), key.serialize_pem());
-        let credentials = Credentials {
-            ca: &ca,
+        let certificate = self.certificate(name, hosts, &key)?;
+        let key = key.serialize_pem();
+        let config = config(&Credentials {
+            ca: &self.issuer.pem(),
             certificate: &certificate,
             key: &key,
             validity: &self.validity,
-        };
+        });
+
         let folder = folder.join(name);
         make_private_folder(&folder)?;
         write_file(&folder.join(CERTIFICATE), &certificate, 0o644)?;
         write_file(&folder.join(KEY), &key, 0o600)?;
-        write_file(&folder.join(CONFIG), &config(&credentials), 0o600)
+        write_file(&folder.join(CONFIG), &config, 0o600)
+    }
+
+    /// A signed certificate, in PEM.
+    fn certificate(&self, name: &str, hosts: Vec<String>, key: &KeyPair) -> miette::Result<String> {
+        let usage = if hosts.is_empty() {
+            ExtendedKeyUsagePurpose::ClientAuth
+        } else {
+            ExtendedKeyUsagePurpose::ServerAuth
+        };
+        let with_hosts = CertificateParams::new(hosts).into_diagnostic()?;
+
+        let mut params = named(name, self.from, self.until);
+        params.subject_alt_names = with_hosts.subject_alt_names;
+        params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+        params.extended_key_usages = vec![usage];
+        let certificate = params.signed_by(key, &self.issuer).into_diagnostic()?;
+        Ok(certificate.pem())
     }
 }
 
 fn named(name: &str, from: SystemTime, until: SystemTime) -> CertificateParams {
     let mut params = CertificateParams::default();
     params.distinguished_name.push(DnType::CommonName, name);
-    (params.not_before, params.not_after) = (from.into(), until.into());
+    params.not_before = from.into();
+    params.not_after = until.into();
     params
 }
 
 fn make_private_folder(folder: &Path) -> miette::Result<()> {
-    let failed = || format!("cannot make the folder {}", folder.display());
     let made = std::fs::DirBuilder::new()
         .recursive(true)
         .mode(0o700)
         .create(folder);
-    made.into_diagnostic().wrap_err_with(failed)?;
-    // It may have been there, open to all.
-    let closed = std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o700));
-    closed.into_diagnostic().wrap_err_with(failed)
+    // An existing folder keeps its permissions, which may be wider.
+    made.and_then(|()| std::fs::set_permissions(folder, Permissions::from_mode(0o700)))
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))
 }
 
-/// Writes a new file that at no moment more people can read than may.
+/// Writes a new file, which has its final permissions from the beginning.
 fn write_file(path: &Path, text: &str, mode: u32) -> miette::Result<()> {
     let file = std::fs::OpenOptions::new()
         .write(true)
@@ -228,64 +234,61 @@ fn write_file(path: &Path, text: &str, mode: u32) -> miette::Result<()> {
         .wrap_err_with(|| format!("cannot write {}", path.display()))
 }
 
-/// Removes what an earlier call made, and nothing else.
-fn forget_participants(folder: &Path) -> miette::Result<()> {
-    for entry in folder
-        .read_dir()
-        .into_diagnostic()?
-        .flatten()
-        .map(|entry| entry.path())
-    {
-        if !entry.join(CONFIG).exists() {
+/// Removes the files of an earlier call, and no other files.
+fn remove_earlier(folder: &Path) -> miette::Result<()> {
+    for entry in folder.read_dir().into_diagnostic()?.flatten() {
+        let participant = entry.path();
+        if !participant.join(CONFIG).exists() {
             continue;
         }
-        for file in [CERTIFICATE, KEY, CONFIG]
-            .map(|name| entry.join(name))
-            .iter()
-            .filter(|file| file.exists())
-        {
-            remove(file)?;
+
+        for name in [CERTIFICATE, KEY, CONFIG] {
+            remove(&participant.join(name))?;
         }
-        // Somebody may keep something of their own in it.
-        let _kept = std::fs::remove_dir(&entry);
+        // A folder with other files stays.
+        let _has_other_files = std::fs::remove_dir(&participant);
     }
-    let ca = folder.join(CA);
-    if ca.exists() { remove(&ca) } else { Ok(()) }
+
+    remove(&folder.join(CA))
 }
 
+/// Removes a file if it exists.
 fn remove(file: &Path) -> miette::Result<()> {
+    if !file.exists() {
+        return Ok(());
+    }
+
     std::fs::remove_file(file)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot replace {}", file.display()))
 }
 
-/// A folder that `cars secure init` made, to be used.
+/// A folder made by `cars secure init`.
 #[derive(Debug, Clone)]
 pub(crate) struct Secured {
     folder: PathBuf,
 }
 
 impl Secured {
-    /// Finds the folder, which must have something for each of these participants, and for the simulator.
+    /// Opens the folder. It must have a configuration file for each of these participants, the simulator and the operator.
     pub(crate) fn find<'a>(
         folder: &Path,
         names: impl Iterator<Item = &'a str>,
     ) -> miette::Result<Self> {
         let folder = std::path::absolute(folder).into_diagnostic()?;
         let secured = Self { folder };
-        let mut wanted = [SIMULATOR, OPERATOR].into_iter().chain(names);
-        match wanted.find(|name| !secured.config_of(name).is_file()) {
-            None => Ok(secured),
-            Some(name) => {
-                let help = "`cars secure init FOLDER --robots NAME,NAME…` makes one for every robot it names";
-                let file = secured.config_of(name);
-                Err(miette!(
+        for name in [SIMULATOR, OPERATOR].into_iter().chain(names) {
+            let file = secured.config_of(name);
+            if !file.is_file() {
+                let help = "`cars secure init FOLDER --robots NAME,NAME…` makes one for each of its robots";
+                let file = file.display();
+                return Err(miette!(
                     help = help,
-                    "{name} has no certificate: there is no {}",
-                    file.display()
-                ))
+                    "{name} has no certificate: there is no {file}"
+                ));
             }
         }
+        Ok(secured)
     }
 
     /// The configuration file of a participant.
@@ -293,7 +296,7 @@ impl Secured {
         self.folder.join(name).join(CONFIG)
     }
 
-    /// That of who started the run.
+    /// The configuration file of the operator.
     pub(crate) fn operator(&self) -> PathBuf {
         self.config_of(OPERATOR)
     }
@@ -315,6 +318,7 @@ mod tests {
             run: None,
             replaces: force,
         };
+
         certificates.make().map(drop)
     }
 
@@ -328,6 +332,7 @@ mod tests {
         let folder = lab.path().join("certificates");
         init(&folder, &["Butler", "Leguin"], false).unwrap();
         assert_eq!(mode(&folder), 0o700);
+
         for name in ["simulator", "operator", "console", "Butler", "Leguin"] {
             assert_eq!(mode(&folder.join(name)), 0o700, "{name}");
             for secret in [KEY, CONFIG] {
@@ -339,6 +344,7 @@ mod tests {
             }
             assert!(folder.join(name).join(CERTIFICATE).is_file());
         }
+
         let files = std::fs::read_dir(&folder).unwrap().count();
         assert_eq!(
             files, 6,
@@ -347,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_overwritten_unless_it_is_meant() {
+    fn nothing_is_overwritten_without_force() {
         let lab = tempfile::tempdir().unwrap();
         let folder = lab.path().join("certificates");
         init(&folder, &["Butler", "Vonda"], false).unwrap();
@@ -364,7 +370,7 @@ mod tests {
         assert_ne!(read("Butler/key.pem"), before);
         assert!(
             !folder.join("Vonda").exists(),
-            "what is of no use any more is gone"
+            "the files of an earlier robot are removed"
         );
 
         let other = lab.path().join("other");
@@ -375,9 +381,10 @@ mod tests {
     }
 
     #[test]
-    fn names_that_would_pass_for_others_are_refused() {
+    fn names_that_are_taken_are_refused() {
         let lab = tempfile::tempdir().unwrap();
         let folder = lab.path().join("certificates");
+
         for robots in [
             &["operator"][..],
             &["Simulator"],
@@ -393,11 +400,12 @@ mod tests {
                 "{robots:?}"
             );
         }
+
         assert!(!folder.exists());
     }
 
     #[test]
-    fn a_secured_folder_has_something_for_everybody() {
+    fn a_secured_folder_has_a_configuration_for_each_participant() {
         let lab = tempfile::tempdir().unwrap();
         let folder = lab.path().join("certificates");
         init(&folder, &["Butler"], false).unwrap();

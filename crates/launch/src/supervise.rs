@@ -1,5 +1,5 @@
-//! Keeps the processes of a run: starts them, starts them again, and brings all of them to an end. It knows processes
-//! and signals, and nothing of the bus.
+//! Supervises the processes of a run: starts, restarts and ends them. It works with processes and signals only, not with
+//! the bus.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -12,51 +12,51 @@ use super::ending::{Ended, Failure};
 use super::plan::{Part, Planned};
 use super::process::{self, Group, Output};
 use super::restart::{BUDGET, Budget};
-use super::screen::Tell;
+use super::screen::ScreenHandle;
 use super::tail::Tail;
 
-/// Everything that can happen to a launcher.
+/// An event of the supervisor's loop. Processes are named by their indices.
 #[derive(Debug)]
-pub(super) enum Event {
-    /// A process is over, and what it had to say has been read.
+pub(super) enum SupervisorEvent {
+    /// A process has exited and its output has been read.
     Ended(usize, Ended),
     /// The wait before a restart is over.
     RestartDue(usize),
-    /// The scenario has something in store for processes.
-    Faults(Vec<ProcessOrder>, Done),
-    /// A fault is over by the wall clock.
+    /// The scenario orders faults of processes; the sender waits until they are carried out.
+    Faults(Vec<ProcessOrder>, FaultsDone),
+    /// The wall-clock duration of a fault is over.
     FaultOver(usize, FaultKind),
-    /// A slowed process goes on for a moment, or is stopped again.
+    /// A slowed process is stopped (`true`) or continued (`false`).
     Pulse(usize, bool),
-    /// A person, or the system, asks to end.
+    /// The launcher has received a signal to end.
     Asked(Signal),
-    /// The patience of a stage is over.
-    GraceOver(Stage),
+    /// The grace period of a phase is over.
+    GraceOver(Shutdown),
 }
 
-/// Tells whoever ordered faults that they have been carried out.
-pub(super) struct Done(pub(super) Box<dyn FnOnce() + Send>);
+/// Callback that reports to the simulator that its faults have been carried out.
+pub(super) struct FaultsDone(pub(super) Box<dyn FnOnce() + Send>);
 
-impl std::fmt::Debug for Done {
+impl std::fmt::Debug for FaultsDone {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Done")
+        f.write_str("FaultsDone")
     }
 }
 
-/// How far the end of a run has come. Stages only ever go forward.
+/// Phase of the end of a run. Phases only advance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Stage {
-    /// Not at all.
+pub(super) enum Shutdown {
+    /// The run goes on.
     Running,
-    /// The simulator was told to end the run, and writes its record.
+    /// The simulator has received SIGTERM and writes its record.
     Stopping,
-    /// The simulator is over; the robots leave by themselves.
+    /// The simulator has exited; the robots exit by themselves.
     Leaving,
-    /// Everybody was told to end.
+    /// All processes have received SIGTERM.
     Terminating,
-    /// Everybody is being killed.
+    /// All processes have received SIGKILL.
     Killing,
-    /// Not even that helped.
+    /// Some processes survived SIGKILL.
     GivenUp,
 }
 
@@ -65,58 +65,72 @@ pub(super) enum Stage {
 pub struct Outcome {
     /// The first failure that ended the run.
     pub failure: Option<Failure>,
-    /// The signal that asked to end.
+    /// The first signal to end.
     pub asked: Option<Signal>,
 }
 
 /// A process under supervision.
-struct Kept {
+struct Supervised {
     planned: Planned,
     budget: Budget,
+    /// Its process group while it runs.
     group: Option<Group>,
     tail: Tail,
-    /// Whether the scenario has killed it: its end is no failure.
+    /// Whether the scenario has killed it, so that its exit is not a failure.
     is_down: bool,
     /// Whether the scenario slows it down.
     is_slow: bool,
 }
 
+impl Supervised {
+    fn new(planned: Planned) -> Self {
+        Self {
+            budget: Budget::new(planned.backoff),
+            planned,
+            group: None,
+            tail: Tail::default(),
+            is_down: false,
+            is_slow: false,
+        }
+    }
+
+    fn signal(&self, signal: Signal) {
+        if let Some(group) = self.group {
+            group.signal(signal);
+        }
+    }
+}
+
 /// The launcher's loop.
 pub(super) struct Supervisor {
-    kept: Vec<Kept>,
+    processes: Vec<Supervised>,
     logs: PathBuf,
     grace: Duration,
-    tell: Tell,
-    queue: UnboundedSender<Event>,
-    events: UnboundedReceiver<Event>,
-    stage: Stage,
+    screen: ScreenHandle,
+    queue: UnboundedSender<SupervisorEvent>,
+    events: UnboundedReceiver<SupervisorEvent>,
+    stage: Shutdown,
     outcome: Outcome,
 }
 
 impl Supervisor {
-    /// Prepares to run these processes; `logs` is the folder of their logs, `grace` how long a process that is asked to
-    /// end has for it.
-    pub(super) fn new(planned: Vec<Planned>, logs: &Path, grace: Duration, tell: Tell) -> Self {
+    /// Prepares to run these processes. `logs` is the folder of their logs; `grace` is how long a process may take to exit
+    /// after SIGTERM.
+    pub(super) fn new(
+        planned: Vec<Planned>,
+        logs: &Path,
+        grace: Duration,
+        screen: ScreenHandle,
+    ) -> Self {
         let (queue, events) = tokio::sync::mpsc::unbounded_channel();
-        let keep = |planned: Planned| {
-            let budget = Budget::new(planned.backoff);
-            Kept {
-                planned,
-                budget,
-                group: None,
-                tail: Tail::default(),
-                is_down: false,
-                is_slow: false,
-            }
-        };
         Self {
-            kept: planned.into_iter().map(keep).collect(),
+            processes: planned.into_iter().map(Supervised::new).collect(),
             logs: logs.to_owned(),
             grace,
-            tell,
+            screen,
             queue,
             events,
-            stage: Stage::Running,
+            stage: Shutdown::Running,
             outcome: Outcome {
                 failure: None,
                 asked: None,
@@ -124,239 +138,248 @@ impl Supervisor {
         }
     }
 
-    /// Where signals are put.
-    pub(super) fn queue(&self) -> UnboundedSender<Event> {
+    /// Queue for events from outside.
+    pub(super) fn queue(&self) -> UnboundedSender<SupervisorEvent> {
         self.queue.clone()
     }
 
-    /// Runs all processes to their end.
+    /// Runs all processes until they have exited.
     pub(super) async fn run(mut self) -> Outcome {
-        for index in 0..self.kept.len() {
-            if self.kept[index].planned.is_extern {
+        for index in 0..self.processes.len() {
+            if self.processes[index].planned.is_extern {
                 self.announce_extern(index);
             } else {
                 self.start(index);
             }
         }
-        while self.stage < Stage::GivenUp
-            && (self.stage == Stage::Running || self.is_anybody_there())
+
+        while self.stage == Shutdown::Running
+            || (self.stage < Shutdown::GivenUp && self.is_any_running())
         {
             match self.events.recv().await {
                 Some(event) => self.handle(event),
                 None => unreachable!("the supervisor holds a sender of its own queue"),
             }
         }
+
         self.outcome
     }
 
-    /// One event. The arms call; they do not think.
-    fn handle(&mut self, event: Event) {
+    fn handle(&mut self, event: SupervisorEvent) {
         match event {
-            Event::Ended(index, ended) => self.on_ended(index, &ended),
-            Event::RestartDue(index) => self.on_restart_due(index),
-            Event::Faults(orders, done) => self.on_faults(&orders, done),
-            Event::FaultOver(index, kind) => self.end_fault(index, kind),
-            Event::Pulse(index, stops) => self.pulse(index, stops),
-            Event::Asked(signal) => self.on_asked(signal),
-            Event::GraceOver(stage) => self.on_grace_over(stage),
+            SupervisorEvent::Ended(index, ended) => self.on_ended(index, &ended),
+            SupervisorEvent::RestartDue(index) => self.on_restart_due(index),
+            SupervisorEvent::Faults(orders, done) => self.on_faults(&orders, done),
+            SupervisorEvent::FaultOver(index, kind) => self.end_fault(index, kind),
+            SupervisorEvent::Pulse(index, stops) => self.pulse(index, stops),
+            SupervisorEvent::Asked(signal) => self.on_asked(signal),
+            SupervisorEvent::GraceOver(stage) => self.on_grace_over(stage),
         }
     }
 
-    fn is_anybody_there(&self) -> bool {
-        self.kept.iter().any(|kept| kept.group.is_some())
+    fn is_any_running(&self) -> bool {
+        self.processes.iter().any(|process| process.group.is_some())
+    }
+
+    fn notice(&self, text: impl Into<String>) {
+        self.screen.notice(text);
+    }
+
+    fn name(&self, index: usize) -> &str {
+        &self.processes[index].planned.name
     }
 
     fn announce_extern(&self, index: usize) {
-        let Planned { name, command, .. } = &self.kept[index].planned;
-        self.tell.notice(format!(
-            "{name} is yours to start, in another terminal or a debugger:\n  {command}"
+        let Planned { name, command, .. } = &self.processes[index].planned;
+        self.notice(format!(
+            "start {name} yourself, in another terminal or a debugger:\n  {command}"
         ));
     }
 
     fn start(&mut self, index: usize) {
-        let kept = &mut self.kept[index];
+        let supervised = &mut self.processes[index];
         let queue = self.queue.clone();
-        let started = match process::start(&kept.planned.command) {
+        let started = match process::start(&supervised.planned.command) {
             Ok(started) => started,
             Err(error) => {
-                let program = kept.planned.command.program.display();
+                let program = supervised.planned.command.program.display();
                 let ended = Ended::NotStarted(format!("{program} cannot be started: {error}"));
-                return report(&queue, Event::Ended(index, ended));
+                return report(&queue, SupervisorEvent::Ended(index, ended));
             }
         };
-        kept.group = Some(started.group);
-        let (tell, tail) = (self.tell.clone(), kept.tail.clone());
+
+        supervised.group = Some(started.group);
         let output = Output {
-            tell,
+            screen: self.screen.clone(),
             index,
-            log: log_of(&self.logs, &kept.planned.name),
-            tail,
+            log: log_of(&self.logs, &supervised.planned.name),
+            tail: supervised.tail.clone(),
         };
         tokio::spawn(async move {
             let ended = match started.run(output).await {
                 Ok(status) => Ended::Exited(status),
-                Err(error) => Ended::NotStarted(format!("it cannot be kept: {error}")),
+                Err(error) => Ended::NotStarted(format!("it cannot be supervised: {error}")),
             };
-            report(&queue, Event::Ended(index, ended));
+            report(&queue, SupervisorEvent::Ended(index, ended));
         });
     }
 
     fn on_ended(&mut self, index: usize, ended: &Ended) {
-        self.kept[index].group = None;
-        if self.kept[index].planned.part == Part::Simulator {
+        let process = &mut self.processes[index];
+        process.group = None;
+
+        if process.planned.part == Part::Simulator {
             self.on_simulator_ended(index, ended);
-        } else if self.kept[index].is_down {
-            tracing::debug!(
-                "{} was killed by the scenario",
-                self.kept[index].planned.name
-            );
-        } else if self.stage == Stage::Running {
+        } else if process.is_down {
+            tracing::debug!("{} was killed by the scenario", self.name(index));
+        } else if self.stage == Shutdown::Running {
             self.on_other_ended(index, ended);
-        } else if ended.has_failed() && self.stage <= Stage::Leaving {
-            self.tell.notice(format!(
+        } else if ended.has_failed() && self.stage <= Shutdown::Leaving {
+            self.notice(format!(
                 "{} {ended} at the end of the run",
-                self.kept[index].planned.name
+                self.name(index)
             ));
         }
     }
 
-    /// The run is over with its simulator.
+    /// Ends the run after its simulator. A failure after SIGTERM is part of the end that was asked for.
     fn on_simulator_ended(&mut self, index: usize, ended: &Ended) {
-        match (ended.has_failed(), self.stage) {
-            (true, Stage::Running) => {
-                self.fail(index, ended);
-                self.terminate();
-            }
-            (true, Stage::Stopping) => {
-                self.tell.notice(format!(
-                    "{} {ended} while ending the run",
-                    self.kept[index].planned.name
-                ));
-                self.terminate();
-            }
-            // A failure after the signal that asked for the end is the end that was asked for.
-            _ => {
-                self.enter(Stage::Leaving);
-                // Robots hear that the run is over; who watches would go on watching.
-                let observers = self
-                    .kept
-                    .iter()
-                    .filter(|kept| kept.planned.part == Part::Observer);
-                observers
-                    .filter_map(|kept| kept.group)
-                    .for_each(|group| group.signal(Signal::SIGTERM));
+        let has_failed = ended.has_failed();
+        if has_failed && self.stage == Shutdown::Running {
+            self.fail(index, ended);
+            self.terminate();
+        } else if has_failed && self.stage == Shutdown::Stopping {
+            self.notice(format!("{} {ended} while ending the run", self.name(index)));
+            self.terminate();
+        } else {
+            self.enter(Shutdown::Leaving);
+            self.end_observers();
+        }
+    }
+
+    /// Robots learn from the bus that the run is over and exit; observers would stay.
+    fn end_observers(&self) {
+        for process in &self.processes {
+            if process.planned.part == Part::Observer {
+                process.signal(Signal::SIGTERM);
             }
         }
     }
 
-    /// A process other than the simulator is over before the run is.
+    /// Handles the exit of a process other than the simulator during the run.
     fn on_other_ended(&mut self, index: usize, ended: &Ended) {
-        let kept = &mut self.kept[index];
-        let (name, has_failed) = (kept.planned.name.clone(), ended.has_failed());
-        if kept.planned.restart.applies(has_failed) {
-            if let Some((wait, number)) = kept.budget.spend(Instant::now()) {
-                let wait_s = wait.as_secs_f64();
-                self.tell.notice(format!(
-                    "{name} {ended}; restart {number} of {BUDGET} in {wait_s:.1} s"
-                ));
-                return self.after(wait, Event::RestartDue(index));
-            }
-            self.tell.notice(format!(
-                "{name} {ended}, and has been restarted {BUDGET} times already"
-            ));
+        let restart = self.processes[index].planned.restart;
+        if restart.applies(ended.has_failed()) && self.restart_later(index, ended) {
+            return;
         }
-        if !has_failed {
-            // Robots leave when they hear that the run is over, often before the simulator does.
+
+        let name = self.name(index);
+        if !ended.has_failed() {
+            // Robots exit when the run is over, often before the simulator does.
             tracing::debug!("{name} {ended}");
-        } else if kept.planned.is_required {
+        } else if self.processes[index].planned.is_required {
             self.fail(index, ended);
             self.stop();
         } else {
-            let log = log_of(&self.logs, &name);
-            let text =
-                format!("{name} {ended}; it is not required, and the run goes on without it");
-            self.tell
-                .notice(format!("{text} (its log: {})", log.display()));
+            let log = log_of(&self.logs, name);
+            self.notice(format!(
+                "{name} {ended}; it is not required, and the run continues without it (its log: {})",
+                log.display()
+            ));
         }
     }
 
-    fn on_restart_due(&mut self, index: usize) {
-        if self.stage == Stage::Running {
-            self.tell.notice(format!(
-                "{} is started again",
-                self.kept[index].planned.name
+    /// Schedules a restart; returns whether the process has one left.
+    fn restart_later(&mut self, index: usize, ended: &Ended) -> bool {
+        let spent = self.processes[index].budget.spend(Instant::now());
+        let name = self.name(index);
+        let Some((wait, number)) = spent else {
+            self.notice(format!(
+                "{name} {ended}, and has been restarted {BUDGET} times already"
             ));
+            return false;
+        };
+
+        let wait_s = wait.as_secs_f64();
+        self.notice(format!(
+            "{name} {ended}; restart {number} of {BUDGET} in {wait_s:.1} s"
+        ));
+        self.after(wait, SupervisorEvent::RestartDue(index));
+        true
+    }
+
+    fn on_restart_due(&mut self, index: usize) {
+        if self.stage == Shutdown::Running {
+            self.notice(format!("restarting {}", self.name(index)));
             self.start(index);
         }
     }
 
     fn on_asked(&mut self, signal: Signal) {
         self.outcome.asked.get_or_insert(signal);
-        if self.stage >= Stage::Terminating || signal == Signal::SIGQUIT {
-            self.tell.notice("killing all processes");
+        if self.stage >= Shutdown::Terminating || signal == Signal::SIGQUIT {
+            self.notice("killing all processes");
             self.kill();
         } else {
-            self.tell
-                .notice("ending all processes; once more to kill them");
+            self.notice("ending all processes; a second signal kills them");
             self.terminate();
         }
     }
 
-    fn on_grace_over(&mut self, stage: Stage) {
+    fn on_grace_over(&mut self, stage: Shutdown) {
         if stage != self.stage {
-            return; // The end went on faster than that.
+            return; // The phase ended before its grace period.
         }
         match stage {
-            Stage::Running | Stage::GivenUp => {
-                unreachable!("no patience with a stage that waits for nothing")
+            Shutdown::Running | Shutdown::GivenUp => {
+                unreachable!("these phases have no grace period")
             }
-            Stage::Stopping | Stage::Leaving => {
-                self.name_those_left("still there after the end of the run");
+            Shutdown::Stopping | Shutdown::Leaving => {
+                self.name_running("still running after the end of the run");
                 self.terminate();
             }
-            Stage::Terminating => {
-                self.name_those_left("still there after the signal to end");
+            Shutdown::Terminating => {
+                self.name_running("still running after SIGTERM");
                 self.kill();
             }
-            Stage::Killing => {
-                self.name_those_left("cannot be killed");
-                self.stage = Stage::GivenUp;
+            Shutdown::Killing => {
+                self.name_running("cannot be killed");
+                self.stage = Shutdown::GivenUp;
             }
         }
     }
 
-    fn name_those_left(&self, what: &str) {
-        let left = self.kept.iter().filter(|kept| kept.group.is_some());
-        let names: Vec<&str> = left.map(|kept| kept.planned.name.as_str()).collect();
-        self.tell.notice(format!("{}: {what}", names.join(", ")));
+    fn name_running(&self, what: &str) {
+        let running = self
+            .processes
+            .iter()
+            .filter(|process| process.group.is_some());
+        let names: Vec<&str> = running.map(|process| &*process.planned.name).collect();
+        self.notice(format!("{}: {what}", names.join(", ")));
     }
 
-    /// Remembers the first failure, and says it at once.
+    /// Reports a failure and keeps it as the outcome if it is the first one.
     fn fail(&mut self, index: usize, ended: &Ended) {
-        let kept = &self.kept[index];
-        let name = kept.planned.name.clone();
-        self.tell.notice(format!("{name} {ended}: ending the run"));
-        let log = log_of(&self.logs, &name);
+        let name = self.name(index);
+        self.notice(format!("{name} {ended}: ending the run"));
+
         let failure = Failure {
             text: format!("{name} {ended}"),
             code: ended.code(),
-            tail: kept.tail.lines(),
-            log,
+            tail: self.processes[index].tail.lines(),
+            log: log_of(&self.logs, name),
         };
         self.outcome.failure.get_or_insert(failure);
     }
 
-    /// Lets the simulator end the run in good order: it writes its record, and the robots leave.
+    /// Ends the run by its simulator, which writes its record and dismisses the robots.
     fn stop(&mut self) {
-        match self
-            .kept
-            .iter()
-            .find(|kept| kept.planned.part == Part::Simulator)
-            .and_then(|kept| kept.group)
-        {
+        let mut processes = self.processes.iter();
+        let simulator = processes.find(|process| process.planned.part == Part::Simulator);
+        match simulator.and_then(|process| process.group) {
             Some(simulator) => {
                 simulator.signal(Signal::SIGTERM);
-                self.enter(Stage::Stopping);
+                self.enter(Shutdown::Stopping);
             }
             None => self.terminate(),
         }
@@ -364,31 +387,30 @@ impl Supervisor {
 
     fn terminate(&mut self) {
         self.signal_all(Signal::SIGTERM);
-        // A process that is stopped hears nothing until it goes on.
+        // A stopped process handles SIGTERM only after it is continued.
         self.signal_all(Signal::SIGCONT);
-        self.enter(Stage::Terminating);
+        self.enter(Shutdown::Terminating);
     }
 
     fn kill(&mut self) {
         self.signal_all(Signal::SIGKILL);
-        self.enter(Stage::Killing);
+        self.enter(Shutdown::Killing);
     }
 
     fn signal_all(&self, signal: Signal) {
-        self.kept
-            .iter()
-            .filter_map(|kept| kept.group)
-            .for_each(|group| group.signal(signal));
-    }
-
-    fn enter(&mut self, stage: Stage) {
-        if stage > self.stage {
-            self.stage = stage;
-            self.after(self.grace, Event::GraceOver(stage));
+        for process in &self.processes {
+            process.signal(signal);
         }
     }
 
-    fn after(&self, wait: Duration, event: Event) {
+    fn enter(&mut self, stage: Shutdown) {
+        if stage > self.stage {
+            self.stage = stage;
+            self.after(self.grace, SupervisorEvent::GraceOver(stage));
+        }
+    }
+
+    fn after(&self, wait: Duration, event: SupervisorEvent) {
         let queue = self.queue.clone();
         tokio::spawn(async move {
             tokio::time::sleep(wait).await;
@@ -397,8 +419,8 @@ impl Supervisor {
     }
 }
 
-/// Nobody listens any more only when the launch is over.
-fn report(queue: &UnboundedSender<Event>, event: Event) {
+/// Queues an event. The queue is closed only when the launch is over.
+fn report(queue: &UnboundedSender<SupervisorEvent>, event: SupervisorEvent) {
     let _over = queue.send(event);
 }
 

@@ -1,9 +1,9 @@
-//! The last lines of an error output, to be shown when its process fails.
+//! The last lines of a process's error output, which are shown if it fails.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Last lines of a process's error output that are shown when it fails.
+/// Number of lines that are kept.
 const TAIL_LINES: usize = 12;
 
 /// The last lines that a process wrote to its error output.
@@ -11,7 +11,7 @@ const TAIL_LINES: usize = 12;
 pub(crate) struct Tail(Arc<Mutex<VecDeque<String>>>);
 
 impl Tail {
-    /// Keeps a line; the oldest one goes.
+    /// Adds a line and drops the oldest one if there are too many.
     pub(crate) fn push(&self, line: String) {
         let mut lines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if lines.len() == TAIL_LINES {
@@ -22,11 +22,7 @@ impl Tail {
 
     /// The lines, oldest first.
     pub(crate) fn lines(&self) -> Vec<String> {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .iter()
-            .cloned()
-            .collect()
+        let lines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        lines.iter().cloned().collect()
     }
 }

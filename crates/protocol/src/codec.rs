@@ -24,7 +24,7 @@ pub struct Malformed {
 /// A field that is wrong, and why.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct FieldError {
-    /// Path of the field: `sent.command`, `robots.Butler`, `setup.obstacles`.
+    /// Path of the field: `command`, `robots.Butler`, `setup.obstacles`.
     pub field: String,
     /// What is wrong with it, and what would be right.
     pub reason: String,

@@ -1,13 +1,13 @@
-//! Digests: two runs are the same if and only if their digests are. Taken over typed values in one fixed order, not
-//! over the text that a robot happened to send.
+//! Digests: runs are equal if and only if their digests are. They cover typed values in a fixed order, not the encoding in
+//! which a robot sent them.
 
 use protocol::messages::{Point, Report, StateVariables, Variable};
 use protocol::{RobotName, Tick};
 
-use crate::medium::Underway;
+use crate::medium::SentCommand;
 use xxhash_rust::xxh3::Xxh3;
 
-/// A chain of digests, one a tick; each covers everything before it.
+/// A chain of digests, one for each tick; each covers all ticks before it.
 #[derive(Clone, Default)]
 pub struct Digest {
     last: u128,
@@ -19,7 +19,7 @@ impl std::fmt::Display for Digest {
     }
 }
 
-/// Collects the values of one tick.
+/// The digest of one tick, in progress.
 pub struct TickDigest {
     hash: Xxh3,
 }
@@ -46,18 +46,18 @@ impl TickDigest {
     }
 
     fn number(&mut self, value: f64) {
-        // Minus zero and zero are the same place.
+        // Minus zero and zero are equal.
         let value = if value == 0.0 { 0.0 } else { value };
         self.integer(value.to_bits());
     }
 
     fn text(&mut self, text: &str) {
-        // The length keeps neighbors apart.
+        // With the length, different pairs of adjacent texts have different digests.
         self.integer(text.len() as u64);
         self.hash.update(text.as_bytes());
     }
 
-    /// Where a body is.
+    /// Adds the location of a body.
     pub fn place(&mut self, x_m: f64, y_m: f64) {
         self.number(x_m);
         self.number(y_m);
@@ -79,8 +79,8 @@ impl TickDigest {
         }
     }
 
-    /// What a robot reported, and the commands that it sent; nothing for a robot that did not report.
-    pub fn report(&mut self, robot: &RobotName, report: Option<(&Report, &[Underway])>) {
+    /// Adds the report of a robot and the commands that it sent; only its name if it did not report.
+    pub fn report(&mut self, robot: &RobotName, report: Option<(&Report, &[SentCommand])>) {
         self.text(robot.as_str());
         let Some((report, commands)) = report else {
             return;

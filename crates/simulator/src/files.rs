@@ -1,58 +1,60 @@
-//! Names of the files in a run's folder.
+//! Names of the files in the folder of a run.
 
 /// The scenario of the epoch in progress, complete.
 pub const SCENARIO: &str = "scenario.toml";
-/// What happened, for machines.
+/// The events, for programs.
 pub const EVENTS: &str = "events.jsonl";
-/// What happened, for people.
+/// The log, for people.
 pub const LOG: &str = "cars.log";
-/// Where everything was after every tick, for the console to play again.
+/// Locations and states after every tick, for replay in the console.
 pub const RECORDING: &str = "recording.jsonl";
-/// What came of it.
+/// The summary at the end of the run.
 pub const SUMMARY: &str = "summary.json";
-/// What each process printed.
+/// Folder with the output of each process.
 pub const LOGS: &str = "logs";
-/// Where the simulator of a run in progress listens.
+/// Endpoint of the simulator during the run.
 pub const ENDPOINT: &str = "endpoint";
-/// Path of the file with which an operator may control a secured run in progress.
+/// Path of the operator's configuration file, during a secured run.
 pub const OPERATOR_CONFIG: &str = "operator_config";
-/// Link under which the last run is found again, beside the run folders.
+/// Symbolic link to the latest run, beside the run folders.
 pub const LATEST: &str = "latest";
-/// Held by the process that writes the record, as long as it lives.
+/// Lock file of the process that writes the record.
 pub(crate) const LOCK: &str = ".lock";
 
-/// A name cannot be that of the readable log.
+/// Why a name cannot be that of the log.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum LogNameError {
-    /// It could lead out of the run's folder, or is hard to type.
-    #[error("{0:?} is no file name of letters, digits, `.`, `_` and `-`")]
+    /// It is not a plain file name, and so might be a path out of the folder.
+    #[error("{0:?} is not a file name of letters, digits, `.`, `_` and `-`")]
     NotPlain(String),
-    /// Another file of the run's folder has it.
+    /// It is the name of another file of the folder.
     #[error("the run keeps something else in {0}")]
     Taken(String),
 }
 
-/// Checks that a name can be that of the readable log.
+/// Checks that a name can be that of the log.
 ///
 /// # Errors
-/// [`LogNameError`] if it is not a plain file name, or if another file of the run's folder has it.
+/// [`LogNameError`] if it is not a plain file name, or the name of another file of the folder.
 pub(crate) fn check_log_name(name: &str) -> Result<(), LogNameError> {
-    let is_plain = !name.is_empty()
-        && name.len() <= 100
-        && !name.starts_with('.')
-        && name
-            .bytes()
-            .all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
-    if !is_plain {
-        return Err(LogNameError::NotPlain(name.to_owned()));
-    }
-    let is_taken = [EVENTS, RECORDING, SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG].contains(&name)
-        || name.starts_with("scenario")
-        || name.starts_with("events")
-        || name.starts_with("recording");
-    if is_taken {
+    if !is_plain(name) {
+        Err(LogNameError::NotPlain(name.to_owned()))
+    } else if is_taken(name) {
         Err(LogNameError::Taken(name.to_owned()))
     } else {
         Ok(())
     }
+}
+
+fn is_plain(name: &str) -> bool {
+    let mut bytes = name.bytes();
+    let has_plain_bytes = bytes.all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
+    has_plain_bytes && (1..=100).contains(&name.len()) && !name.starts_with('.')
+}
+
+/// Whether another file has the name, or an earlier epoch's file could have it.
+fn is_taken(name: &str) -> bool {
+    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG];
+    let prefixes = ["scenario", "events", "recording"];
+    names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))
 }

@@ -1,8 +1,7 @@
-//! The simulator: what a run is ([`scenario`]), one tick of it ([`Simulation::step`]), who takes part and how the
-//! clock is held for them ([`server`]), and what is kept of it ([`recorder`]).
+//! The simulator: the scenario of a run ([`scenario`]), one tick ([`Simulation::step`]), the lock-step over the bus
+//! ([`server`]), and the record ([`recorder`]).
 //!
-//! It owns the environment and the clock. It neither knows nor cares what a robot feels: there is no dependency on
-//! `affect`.
+//! It owns the environment and the clock. It does not know the robots' emotions: there is no dependency on `affect`.
 
 pub mod digest;
 mod files;
@@ -14,7 +13,7 @@ pub mod server;
 pub mod simulation;
 pub mod summary;
 
-/// Files that people write, and errors in them: [`Scenario::parse`] takes the one and returns the other.
+/// Source texts and their errors, which [`Scenario::parse`] takes and returns.
 pub use config::diagnostic;
 pub use protocol::{Event, Line};
 pub use recorder::{Recorder, RunFolder};

@@ -1,6 +1,6 @@
-//! The folder of a run. Everything in it is written as it happens: a crash loses at most the current tick.
+//! The folder of a run and its record. Every tick is written at once, so a crash loses at most the current one.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -33,58 +33,65 @@ impl RunFolder {
         }
     }
 
-    /// A folder that is known by its path.
+    /// The folder at a path.
     #[must_use]
     pub fn at(path: PathBuf) -> Self {
         Self { path }
     }
 
-    /// Makes the folder, empty of an earlier run with this name, and writes the resolved scenario into it.
+    /// Makes the folder, removes the files of an earlier run with this name, and writes the resolved scenario.
     ///
-    /// The folder is the caller's as long as the returned lock lives: no other process overwrites a run in progress.
+    /// No other process can overwrite the run while the returned lock is held.
     ///
     /// # Errors
-    /// [`FileError`] if that cannot be done, if the folder holds something that is not a run, or a run in progress.
+    /// [`FileError`] if a file cannot be written or removed, or the folder has other content or a run in progress.
     pub fn create(&self, scenario: &Scenario) -> Result<RunLock, FileError> {
         if self.path.exists() && !self.file(SCENARIO).exists() && has_entries(&self.path) {
-            let text = format!(
-                "{} is there and is not the folder of a run",
-                self.path.display()
-            );
-            return Err(
-                FileError::new(text).with_help("choose another --run or --out, or move it away")
-            );
+            let path = self.path.display();
+            let error = FileError::new(format!("{path} is there and is not the folder of a run"));
+            return Err(error.with_help("choose another --run or --out, or move it away"));
         }
+
         std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
         let lock = self.lock()?;
-        let log = self.log();
-        let own =
-            [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG].map(|name| self.file(name));
-        for file in self.superseded().into_iter().chain(own).chain([log]) {
-            if file.exists() {
-                std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
-            }
-        }
+        self.clear()?;
         self.write_scenario(scenario)?;
         Ok(lock)
     }
 
-    /// The one writer of [`SCENARIO`], once for each epoch.
+    /// Removes the files of an earlier run.
+    fn clear(&self) -> Result<(), FileError> {
+        let mut files = self.superseded();
+        files.push(self.log());
+        for name in [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG] {
+            files.push(self.file(name));
+        }
+
+        for file in files {
+            if file.exists() {
+                std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes [`SCENARIO`], once for each epoch.
     fn write_scenario(&self, scenario: &Scenario) -> Result<(), FileError> {
         std::fs::write(self.file(SCENARIO), scenario.to_toml()?)
             .map_err(|error| self.failed("write to", &error))
     }
 
-    /// Points the link [`LATEST`] beside the folder at it. It is a convenience: where links cannot be made, runs are found
-    /// by their names.
+    /// Points the symbolic link [`LATEST`] to the folder. If links cannot be made, runs have to be named.
     pub fn point_latest(&self) {
         let link = self.path.with_file_name(LATEST);
         if link.is_symlink() {
             let _ = std::fs::remove_file(&link);
         }
+
         let Some(name) = self.path.file_name() else {
             return;
         };
+
         if let Err(error) = std::os::unix::fs::symlink(name, &link) {
             tracing::debug!(%error, "no link to the latest run");
         }
@@ -93,62 +100,58 @@ impl RunFolder {
     fn lock(&self) -> Result<RunLock, FileError> {
         let file = File::create(self.file(LOCK)).map_err(|error| self.failed("lock", &error))?;
         file.try_lock().map_err(|_| {
-            FileError::new(format!("the run in {} is in progress", self.path.display()))
+            let path = self.path.display();
+            FileError::new(format!("the run in {path} is in progress"))
                 .with_help("choose another --run, or end it with `cars ctl stop`")
         })?;
         Ok(RunLock { _file: file })
     }
 
-    /// Files of epochs that `init` ended.
+    /// Files of epochs that `init` has ended.
     fn superseded(&self) -> Vec<PathBuf> {
-        let entries = std::fs::read_dir(&self.path)
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(&self.path)
             .into_iter()
             .flatten()
-            .flatten();
-        let is_superseded = |path: &PathBuf| {
-            let name = path
-                .file_name()
-                .and_then(|name| name.to_str())
-                .unwrap_or_default();
-            PER_EPOCH
-                .iter()
-                .any(|file| name.starts_with(&superseded_prefix(file)))
-        };
-        entries
-            .map(|entry| entry.path())
-            .filter(is_superseded)
-            .collect()
+            .flatten()
+        {
+            let name = entry.file_name();
+            let name = name.to_str().unwrap_or_default();
+            let mut prefixes = PER_EPOCH.iter().map(|file| superseded_prefix(file));
+            if prefixes.any(|prefix| name.starts_with(&prefix)) {
+                files.push(entry.path());
+            }
+        }
+        files
     }
 
-    /// Keeps the files of the epoch before this one under its number.
-    fn keep(&self, epoch: Epoch) -> Result<(), FileError> {
+    /// Renames the files of the epoch before this one, so that their names contain its number.
+    fn supersede(&self, epoch: Epoch) -> Result<(), FileError> {
+        let before = epoch.saturating_sub(1);
         for name in PER_EPOCH {
-            let (file, suffix) = (self.file(name), name.rsplit('.').next().unwrap_or_default());
-            if file.exists() {
-                let kept = self.file(&format!(
-                    "{}{}.{suffix}",
-                    superseded_prefix(name),
-                    epoch.saturating_sub(1)
-                ));
-                std::fs::rename(&file, kept)
-                    .map_err(|error| self.failed("keep files in", &error))?;
+            let file = self.file(name);
+            if !file.exists() {
+                continue;
             }
+
+            let prefix = superseded_prefix(name);
+            let suffix = name.rsplit('.').next().unwrap_or_default();
+            let renamed = self.file(&format!("{prefix}{before}.{suffix}"));
+            std::fs::rename(&file, renamed)
+                .map_err(|error| self.failed("keep files in", &error))?;
         }
         Ok(())
     }
 
-    /// The readable log, wherever the scenario of the run puts it.
+    /// The log, the name of which is in the scenario of the run.
     #[must_use]
     pub fn log(&self) -> PathBuf {
         let scenario = std::fs::read_to_string(self.file(SCENARIO)).unwrap_or_default();
         let scenario: toml::Table = toml::from_str(&scenario).unwrap_or_default();
-        let name = scenario
-            .get("record")
-            .and_then(|record| record.get("log_name")?.as_str());
-        self.file(
-            name.filter(|name| check_log_name(name).is_ok())
-                .unwrap_or(LOG),
-        )
+        let record = scenario.get("record");
+        let name = record.and_then(|record| record.get("log_name")?.as_str());
+        let name = name.filter(|name| check_log_name(name).is_ok());
+        self.file(name.unwrap_or(LOG))
     }
 
     /// A file of the folder.
@@ -163,12 +166,18 @@ impl RunFolder {
         &self.path
     }
 
+    fn open(&self, name: &str, options: &OpenOptions) -> Result<BufWriter<File>, FileError> {
+        let file = options.open(self.file(name));
+        file.map(BufWriter::new)
+            .map_err(|error| self.failed("write to", &error))
+    }
+
     fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
         FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
     }
 }
 
-/// The right to write a run's folder; the operating system takes it back when the process ends, however it ends.
+/// The lock of a run's folder. The operating system releases it when the process ends, also by a crash.
 #[derive(Debug)]
 pub struct RunLock {
     _file: File,
@@ -178,7 +187,7 @@ fn has_entries(path: &Path) -> bool {
     std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some())
 }
 
-/// Writes one epoch into its folder.
+/// Writes the record of one epoch.
 pub struct Recorder {
     folder: RunFolder,
     events: BufWriter<File>,
@@ -188,7 +197,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins an epoch in a folder that [`RunFolder::create`] made. What an epoch before it left is kept under its number, `events-epoch1.jsonl`.
+    /// Begins an epoch in a folder that [`RunFolder::create`] made. The files of an earlier epoch are renamed, as in
+    /// `events-epoch1.jsonl`.
     ///
     /// # Errors
     /// [`FileError`] if the files cannot be made.
@@ -197,40 +207,42 @@ impl Recorder {
         run: &RunName,
         simulation: &Simulation,
     ) -> Result<Self, FileError> {
-        let (scenario, epoch) = (simulation.scenario(), simulation.epoch());
+        let scenario = simulation.scenario();
+        let epoch = simulation.epoch();
         if epoch > 1 {
-            folder.keep(epoch)?;
+            folder.supersede(epoch)?;
             folder.write_scenario(scenario)?;
         }
-        let make = |name| {
-            File::create(folder.file(name)).map_err(|error| folder.failed("write to", &error))
-        };
-        let log = || {
-            let file = File::options()
-                .create(true)
-                .append(true)
-                .open(folder.file(&scenario.record.log_name));
-            file.map(BufWriter::new)
-                .map_err(|error| folder.failed("write to", &error))
-        };
-        let mut recorder = Self {
-            folder: folder.clone(),
-            events: BufWriter::new(make(EVENTS)?),
-            log: scenario.record.log.then(log).transpose()?,
-            recording: scenario
-                .record
-                .frames
-                .then(|| make(RECORDING).map(BufWriter::new))
-                .transpose()?,
-            summary: Summary::begin(run, simulation),
-        };
-        if let Some(recording) = &mut recorder.recording {
-            writeln!(recording, "{}", json(&header(run, simulation))).map_err(unwritable)?;
+
+        let events = folder.open(
+            EVENTS,
+            File::options().create(true).write(true).truncate(true),
+        )?;
+        let mut log = None;
+        if scenario.record.log {
+            let name = &scenario.record.log_name;
+            log = Some(folder.open(name, File::options().create(true).append(true))?);
         }
-        Ok(recorder)
+        let mut recording = None;
+        if scenario.record.frames {
+            let mut file = folder.open(
+                RECORDING,
+                File::options().create(true).write(true).truncate(true),
+            )?;
+            writeln!(file, "{}", json(&header(run, simulation))).map_err(unwritable)?;
+            recording = Some(file);
+        }
+
+        Ok(Self {
+            folder: folder.clone(),
+            events,
+            log,
+            recording,
+            summary: Summary::begin(run, simulation),
+        })
     }
 
-    /// Writes a tick; returns the lines of the readable log, for observers.
+    /// Writes a tick. Returns the lines of the log, for observers.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be written.
@@ -244,12 +256,10 @@ impl Recorder {
             writeln!(self.events, "{}", line.to_json()).map_err(unwritable)?;
             self.summary.count(simulation, &line);
             if let Some((source, kind, text)) = line.event.readable() {
-                let (epoch, tick) = (simulation.epoch(), line.tick);
-                let time_s = simulation.time_s(tick);
                 lines.push(LogRecord {
-                    epoch,
-                    tick,
-                    time_s,
+                    epoch: simulation.epoch(),
+                    tick: line.tick,
+                    time_s: simulation.time_s(line.tick),
                     source,
                     kind,
                     text,
@@ -258,13 +268,14 @@ impl Recorder {
         }
         self.events.flush().map_err(unwritable)?;
         self.write_log(&lines).map_err(unwritable)?;
-        // The end of a run is no tick of its own.
-        if !matches!(record.events.last(), Some(Event::End { .. }))
-            && let Some(recording) = &mut self.recording
-        {
+
+        // The event of the end belongs to the last tick, which is recorded already.
+        let is_end = matches!(record.events.last(), Some(Event::End { .. }));
+        if !is_end && let Some(recording) = &mut self.recording {
             writeln!(recording, "{}", json(&recorded(simulation))).map_err(unwritable)?;
             recording.flush().map_err(unwritable)?;
         }
+
         Ok(lines)
     }
 
@@ -278,13 +289,13 @@ impl Recorder {
         log.flush()
     }
 
-    /// What has been counted so far.
+    /// The summary so far.
     #[must_use]
     pub fn summary(&mut self) -> &mut Summary {
         &mut self.summary
     }
 
-    /// Ends the epoch: writes the summary.
+    /// Ends the epoch and writes the summary.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be written.
@@ -299,7 +310,7 @@ impl Recorder {
     }
 }
 
-/// Files of which every epoch has its own.
+/// Files that every epoch has.
 const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];
 
 fn superseded_prefix(file: &str) -> String {
@@ -331,27 +342,32 @@ fn header(run: &RunName, simulation: &Simulation) -> RecordingHeader {
 }
 
 fn recorded(simulation: &Simulation) -> RecordedTick {
-    let robot = |name: &RobotName| {
-        let report = simulation.report(name)?;
-        Some(RecordedRobot {
-            name: name.clone(),
-            location: simulation.location(name)?,
-            speed_mps: report.speed_mps,
-            direction_rad: report.direction_rad,
-            blocked: simulation.is_blocked(name),
-            missed: report.tick != simulation.tick(),
-            emotion_state: report.emotion_state.clone(),
-            behavior_state: report.behavior_state.clone(),
-            state_variables: report.state_variables.clone(),
-        })
-    };
-    let guests = simulation.world().guests().iter();
+    let names = simulation.names().iter();
+    let robots = names.filter_map(|name| recorded_robot(simulation, name));
+    let mut guests_mm = Vec::new();
+    for guest in simulation.world().guests() {
+        guests_mm.push((guest.x * 1000.0).round() as i64);
+        guests_mm.push((guest.y * 1000.0).round() as i64);
+    }
+
     RecordedTick {
         tick: simulation.tick(),
-        robots: simulation.names().iter().filter_map(robot).collect(),
-        guests_mm: guests
-            .flat_map(|guest| [guest.x, guest.y])
-            .map(|at_m| (at_m * 1000.0).round() as i64)
-            .collect(),
+        robots: robots.collect(),
+        guests_mm,
     }
+}
+
+fn recorded_robot(simulation: &Simulation, name: &RobotName) -> Option<RecordedRobot> {
+    let report = simulation.report(name)?;
+    Some(RecordedRobot {
+        name: name.clone(),
+        location: simulation.location(name)?,
+        speed_mps: report.speed_mps,
+        direction_rad: report.direction_rad,
+        blocked: simulation.is_blocked(name),
+        missed: report.tick != simulation.tick(),
+        emotion_state: report.emotion_state.clone(),
+        behavior_state: report.behavior_state.clone(),
+        state_variables: report.state_variables.clone(),
+    })
 }

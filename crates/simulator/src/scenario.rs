@@ -1,5 +1,4 @@
-//! What is simulated. A file is read as it is written (module `raw`), then checked and turned into what it means
-//! ([`Scenario`]).
+//! Scenarios. A file is read as written (module `raw`), then checked and converted ([`Scenario`]).
 
 mod checked;
 pub mod fault;
@@ -14,8 +13,8 @@ pub use config::{Changes, Override};
 use config::{FileError, Source};
 pub use protocol::messages::OnLate;
 
-pub(crate) use checked::to_wire;
 pub use checked::{DEFAULT_SEED, Lateness, Record, RobotSpec, Scenario};
+pub(crate) use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use network::Network;
 
@@ -23,20 +22,21 @@ impl Scenario {
     /// Reads, changes and checks a scenario file.
     ///
     /// # Errors
-    /// [`FileError`] with file, line and caret, or naming the change that cannot be made.
+    /// [`FileError`] with file, line and caret; for a change that cannot be made, with its path.
     pub fn load(path: &Path, changes: &Changes) -> Result<Self, FileError> {
         let source = Source::read(path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
-        // First as it is, so that its own errors are shown at their own lines.
+        // Parsed before it is changed, so that errors show the lines of the file.
         let raw: raw::Scenario = source.parse()?;
         if changes.is_empty() {
             return raw.check(&source, folder);
         }
+
         let source = changes.apply(&source)?;
         source.parse::<raw::Scenario>()?.check(&source, folder)
     }
 
-    /// Reads and checks a scenario text; `folder` is where files that it names are looked for.
+    /// Reads and checks the text of a scenario. Files that it names are relative to `folder`.
     ///
     /// # Errors
     /// [`FileError`] with line and caret.
@@ -44,7 +44,7 @@ impl Scenario {
         source.parse::<raw::Scenario>()?.check(source, folder)
     }
 
-    /// Reads and checks a scenario text that comes from outside: it may name no other file.
+    /// Reads and checks an untrusted text of a scenario, which must not name files.
     ///
     /// # Errors
     /// [`FileError`] with line and caret.
@@ -55,7 +55,7 @@ impl Scenario {
             .check(source, Path::new("."))
     }
 
-    /// The scenario as a file that says everything and gives the same run.
+    /// The scenario as a file without defaults, which gives the same run.
     ///
     /// # Errors
     /// [`FileError`] if a parameter cannot be written as TOML (a JSON `null`).

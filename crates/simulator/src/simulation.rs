@@ -1,4 +1,4 @@
-//! The simulation itself: synchronous, without a network, a function of scenario, seed and reports.
+//! The simulation: synchronous, without a network, a function of scenario, seed and reports.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -14,22 +14,25 @@ use protocol::random::{Stream, stream};
 use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
 use world::{Body, HallError, Verdict, World};
 
-use crate::digest::Digest;
-use crate::medium::{Arrival, Medium, Underway};
-use crate::scenario::{Fault, FaultEnd, Scenario, to_wire};
+use crate::digest::{Digest, TickDigest};
+use crate::medium::{Arrival, Medium, SentCommand};
+use crate::scenario::{FaultEnd, Scenario, to_wire, to_world};
 
-/// Most bodies that the news of a robot list: they fit into a message with everything else.
+/// Most bodies in the news of a robot, so that the news fit into a message.
 const MAX_BODIES: usize = 4096;
 
-/// The robots as a simulation meets them: news out, reports and commands back.
+/// Reports, commands and membership changes of a tick.
 pub type Reports = Outcome<Arc<Report>, CommandText>;
+
+/// Reports and commands by robot.
+type ReportsByName = BTreeMap<RobotName, (Arc<Report>, Vec<Sent<CommandText>>)>;
 
 /// A complete tick.
 #[derive(Debug)]
 pub struct TickRecord {
     /// The tick.
     pub tick: Tick,
-    /// What happened in it, in a fixed order; the last event carries the digest.
+    /// Its events in a fixed order; the last one has the digest.
     pub events: Vec<Event>,
 }
 
@@ -50,25 +53,25 @@ pub struct Simulation {
     names: Vec<RobotName>,
     /// Last complete tick.
     tick: Tick,
-    /// Tick as of which bodies stand where they do: the complete one or the one under way.
+    /// Tick of the bodies' locations: the last complete tick or the one in progress.
     now: Tick,
     world: World<Stream>,
     medium: Medium,
-    /// Robots whose news list the bodies around them.
+    /// Robots with the bodies around them in their news.
     with_bodies: BTreeSet<RobotName>,
-    /// Commands that arrive in the tick under way, by target.
+    /// Commands that arrive in the tick in progress, by target.
     arriving: BTreeMap<RobotName, Vec<Arrival>>,
-    /// Robots that each robot cannot query during the tick under way.
+    /// Robots that each robot cannot query in the tick in progress.
     unreachable: BTreeMap<RobotName, Vec<RobotName>>,
-    /// News of the tick under way; robots without any have no entry.
+    /// News of the tick in progress; robots without any have no entry.
     news: BTreeMap<RobotName, News>,
-    /// What happened in the tick under way so far.
+    /// Events of the tick in progress.
     events: Vec<Event>,
-    /// What each robot reported last.
+    /// The last report of each robot.
     reports: BTreeMap<RobotName, Arc<Report>>,
-    /// Where each robot stood at the last complete tick, in the order of names.
+    /// Location of each robot at the last complete tick, in the order of names.
     stood_at: Vec<Point>,
-    /// Robots whose report of the last tick is missing: they propose nothing and cannot be queried.
+    /// Robots without a report of the last tick: they propose nothing and cannot be queried.
     silent: Vec<RobotName>,
     /// Robots of which a new incarnation joined in the last tick. They cannot be queried: the previous incarnation may have
     /// published another state for that tick before it died, and followers of that state cannot tell the two apart.
@@ -77,12 +80,12 @@ pub struct Simulation {
     /// state of the last tick already is a matter of real time.
     stopped: Vec<RobotName>,
     blocked: Vec<bool>,
-    /// The generation that each robot took part with last in this epoch, and which incarnation of the epoch that is, from 1.
-    /// The record counts incarnations, because generations also count processes that never took part.
+    /// Generation of each robot's last participation in this epoch, and its incarnation, counted from 1 in the epoch. The
+    /// record has incarnations, because generations also count processes that never took part.
     incarnations: BTreeMap<RobotName, (Generation, u32)>,
-    /// Commands that each sender has sent in this epoch.
+    /// Number of commands of each sender in this epoch.
     sent: BTreeMap<RobotName, Seq>,
-    /// What happened between the last tick and the next.
+    /// Events between the last tick and the next.
     between: Vec<Event>,
     digest: Digest,
 }
@@ -128,10 +131,10 @@ impl Simulation {
         })
     }
 
-    /// Tick 0, by one call: robots initialize, and propose where to go.
+    /// Runs tick 0, in which robots initialize and propose their first locations.
     ///
     /// # Errors
-    /// Why the exchange was given up.
+    /// If the exchange is given up.
     pub fn init<E>(&mut self, robots: &mut E) -> Result<TickRecord, E::Error>
     where
         E: Exchange<News, Arc<Report>, CommandText>,
@@ -143,10 +146,10 @@ impl Simulation {
         Ok(self.end_tick(outcome))
     }
 
-    /// The next tick, by one call.
+    /// Runs the next tick.
     ///
     /// # Errors
-    /// Why the exchange was given up; the tick is then incomplete and the epoch is over.
+    /// If the exchange is given up. The tick is then incomplete and the epoch is over.
     pub fn step<E>(&mut self, robots: &mut E) -> Result<TickRecord, E::Error>
     where
         E: Exchange<News, Arc<Report>, CommandText>,
@@ -158,7 +161,7 @@ impl Simulation {
         Ok(self.end_tick(outcome))
     }
 
-    /// The first half of tick 0: what robots are told before they initialize.
+    /// The first half of tick 0: the news before robots initialize.
     pub fn begin_init(&mut self) {
         self.events = vec![Event::Init {
             seed: self.scenario.seed,
@@ -178,7 +181,8 @@ impl Simulation {
         self.compose_news(&[]);
     }
 
-    /// The first half of a tick (paper, Figure 5): bodies move, the medium decides, news are composed. Returns the tick.
+    /// The first half of a tick (Figure 5 of the paper): bodies move, the medium decides, news are composed. Returns the
+    /// tick.
     pub fn begin_tick(&mut self) -> Tick {
         self.now = self.tick + 1;
         self.events = std::mem::take(&mut self.between);
@@ -196,30 +200,16 @@ impl Simulation {
         self.now
     }
 
-    /// The second half of a tick: what the robots did becomes the record, and the digest covers it.
+    /// The second half of a tick: reports become events and are added to the digest.
     pub fn end_tick(&mut self, outcome: Reports) -> TickRecord {
         self.note_membership(outcome.membership);
         self.note_deliveries(&outcome.reports);
 
-        self.silent.clear();
-        let mut reports = outcome.reports;
         let mut digest = self.digest.tick(self.now);
         for body in self.world.robots().iter().chain(self.world.guests()) {
             digest.place(body.x, body.y);
         }
-        for name in self.names.clone() {
-            let Some((report, commands)) = reports.remove(&name) else {
-                self.events.push(Event::Missed {
-                    robot: name.clone(),
-                });
-                digest.report(&name, None);
-                self.silent.push(name);
-                continue;
-            };
-            let underway = self.number_commands(&name, commands);
-            digest.report(&name, Some((&report, &underway)));
-            self.note_report(&name, &report, underway);
-        }
+        self.note_reports(outcome.reports, &mut digest);
 
         self.tick = self.now;
         self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
@@ -233,14 +223,29 @@ impl Simulation {
         }
     }
 
-    /// Robots that have news of the tick under way.
+    fn note_reports(&mut self, mut reports: ReportsByName, digest: &mut TickDigest) {
+        self.silent.clear();
+        for name in self.names.clone() {
+            if let Some((report, commands)) = reports.remove(&name) {
+                let sent = self.number_commands(&name, commands);
+                digest.report(&name, Some((&report, &sent)));
+                self.note_report(&name, &report, sent);
+            } else {
+                digest.report(&name, None);
+                self.silent.push(name.clone());
+                self.events.push(Event::Missed { robot: name });
+            }
+        }
+    }
+
+    /// Robots with news of the tick in progress.
     #[must_use]
     pub fn robots_with_news(&self) -> BTreeSet<RobotName> {
         self.news.keys().cloned().collect()
     }
 
-    /// The news of a robot for the tick under way, with the incarnations that they name. One that takes part from this tick on
-    /// must learn where it stands.
+    /// The news of a robot for the tick in progress, with the incarnations that they name. Those of an incarnation that takes
+    /// part from this tick on always contain its location.
     #[must_use]
     pub fn news(&self, name: &RobotName, naming: Naming) -> News {
         let mut news = self.news.get(name).cloned().unwrap_or(News {
@@ -248,22 +253,20 @@ impl Simulation {
             tick: self.now,
             ..News::default()
         });
+
         news.joined = naming.joined;
         news.rejoin = naming.rejoin;
         if naming.joined.is_some() {
-            news.correction = news.correction.or_else(|| {
-                let location = self.location(name)?;
-                Some(Correction {
-                    location,
-                    blocked: false,
-                })
-            });
+            let location = self.location(name);
+            news.correction = news.correction.or(location.map(|location| Correction {
+                location,
+                blocked: false,
+            }));
         }
-
         news
     }
 
-    /// Whether the news of a robot list the bodies around it, from the next tick on.
+    /// Whether the news of a robot contain the bodies around it, from the next tick on.
     pub fn list_bodies(&mut self, name: &RobotName, is_wanted: bool) {
         if is_wanted {
             self.with_bodies.insert(name.clone());
@@ -272,18 +275,14 @@ impl Simulation {
         }
     }
 
-    /// Where each robot wants to be; one that has not reported stays.
+    /// The proposed location of each robot; `None` for a robot without a report of the last tick.
     fn proposals(&self) -> Vec<Option<world::Point>> {
         let mut proposals = Vec::with_capacity(self.names.len());
         for name in &self.names {
-            let report = self
-                .reports
-                .get(name)
-                .filter(|_| !self.silent.contains(name));
-            proposals
-                .push(report.map(|report| world::Point::new(report.proposal.x, report.proposal.y)));
+            let is_silent = self.silent.contains(name);
+            let report = self.reports.get(name).filter(|_| !is_silent);
+            proposals.push(report.map(|report| to_world(report.proposal)));
         }
-
         proposals
     }
 
@@ -301,23 +300,23 @@ impl Simulation {
         }
     }
 
-    /// What refused a move; `None` if it was not refused.
+    /// What has blocked a move; `None` if it was not blocked.
     fn blocker(&self, verdict: Verdict) -> Option<Blocker> {
-        Some(match verdict {
+        let by = match verdict {
             Verdict::Advanced | Verdict::Stayed => return None,
-            Verdict::Blocked { by } => match by {
-                world::Blocker::Edge => Blocker::Edge,
-                world::Blocker::Body(Body::Obstacle(_)) => Blocker::Obstacle,
-                world::Blocker::Body(Body::Guest(_)) => Blocker::Guest,
-                world::Blocker::Body(Body::Robot(index)) => {
-                    Blocker::Robot(self.names[index].clone())
-                }
-            },
-            Verdict::TooFast | Verdict::NotFinite => Blocker::TooFast,
+            Verdict::TooFast | Verdict::NotFinite => return Some(Blocker::TooFast),
+            Verdict::Blocked { by } => by,
+        };
+
+        Some(match by {
+            world::Blocker::Edge => Blocker::Edge,
+            world::Blocker::Body(Body::Obstacle(_)) => Blocker::Obstacle,
+            world::Blocker::Body(Body::Guest(_)) => Blocker::Guest,
+            world::Blocker::Body(Body::Robot(index)) => Blocker::Robot(self.names[index].clone()),
         })
     }
 
-    /// The news of the tick under way: exceptions only.
+    /// Composes the news of the tick in progress, which contain exceptions only.
     fn compose_news(&mut self, verdicts: &[Verdict]) {
         let mut all = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
@@ -346,14 +345,8 @@ impl Simulation {
     }
 
     fn deliveries(&self, to: &RobotName) -> Vec<Delivery> {
-        let Some(arriving) = self.arriving.get(to) else {
-            return Vec::new();
-        };
-
-        arriving
-            .iter()
-            .map(|arrival| arrival.delivery.clone())
-            .collect()
+        let arrivals = self.arriving.get(to).into_iter().flatten();
+        arrivals.map(|arrival| arrival.delivery.clone()).collect()
     }
 
     /// Robots that each robot cannot query: those from which the medium cuts it off, those whose last report is missing, those
@@ -384,28 +377,32 @@ impl Simulation {
 
     fn note_membership(&mut self, membership: Vec<Membership>) {
         self.newcomers.clear();
+
         for change in membership {
-            self.events.push(match change {
-                Membership::Joined(robot, generation) => {
-                    let incarnation = self.incarnation(&robot, generation);
-                    self.incarnations
-                        .insert(robot.clone(), (generation, incarnation));
-                    // At tick 0 every incarnation publishes the same state.
-                    if self.now > 0 {
-                        self.newcomers.push(robot.clone());
-                    }
-                    Event::Joined {
-                        at: self.location(&robot).unwrap_or_default(),
-                        robot,
-                        generation: Some(incarnation),
-                    }
-                }
-                Membership::Lost(robot) => Event::Lost { robot },
-            });
+            match change {
+                Membership::Joined(robot, generation) => self.note_joined(robot, generation),
+                Membership::Lost(robot) => self.events.push(Event::Lost { robot }),
+            }
         }
     }
 
-    /// Which incarnation of this epoch a generation is, if it takes part next.
+    fn note_joined(&mut self, robot: RobotName, generation: Generation) {
+        let incarnation = self.incarnation(&robot, generation);
+        self.incarnations
+            .insert(robot.clone(), (generation, incarnation));
+        // At tick 0 every incarnation publishes the same state.
+        if self.now > 0 {
+            self.newcomers.push(robot.clone());
+        }
+
+        self.events.push(Event::Joined {
+            at: self.location(&robot).unwrap_or_default(),
+            robot,
+            generation: Some(incarnation),
+        });
+    }
+
+    /// The incarnation in this epoch that a generation has if it takes part next.
     fn incarnation(&self, robot: &RobotName, generation: Generation) -> u32 {
         match self.incarnations.get(robot) {
             Some((last, incarnation)) if *last == generation => *incarnation,
@@ -414,12 +411,13 @@ impl Simulation {
         }
     }
 
-    /// A command has arrived if its target took part in the tick.
-    fn note_deliveries<C>(&mut self, reports: &BTreeMap<RobotName, (Arc<Report>, Vec<Sent<C>>)>) {
-        for (to, arrivals) in std::mem::take(&mut self.arriving) {
-            let has_arrived = reports.contains_key(&to);
+    /// Records the commands that arrived in the tick. Those to a robot that did not take part are lost.
+    fn note_deliveries(&mut self, reports: &ReportsByName) {
+        for (target, arrivals) in std::mem::take(&mut self.arriving) {
+            let has_arrived = reports.contains_key(&target);
             for Arrival { seq, delivery } in arrivals {
-                let (to, from) = (to.clone(), delivery.from);
+                let to = target.clone();
+                let from = delivery.from;
                 self.events.push(if has_arrived {
                     Event::CommandDelivered { from, to, seq }
                 } else {
@@ -434,28 +432,27 @@ impl Simulation {
         }
     }
 
-    /// Gives each command of a sender its number in the record.
+    /// Numbers the commands of a sender for the record.
     fn number_commands(
         &mut self,
         from: &RobotName,
         commands: Vec<Sent<CommandText>>,
-    ) -> Vec<Underway> {
-        let mut underway = Vec::with_capacity(commands.len());
+    ) -> Vec<SentCommand> {
+        let count = self.sent.entry(from.clone()).or_default();
+        let mut numbered = Vec::with_capacity(commands.len());
         for Sent { to, command } in commands {
-            let count = self.sent.entry(from.clone()).or_default();
             *count += 1;
-            underway.push(Underway {
+            numbered.push(SentCommand {
                 to,
                 from: from.clone(),
                 seq: *count,
                 text: command,
             });
         }
-
-        underway
+        numbered
     }
 
-    fn note_report(&mut self, robot: &RobotName, report: &Arc<Report>, underway: Vec<Underway>) {
+    fn note_report(&mut self, robot: &RobotName, report: &Arc<Report>, sent: Vec<SentCommand>) {
         self.incarnations
             .entry(robot.clone())
             .or_insert((report.generation, 1));
@@ -477,7 +474,7 @@ impl Simulation {
                 to: report.behavior_state.clone(),
             });
         }
-        for command in underway {
+        for command in sent {
             self.events.push(command.event());
             self.medium.accept(command);
         }
@@ -489,40 +486,23 @@ impl Simulation {
         }
     }
 
-    /// What the launcher must do to processes before the next tick, in the order of the scenario.
+    /// The orders that the launcher must carry out before the next tick, in the order of the scenario.
     #[must_use]
     pub fn faults_due(&self) -> Vec<ProcessOrder> {
         let tick = self.tick + 1;
         let mut due = Vec::new();
-        for Fault {
-            robot,
-            kind,
-            at,
-            end,
-        } in &self.scenario.faults
-        {
-            let order = |begins, for_s| ProcessOrder {
-                robot: robot.clone(),
-                kind: *kind,
-                begins,
-                for_s,
-            };
-            if *at == tick {
-                let for_s = match end {
-                    FaultEnd::After(wall_s) => Some(*wall_s),
-                    _ => None,
-                };
-                due.push(order(true, for_s));
+        for fault in &self.scenario.faults {
+            if fault.at == tick {
+                due.push(fault.begin_order());
             }
-            if *end == FaultEnd::At(tick) {
-                due.push(order(false, None));
+            if fault.end == FaultEnd::At(tick) {
+                due.push(fault.end_order());
             }
         }
-
         due
     }
 
-    /// What was ordered before the next tick has been done; it is recorded with that tick.
+    /// Records orders that have been carried out, as part of the next tick.
     pub fn note_faults(&mut self, orders: &[ProcessOrder]) {
         for order in orders {
             self.between.push(Event::Fault {
@@ -538,7 +518,7 @@ impl Simulation {
         self.stopped.push(robot.clone());
     }
 
-    /// A command from outside the roster; it arrives at the next tick.
+    /// Sends a command of the operator, which arrives in the next tick.
     pub fn command(&mut self, to: &RobotName, command: &str) {
         let text = CommandText {
             performative: Performative::Achieve,
@@ -549,13 +529,13 @@ impl Simulation {
             command: text,
         };
 
-        for underway in self.number_commands(&RobotName::operator(), vec![sent]) {
-            self.between.push(underway.event());
-            self.medium.accept(underway);
+        for command in self.number_commands(&RobotName::operator(), vec![sent]) {
+            self.between.push(command.event());
+            self.medium.accept(command);
         }
     }
 
-    /// The last event of the run.
+    /// The record of the end of the run.
     #[must_use]
     pub fn end(&self, reason: End) -> TickRecord {
         TickRecord {
@@ -567,7 +547,8 @@ impl Simulation {
         }
     }
 
-    /// What a robot needs to know to take part. `open` is what it has already reported for the tick under way.
+    /// The welcome of a robot that joins; `None` if it is not in the roster. `open` is a report that an earlier incarnation
+    /// has sent for the tick in progress.
     #[must_use]
     pub fn welcome(
         &self,
@@ -579,26 +560,8 @@ impl Simulation {
         let spec = self.scenario.robots.get(name)?;
         let index = self.index(name)?;
         let location = self.location(name)?;
-        let last = self.reports.get(name);
-        let last_state = last.and_then(|report| {
-            let location = self.stood_at.get(index)?;
-            Some(public_state(report, *location))
-        });
         let open_state = open.map(|report| public_state(report, location));
-
-        // A robot that takes part from the beginning draws from a stream of its name alone, whatever happened to it in an
-        // earlier epoch; a later incarnation must not draw the same numbers again.
-        let is_first = last.is_none() && open.is_none();
-        let stream = if is_first {
-            format!("robot/{name}")
-        } else {
-            let incarnation = match open {
-                // It has reported for tick 0, which is not complete.
-                Some(_) if last.is_none() => 2,
-                _ => self.incarnation(name, generation),
-            };
-            format!("robot/{name}#{incarnation}")
-        };
+        let last_state = self.last_state(name, index);
 
         Some(Welcome {
             protocol: PROTOCOL_VERSION,
@@ -608,7 +571,7 @@ impl Simulation {
             epoch: self.epoch,
             tick: self.tick,
             seed: self.scenario.seed,
-            stream,
+            stream: self.stream_of(name, generation, open.is_some()),
             tick_s: self.scenario.tick_s,
             field_m: self.scenario.field_m,
             body_m: self.scenario.body_m,
@@ -622,27 +585,48 @@ impl Simulation {
         })
     }
 
-    /// All bodies within a robot's sensing range, if it wants to know.
+    /// The state of a robot as of the last complete tick, if it has reported.
+    fn last_state(&self, name: &RobotName, index: usize) -> Option<PublicState> {
+        let report = self.reports.get(name)?;
+        let location = self.stood_at.get(index)?;
+        Some(public_state(report, *location))
+    }
+
+    /// The name of a robot's random stream. The first incarnation in an epoch draws from the stream of its name; a later one
+    /// must not draw the same numbers again.
+    fn stream_of(&self, name: &RobotName, generation: Generation, has_open_report: bool) -> String {
+        let has_last_report = self.reports.contains_key(name);
+        let incarnation = match (has_last_report, has_open_report) {
+            (false, false) => return format!("robot/{name}"),
+            // The first incarnation has reported for tick 0, which is not complete.
+            (false, true) => 2,
+            (true, _) => self.incarnation(name, generation),
+        };
+        format!("robot/{name}#{incarnation}")
+    }
+
+    /// All bodies within a robot's sensing range, if its news contain them.
     fn sensed_bodies(&self, of: usize) -> Vec<SensedBody> {
         if !self.with_bodies.contains(&self.names[of]) {
             return Vec::new();
         }
 
         let center = self.world.robots()[of];
-        self.world
-            .near(center, self.scenario.sensing_range_m)
-            .into_iter()
-            .filter(|near| near.body != Body::Robot(of))
-            .take(MAX_BODIES)
-            .map(|near| SensedBody {
-                kind: match near.body {
-                    Body::Obstacle(_) => SensedKind::Obstacle,
-                    Body::Guest(_) => SensedKind::Guest,
-                    Body::Robot(_) => SensedKind::Robot,
-                },
+        let near = self.world.near(center, self.scenario.sensing_range_m);
+        let others = near.into_iter().filter(|near| near.body != Body::Robot(of));
+        let mut sensed = Vec::new();
+        for near in others.take(MAX_BODIES) {
+            let kind = match near.body {
+                Body::Obstacle(_) => SensedKind::Obstacle,
+                Body::Guest(_) => SensedKind::Guest,
+                Body::Robot(_) => SensedKind::Robot,
+            };
+            sensed.push(SensedBody {
+                kind,
                 location: to_wire(near.center),
-            })
-            .collect()
+            });
+        }
+        sensed
     }
 
     fn sensed_robots(&self, of: usize) -> Vec<SensedRobot> {
@@ -665,14 +649,14 @@ impl Simulation {
         self.names.binary_search(name).ok()
     }
 
-    /// Where a robot stands.
+    /// Location of a robot; `None` if it is not in the roster.
     #[must_use]
     pub fn location(&self, name: &RobotName) -> Option<Point> {
-        self.index(name)
-            .map(|index| to_wire(self.world.robots()[index]))
+        let index = self.index(name)?;
+        Some(to_wire(self.world.robots()[index]))
     }
 
-    /// Whether a robot's last move was refused.
+    /// Whether a robot's last move was blocked.
     #[must_use]
     pub fn is_blocked(&self, name: &RobotName) -> bool {
         self.index(name).is_some_and(|index| self.blocked[index])
@@ -690,7 +674,7 @@ impl Simulation {
         self.epoch
     }
 
-    /// What is simulated.
+    /// The scenario.
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
@@ -714,25 +698,25 @@ impl Simulation {
         &self.world
     }
 
-    /// What a robot reported last.
+    /// The last report of a robot.
     #[must_use]
     pub fn report(&self, name: &RobotName) -> Option<&Report> {
         self.reports.get(name).map(Arc::as_ref)
     }
 
-    /// What a robot published of itself last.
+    /// The last state variables of a robot.
     #[must_use]
     pub fn state_variables(&self, name: &RobotName) -> Option<&StateVariables> {
         self.report(name).map(|report| &report.state_variables)
     }
 
-    /// Pairs of robots between which the medium lets nothing through now.
+    /// Pairs of robots whose link is cut now.
     #[must_use]
     pub fn cuts(&self) -> Vec<Cut> {
         self.medium.cuts()
     }
 
-    /// Whom each robot could not ask in this tick.
+    /// Robots that each robot cannot query in this tick.
     #[must_use]
     pub fn unreachable(&self) -> &BTreeMap<RobotName, Vec<RobotName>> {
         &self.unreachable
@@ -745,7 +729,7 @@ impl Simulation {
     }
 }
 
-/// What the other robots may learn of a robot that reported this from there.
+/// The state that a report and a location publish to the other robots.
 fn public_state(report: &Report, location: Point) -> PublicState {
     PublicState {
         epoch: report.epoch,

@@ -1,4 +1,4 @@
-//! What came of a run, as data: the table at the end of a run and every later report are made from it.
+//! The summary of a run, from which the table at its end and all reports are made.
 
 mod network;
 
@@ -22,7 +22,7 @@ pub struct Summary {
     pub seed: u64,
     /// Version of the simulator.
     pub version: String,
-    /// How it ended; absent while it runs.
+    /// How it ended; absent during the run.
     pub end: Option<End>,
     /// Complete ticks after tick 0.
     pub ticks: Tick,
@@ -34,10 +34,10 @@ pub struct Summary {
     pub digest: String,
     /// The robots.
     pub robots: BTreeMap<RobotName, RobotSummary>,
-    /// What the network did.
+    /// Metrics of the network.
     #[serde(default)]
     pub network: NetworkSummary,
-    /// Wall-clock matters; they differ from run to run.
+    /// Wall-clock times; they differ from run to run.
     pub wall: Wall,
     #[serde(skip)]
     begun: Option<Instant>,
@@ -45,7 +45,7 @@ pub struct Summary {
     since: BTreeMap<RobotName, Since>,
 }
 
-/// What came of one robot.
+/// Metrics of one robot.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RobotSummary {
     /// Simulated seconds in each emotion.
@@ -54,45 +54,45 @@ pub struct RobotSummary {
     pub behaviors_s: BTreeMap<String, f64>,
     /// How often it entered each behavior, the first one included.
     pub entered: BTreeMap<String, u64>,
-    /// Moves that were refused.
+    /// Moves that were blocked.
     pub blocked: u64,
-    /// Commands it sent, by what they say.
+    /// Commands that it sent, by text.
     pub sent: BTreeMap<String, u64>,
-    /// Commands that reached it.
+    /// Commands that it received.
     pub received: u64,
-    /// Commands to it that the medium lost.
+    /// Commands to it that were lost.
     pub dropped: u64,
-    /// Ticks it missed.
+    /// Ticks that it missed.
     pub missed: u64,
     /// Incarnations after the first.
     pub returns: u64,
-    /// What it published last.
+    /// Its last state variables.
     pub state_variables: StateVariables,
 }
 
-/// Wall-clock matters.
+/// Wall-clock times and counts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Wall {
-    /// How long the run took, seconds.
+    /// Duration of the run, seconds.
     pub elapsed_s: f64,
-    /// Who held up the run: robots for which the clock was held long enough for people to be told.
+    /// Robots for which the clock was held long enough to be reported.
     pub held_up_by: BTreeMap<RobotName, HeldUp>,
     /// Messages that were ignored, by reason.
     pub ignored: BTreeMap<String, u64>,
 }
 
-/// How much a robot held up a run.
+/// How long the clock was held for a robot.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeldUp {
     /// Ticks in which the clock was held for it.
     pub ticks: u64,
-    /// Time that these ticks took, seconds.
+    /// Total wait, seconds.
     pub waited_s: f64,
-    /// The longest of these waits, seconds.
+    /// Longest wait, seconds.
     pub longest_s: f64,
 }
 
-/// The emotion and behavior that a robot is in, and from which tick on.
+/// The current emotion and behavior of a robot, and the ticks in which they began.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Since {
     emotion: Option<(String, Tick)>,
@@ -100,14 +100,12 @@ struct Since {
 }
 
 impl Summary {
-    /// An epoch begins.
+    /// The empty summary of an epoch.
     #[must_use]
     pub fn begin(run: &RunName, simulation: &Simulation) -> Self {
-        let robots = simulation
-            .names()
-            .iter()
-            .map(|name| (name.clone(), RobotSummary::default()))
-            .collect();
+        let names = simulation.names().iter().cloned();
+        let robots = names.map(|name| (name, RobotSummary::default()));
+
         Self {
             run: run.clone(),
             seed: simulation.scenario().seed,
@@ -117,7 +115,7 @@ impl Summary {
             time_s: 0.0,
             guests: simulation.scenario().guests.count,
             digest: String::new(),
-            robots,
+            robots: robots.collect(),
             network: NetworkSummary::default(),
             wall: Wall::default(),
             begun: None,
@@ -129,6 +127,7 @@ impl Summary {
     pub fn count(&mut self, simulation: &Simulation, line: &Line) {
         let tick_s = simulation.scenario().tick_s;
         self.network.count(simulation, line.tick, &line.event);
+
         match &line.event {
             Event::Emotion { robot, to, .. } => self.enter_emotion(robot, to, line.tick, tick_s),
             Event::Behavior { robot, to, .. } => self.enter_behavior(robot, to, line.tick, tick_s),
@@ -148,7 +147,7 @@ impl Summary {
                 self.end = Some(*reason);
                 self.digest.clone_from(digest);
             }
-            // What came before, waiting for robots to join, is not part of the epoch.
+            // The time in which robots join is not part of the epoch.
             Event::Init { .. } => self.begun = Some(Instant::now()),
             _ => {}
         }
@@ -172,26 +171,28 @@ impl Summary {
         *robot.entered.entry(to.to_owned()).or_default() += 1;
     }
 
-    /// The epoch is over.
+    /// Completes the summary at the end of the epoch.
     pub fn finish(&mut self, simulation: &Simulation) {
-        (self.ticks, self.time_s) = (simulation.tick(), simulation.time_s(simulation.tick()));
+        let ticks = simulation.tick();
+        let tick_s = simulation.scenario().tick_s;
+        self.ticks = ticks;
+        self.time_s = simulation.time_s(ticks);
         self.digest = simulation.digest();
-        for (robot, since) in std::mem::take(&mut self.since) {
-            let (ticks, tick_s) = (self.ticks, simulation.scenario().tick_s);
-            let own = self.robot(&robot);
-            add(&mut own.emotions_s, since.emotion, ticks, tick_s);
-            add(&mut own.behaviors_s, since.behavior, ticks, tick_s);
-            own.state_variables = simulation
-                .state_variables(&robot)
-                .cloned()
-                .unwrap_or_default();
+
+        for (name, since) in std::mem::take(&mut self.since) {
+            let state_variables = simulation.state_variables(&name).cloned();
+            let robot = self.robot(&name);
+            add(&mut robot.emotions_s, since.emotion, ticks, tick_s);
+            add(&mut robot.behaviors_s, since.behavior, ticks, tick_s);
+            robot.state_variables = state_variables.unwrap_or_default();
         }
-        self.wall.elapsed_s = self
-            .begun
-            .map_or(0.0, |begun| begun.elapsed().as_secs_f64());
+
+        let elapsed = self.begun.map(|begun| begun.elapsed());
+        self.wall.elapsed_s = elapsed.unwrap_or_default().as_secs_f64();
     }
 }
 
+/// Adds the time in a state that a robot has left.
 fn add(times_s: &mut BTreeMap<String, f64>, left: Option<(String, Tick)>, now: Tick, tick_s: f64) {
     if let Some((state, since)) = left {
         *times_s.entry(state).or_default() += (now - since) as f64 * tick_s;

@@ -10,7 +10,7 @@ use protocol::messages::{CommandText, Performative};
 use protocol::{Event, RobotName};
 use simulator::Scenario;
 use simulator::diagnostic::{FileError, Source};
-use simulator::medium::{Decision, Medium, Underway};
+use simulator::medium::{Decision, Medium, SentCommand};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";
@@ -36,8 +36,8 @@ fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap()
 }
 
-fn command(from: &str, to: &str, seq: u64) -> Underway {
-    Underway {
+fn command(from: &str, to: &str, seq: u64) -> SentCommand {
+    SentCommand {
         to: name(to),
         from: name(from),
         seq,
@@ -67,6 +67,7 @@ fn lost(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, Cause)> {
         } if from.as_str() == "A" => Some((*seq, *because)),
         _ => None,
     };
+
     decisions
         .values()
         .flat_map(|decision| decision.events.iter().filter_map(dropped))
@@ -87,6 +88,7 @@ fn arrived(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, u64)> {
             .filter(|arrival| arrival.delivery.from.as_str() == "A")
             .map(move |arrival| (tick, arrival.seq))
     };
+
     decisions.iter().flat_map(at_b).collect()
 }
 
@@ -104,6 +106,7 @@ fn a_perfect_network_loses_nothing_and_a_dead_one_everything() {
                 .all(|decision| decision.events.is_empty() && decision.unreachable.is_empty())
         );
     }
+
     let decisions = play("network.commands.loss = 1.0", 100, |_, _| ());
     assert_eq!(
         (arrived(&decisions).len(), lost(&decisions).len()),
@@ -136,6 +139,7 @@ fn other_messages_and_robots_change_nothing_of_the_fate_of_one() {
         medium.accept(command("B", "A", tick));
         medium.accept(command("C", "B", tick));
     });
+
     assert_eq!(
         (lost(&alone), arrived(&alone)),
         (lost(&in_company), arrived(&in_company))
@@ -195,8 +199,10 @@ fn bursts_lose_in_runs() {
     let decisions = play(network, 40_000, |_, _| ());
     let lost = lost(&decisions);
     assert!(lost.iter().all(|(_, cause)| *cause == Cause::Burst));
+
     let share = lost.len() as f64 / 40_000.0;
     assert!((share - 0.2).abs() < 0.03, "{share}");
+
     let runs = 1 + lost
         .windows(2)
         .filter(|pair| pair[1].0 != pair[0].0 + 1)
@@ -226,6 +232,7 @@ fn cut_off(decision: &Decision) -> String {
             targets.iter().map(RobotName::as_str).collect::<String>()
         )
     };
+
     decision
         .unreachable
         .iter()
@@ -240,6 +247,7 @@ fn a_partition_cuts_commands_and_queries_from_its_first_to_its_last_tick() {
     let decisions = play(network, 30, |tick, medium| {
         medium.accept(command("B", "C", tick));
     });
+
     // What is decided at the ticks 10 to 19 was sent one tick earlier.
     assert_eq!(
         lost(&decisions),
@@ -247,6 +255,7 @@ fn a_partition_cuts_commands_and_queries_from_its_first_to_its_last_tick() {
             .map(|seq| (seq, Cause::Partition))
             .collect::<Vec<_>>()
     );
+
     for (tick, decision) in &decisions {
         let expected = if (10..20).contains(tick) {
             "A:BC B:A C:A"
@@ -334,6 +343,7 @@ fn lost_queries_are_one_verdict_for_asker_target_and_tick() {
         .count() as f64;
     assert!((count / 4000.0 - 0.25).abs() < 0.05, "{count}");
     assert!(lost(&decisions).is_empty());
+
     for decision in decisions.values() {
         let told = decision
             .events
@@ -358,6 +368,7 @@ fn a_person_at_the_console_is_not_on_the_robots_network() {
 #[test]
 fn impossible_networks_are_refused_where_they_stand() {
     let partition = |rest: &str| format!("[[network.partition]]\n{rest}");
+
     for (network, reason) in [
         ("network.commands.loss = 1.5".to_owned(), "from 0 to 1"),
         ("network.commands.loss = -0.1".to_owned(), "from 0 to 1"),
@@ -428,5 +439,6 @@ fn the_resolved_file_has_the_same_network() {
         Path::new("."),
     )
     .unwrap();
+
     assert_eq!(again.network, scenario.network);
 }

@@ -139,6 +139,7 @@ fn a_fault_ends_by_the_wall_clock_only_where_the_clock_waits() {
              at = \"4 s\"\n{end}\n"
         ))
     };
+
     for kind in ["hang", "crash", "slow"] {
         let waiting = with("", kind, "for = \"1 s\"");
         assert!(waiting.is_ok(), "{kind}: {waiting:?}");
@@ -147,7 +148,7 @@ fn a_fault_ends_by_the_wall_clock_only_where_the_clock_waits() {
         let by_wall = with("on_late = \"continue\"", kind, "for = \"1 s\"");
         let error = shown(&by_wall.unwrap_err());
         assert!(
-            error.contains("goes on without A") && error.contains("say `until`"),
+            error.contains("continues without A") && error.contains("say `until`"),
             "{kind}: {error}"
         );
     }
@@ -191,8 +192,11 @@ fn the_command_line_changes_a_scenario() {
 
     let unknown = shown(&load(&["guest.count=7"]).unwrap_err());
     assert!(unknown.contains("unknown field `guest`"), "{unknown}");
-    let nobody = shown(&load(&["robot.Vonda.class=X"]).unwrap_err());
-    assert!(nobody.contains("called or numbered \"Vonda\""), "{nobody}");
+    let unknown = shown(&load(&["robot.Vonda.class=X"]).unwrap_err());
+    assert!(
+        unknown.contains("called or numbered \"Vonda\""),
+        "{unknown}"
+    );
 }
 
 #[test]

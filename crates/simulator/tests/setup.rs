@@ -55,6 +55,7 @@ fn what_is_changed_is_changed_and_the_rest_stays() {
     setup.robots.insert(name("A"), Point::new(3.0, 4.0));
     setup.log_file.name = "evening.log".into();
     let changed = scenario().with_setup(&setup).unwrap();
+
     assert_eq!(changed.setup(), setup);
     assert_eq!(changed.robots[&name("A")].parameters["x"], 1);
 }
@@ -64,11 +65,13 @@ fn every_mistake_is_told_beside_its_field() {
     assert_eq!(blamed(|setup| setup.seed = u64::MAX), ["seed"]);
     assert_eq!(blamed(|setup| setup.duration_s = 0.0), ["duration_s"]);
     assert_eq!(blamed(|setup| setup.duration_s = 1e300), ["duration_s"]);
+
     let wrong = Range {
         min: 3.0,
         mode: 1.0,
         max: 2.0,
     };
+
     assert_eq!(
         blamed(|setup| setup.guest_speed_mps = wrong),
         ["guest_speed_mps"]
@@ -101,6 +104,7 @@ fn every_mistake_is_told_beside_its_field() {
         blamed(|setup| assert!(setup.robots.remove(&name("A")).is_some())),
         ["robots.A"]
     );
+
     for bad in [
         "",
         "../x",
@@ -117,6 +121,7 @@ fn every_mistake_is_told_beside_its_field() {
             "{bad:?}"
         );
     }
+
     // Several mistakes are told at once.
     assert_eq!(
         blamed(|setup| {
@@ -136,6 +141,7 @@ fn a_scenario_for_other_robots_is_refused_with_both_rosters() {
     })
     .unwrap();
     let reason = other.with_roster_of(&scenario()).unwrap_err();
+
     assert!(
         reason.contains('Z') && reason.contains('A') && reason.contains('B'),
         "{reason}"
@@ -150,6 +156,7 @@ fn a_scenario_from_outside_reads_no_files() {
         text: text.into(),
     })
     .unwrap_err();
+
     assert!(
         error.in_words().contains("params_from"),
         "{}",

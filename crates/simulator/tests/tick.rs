@@ -179,6 +179,7 @@ fn an_accepted_proposal_is_where_the_robot_is_and_is_not_told() {
             report.proposal = Point::new(2.5, 2.25);
         }
     });
+
     assert_eq!(simulation.location(&name("A")), Some(Point::new(2.5, 2.25)));
     assert!(
         news[1]
@@ -194,17 +195,21 @@ fn who_collides_is_not_advanced_and_is_told_where_it_stands() {
             report.proposal.x += 1.45; // Overlaps B, 2 m away, with bodies of 0.61 m.
         }
     });
+
     assert_eq!(simulation.location(&name("A")), Some(Point::new(2.0, 2.0)));
+
     let correction = news[1][&name("A")].correction.unwrap();
     assert_eq!(
         (correction.location, correction.blocked),
         (Point::new(2.0, 2.0), true)
     );
+
     let blocked = Event::Blocked {
         robot: name("A"),
         by: Blocker::Robot(name("B")),
         at: Point::new(2.0, 2.0),
     };
+
     assert!(
         records[1].events.contains(&blocked),
         "{:?}",
@@ -267,6 +272,7 @@ fn a_command_sent_in_a_tick_is_named_by_the_next_clock_in_the_order_of_senders()
             *commands = vec![command("A", "c1"), command("B", "c2"), command("A", "c3")];
         }
     });
+
     assert_eq!(
         news[2][&name("A")].commands,
         [("A", "c1"), ("A", "c3"), ("B", "c1"), ("B", "c3")]
@@ -277,12 +283,14 @@ fn a_command_sent_in_a_tick_is_named_by_the_next_clock_in_the_order_of_senders()
         [("A", "c2"), ("B", "c2")].map(|(from, text)| delivery(from, text))
     );
     assert!(news[1].is_empty() && news[3].is_empty());
+
     let mut delivered = vec![];
     for event in &records[2].events {
         if let Event::CommandDelivered { from, to, seq } = event {
             delivered.push((from.as_str(), to.as_str(), *seq));
         }
     }
+
     assert_eq!(
         delivered,
         [
@@ -302,6 +310,7 @@ fn a_command_from_outside_is_delivered_at_the_next_tick_and_recorded() {
     simulation.command(&name("B"), "refill");
     let mut puppets = Puppets::new(&simulation, |_, _, _| {});
     let record = simulation.step(&mut puppets).unwrap();
+
     assert_eq!(
         puppets.news[0][&name("B")].commands,
         [delivery("operator", "refill")]
@@ -319,6 +328,7 @@ fn a_command_to_a_robot_outside_the_roster_is_dropped_and_recorded() {
     });
     let is_sent =
         |event: &Event| matches!(event, Event::CommandSent { to, .. } if to.as_str() == "Z");
+
     assert!(records[1].events.iter().any(is_sent));
     assert_eq!(
         dropped(&records[2]),
@@ -369,19 +379,23 @@ fn more_commands_than_news_hold_are_dropped_from_the_last_and_the_run_goes_on() 
     let arrived = &news[2][&name("A")];
     let bytes = protocol::encode(arrived).len();
     assert!(bytes <= 512 * 1024 + 1024, "{bytes} bytes of news");
+
     let dropped = dropped(&records[2]);
     let causes: Vec<Cause> = dropped.iter().map(|(.., because)| *because).collect();
     assert!(!dropped.is_empty());
     assert_eq!(causes, vec![Cause::Overflow; dropped.len()]);
     assert_eq!(arrived.commands.len() + dropped.len(), 200);
+
     // Hardly one more would have fitted, and what is dropped is what counts last.
     assert!(bytes + 2 * 4096 > 512 * 1024, "{bytes} bytes of news");
+
     let from_b =
         |(from, to, seq, _): &(String, String, u64, Cause)| (from == "B" && to == "A", *seq);
     let numbers: Vec<(bool, u64)> = dropped.iter().map(from_b).collect();
     let kept = 200 - dropped.len() as u64;
     let expected: Vec<(bool, u64)> = (kept - 100 + 1..=100).map(|seq| (true, seq)).collect();
     assert_eq!(numbers, expected);
+
     // Nothing else suffers from it.
     assert_eq!(news[2][&name("B")].commands.len(), 2);
     assert_eq!(simulation.tick(), 3);
@@ -461,6 +475,7 @@ fn every_value_that_a_robot_reports_is_in_the_digest() {
     };
     let same = digest(|_, _| {});
     assert_eq!(same, digest(|_, _| {}));
+
     let changes: [fn(&mut Report, &mut Commands); 11] = [
         |report, _| report.proposal.x += 1e-12,
         |report, _| report.speed_mps = 1e-300,
@@ -480,6 +495,7 @@ fn every_value_that_a_robot_reports_is_in_the_digest() {
         assert!(!seen.contains(&other), "a change is not in the digest");
         seen.push(other);
     }
+
     assert_eq!(
         digest(|report, _| report.speed_mps = -0.0),
         seen[0],

@@ -23,6 +23,7 @@ fn sigterm_ends_the_program_in_order() {
         log.contains("Leguin: end {\"type\":\"end\",\"reason\":\"interrupted\"}"),
         "{log}"
     );
+
     says(&launch, &["Leguin ended with exit status 143"]);
     nobody_is_left("exec-term");
 }
@@ -56,6 +57,7 @@ fn interrupting_the_launch_leaves_nobody() {
         "{}",
         stage.log("exec-interrupt")
     );
+
     nobody_is_left("exec-interrupt");
 }
 

@@ -43,6 +43,7 @@ impl Robot {
             text.contains("launch.toml"),
             "it says what comes next: {text}"
         );
+
         let folder = Path::new(out).join("Rosie");
         Self { lab, folder }
     }
@@ -59,6 +60,7 @@ impl Robot {
             "--run",
             run,
         ]);
+
         command.args(more).env("PYTHONPATH", python_path());
         Running::start(command, run, self.lab.out().join(run))
     }
@@ -74,9 +76,12 @@ impl Robot {
             self.start(run, &[]).finish();
             nobody_is_left(run);
         }
+
         let [first, second] = runs.each_ref().map(|run| self.lab.bytes(run));
         assert_same(("the first launch", &first), ("the second launch", &second));
+
         let log = self.cars_log(&runs[0]);
+
         for part in [
             "behavior STROLL",
             "emotion HAPPY -> FRUSTRATED",
@@ -84,14 +89,17 @@ impl Robot {
         ] {
             assert!(log.contains(part), "{language}: no {part:?} in\n{log}");
         }
+
         let recording =
             std::fs::read_to_string(self.lab.file(&runs[0], "recording.jsonl")).unwrap();
         assert!(
             recording.lines().any(|line| line.contains("\"x\":12.192")),
             "it reaches the end of its way"
         );
+
         self.obeys(language);
         assert_conforms(&self.folder.join("launch.toml"), "Rosie");
+
         first
     }
 
@@ -154,6 +162,7 @@ fn has(tool: &str, test: &mut Command, help: &str) -> bool {
         // Past the test harness, which keeps what a passing test prints to itself.
         let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
     }
+
     found
 }
 
@@ -260,6 +269,7 @@ fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
         command.arg("--version");
         command
     };
+
     if has(
         "C",
         &mut version("cc"),
@@ -267,6 +277,7 @@ fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
     ) {
         assert_same(("Rust", &rust), ("C", &c().plays("c")));
     }
+
     if has(
         "Node.js",
         &mut version("node"),
@@ -277,10 +288,12 @@ fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
             ("Node.js", &Robot::new("node").plays("node")),
         );
     }
+
     let mut python = Command::new("python3");
     python
         .args(["-c", "import cars_robot"])
         .env("PYTHONPATH", python_path());
+
     if has(
         "Python",
         &mut python,
@@ -313,10 +326,13 @@ fn nothing_is_overwritten_and_what_is_wrong_is_said() {
         "{text}"
     );
     assert_eq!(std::fs::read_to_string(&source).unwrap(), "mine");
+
     let (_, text) = again(&["../Rosie", "--lang", "c"]);
     assert!(text.contains("is not a usable name"), "{text}");
+
     let (_, text) = again(&["Rita", "--lang", "cobol"]);
     assert!(text.contains("rust, python, c, bash, node"), "{text}");
+
     let (_, text) = again(&["Rita", "--lang", "rust", "--cars", "/"]);
     assert!(
         text.contains("whose SDK this robot uses, is not at /") && text.contains("--cars DIR"),
@@ -331,6 +347,7 @@ fn nothing_is_overwritten_and_what_is_wrong_is_said() {
 #[test]
 fn whatever_its_name_is_its_files_are_read() {
     let lab = Lab::new();
+
     for (name, language) in [
         ("a.b-C_9", "rust"),
         ("9", "bash"),
@@ -366,6 +383,7 @@ fn whatever_its_name_is_its_files_are_read() {
             lab.cars_without_out(&["check", folder.join("scenario.toml").to_str().unwrap()]);
         assert_eq!(code, 0, "{text}");
     }
+
     let manifest = std::fs::read_to_string(lab.out().join("a.b-C_9/Cargo.toml")).unwrap();
     assert!(manifest.contains("name = \"cars-a-b-c_9\""), "{manifest}");
 }

@@ -37,6 +37,7 @@ impl Stage {
             scenario.display().to_string()
         );
         let file = lab.write("launch.toml", &text).to_str().unwrap().to_owned();
+
         Self { lab, file }
     }
 

@@ -1,4 +1,4 @@
-//! Processes are killed and stopped and their links cut at random, drawn from a seed: nothing hangs, nobody is left behind,
+//! Processes are killed and stopped and their links cut at random, drawn from a seed: nothing hangs, no process is left behind,
 //! the record is whole and names whom it happened to. A short version runs always; `CARS_CHAOS=200` plays as many events as
 //! it says, `CARS_CHAOS_SEED` others.
 
@@ -33,7 +33,7 @@ enum Blow {
 /// The link of a robot: a proxy that obeys.
 struct Cable {
     proxy: Child,
-    /// What it says; kept, because a program that nobody listens to ends.
+    /// Its output, which must be read: a program with a closed pipe ends.
     _said: BufReader<ChildStdout>,
     endpoint: String,
     /// When it is to be whole again.
@@ -57,6 +57,7 @@ impl Cable {
             .and_then(|rest| rest.split(',').next())
             .unwrap();
         let endpoint = format!("tcp/{address}");
+
         Self {
             proxy,
             _said: said,
@@ -110,7 +111,9 @@ fn launch_file(lab: &Lab, n: usize) -> String {
             "[[process]]\nname = \"R{i}\"\ncommand = [\"cars-vonda\"]\nrestart = \"on-failure\"\nbackoff = \"0.05 s\"\n"
         );
     }
+
     lab.write("chaos.toml", &scenario);
+
     lab.write("chaos-launch.toml", &launch)
         .to_str()
         .unwrap()
@@ -192,14 +195,17 @@ fn strike(run: &str, cables: &mut [Cable], count: usize, chance: &mut Stream) ->
         }
         struck.insert(name);
     }
+
     // One that was cut a moment ago has to be missed before it is back.
     let last = cables
         .iter()
         .filter_map(|cable| cable.heals)
         .max()
         .unwrap_or_else(Instant::now);
+
     std::thread::sleep(last.saturating_duration_since(Instant::now()));
     cables.iter_mut().for_each(|cable| cable.heal_by(last));
+
     struck
 }
 
@@ -215,12 +221,13 @@ fn whatever_befalls_the_robots_the_run_goes_on_and_its_record_is_whole() {
         .unwrap_or(1);
     let launches = ROBOTS.len().min(events);
     let lab = Lab::new();
+
     for (index, n) in ROBOTS.iter().take(launches).enumerate() {
         let run = format!("chaos-{index}");
         let (mut launch, mut cables) = start(&lab, &run, *n);
         let mut chance = stream(seed, &run);
         let struck = strike(&run, &mut cables, events / launches, &mut chance);
-        // The clock still goes, whoever is missing.
+        // The clock still runs, whichever robots are missing.
         let tick = || status(&lab, &run).unwrap()["tick"].as_u64().unwrap();
         let reached = tick();
         eventually("further ticks", || (tick() > reached + 10).then_some(()));
@@ -292,12 +299,14 @@ fn a_robot_that_is_cut_off_while_the_run_is_initialized_returns() {
     assert!(acted[0] >= joined[1], "it acted: {acted:?}");
 }
 
-/// Every line is whole, every tick is there once and in order, and everybody who was struck is named.
+/// Every line is complete, every tick is there once and in order, and every robot with a fault is named.
 fn check_record(lab: &Lab, run: &str, struck: &BTreeSet<String>) {
     let bytes = lab.bytes(run);
     assert!(bytes.ends_with(b"\n"));
+
     let events = lab.events(run);
     assert_eq!(events.last().unwrap()["reason"], "stopped");
+
     let ticks = events
         .iter()
         .filter(|event| event["event"] == "tick")
@@ -306,6 +315,7 @@ fn check_record(lab: &Lab, run: &str, struck: &BTreeSet<String>) {
         ticks.enumerate().all(|(index, tick)| index as u64 == tick),
         "a tick is missing or out of order"
     );
+
     let named: BTreeSet<String> = events
         .iter()
         .filter(|event| {
@@ -313,10 +323,12 @@ fn check_record(lab: &Lab, run: &str, struck: &BTreeSet<String>) {
         })
         .map(|event| event["robot"].as_str().unwrap().to_owned())
         .collect();
+
     assert!(
         struck.is_subset(&named),
         "struck {struck:?}, named {named:?}"
     );
+
     // A robot is lost before a further incarnation of it joins, and every incarnation has a higher number.
     for robot in struck {
         let own = events

@@ -33,6 +33,7 @@ fn paused(lab: &Lab, run: &str, more: &[&str]) -> Running {
         let status: Value = serde_json::from_slice(&output.stdout).ok()?;
         (status["phase"] == "ready").then_some(())
     });
+
     launch
 }
 
@@ -45,11 +46,14 @@ fn step_answers_with_the_tick_reached_and_the_buttons_do_what_they_say() {
     assert_eq!(ctl(&lab, "ctl-buttons", &["step"])["tick"], 11);
     assert_eq!(ctl(&lab, "ctl-buttons", &["speed", "2"])["speed"], 2.0);
     assert_eq!(ctl(&lab, "ctl-buttons", &["start"])["phase"], "running");
+
     let (code, text) = lab.fails(&["ctl", "step", "--run", "ctl-buttons"]);
     assert!(code == 1 && text.contains("pause it to step"), "{text}");
     assert_eq!(ctl(&lab, "ctl-buttons", &["pause"])["phase"], "paused");
+
     let at = status(&lab, "ctl-buttons")["tick"].as_u64().unwrap();
     assert_eq!(ctl(&lab, "ctl-buttons", &["step", "3"])["tick"], at + 3);
+
     ctl(&lab, "ctl-buttons", &["speed", "max"]);
     ctl(&lab, "ctl-buttons", &["start"]);
     launch.finish();
@@ -83,6 +87,7 @@ fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
     });
     assert_eq!(again["tick"], 0);
     assert_eq!(launch.processes(), before);
+
     ctl(&lab, "ctl-init", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-fresh", "--duration", "60 s"]);
@@ -90,6 +95,7 @@ fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
         ("after init", &lab.bytes("ctl-init")),
         ("fresh", &lab.bytes("ctl-fresh")),
     );
+
     // Nothing is lost: what the first epoch recorded is kept, too, up to where it was left.
     let kept = std::fs::read(lab.file("ctl-init", "events-epoch1.jsonl")).unwrap();
     assert!(
@@ -119,6 +125,7 @@ fn init_with_another_seed_is_another_run() {
         "--seed",
         "77",
     ]);
+
     assert_same(
         ("after init", &lab.bytes("ctl-seed")),
         ("fresh", &lab.bytes("ctl-77")),
@@ -132,6 +139,7 @@ fn control_answers_at_once_while_the_clock_is_held() {
     ctl(&lab, "ctl-held", &["step", "5"]);
     let leguin = launch.process("cars-leguin");
     send(leguin, Signal::SIGSTOP);
+
     // Less than the time after which an asker gives up.
     let begun = Instant::now();
     let stepped = ctl(&lab, "ctl-held", &["step", "10"]);
@@ -141,15 +149,18 @@ fn control_answers_at_once_while_the_clock_is_held() {
         begun.elapsed()
     );
     assert!(stepped["tick"].as_u64().unwrap() < 15, "{stepped}");
+
     let awaited: Vec<&str> = stepped["awaiting"]
         .as_array()
         .unwrap()
         .iter()
         .map(|awaited| awaited["name"].as_str().unwrap())
         .collect();
+
     assert!(awaited.contains(&"Leguin"), "{stepped}");
     assert_eq!(ctl(&lab, "ctl-held", &["pause"])["phase"], "paused");
     assert_eq!(status(&lab, "ctl-held")["phase"], "paused");
+
     send(leguin, Signal::SIGCONT);
     ctl(&lab, "ctl-held", &["start"]);
     launch.finish();
@@ -197,6 +208,7 @@ fn stop_ends_the_run_with_its_record_complete() {
     );
     assert_eq!(end["digest"], tick["digest"]);
     assert_eq!(lab.summary("ctl-stop")["end"], "stopped");
+
     let (_, text) = lab.fails(&["ctl", "status", "--run", "ctl-stop"]);
     assert!(text.contains("not in progress"), "{text}");
 }
@@ -209,6 +221,7 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
     let processes = launch.processes();
     let scenario = lab.ok(&["ctl", "scenario", "--run", "ctl-load"]);
     assert!(scenario.contains("count = 100"), "{scenario}");
+
     let fewer = lab.write(
         "fewer.toml",
         &scenario
@@ -222,6 +235,7 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
         (status["phase"] == "ready" && status["epoch"] == 2 && status["seed"] == 5).then_some(())
     });
     assert_eq!(launch.processes(), processes);
+
     let (_, text) = lab.fails(&[
         "ctl",
         "load",
@@ -229,20 +243,25 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
         "--run",
         "ctl-load",
     ]);
+
     assert!(text.contains("Vonda"), "{text}");
+
     ctl(&lab, "ctl-load", &["start"]);
     launch.finish();
+
     // What is kept of the second epoch is what a fresh run of its scenario gives, and the first epoch is kept, too.
     lab.ok(&["run", fewer, "--run", "ctl-loaded"]);
     assert_same(
         ("loaded", &lab.bytes("ctl-load")),
         ("fresh", &lab.bytes("ctl-loaded")),
     );
+
     let read = |run, name| std::fs::read(lab.file(run, name)).unwrap();
     assert_eq!(
         read("ctl-load", "scenario.toml"),
         read("ctl-loaded", "scenario.toml")
     );
+
     for kept in [
         "events-epoch1.jsonl",
         "scenario-epoch1.toml",

@@ -33,8 +33,10 @@ fn a_launch_and_a_run_in_one_process_are_the_same() {
     let second = launched(&lab, "same-second", FILE, &["--seed", "3"]);
     assert_same(("run", &local), ("launch", &first));
     assert_same(("first launch", &first), ("second launch", &second));
+
     // Nothing would be shown by two runs in which nothing happens.
     let text = String::from_utf8(local).unwrap();
+
     for event in [
         "command_sent",
         "command_delivered",
@@ -86,6 +88,7 @@ fn the_order_in_which_robots_start_changes_nothing() {
     );
     let forward = launched(&lab, "order-forward", forward.to_str().unwrap(), &[]);
     let backward = launched(&lab, "order-backward", backward.to_str().unwrap(), &[]);
+
     assert_same(("forward", &forward), ("backward", &backward));
 }
 
@@ -137,6 +140,7 @@ fn several_robots_in_one_process_are_the_same() {
     let file = lab.write("together.toml", &text);
     let together = launched(&lab, "hosts-together", file.to_str().unwrap(), &[]);
     let apart = in_process(&lab, "hosts-apart", "configs/three_robots.toml", &[]);
+
     assert_same(("together", &together), ("apart", &apart));
 }
 
@@ -156,6 +160,7 @@ fn the_resolved_scenario_of_a_run_gives_the_same_run() {
         "--run",
         "resolved-second",
     ]);
+
     assert_same(("first", &first), ("second", &lab.bytes("resolved-second")));
 }
 
@@ -177,6 +182,7 @@ fn a_lossy_network_is_part_of_the_seed() {
         "--run",
         "lossy-run",
     ]));
+
     lab.start(
         "lossy-launch",
         &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"]),
@@ -186,10 +192,12 @@ fn a_lossy_network_is_part_of_the_seed() {
         ("run", &lab.bytes("lossy-run")),
         ("launch", &lab.bytes("lossy-launch")),
     );
+
     // The recording of both is the same, too.
     let recording = |run: &str| std::fs::read(lab.file(run, "recording.jsonl")).unwrap();
     let without_name = |run: &str| String::from_utf8(recording(run)).unwrap().replace(run, "");
     assert!(without_name("lossy-run") == without_name("lossy-launch"));
+
     let dropped = lab
         .events("lossy-run")
         .iter()
@@ -200,6 +208,7 @@ fn a_lossy_network_is_part_of_the_seed() {
         .into_iter()
         .filter(|event| event["event"] == "command_sent")
         .collect();
+
     assert!(
         dropped > 0 && dropped < sent.len(),
         "{dropped} of {}",
@@ -220,12 +229,14 @@ fn a_partition_is_part_of_the_seed_and_told_in_the_summary() {
             .chain(["--duration", "300 s", "--set", CUT])
             .collect::<Vec<_>>()
     };
+
     lab.ok(&with([
         "run",
         "configs/hors_doeuvres.toml",
         "--run",
         "cut-run",
     ]));
+
     for run in ["cut-launch", "cut-again"] {
         lab.start(
             run,
@@ -234,6 +245,7 @@ fn a_partition_is_part_of_the_seed_and_told_in_the_summary() {
         .finish();
         assert_same(("run", &lab.bytes("cut-run")), (run, &lab.bytes(run)));
     }
+
     let events = lab.events("cut-launch");
     let at = |kind: &str| -> Vec<u64> {
         events
@@ -242,13 +254,16 @@ fn a_partition_is_part_of_the_seed_and_told_in_the_summary() {
             .map(|event| event["tick"].as_u64().unwrap())
             .collect()
     };
+
     assert_eq!(
         (at("link_cut"), at("link_healed")),
         (vec![120, 120], vec![360, 360])
     );
+
     let summary = lab.summary("cut-launch");
     let network = &summary["network"];
     assert_eq!(network, &lab.summary("cut-run")["network"]);
+
     let (there, back) = (
         &network["links"]["Butler -> Leguin"],
         &network["links"]["Leguin -> Butler"],
@@ -258,6 +273,7 @@ fn a_partition_is_part_of_the_seed_and_told_in_the_summary() {
         (&240.into(), &120.0.into())
     );
     assert_eq!(network["cuts"][0]["until_s"], 180.0);
+
     let dropped = at("command_dropped");
     assert!(
         !dropped.is_empty() && dropped.iter().all(|tick| (120..360).contains(tick)),
@@ -281,12 +297,14 @@ fn delays_and_doubles_are_the_same_as_processes_and_in_one() {
         ];
         first.into_iter().chain(more).collect::<Vec<_>>()
     };
+
     lab.ok(&with([
         "run",
         "configs/hors_doeuvres.toml",
         "--run",
         "late-run",
     ]));
+
     lab.start(
         "late-launch",
         &with(["launch", "launch/hors_doeuvres.toml", "--speed", "max"]),
@@ -296,7 +314,9 @@ fn delays_and_doubles_are_the_same_as_processes_and_in_one() {
         ("run", &lab.bytes("late-run")),
         ("launch", &lab.bytes("late-launch")),
     );
+
     let events = lab.events("late-run");
+
     for kind in [
         "command_delayed",
         "command_duplicated",
@@ -305,5 +325,6 @@ fn delays_and_doubles_are_the_same_as_processes_and_in_one() {
     ] {
         assert!(events.iter().any(|event| event["event"] == kind), "{kind}");
     }
+
     assert!(events.iter().all(|event| event["because"] != "missed"));
 }

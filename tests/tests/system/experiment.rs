@@ -55,6 +55,7 @@ fn play<N: Default>(
         };
         look(&mut notes, &change);
     }
+
     (notes, hall)
 }
 
@@ -78,7 +79,9 @@ fn for_each_seed<T: Send>(one: impl Fn(u64) -> T + Sync) -> Vec<T> {
         };
         workers.into_iter().flat_map(join).collect()
     });
+
     done.sort_by_key(|(seed, _)| *seed);
+
     done.into_iter().map(|(_, result)| result).collect()
 }
 
@@ -115,6 +118,7 @@ fn t01_the_hall_is_that_of_the_paper() {
     let scenario = scenario(HALL, 1, &[]);
     assert_eq!(scenario.field_m, [50.0 * FT_M, 50.0 * FT_M]);
     assert_eq!((scenario.guests.count, scenario.body_m), (100, 2.0 * FT_M));
+
     let table = scenario.obstacles[0];
     let hall = Hall::new(scenario);
     assert!(
@@ -168,6 +172,7 @@ fn t05_an_exchange_happens_within_four_feet_and_fills_the_tray() {
             }
         },
     );
+
     let (exchanges, from_intercept) = totals(&notes);
     println!("{exchanges} exchanges, {from_intercept} of them begun from INTERCEPT");
     assert!(exchanges > 150 && from_intercept > 0);
@@ -181,6 +186,7 @@ fn t07_after_the_exchange_leguin_stands_until_she_is_sent_home() {
         at: Option<Point>,
         counts: (u32, u32),
     }
+
     let notes = watch(
         HALL,
         &[],
@@ -229,6 +235,7 @@ fn t08_at_the_table_leguin_waits_for_refill_or_hurry() {
         at: Option<Point>,
         starts: u32,
     }
+
     let notes = watch(HALL, &[], |Notes { at, starts }, change| {
         let now = change.hall.at("Leguin");
         if change.leguin == ("WAIT", "WAIT") {
@@ -250,6 +257,7 @@ fn t10_intercepting_is_moving_toward_leguin() {
         before: Option<(Point, Point)>,
         counts: (u32, u32),
     }
+
     /// Share of the moves that brought Butler nearer to where Leguin was.
     fn share_toward(behavior: &str) -> f64 {
         let notes = watch(
@@ -275,6 +283,7 @@ fn t10_intercepting_is_moving_toward_leguin() {
         let (nearer, moves) = totals(&notes.iter().map(|notes| notes.counts).collect::<Vec<_>>());
         f64::from(nearer) / f64::from(moves)
     }
+
     let (intercept, serve) = (share_toward("INTERCEPT"), share_toward("SERVE"));
     println!("share of moves toward Leguin: {intercept:.2} intercepting, {serve:.2} serving");
     assert!(
@@ -323,6 +332,7 @@ fn share_intercepted(set: &[&str]) -> f64 {
         },
     );
     let (exchanges, from_intercept) = totals(&notes);
+
     f64::from(from_intercept) / f64::from(exchanges)
 }
 
@@ -341,6 +351,7 @@ fn t12_who_blocks_leguin_frustrates_butler_who_intercepts_and_else_he_does_not()
         "obstacle=[{{ at = [\"2 ft\", \"2 ft\"] }}, {}]",
         around.join(", ")
     );
+
     for (what, set) in [
         ("a wall", vec![wall.as_str(), "guests.count=0"]),
         ("a wall and guests", vec![wall.as_str()]),
@@ -358,8 +369,9 @@ fn t12_who_blocks_leguin_frustrates_butler_who_intercepts_and_else_he_does_not()
         );
         assert!(share >= 0.95, "{what}: {share}");
     }
+
     let share = share_intercepted(&["guests.count=0"]);
-    println!("nobody in front of Leguin: {share:.3} of the exchanges begun from INTERCEPT");
+    println!("no guest in front of Leguin: {share:.3} of the exchanges begun from INTERCEPT");
     assert!(share <= 0.05, "{share}");
 }
 
@@ -381,6 +393,7 @@ fn t14_vonda_stands_still_unless_she_is_called() {
         hall.emotion("Vonda"),
         hall.behavior("Vonda"),
     );
+
     for _ in 0..hall.simulation.scenario().ticks {
         hall.step();
         assert_eq!(
@@ -392,6 +405,7 @@ fn t14_vonda_stands_still_unless_she_is_called() {
             (at, emotion.clone(), behavior.clone())
         );
     }
+
     assert!(
         hall.number("Butler", "exchanges") > 3.0,
         "Leguin works meanwhile"
@@ -412,6 +426,7 @@ fn t14_vonda_comes_in_leguins_place_when_butlers_parameter_names_her() {
         );
         vonda_worked |= hall.behavior("Vonda") == "EXCHANGE";
     }
+
     assert!(vonda_worked && hall.number("Butler", "exchanges") > 3.0);
 }
 
@@ -443,9 +458,11 @@ fn t15_the_state_of_figure_6_is_reached() {
     });
     let seeds = notes.iter().filter(|found| !found.is_empty()).count();
     println!("Figure 6 in {seeds} of {SEEDS} seeds, first at (seed, tick, part of the way):");
+
     for (seed, tick, part) in notes.iter().filter_map(|found| found.first()) {
         println!("  {seed}, {tick}, {part:.2}");
     }
+
     assert!(seeds > 0);
 }
 
@@ -467,6 +484,7 @@ fn lossy(loss: f64, arm: &[&str]) -> Losses {
         )
     });
     let (exchanges, empty_s) = runs.into_iter().unzip();
+
     Losses { exchanges, empty_s }
 }
 
@@ -500,12 +518,14 @@ fn arms(loss: f64) -> BTreeMap<&'static str, Losses> {
             mean(empty_s)
         );
     }
+
     arms
 }
 
 #[test]
 fn t20_without_any_command_emotions_keep_the_team_at_work() {
     let arms = arms(1.0);
+
     for with in ["affect only", "both"] {
         let least = arms[with]
             .exchanges
@@ -514,6 +534,7 @@ fn t20_without_any_command_emotions_keep_the_team_at_work() {
             .fold(f64::INFINITY, f64::min);
         assert!(least >= 3.0, "{with}: {least} exchanges in some seed");
     }
+
     for without in ["affectless", "timer repeat"] {
         let most = arms[without].exchanges.iter().copied().fold(0.0, f64::max);
         assert!(most <= 1.0, "{without}: {most} exchanges in some seed");
@@ -525,6 +546,7 @@ fn t21_with_a_quarter_of_commands_lost_emotions_do_better_than_a_timer() {
     let arms = arms(0.25);
     let empty_s = |arm| mean(&arms[arm].empty_s);
     let (affect, timer) = (empty_s("affect only"), empty_s("timer repeat"));
+
     assert!(
         affect < timer / 2.0,
         "{affect} s, and {timer} s with the timer"
@@ -552,6 +574,7 @@ fn events_in_order(order: [&str; 3]) -> Vec<Event> {
     for _ in 0..simulation.scenario().ticks {
         events.extend(simulation.step(&mut robots).unwrap().events);
     }
+
     events
 }
 
@@ -570,6 +593,7 @@ fn the_readable_log_tells_the_story() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--run", "story", "--duration", "300 s"]);
     let log = std::fs::read_to_string(lab.file("story", "cars.log")).unwrap();
+
     for part in [
         "emotion HAPPY -> CONFIDENT",
         "-> Leguin: refill",
@@ -587,13 +611,14 @@ fn shown<'a>(page: &'a str, file: &str) -> &'a str {
     block.split_once("```").unwrap().0
 }
 
-/// Vera, whom `crates/robots/tests/new_robot.rs` plays in memory, as somebody starts her who follows the page.
+/// Vera, whom `crates/robots/tests/new_robot.rs` plays in memory, started as the page describes.
 #[test]
 fn the_robot_of_the_documentation_runs_as_a_process() {
     let (lab, page) = (
         Lab::new(),
         std::fs::read_to_string(root().join("docs/new-robot.md")).unwrap(),
     );
+
     for folder in ["configs", "launch"] {
         std::fs::create_dir(lab.out().join(folder)).unwrap();
         let file = format!("{folder}/vera.toml");
@@ -604,6 +629,7 @@ fn the_robot_of_the_documentation_runs_as_a_process() {
             &text.replace("../target/release/examples/vera", program.to_str().unwrap()),
         );
     }
+
     let launch = lab.out().join("launch/vera.toml");
     lab.ok(&[
         "launch",
@@ -614,7 +640,9 @@ fn the_robot_of_the_documentation_runs_as_a_process() {
         "--run",
         "party",
     ]);
+
     let log = std::fs::read_to_string(lab.file("party", "cars.log")).unwrap();
+
     for part in [
         "emotion CALM -> SHY",
         "behavior MINGLE -> HIDE",
@@ -639,6 +667,7 @@ fn numbers_in(folder: &Path) -> BTreeSet<u32> {
             numbers.extend(names.filter_map(|name| name.split_once('_')?.0.parse::<u32>().ok()));
         }
     }
+
     numbers
 }
 
@@ -654,5 +683,6 @@ fn every_documented_behavior_has_its_test() {
         .iter()
         .flat_map(|folder| numbers_in(&root().join(folder)))
         .collect();
+
     assert_eq!(found, (1..=25).collect());
 }

@@ -77,6 +77,7 @@ fn the_log_can_be_followed_to_the_end() {
             "60 s",
         ],
     );
+
     eventually("the run", || {
         lab.cars(&["ctl", "step", "--run", "follow"])
             .status()
@@ -84,6 +85,7 @@ fn the_log_can_be_followed_to_the_end() {
             .success()
             .then_some(())
     });
+
     let mut log = lab.start("follow", &["log", "-f"]);
     log.prints("initialized");
     lab.ok(&["ctl", "speed", "max", "--run", "follow"]);
@@ -101,10 +103,13 @@ fn files_are_checked_with_line_and_place() {
         "launch/hors_doeuvres.toml",
         "configs/three_robots.toml",
     ]);
+
     assert!(good.0 == 0 && good.1.contains("ok"), "{}", good.1);
+
     let bad = lab.write("bad.toml", "seed = 1\n[guests]\ncuont = 5\n");
     let (code, text) = lab.cars_without_out(&["check", bad.to_str().unwrap()]);
     assert_eq!(code, 1);
+
     for part in ["bad.toml", "cuont = 5", "unknown field `cuont`"] {
         assert!(text.contains(part), "no {part:?} in\n{text}");
     }
@@ -126,6 +131,7 @@ fn a_plain_roster_plays() {
         "max",
     ];
     let printed = lab.ok(&args);
+
     assert!(printed.contains("Vonda"), "{printed}");
     assert_eq!(lab.summary("roster")["ticks"], 60);
 }
@@ -140,9 +146,11 @@ fn a_dry_run_says_what_it_would_start_and_starts_nothing() {
         "--run",
         "dry",
     ]);
+
     for program in ["cars-sim", "cars-butler", "cars-leguin"] {
         assert!(printed.contains(program), "no {program} in\n{printed}");
     }
+
     assert!(!lab.file("dry", "events.jsonl").exists());
 }
 
@@ -160,10 +168,13 @@ fn a_run_is_three_processes_and_leaves_a_whole_folder() {
             "20",
         ],
     );
+
     for program in ["cars-sim", "cars-butler", "cars-leguin"] {
         assert!(launch.process(program) > 0);
     }
+
     launch.finish();
+
     for file in [
         "scenario.toml",
         "events.jsonl",
@@ -173,18 +184,22 @@ fn a_run_is_three_processes_and_leaves_a_whole_folder() {
     ] {
         assert!(lab.file("folder", file).exists(), "no {file}");
     }
+
     assert!(
         launch.printed().contains("Butler") && launch.printed().contains("digest"),
         "{}",
         launch.printed()
     );
+
     let summary = lab.summary("folder");
     assert_eq!(
         (&summary["ticks"], &summary["end"]),
         (&120.into(), &"finished".into())
     );
+
     let last = lab.events("folder").pop().unwrap();
     assert_eq!(last["digest"], summary["digest"]);
+
     for event in lab.events("folder") {
         let text = event.to_string();
         assert!(
@@ -208,10 +223,12 @@ fn a_run_in_progress_is_not_overwritten() {
             .success()
             .then_some(())
     });
+
     for how in ["launch", "run"] {
         let (_, text) = lab.fails(&[how, "launch/hors_doeuvres.toml", "--run", "twice"]);
         assert!(text.contains("is in progress"), "{text}");
     }
+
     lab.ok(&["ctl", "stop", "--run", "twice"]);
     launch.finish();
     assert_eq!(lab.events("twice").last().unwrap()["event"], "end");
@@ -240,8 +257,10 @@ fn the_deadlock_experiment_gives_the_same_table_for_any_number_of_jobs() {
     };
     let one = experiment("1");
     assert_eq!(one, experiment("3"));
+
     let all: serde_json::Value = serde_json::from_str(&one).unwrap();
     assert_eq!(all["runs"].as_array().unwrap().len(), 2 * 4 * 8);
+
     let exchanges = |loss: &str, arm: &str| {
         let cells = all["estimates"].as_array().unwrap().iter();
         let cell = cells
@@ -249,6 +268,7 @@ fn the_deadlock_experiment_gives_the_same_table_for_any_number_of_jobs() {
             .collect::<Vec<_>>();
         cell[0]["exchanges"]["mean"].as_f64().unwrap()
     };
+
     // Every command lost: who has no emotions never gets treats, timer or not.
     assert!(exchanges("1", "affectless") < 1.0 && exchanges("1", "timer repeat") < 1.0);
     assert!(
@@ -273,6 +293,7 @@ fn with_emotions_the_team_works_on_while_it_is_cut_off_and_recovers() {
     ];
     let (code, text) = lab.cars_without_out(&args);
     assert_eq!(code, 0, "{text}");
+
     let all: serde_json::Value = serde_json::from_str(&text).unwrap();
     let mean = |condition: &str, arm: &str, what: &str| {
         let cells = all["estimates"].as_array().unwrap().iter();
@@ -289,6 +310,7 @@ fn with_emotions_the_team_works_on_while_it_is_cut_off_and_recovers() {
     println!(
         "exchanges after 120 s uncut, without emotions: {uncut}; after a cut of 240 s: {without} without, {with} with"
     );
+
     // One lost call is the end for those who call once; those who feel go on.
     assert!(with > 2.0 * without && with > 4.0, "{with} {without}");
     assert!(mean("240 s", "affect only", "during") > mean("240 s", "affectless", "during") + 1.0);

@@ -60,6 +60,7 @@ impl Wire {
         let bus = Bus::open(&role, None).unwrap();
         let run = RunName::new(run).unwrap();
         let keys = Keys::new(&run);
+
         Self {
             lab,
             simulator,
@@ -130,6 +131,7 @@ impl Wire {
     fn recorded(&self, tick: u64, kind: &str) -> Vec<Value> {
         let run = self.run.as_str();
         let is_over = |event: &Value| event["event"] == "tick" && event["tick"] == tick;
+
         eventually("the record", || {
             let bytes = self.lab.bytes(run);
             let is_whole = bytes.ends_with(b"\n");
@@ -175,8 +177,10 @@ impl Hand {
         let JoinAnswer::Welcome(welcome) = wire.join(&wire.request(robot, &bus.id())) else {
             panic!("refused")
         };
+
         let token = bus.token(&wire.keys.alive_robot(&own)).unwrap();
         let declared = vec![clock.unwrap(), subscribed.unwrap(), token];
+
         Self {
             bus,
             keys: wire.keys.clone(),
@@ -273,9 +277,11 @@ fn ready_with(run: &str, more: &str) -> (Wire, Hand, Hand) {
         assert_eq!(hand.clock().tick, 0);
         hand.put(&hand.report(0));
     }
+
     eventually("tick 0", || {
         (wire.status().phase == protocol::messages::Phase::Ready).then_some(())
     });
+
     (wire, a, b)
 }
 
@@ -386,6 +392,7 @@ fn a_second_report_for_the_same_tick_changes_nothing() {
     b.put(&b.report(1));
     let news = a.news_of(&a.clock_after(1));
     assert!(news.is_none_or(|news| news.correction.is_none()));
+
     let lines = eventually("tick 1", || {
         let text = std::fs::read_to_string(wire.lab.file("wire-twice", "events.jsonl")).unwrap();
         text.contains("\"tick\":1,").then_some(text)
@@ -538,16 +545,19 @@ fn a_command_to_a_robot_outside_the_roster_is_recorded_as_dropped() {
     let (wire, a, b) = ready("wire-unknown-target");
     wire.start();
     assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+
     a.put_command("Zed", &a.command(1, 1, "come"));
     a.put(&Report {
         commands: 1,
         ..a.report(1)
     });
     b.put(&b.report(1));
+
     for hand in [&a, &b] {
         assert_eq!(hand.clock_after(1).tick, 2);
         hand.put(&hand.report(2));
     }
+
     assert_eq!(
         wire.recorded(2, "command_dropped"),
         [
@@ -555,6 +565,7 @@ fn a_command_to_a_robot_outside_the_roster_is_recorded_as_dropped() {
             "because": "unknown" })
         ]
     );
+
     assert_eq!(wire.recorded(2, "command_sent").len(), 1);
 }
 
@@ -633,6 +644,7 @@ fn malformed_and_impossible_controls_are_refused_with_a_reason() {
             ControlAnswer::Done(_) | ControlAnswer::Setup(_) => panic!("accepted: {text}"),
         }
     };
+
     for (text, reason) in [
         ("", "EOF"),
         ("{\"do\":\"dance\"}", "unknown variant `dance`"),
@@ -652,6 +664,7 @@ fn malformed_and_impossible_controls_are_refused_with_a_reason() {
         let explanation = raw(text);
         assert!(explanation.contains(reason), "{text}: {explanation}");
     }
+
     assert_eq!(wire.status().tick, 0);
 }
 
@@ -672,6 +685,7 @@ fn a_newcomer_is_told_all_that_others_may_still_ask_for() {
     let (wire, a, b) = ready("wire-return");
     wire.start();
     assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+
     // A does tick 1 and is gone; B is still in it, and may ask for what A reported for tick 0.
     a.put(&a.report(1));
     drop(a);
@@ -687,6 +701,7 @@ fn a_newcomer_is_told_all_that_others_may_still_ask_for() {
         (Some(1), Some(0))
     );
     assert_eq!((welcome.generation, welcome.tick), (2, 0));
+
     drop(b);
 }
 
@@ -719,6 +734,7 @@ fn queries_answer_with_the_tick_before() {
             .success()
             .then_some(())
     });
+
     let ask = |what: &str, parameters: &str| {
         let answer = bus
             .get(&keys.query(&name("Leguin"), what), parameters, None)
@@ -732,11 +748,13 @@ fn queries_answer_with_the_tick_before() {
     assert_eq!(state("tick=8;epoch=1").tick, 7);
     assert_eq!(state("tick=7;epoch=1").tick, 6);
     assert!(ask("state", "tick=3;epoch=1").unwrap_err().contains("over"));
+
     // At once, and not when the tick has come: the one who asks asks again.
     for early in ["tick=9;epoch=1", "tick=8;epoch=2"] {
         let refused = ask("state", early).unwrap_err();
         assert!(refused.contains("not been reported yet"), "{refused}");
     }
+
     let refused = ask("state", "tick=10;epoch=1").unwrap_err();
     assert!(refused.contains("out of range"), "{refused}");
     assert!(
@@ -744,6 +762,7 @@ fn queries_answer_with_the_tick_before() {
             .unwrap_err()
             .contains("not a whole number")
     );
+
     for (what, expected) in [
         ("behavior_state", json!("WAIT")),
         ("emotion_state", json!("HAPPY")),
@@ -752,6 +771,7 @@ fn queries_answer_with_the_tick_before() {
         let answer: Value = serde_json::from_slice(&ask(what, "").unwrap()).unwrap();
         assert_eq!((&answer["value"], &answer["tick"]), (&expected, &json!(7)));
     }
+
     lab.ok(&["ctl", "stop", "--run", "wire-query"]);
     launch.finish();
 }
@@ -760,18 +780,23 @@ fn queries_answer_with_the_tick_before() {
 fn the_simulator_survives_rubbish_on_its_port() {
     let (mut wire, a, b) = ready("wire-rubbish");
     let address = wire.endpoint.trim_start_matches("tcp/").to_owned();
+
     for rubbish in [&b"GET / HTTP/1.1\r\n\r\n"[..], &[0; 4096], &[0xff; 4096]] {
         let mut stream = std::net::TcpStream::connect(&address).unwrap();
         let _ = std::io::Write::write_all(&mut stream, rubbish);
     }
+
     wire.start();
+
     for tick in 1..=40 {
         for hand in [&a, &b] {
             assert_eq!(hand.clock().tick, tick);
             hand.put(&hand.report(tick));
         }
     }
+
     assert_eq!(a.clock().end, Some(protocol::messages::End::Finished));
+
     drop((a, b));
     wire.simulator.finish();
 }

@@ -1,5 +1,4 @@
-//! The lock-step of this project, measured with the programs of a build. Scenarios are written here, so that another build
-//! runs the same ones.
+//! Measures the lock-step with the programs of a build. The scenarios are generated here, so two builds run the same ones.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,40 +7,41 @@ use miette::{IntoDiagnostic, WrapErr};
 use serde::Deserialize;
 use simulator::recorder::SUMMARY;
 
-use super::Bench;
 use super::programs::{Processes, Programs, free_endpoint};
+use super::workload::Workload;
 
 /// Name of each run.
 const RUN: &str = "bench";
 /// Length of a tick in the scenarios below, s.
 const TICK_S: f64 = 0.5;
-/// Distance between robots that only answer, m: farther than they sense each other (6 ft).
+/// Distance between idle robots, m; greater than the sensing range (6 ft).
 const APART_M: usize = 3;
-/// Side of the square in which a Butler and his Leguin work, m.
+/// Side of the square room of a Butler and his Leguin, m.
 const ROOM_M: usize = 8;
 
-/// The lock-step with robots that only answer.
-pub(super) fn bare(bench: &Bench<'_>, programs: &Programs, robots: usize) -> miette::Result<f64> {
-    let ticks = bench.ticks_with(robots);
-    let scenario = write(bench, &bare_scenario(robots))?;
+/// Ticks per second of the lock-step with idle robots.
+pub(super) fn bare(
+    workload: &Workload<'_>,
+    programs: &Programs,
+    robots: usize,
+) -> miette::Result<f64> {
+    let scenario = write(workload, &bare_scenario(robots))?;
     let mut commands = Vec::new();
     for number in 0..robots {
         let mut command = programs.command("cars");
         command.args(["bench-robot", "--name", &format!("r{number}")]);
         commands.push(command);
     }
-    let duration_s = ticks as f64 * TICK_S;
-    as_processes(bench, programs, &scenario, duration_s, commands)
+
+    let duration_s = duration_s(workload, robots);
+    as_processes(workload, programs, &scenario, duration_s, commands)
 }
 
 fn bare_scenario(robots: usize) -> String {
     let columns = side_of_square(robots);
     let field_m = APART_M * (columns + 1);
-    let mut text = format!(
-        "tick = \"{TICK_S} s\"\n\
-         [field]\n\
-         size = [\"{field_m} m\", \"{field_m} m\"]\n"
-    );
+    let mut text = scenario_head(field_m);
+
     for number in 0..robots {
         let x = APART_M * (1 + number % columns);
         let y = APART_M * (1 + number / columns);
@@ -51,80 +51,106 @@ fn bare_scenario(robots: usize) -> String {
              at = [\"{x} m\", \"{y} m\"]\n"
         );
     }
+
     text
 }
 
-/// Pairs of a Butler and his Leguin. Nothing is set but who belongs to whom.
-pub(super) fn crowd(bench: &Bench<'_>, programs: &Programs, robots: usize) -> miette::Result<f64> {
-    let ticks = bench.ticks_with(robots);
-    let scenario = write(bench, &crowd_scenario(robots / 2))?;
+/// Ticks per second of pairs of a Butler and his Leguin.
+pub(super) fn crowd(
+    workload: &Workload<'_>,
+    programs: &Programs,
+    robots: usize,
+) -> miette::Result<f64> {
+    let scenario = write(workload, &crowd_scenario(robots / 2))?;
     let mut commands = Vec::new();
     for number in 0..robots / 2 {
         for class in ["Butler", "Leguin"] {
             commands.push(robot(programs, class, &format!("{class}{number}")));
         }
     }
-    let duration_s = ticks as f64 * TICK_S;
-    as_processes(bench, programs, &scenario, duration_s, commands)
+
+    let duration_s = duration_s(workload, robots);
+
+    as_processes(workload, programs, &scenario, duration_s, commands)
 }
 
 fn crowd_scenario(pairs: usize) -> String {
     let columns = side_of_square(pairs);
     let field_m = ROOM_M * columns;
-    let mut text = format!(
-        "tick = \"{TICK_S} s\"\n\
-         [field]\n\
-         size = [\"{field_m} m\", \"{field_m} m\"]\n"
-    );
+    let mut text = scenario_head(field_m);
+
     for number in 0..pairs {
         let left_m = ROOM_M * (number % columns);
         let bottom_m = ROOM_M * (number / columns);
-        text += &format!(
-            "[[robot]]\n\
-             name = \"Butler{number}\"\n\
-             class = \"Butler\"\n\
-             at = [\"{} m\", \"{} m\"]\n\
-             params = {{ refiller = \"Leguin{number}\" }}\n\
-             [[robot]]\n\
-             name = \"Leguin{number}\"\n\
-             class = \"Leguin\"\n\
-             at = [\"{} m\", \"{} m\"]\n\
-             params = {{ waiter = \"Butler{number}\" }}\n",
-            left_m + 5,
-            bottom_m + 5,
-            left_m + 2,
-            bottom_m + 2,
-        );
+        text += &pair(number, left_m, bottom_m);
     }
+
     text
 }
 
-/// Columns of a square with room for so many.
+/// A Butler and his Leguin in the room whose lower left corner is given.
+fn pair(number: usize, left_m: usize, bottom_m: usize) -> String {
+    format!(
+        "[[robot]]\n\
+         name = \"Butler{number}\"\n\
+         class = \"Butler\"\n\
+         at = [\"{} m\", \"{} m\"]\n\
+         params = {{ refiller = \"Leguin{number}\" }}\n\
+         [[robot]]\n\
+         name = \"Leguin{number}\"\n\
+         class = \"Leguin\"\n\
+         at = [\"{} m\", \"{} m\"]\n\
+         params = {{ waiter = \"Butler{number}\" }}\n",
+        left_m + 5,
+        bottom_m + 5,
+        left_m + 2,
+        bottom_m + 2,
+    )
+}
+
+/// Length of a measurement with this number of processes, simulated seconds.
+fn duration_s(workload: &Workload<'_>, processes: usize) -> f64 {
+    workload.ticks_with(processes) as f64 * TICK_S
+}
+
+/// Tick and field, the side of which is given in m.
+fn scenario_head(field_m: usize) -> String {
+    format!(
+        "tick = \"{TICK_S} s\"\n\
+         [field]\n\
+         size = [\"{field_m} m\", \"{field_m} m\"]\n"
+    )
+}
+
+/// Columns of the smallest square with room for this many.
 fn side_of_square(count: usize) -> usize {
     (1..).find(|side| side * side >= count).unwrap_or(count)
 }
 
-/// The hall, a process for each robot.
-pub(super) fn hall(bench: &Bench<'_>, programs: &Programs) -> miette::Result<f64> {
+/// Ticks per second of the hall with a process for each robot.
+pub(super) fn hall(workload: &Workload<'_>, programs: &Programs) -> miette::Result<f64> {
     let mut commands = Vec::new();
-    for (name, spec) in &bench.hall.robots {
+    for (name, spec) in &workload.hall.robots {
         commands.push(robot(programs, &spec.class, name.as_str()));
     }
-    let duration_s = hall_duration_s(bench);
-    as_processes(bench, programs, bench.hall_file, duration_s, commands)
+    let duration_s = hall_duration_s(workload);
+    as_processes(workload, programs, workload.hall_file, duration_s, commands)
 }
 
-/// The hall in one process.
-pub(super) fn hall_in_one_process(bench: &Bench<'_>, programs: &Programs) -> miette::Result<f64> {
-    let duration_s = hall_duration_s(bench);
+/// Ticks per second of the hall in one process.
+pub(super) fn hall_in_one_process(
+    workload: &Workload<'_>,
+    programs: &Programs,
+) -> miette::Result<f64> {
+    let duration_s = hall_duration_s(workload);
     let mut command = programs.command("cars");
-    command.arg("run").arg(bench.hall_file).arg("--quiet");
-    execute(bench, &mut command, duration_s, Vec::new())
+    command.arg("run").arg(workload.hall_file).arg("--quiet");
+    execute(workload, &mut command, duration_s, Vec::new())
 }
 
-fn hall_duration_s(bench: &Bench<'_>) -> f64 {
-    let ticks = bench.ticks / 2;
-    ticks as f64 * bench.hall.tick_s
+fn hall_duration_s(workload: &Workload<'_>) -> f64 {
+    let ticks = workload.ticks / 2;
+    ticks as f64 * workload.hall.tick_s
 }
 
 /// The program of a shipped class.
@@ -136,7 +162,7 @@ fn robot(programs: &Programs, class: &str, name: &str) -> Command {
 
 /// Ticks per second of a simulator and robots as processes.
 fn as_processes(
-    bench: &Bench<'_>,
+    workload: &Workload<'_>,
     programs: &Programs,
     scenario: &Path,
     duration_s: f64,
@@ -150,12 +176,13 @@ fn as_processes(
         robot.env("CARS_RUN", RUN).env("CARS_CONNECT", &endpoint);
         commands.push(robot);
     }
-    execute(bench, &mut simulator, duration_s, commands)
+
+    execute(workload, &mut simulator, duration_s, commands)
 }
 
-/// Runs a simulation and its robots to the end, and returns ticks per second as the simulation measured them.
+/// Runs a simulation and its robots to the end. Returns ticks per second as measured by the simulation.
 fn execute(
-    bench: &Bench<'_>,
+    workload: &Workload<'_>,
     simulation: &mut Command,
     duration_s: f64,
     robots: Vec<Command>,
@@ -163,7 +190,7 @@ fn execute(
     simulation
         .args(["--run", RUN, "--duration", &format!("{duration_s} s")])
         .arg("--out")
-        .arg(bench.scratch);
+        .arg(workload.scratch);
     let mut processes = Processes::default();
     processes.start(simulation)?;
     for mut robot in robots {
@@ -171,13 +198,13 @@ fn execute(
     }
     processes.wait()?;
 
-    let folder = bench.scratch.join(RUN);
+    let folder = workload.scratch.join(RUN);
     let summary = read_summary(&folder.join(SUMMARY))?;
     std::fs::remove_dir_all(&folder).into_diagnostic()?;
     Ok(summary.ticks as f64 / summary.wall.elapsed_s)
 }
 
-/// What is read of a summary: no more than any build writes.
+/// The fields of a summary that every build writes.
 #[derive(Debug, Deserialize)]
 struct Measured {
     ticks: u64,
@@ -190,16 +217,14 @@ struct Wall {
 }
 
 fn read_summary(file: &Path) -> miette::Result<Measured> {
-    let text = std::fs::read_to_string(file)
+    std::fs::read_to_string(file)
         .into_diagnostic()
-        .wrap_err_with(|| format!("reading {}", file.display()))?;
-    serde_json::from_str(&text)
-        .into_diagnostic()
+        .and_then(|text| serde_json::from_str(&text).into_diagnostic())
         .wrap_err_with(|| format!("reading {}", file.display()))
 }
 
-fn write(bench: &Bench<'_>, scenario: &str) -> miette::Result<PathBuf> {
-    let file = bench.scratch.join("scenario.toml");
+fn write(workload: &Workload<'_>, scenario: &str) -> miette::Result<PathBuf> {
+    let file = workload.scratch.join("scenario.toml");
     std::fs::write(&file, scenario)
         .into_diagnostic()
         .wrap_err_with(|| format!("writing {}", file.display()))?;
@@ -222,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn robots_that_only_answer_do_not_sense_each_other() {
+    fn idle_robots_do_not_sense_each_other() {
         for count in [1, 2, 4, 16, 64, 100] {
             let scenario = parsed(bare_scenario(count));
             assert_eq!(scenario.robots.len(), count);
@@ -241,10 +266,10 @@ mod tests {
     #[test]
     fn butlers_and_leguins_belong_together() {
         let scenario = parsed(crowd_scenario(32));
-        let of_class = |class: &str| {
+        for class in ["Butler", "Leguin"] {
             let robots = scenario.robots.values();
-            robots.filter(|robot| robot.class == class).count()
-        };
-        assert_eq!((of_class("Butler"), of_class("Leguin")), (32, 32));
+            let count = robots.filter(|robot| robot.class == class).count();
+            assert_eq!(count, 32, "{class}");
+        }
     }
 }

@@ -9,8 +9,8 @@ use std::time::Duration;
 use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use miette::{IntoDiagnostic, WrapErr, miette};
 
-/// How often it is looked whether processes have ended. It is no part of a measurement: each is timed by the process
-/// that has the clock.
+/// How often the processes are polled for their end. It is no part of the measured time, which the process with the clock
+/// measures.
 const POLL: Duration = Duration::from_millis(20);
 
 /// The folder of a build's programs.
@@ -20,18 +20,22 @@ pub(super) struct Programs {
 }
 
 impl Programs {
-    /// Those of the build that runs now.
+    /// The programs beside this executable.
     pub(super) fn of_this_build() -> miette::Result<Self> {
         let own = std::env::current_exe().into_diagnostic()?;
         let folder = own.parent().unwrap_or(Path::new("/"));
         Self::of(folder)
     }
 
-    /// Those in a folder.
+    /// The programs in a folder.
+    ///
+    /// # Errors
+    /// If one of them is missing.
     pub(super) fn of(folder: &Path) -> miette::Result<Self> {
         let programs = Self {
             folder: folder.to_owned(),
         };
+
         for name in ["cars", "cars-sim", "cars-butler", "cars-leguin"] {
             let program = folder.join(name);
             if !program.exists() {
@@ -42,6 +46,7 @@ impl Programs {
                 ));
             }
         }
+
         Ok(programs)
     }
 
@@ -72,14 +77,14 @@ pub(super) fn free_endpoint() -> miette::Result<String> {
     Ok(format!("tcp/{address}"))
 }
 
-/// Processes of one measurement. They are killed when this is dropped, so none outlives a measurement that fails.
+/// Processes of one measurement. They are killed on drop, so none outlives a measurement that fails.
 #[derive(Debug, Default)]
 pub(super) struct Processes {
     children: Vec<Child>,
 }
 
 impl Processes {
-    /// Starts another process.
+    /// Starts a process.
     pub(super) fn start(&mut self, command: &mut Command) -> miette::Result<()> {
         let child = command
             .spawn()
@@ -89,27 +94,30 @@ impl Processes {
         Ok(())
     }
 
-    /// Waits until all have ended well. The first failure counts: the others might wait for that process.
+    /// Waits until all processes have exited with success.
+    ///
+    /// # Errors
+    /// At the first failure, without waiting for the others: they might wait for the failed process.
     pub(super) fn wait(&mut self) -> miette::Result<()> {
-        loop {
-            let mut is_any_left = false;
-            for child in &mut self.children {
-                match child.try_wait().into_diagnostic()? {
-                    None => is_any_left = true,
-                    Some(status) if status.success() => {}
-                    Some(status) => {
-                        return Err(miette!("a process of the benchmark failed: {status}"));
-                    }
-                }
-            }
-            if !is_any_left {
-                return Ok(());
-            }
+        while self.is_any_running()? {
             std::thread::sleep(POLL);
         }
+        Ok(())
     }
 
-    /// What the process that was started first has printed, if it was started with its output piped and has ended.
+    fn is_any_running(&mut self) -> miette::Result<bool> {
+        let mut is_running = false;
+        for child in &mut self.children {
+            match child.try_wait().into_diagnostic()? {
+                None => is_running = true,
+                Some(status) if status.success() => {}
+                Some(status) => return Err(miette!("a process of the benchmark failed: {status}")),
+            }
+        }
+        Ok(is_running)
+    }
+
+    /// Output of the process that was started first, after its end. Empty unless its output was piped.
     pub(super) fn output_of_first(&mut self) -> miette::Result<String> {
         let mut printed = String::new();
         let first = self.children.first_mut();
@@ -123,7 +131,7 @@ impl Processes {
 impl Drop for Processes {
     fn drop(&mut self) {
         for child in &mut self.children {
-            // One that has ended cannot be killed, which is what is wanted.
+            // Killing a process that has exited fails, which is fine.
             let _ended_already = child.kill();
             let _ended_already = child.wait();
         }

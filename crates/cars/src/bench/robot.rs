@@ -1,4 +1,4 @@
-//! The robot of the bare lock-step: it only answers.
+//! The idle robot of the bare lock-step: it reports and does nothing else.
 
 use std::process::ExitCode;
 
@@ -16,7 +16,7 @@ pub(crate) fn take_part(args: &RobotArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Stands where it was placed.
+/// Stays where it was placed.
 struct Idle;
 
 impl Robot for Idle {

@@ -1,6 +1,6 @@
-//! A barrier with nothing in it but zenoh: the router puts a clock, each client puts a report in its subscriber callback,
-//! and the router puts the next clock in the callback that receives the last report. No queue, no thread of ours, no
-//! message to encode: a lock-step over zenoh with the same settings cannot be faster.
+//! The floor over zenoh: the router puts a clock, each client puts a report in its subscriber callback, and the router puts
+//! the next clock in the callback that receives the last report. It has no queue, no thread of its own and no message to
+//! encode, so no lock-step over zenoh with the same settings is faster.
 
 use std::process::{ExitCode, Stdio};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 
 use super::programs::{Processes, free_endpoint, own_command};
-use super::{CLOCK_BYTES, REPORT_BYTES};
+use super::workload::{CLOCK_BYTES, REPORT_BYTES};
 
 const CLOCK: &str = "cars/star/clock";
 const REPORTS: &str = "cars/star/robot/*/report";
@@ -24,7 +24,7 @@ const TICK: u8 = 1;
 /// First byte of the last clock.
 const END: u8 = 0;
 
-/// How long a process of the star waits for the others: far longer than any measurement takes.
+/// How long a process of the star waits for the others; far longer than any measurement takes.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// `cars bench-star`: the router in the middle.
@@ -33,10 +33,10 @@ pub(crate) struct StarArgs {
     /// Where clients connect.
     #[arg(long)]
     listen: String,
-    /// How many to wait for.
+    /// Number of clients to wait for.
     #[arg(long)]
     clients: u64,
-    /// How many clocks to put.
+    /// Number of clocks to put.
     #[arg(long)]
     ticks: u64,
 }
@@ -47,13 +47,21 @@ pub(crate) struct ClientArgs {
     /// Where the router listens.
     #[arg(long)]
     connect: String,
-    /// Which of the clients it is.
+    /// Number of this client, from 0.
     #[arg(long)]
     number: usize,
 }
 
-/// Ticks per second of a star with so many clients.
+/// Ticks per second of a star with this number of clients.
 pub(super) fn measure(clients: usize, ticks: u64) -> miette::Result<f64> {
+    let printed = run_star(clients, ticks)?;
+    let rate = printed.trim().parse();
+    rate.into_diagnostic()
+        .wrap_err_with(|| format!("the star printed {printed:?}"))
+}
+
+/// Runs a star to its end; returns what its router printed.
+fn run_star(clients: usize, ticks: u64) -> miette::Result<String> {
     let endpoint = free_endpoint()?;
     let mut router = own_command()?;
     router
@@ -72,10 +80,7 @@ pub(super) fn measure(clients: usize, ticks: u64) -> miette::Result<f64> {
     }
     processes.wait()?;
 
-    let printed = processes.output_of_first()?;
-    let rate = printed.trim().parse();
-    rate.into_diagnostic()
-        .wrap_err_with(|| format!("the star printed {printed:?}"))
+    processes.output_of_first()
 }
 
 /// The center of the star: counts reports and puts clocks.
@@ -92,22 +97,23 @@ impl Center {
         self.clock.put(vec![kind; CLOCK_BYTES])
     }
 
-    /// Counts a report. Each count is seen by one call only, so each clock is put once, whatever thread calls.
+    /// Counts a report. The counter returns each number to one caller only, so each clock is put once even if zenoh calls
+    /// from several threads.
     fn on_report(&self) {
         let reports = self.reports.fetch_add(1, Ordering::SeqCst) + 1;
         if !reports.is_multiple_of(self.clients) {
             return;
         }
 
-        let outcome = if reports / self.clients == self.ticks {
-            Ok(Instant::now())
-        } else {
-            match self.put_clock(TICK) {
-                Ok(()) => return,
-                Err(error) => Err(error),
-            }
-        };
-        // The receiver is gone only when the measurement has failed already.
+        if reports / self.clients == self.ticks {
+            self.end(Ok(Instant::now()));
+        } else if let Err(error) = self.put_clock(TICK) {
+            self.end(Err(error));
+        }
+    }
+
+    fn end(&self, outcome: Result<Instant, BusError>) {
+        // The receiver is dropped only when the measurement has failed already.
         let _failed_already = self.outcome.send(outcome);
     }
 }
@@ -149,14 +155,16 @@ fn wait_for_clients(bus: &Bus, clients: u64) -> miette::Result<()> {
     let _tokens = bus
         .liveliness(TOKENS, move |_, is_there| {
             if is_there {
-                // The receiver is gone once all have arrived.
+                // The receiver is dropped once all tokens are declared.
                 let _all_are_there = sender.send(());
             }
         })
         .into_diagnostic()?;
+
     for _ in 0..clients {
         wait(&arrivals)?;
     }
+
     Ok(())
 }
 
@@ -173,16 +181,10 @@ pub(crate) fn client(args: &ClientArgs) -> miette::Result<ExitCode> {
     let (sender, finished) = channel();
     let _clock = bus
         .subscribe(CLOCK, move |_, clock| {
-            let outcome = if clock.first() == Some(&END) {
-                Ok(())
-            } else {
-                match report.put(vec![2; REPORT_BYTES]) {
-                    Ok(()) => return,
-                    Err(error) => Err(error),
-                }
-            };
-            // The receiver is gone only when this client has ended already.
-            let _ended_already = sender.send(outcome);
+            if let Some(outcome) = answer(clock, &report) {
+                // The receiver is dropped only when this client has ended already.
+                let _ended_already = sender.send(outcome);
+            }
         })
         .into_diagnostic()?;
     let _token = bus
@@ -194,8 +196,18 @@ pub(crate) fn client(args: &ClientArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Puts a report. Returns the outcome of the measurement at the last clock, or if the put fails.
+fn answer(clock: &[u8], report: &Publisher) -> Option<Result<(), BusError>> {
+    if clock.first() == Some(&END) {
+        return Some(Ok(()));
+    }
+
+    let put = report.put(vec![2; REPORT_BYTES]);
+    put.is_err().then_some(put)
+}
+
 fn wait<T>(receiver: &Receiver<T>) -> miette::Result<T> {
     receiver
         .recv_timeout(PATIENCE)
-        .map_err(|_| miette!("the star stands still"))
+        .map_err(|_| miette!("the star did not finish within {PATIENCE:?}"))
 }

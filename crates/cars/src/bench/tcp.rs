@@ -1,4 +1,4 @@
-//! A barrier with nothing in it but TCP: one write and one read for each process and tick.
+//! The floor over TCP: a barrier of one write and one read for each process and tick.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -9,7 +9,7 @@ use clap::Args;
 use miette::IntoDiagnostic;
 
 use super::programs::{Processes, own_command};
-use super::{CLOCK_BYTES, REPORT_BYTES};
+use super::workload::{CLOCK_BYTES, REPORT_BYTES};
 
 /// `cars bench-echo`.
 #[derive(Debug, Args)]
@@ -18,7 +18,7 @@ pub(crate) struct EchoArgs {
     address: String,
 }
 
-/// Ticks per second of a barrier with so many processes.
+/// Ticks per second of a barrier with this number of processes.
 pub(super) fn measure(processes: usize, ticks: u64) -> miette::Result<f64> {
     let listener = TcpListener::bind("127.0.0.1:0").into_diagnostic()?;
     let address = listener.local_addr().into_diagnostic()?.to_string();
@@ -32,24 +32,30 @@ pub(super) fn measure(processes: usize, ticks: u64) -> miette::Result<f64> {
     }
 
     let begun = Instant::now();
-    let mut report = [0; REPORT_BYTES];
     for _ in 0..ticks {
-        for stream in &mut streams {
-            stream.write_all(&[1; CLOCK_BYTES]).into_diagnostic()?;
-        }
-        for stream in &mut streams {
-            stream.read_exact(&mut report).into_diagnostic()?;
-        }
+        tick(&mut streams).into_diagnostic()?;
     }
     let rate = ticks as f64 / begun.elapsed().as_secs_f64();
 
-    // The other side ends with its connection.
+    // The processes end when their connections are closed.
     drop(streams);
     children.wait()?;
     Ok(rate)
 }
 
-/// The other side of the barrier.
+fn tick(streams: &mut [TcpStream]) -> std::io::Result<()> {
+    for stream in &mut *streams {
+        stream.write_all(&[1; CLOCK_BYTES])?;
+    }
+
+    let mut report = [0; REPORT_BYTES];
+    for stream in streams {
+        stream.read_exact(&mut report)?;
+    }
+    Ok(())
+}
+
+/// A process of the barrier: answers each clock with a report.
 pub(crate) fn echo(args: &EchoArgs) -> miette::Result<ExitCode> {
     let mut stream = TcpStream::connect(&args.address).into_diagnostic()?;
     stream.set_nodelay(true).into_diagnostic()?;

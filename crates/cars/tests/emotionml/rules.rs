@@ -61,6 +61,7 @@ pub(crate) fn broken(text: &str) -> BTreeSet<String> {
     let Ok(document) = Document::parse(text) else {
         return ["xml".to_owned()].into();
     };
+
     let mut rules = Rules::default();
     let root = document.root_element();
     rules.demand("101", root.has_tag_name((NAMESPACE, "emotionml")));
@@ -81,9 +82,11 @@ pub(crate) fn broken(text: &str) -> BTreeSet<String> {
             rules.demand("304", !has_own);
         }
     }
+
     for emotion in elements(root, "emotion") {
         rules.emotion(root, emotion, &vocabularies);
     }
+
     rules.broken
 }
 
@@ -106,6 +109,7 @@ impl Rules {
             let uri = format!("http://www.w3.org/TR/emotion-voc/xml#{id}");
             all.insert(uri, (kind, items.split_whitespace().collect()));
         }
+
         for vocabulary in elements(root, "vocabulary") {
             let (kind, id) = (
                 vocabulary.attribute("type").unwrap_or(""),
@@ -120,6 +124,7 @@ impl Rules {
             self.demand("schema vocabulary", !items.is_empty());
             all.insert(format!("#{}", id.unwrap_or("")), (kind, items));
         }
+
         all
     }
 
@@ -152,6 +157,7 @@ impl Rules {
             );
             reached = group.unwrap_or(reached).max(reached);
         }
+
         self.demand("schema order", elements(of, "info").count() <= 1);
     }
 
@@ -163,6 +169,7 @@ impl Rules {
             .flat_map(|kind| elements(emotion, kind))
             .collect();
         self.demand("156", !descriptors.is_empty());
+
         for (kind, hundred) in KINDS.into_iter().zip([210, 220, 230, 240]) {
             let mut names = BTreeSet::new();
             for descriptor in elements(emotion, kind) {
@@ -179,6 +186,7 @@ impl Rules {
                 self.scale(emotion, descriptor, hundred);
             }
         }
+
         for reference in elements(emotion, "reference") {
             self.demand(
                 "410",
@@ -193,6 +201,7 @@ impl Rules {
                     .is_none_or(|role| ROLES.contains(&role)),
             );
         }
+
         self.times(emotion);
     }
 
@@ -204,10 +213,13 @@ impl Rules {
         );
         self.demand(&(hundred + 6).to_string(), value.is_none() || traces == 0);
         self.demand("schema order", traces <= 1);
+
         if hundred == 220 {
             self.demand("224", value.is_some() || traces > 0);
         }
+
         self.demand("schema value", value.is_none_or(is_scale_value));
+
         for trace in elements(descriptor, "trace") {
             let frequency_hz = frequency_hz(trace.attribute("freq").unwrap_or(""));
             self.demand("schema freq", frequency_hz.is_some());
@@ -244,6 +256,7 @@ impl Rules {
             let is_whole = |text: &str| text.parse::<u64>().is_ok();
             self.demand("schema time", emotion.attribute(name).is_none_or(is_whole));
         }
+
         let offset = emotion.attribute("offset-to-start");
         self.demand(
             "schema time",

@@ -11,12 +11,14 @@ use std::sync::Once;
 /// The schema is there, `xmllint` is not, and this is CI.
 pub(crate) fn is_valid(document: &str, folder: &Path) -> Option<bool> {
     let schema = schema()?;
+
     if Command::new("xmllint").arg("--version").output().is_err() {
         let text = "no `xmllint`: install it (Debian: libxml2-utils) to validate by W3C's schema";
         assert!(std::env::var_os("CI").is_none(), "{text}");
         say(text);
         return None;
     }
+
     let file = folder.join("document.xml");
     std::fs::write(&file, document).unwrap();
     let args = ["--noout", "--nonet", "--schema"];
@@ -26,6 +28,7 @@ pub(crate) fn is_valid(document: &str, folder: &Path) -> Option<bool> {
         .arg(file)
         .output()
         .unwrap();
+
     // 3 and 4: not valid. Anything else says nothing about the document.
     let code = output.status.code();
     assert!(
@@ -33,11 +36,13 @@ pub(crate) fn is_valid(document: &str, folder: &Path) -> Option<bool> {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
+
     Some(code == Some(0))
 }
 
 fn schema() -> Option<PathBuf> {
     const VARIABLE: &str = "CARS_EMOTIONML_XSD";
+
     let told = std::env::var_os(VARIABLE).map(PathBuf::from);
     let beside =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/emotionml/emotionml.xsd");
@@ -45,10 +50,12 @@ fn schema() -> Option<PathBuf> {
     if schema.exists() {
         return Some(schema);
     }
+
     say(&format!(
         "no W3C schema: put emotionml.xsd and emotionml-fragments.xsd of https://www.w3.org/TR/emotionml/ into one \
          folder and let {VARIABLE} name the first to validate by it"
     ));
+
     None
 }
 

@@ -417,7 +417,7 @@ export interface SetupAnswer {
  */
 export interface FieldError {
   /**
-   * Path of the field: `sent.command`, `robots.Butler`, `setup.obstacles`.
+   * Path of the field: `command`, `robots.Butler`, `setup.obstacles`.
    */
   field: string;
   /**

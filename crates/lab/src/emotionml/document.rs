@@ -1,4 +1,4 @@
-//! The document: its beginning, an `<emotion>` for each episode, its vocabularies at the end, when they are known.
+//! Writes the document: its head, an `<emotion>` for each episode, and at the end the vocabularies, when they are known.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
@@ -7,12 +7,12 @@ use affect::akr::{ActionTendency, FacialExpression, Valence};
 use affect::{AgencyRole, Circumstances, DynamicsParameters, Schema, SchemaValence, Schemata};
 use protocol::RobotName;
 use protocol::keys::Keys;
+use protocol::messages::Parameters;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 
-use super::episode::{Episode, Seen};
-use super::notes::note;
-use super::source::Facts;
+use super::episode::{Episode, RobotState};
+use super::reader::Facts;
 use super::terms::{self, Term};
 
 const NAMESPACE: &str = "http://www.w3.org/2009/10/emotionml";
@@ -22,7 +22,7 @@ const ROOT: &str = "emotionml";
 const EMOTIONS: &str = "cars-emotions";
 const TENDENCIES: &str = "cars-action-tendencies";
 
-/// What the refiller's way is blocked by, in words [I: as her panel says it].
+/// What blocks the refiller's way, in words [I: as on her panel].
 const CROWD: &str = "the crowd";
 
 /// A document that is being written.
@@ -30,21 +30,22 @@ pub(super) struct Document<W: Write> {
     xml: Writer<W>,
     facts: Facts,
     keys: Keys,
-    /// Names of the robots: who can be a target.
+    /// Names of the robots, which can be targets of emotions.
     roster: BTreeSet<RobotName>,
-    /// Whether W3C's vocabularies alone are spoken.
+    /// Whether only W3C's vocabularies are used.
     is_standard: bool,
-    /// What occurred, for the vocabularies.
+    /// Emotions written so far, for the vocabulary.
     emotions: BTreeSet<String>,
+    /// Action tendencies written so far, for the vocabulary.
     tendencies: BTreeSet<ActionTendency>,
-    /// Emotions that cannot be said in this view.
+    /// Number of episodes left out, by emotion: this view has no term for it.
     left_out: BTreeMap<String, u64>,
 }
 
-/// What an `<emotion>` says of one aspect.
+/// One element of an `<emotion>`, such as its category.
 struct Descriptor {
     kind: Kind,
-    /// The vocabulary of its name, as the `*-set` attribute has it; the same for all of a kind.
+    /// URI of the vocabulary of its name, for the `*-set` attribute; the same for all of a kind.
     set: String,
     name: String,
     scale: Scale,
@@ -59,11 +60,12 @@ enum Kind {
     ActionTendency,
 }
 
-/// How strongly: never both a value and a trace.
+/// Strength of a descriptor. The schema allows a value or a trace, not both.
 enum Scale {
-    Unsaid,
+    /// Not given.
+    Unknown,
     Value(f64),
-    /// The episode's intensity.
+    /// The intensity of the episode, tick by tick.
     Trace,
 }
 
@@ -116,7 +118,7 @@ impl Descriptor {
 }
 
 impl<W: Write> Document<W> {
-    /// Begins a document.
+    /// Writes the head of a document.
     pub(super) fn begin(
         out: W,
         facts: Facts,
@@ -130,16 +132,16 @@ impl<W: Write> Document<W> {
         xml.write_event(Event::Start(root))?;
         let keys = Keys::new(&facts.run);
         write_info(&mut xml, &about(&facts, &keys))?;
-        let (emotions, tendencies, left_out) = Default::default();
+
         Ok(Self {
             xml,
             facts,
             keys,
             roster,
             is_standard,
-            emotions,
-            tendencies,
-            left_out,
+            emotions: BTreeSet::new(),
+            tendencies: BTreeSet::new(),
+            left_out: BTreeMap::new(),
         })
     }
 
@@ -157,37 +159,21 @@ impl<W: Write> Document<W> {
             self.tendencies
                 .extend(schema.map(|schema| schema.action_tendency));
         }
-        let told = schema.map(|schema| Told::new(schema, episode, &self.facts));
+        let explanation = schema.map(|schema| Explanation::new(schema, episode, &self.facts));
+        let other = explanation.as_ref().and_then(|own| own.other.as_deref());
+        let targeted_at = other.and_then(|other| self.target(other));
         let experienced_by = self.robot_uri(&episode.begun.name);
-        let targeted_at = told
-            .as_ref()
-            .and_then(|told| self.target(told.other.as_deref()?));
         let trace = episode.intensity.values().map(samples);
         let frequency = format!("{}Hz", 1.0 / self.facts.tick_s);
+        let time = self.time_attributes(episode);
 
-        let element = self.xml.create_element("emotion").with_attributes([
-            (
-                "id",
-                format!("emotion.{}.{}", episode.begun.name, episode.first).as_str(),
-            ),
-            ("time-ref-uri", &self.keys.clock()),
-            (
-                "offset-to-start",
-                &milliseconds(episode.first, self.facts.tick_s).to_string(),
-            ),
-            (
-                "duration",
-                &duration_ms(episode, self.facts.tick_s).to_string(),
-            ),
-        ]);
+        let element = self.xml.create_element("emotion");
+        let element = element.with_attributes(time.iter().map(|(key, value)| (*key, &**value)));
         let element = element.with_attributes(sets(&descriptors));
-        // A neutral face expresses nothing.
-        let is_seen =
-            schema.is_some_and(|schema| schema.facial_expression != FacialExpression::Neutral);
-        let element = element.with_attributes(is_seen.then_some(("expressed-through", "face")));
+        let element = element.with_attributes(expressed_through(schema));
         element.write_inner_content(|xml| {
-            if let Some(told) = &told {
-                write_info(xml, &told.account)?;
+            if let Some(explanation) = &explanation {
+                write_info(xml, &explanation.text)?;
             }
             for descriptor in &descriptors {
                 write_descriptor(xml, descriptor, trace.as_deref(), &frequency)?;
@@ -195,61 +181,74 @@ impl<W: Write> Document<W> {
             write_reference(xml, &experienced_by, "experiencedBy")?;
             targeted_at.map_or(Ok(()), |uri| write_reference(xml, &uri, "targetedAt"))
         })?;
-        // Whoever reads along gets whole emotions.
+
+        // A program that follows the output sees complete emotions only.
         self.xml.get_mut().flush()
     }
 
-    /// Ends the document: the vocabularies, and what could not be said.
-    pub(super) fn end(mut self) -> io::Result<()> {
-        let emotions: Vec<_> = self
-            .emotions
-            .iter()
-            .map(|name| (terms::token(name), describe_emotion(name)))
-            .collect();
-        write_vocabulary(&mut self.xml, "category", EMOTIONS, emotions)?;
-        let tendencies = self
-            .tendencies
-            .iter()
-            .map(|t| (t.name().to_owned(), describe_tendency(*t)));
-        let tendencies: Vec<_> = tendencies.collect();
-        write_vocabulary(&mut self.xml, "action-tendency", TENDENCIES, tendencies)?;
-        for (name, count) in &self.left_out {
-            note(&format!(
-                "{count} episodes of {name:?} are left out: no standard vocabulary can say it"
-            ));
-        }
-        self.xml.write_event(Event::End(BytesEnd::new(ROOT)))?;
-        self.xml.get_mut().write_all(b"\n")
+    /// Id, reference clock, begin and duration of an episode.
+    fn time_attributes(&self, episode: &Episode) -> [(&'static str, String); 4] {
+        let name = &episode.begun.name;
+        let begin_ms = milliseconds(episode.first, self.facts.tick_s);
+        let duration_ms = duration_ms(episode, self.facts.tick_s);
+
+        [
+            ("id", format!("emotion.{name}.{}", episode.first)),
+            ("time-ref-uri", self.keys.clock()),
+            ("offset-to-start", begin_ms.to_string()),
+            ("duration", duration_ms.to_string()),
+        ]
     }
 
-    /// All that is known of an episode, in the order of kinds.
+    /// Writes the vocabularies and the end tag. Returns notes about episodes that were left out.
+    pub(super) fn end(mut self) -> io::Result<Vec<String>> {
+        let mut emotions = Vec::new();
+        for name in &self.emotions {
+            emotions.push((terms::token(name), describe_emotion(name)));
+        }
+        write_vocabulary(&mut self.xml, "category", EMOTIONS, emotions)?;
+
+        let mut tendencies = Vec::new();
+        for tendency in &self.tendencies {
+            tendencies.push((tendency.name().to_owned(), describe_tendency(*tendency)));
+        }
+        write_vocabulary(&mut self.xml, "action-tendency", TENDENCIES, tendencies)?;
+
+        self.xml.write_event(Event::End(BytesEnd::new(ROOT)))?;
+        self.xml.get_mut().write_all(b"\n")?;
+        Ok(self.notes())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (name, count) in &self.left_out {
+            notes.push(format!(
+                "{count} episodes of {name:?} are left out: no standard vocabulary has a term for it"
+            ));
+        }
+        notes
+    }
+
+    /// The descriptors of an episode, ordered by kind.
     fn descriptors(&self, episode: &Episode, schema: Option<&Schema>) -> Vec<Descriptor> {
         let mean_intensity = episode.intensity.values().and_then(mean);
         let mut descriptors = Vec::new();
         descriptors.extend(self.category(episode));
+
         if let Some(schema) = schema {
-            let value = mean_intensity
-                .zip(sign(schema.valence))
-                .map(|(mean, sign)| 0.5 + 0.5 * sign * mean);
-            descriptors.extend(value.map(|value| Descriptor::dimension(terms::VALENCE, value)));
-            let unpredictability = terms::unpredictability(schema.certainty);
-            descriptors.push(Descriptor::dimension(
-                terms::UNPREDICTABILITY,
-                unpredictability,
-            ));
+            descriptors.extend(dimensions(schema, mean_intensity));
             descriptors.extend(components(schema));
         } else if self.is_standard && mean_intensity.is_some() {
-            descriptors.push(Descriptor::of_w3c(
-                Kind::Dimension,
-                terms::INTENSITY,
-                Scale::Trace,
-            ));
+            let intensity = Descriptor::of_w3c(Kind::Dimension, terms::INTENSITY, Scale::Trace);
+            descriptors.push(intensity);
         }
         if let Some(urgency) = self.urgency(episode) {
             descriptors.push(Descriptor::appraisal(terms::URGENCY, urgency));
             descriptors.push(Descriptor::appraisal(terms::DESIRABILITY, 1.0 - urgency));
         }
+
         descriptors.extend(schema.and_then(|schema| self.tendency(schema.action_tendency)));
+
         descriptors
     }
 
@@ -258,56 +257,52 @@ impl<W: Write> Document<W> {
         let scale = if episode.intensity.values().is_some() {
             Scale::Trace
         } else {
-            Scale::Unsaid
+            Scale::Unknown
         };
+
+        let kind = Kind::Category;
         if self.is_standard {
             let term = terms::nearest_category(emotion)?;
-            return Some(Descriptor::of_w3c(Kind::Category, term, scale));
+            return Some(Descriptor::of_w3c(kind, term, scale));
         }
-        Some(Descriptor::own(
-            Kind::Category,
-            EMOTIONS,
-            terms::token(emotion),
-            scale,
-        ))
+
+        let name = terms::token(emotion);
+        Some(Descriptor::own(kind, EMOTIONS, name, scale))
     }
 
     fn tendency(&self, tendency: ActionTendency) -> Option<Descriptor> {
+        let kind = Kind::ActionTendency;
         if self.is_standard {
             let term = terms::nearest_tendency(tendency)?;
-            return Some(Descriptor::of_w3c(
-                Kind::ActionTendency,
-                term,
-                Scale::Unsaid,
-            ));
+            return Some(Descriptor::of_w3c(kind, term, Scale::Unknown));
         }
+
         let name = tendency.name().to_owned();
-        Some(Descriptor::own(
-            Kind::ActionTendency,
-            TENDENCIES,
-            name,
-            Scale::Unsaid,
-        ))
+        Some(Descriptor::own(kind, TENDENCIES, name, Scale::Unknown))
     }
 
-    /// How much the need pressed, on the average: 1 is the need that saturates the robot's emotion.
+    /// Mean urgency of the need, 0 to 1; 1 is the need that saturates the robot's emotion.
     fn urgency(&self, episode: &Episode) -> Option<f64> {
-        let parameters = self.facts.parameters.get(&episode.begun.name);
-        let rho_max = parameters.and_then(|own| own.get("dynamics")?.get("rho_max")?.as_f64());
-        let rho_max = rho_max
-            .filter(|rho| *rho > 0.0)
-            .unwrap_or_else(|| DynamicsParameters::default().rho_max);
-        let urgencies: Vec<f64> = episode
-            .need_ratio
-            .values()?
-            .iter()
-            .map(|rho| (rho / rho_max).min(1.0))
-            .collect();
+        let rho_max = self.rho_max(&episode.begun.name);
+        let mut urgencies = Vec::new();
+        for rho in episode.need_ratio.values()? {
+            urgencies.push((rho / rho_max).min(1.0));
+        }
+
         mean(&urgencies)
     }
 
+    /// The need ratio that saturates the emotion of a robot: from its parameters, or the default.
+    fn rho_max(&self, name: &RobotName) -> f64 {
+        let parameters = self.facts.parameters.get(name);
+        let rho_max = parameters.and_then(|own| own.get("dynamics")?.get("rho_max")?.as_f64());
+        rho_max
+            .filter(|rho| *rho > 0.0)
+            .unwrap_or_else(|| DynamicsParameters::default().rho_max)
+    }
+
     fn robot_uri(&self, name: &RobotName) -> String {
-        // Without a query, the address under which the robot answers them.
+        // The common prefix of the keys at which the robot answers queries.
         self.keys.query(name, "").trim_end_matches('/').to_owned()
     }
 
@@ -316,64 +311,93 @@ impl<W: Write> Document<W> {
     }
 }
 
-/// An emotion as its robot would account for it.
-struct Told {
-    account: String,
-    /// Who is responsible, if that is not the robot itself.
+/// The cause of an emotion as its robot states it.
+struct Explanation {
+    text: String,
+    /// The agent responsible, if it is not the robot itself.
     other: Option<String>,
 }
 
-impl Told {
-    /// Reads what the shipped robots publish: `refiller` and `treats` of a waiter, `waiter` and `hurried` of a refiller.
-    /// A robot of another kind that publishes the same is told likewise; of one that does not, less is told.
+impl Explanation {
+    /// Reads the state variables of the shipped robots: `refiller` and `treats` of a waiter, `waiter` and `hurried` of a
+    /// refiller. The explanation of a robot without these variables has fewer details.
     fn new(schema: &Schema, episode: &Episode, facts: &Facts) -> Self {
-        let (begun, before) = (&episode.begun, &episode.before);
+        let begun = &episode.begun;
         let parameters = facts.parameters.get(&begun.name);
-        let parameter = |name: &str| parameters.and_then(|own| own.get(name)?.as_str());
-        let goods = parameter("goods").unwrap_or("treats");
+        let goods = text_of(parameters, "goods").unwrap_or("treats");
+        let treats = begun.number("treats");
+        let amount = treats.map(|treats| format!("{treats} {goods}"));
+
         let waiter = begun.text("waiter");
-        let other = begun
-            .text("refiller")
-            .or(waiter.map(|waiter| blamed(before, waiter)));
-        let goal = parameter("goal").map(str::to_owned);
-        let goal = goal.or(waiter.map(|waiter| format!("to bring {goods} to {waiter}")));
-        let amount = begun
-            .number_in_words("treats")
-            .map(|treats| format!("{treats} {goods}"));
+        let mut other = begun.text("refiller");
+        let mut goal = text_of(parameters, "goal").map(str::to_owned);
+        if let Some(waiter) = waiter {
+            other = other.or(Some(blamed(&episode.before, waiter)));
+            goal = goal.or(Some(format!("to bring {goods} to {waiter}")));
+        }
+
         let circumstances = Circumstances {
             other,
             goal: goal.as_deref(),
             amount: amount.as_deref(),
             valence: None,
         };
-        let account = schema.account(&circumstances).spoken();
-        let other = other
-            .filter(|_| schema.agency == AgencyRole::Other)
-            .map(str::to_owned);
-        Self { account, other }
+        let is_by_other = schema.agency == AgencyRole::Other;
+        Self {
+            text: schema.account(&circumstances).spoken(),
+            other: other.filter(|_| is_by_other).map(str::to_owned),
+        }
     }
 }
 
-/// On the way it is the crowd that a refiller blames, unless it is the waiter who presses.
-fn blamed<'a>(before: &Seen, waiter: &'a str) -> &'a str {
+/// A parameter of a robot that is a text.
+fn text_of<'a>(parameters: Option<&'a Parameters>, name: &str) -> Option<&'a str> {
+    parameters?.get(name)?.as_str()
+}
+
+/// The agent that a refiller blames: the crowd while she is on her way, unless the waiter has hurried her.
+fn blamed<'a>(before: &RobotState, waiter: &'a str) -> &'a str {
     let is_crowd = before.behavior == "REFILL" && !before.flag("hurried");
     if is_crowd { CROWD } else { waiter }
 }
 
-/// What is the same in every instance of an emotion.
+/// The `expressed-through` attribute; a neutral face expresses nothing.
+fn expressed_through(schema: Option<&Schema>) -> Option<(&'static str, &'static str)> {
+    let is_expressed = schema?.facial_expression != FacialExpression::Neutral;
+    is_expressed.then_some(("expressed-through", "face"))
+}
+
+/// Valence and unpredictability. Valence needs a mean intensity and a schema with a sign.
+fn dimensions(schema: &Schema, mean_intensity: Option<f64>) -> Vec<Descriptor> {
+    let mut dimensions = Vec::new();
+    if let (Some(mean), Some(sign)) = (mean_intensity, sign(schema.valence)) {
+        let valence = 0.5 + 0.5 * sign * mean;
+        dimensions.push(Descriptor::dimension(terms::VALENCE, valence));
+    }
+
+    let unpredictability = terms::unpredictability(schema.certainty);
+    dimensions.push(Descriptor::dimension(
+        terms::UNPREDICTABILITY,
+        unpredictability,
+    ));
+    dimensions
+}
+
+/// The appraisals that all episodes of an emotion share.
 fn components(schema: &Schema) -> [Descriptor; 4] {
     let agency = match schema.agency {
         AgencyRole::Oneself => 1.0,
         AgencyRole::Other => 0.0,
     };
+    let unexpectedness = terms::unexpectedness(schema.novelty);
+    let controllability = terms::degree(schema.controllability);
+    let changeability = terms::degree(schema.modifiability);
+
     [
         Descriptor::appraisal(terms::AGENCY, agency),
-        Descriptor::appraisal(terms::UNEXPECTEDNESS, terms::unexpectedness(schema.novelty)),
-        Descriptor::appraisal(
-            terms::CONTROLLABILITY,
-            terms::degree(schema.controllability),
-        ),
-        Descriptor::appraisal(terms::CHANGEABILITY, terms::degree(schema.modifiability)),
+        Descriptor::appraisal(terms::UNEXPECTEDNESS, unexpectedness),
+        Descriptor::appraisal(terms::CONTROLLABILITY, controllability),
+        Descriptor::appraisal(terms::CHANGEABILITY, changeability),
     ]
 }
 
@@ -398,7 +422,7 @@ fn milliseconds(tick: u64, tick_s: f64) -> u64 {
     (tick as f64 * tick_s * 1000.0).round() as u64
 }
 
-/// From the beginning of the first to the end of the last tick, so that one episode ends where the next one begins.
+/// Duration from the beginning of the first to the end of the last tick: an episode ends where the next one begins.
 fn duration_ms(episode: &Episode, tick_s: f64) -> u64 {
     milliseconds(episode.last + 1, tick_s) - milliseconds(episode.first, tick_s)
 }
@@ -413,7 +437,7 @@ fn sets(descriptors: &[Descriptor]) -> Vec<(&'static str, &str)> {
     sets
 }
 
-/// What a reader of the document has to know.
+/// The description of the document: its run, and how times and traces are to be read.
 fn about(facts: &Facts, keys: &Keys) -> String {
     let Facts {
         run,
@@ -422,9 +446,11 @@ fn about(facts: &Facts, keys: &Keys) -> String {
         file,
         ..
     } = facts;
-    let epoch = facts
-        .epoch
-        .map_or_else(String::new, |epoch| format!(", epoch {epoch}"));
+    let epoch = match facts.epoch {
+        Some(epoch) => format!(", epoch {epoch}"),
+        None => String::new(),
+    };
+
     format!(
         "Emotions of robots in the simulated run {run}{epoch}, seed {seed}, from its {file}, by cars {}. \
          Times are simulated milliseconds since tick 0 of {}; a tick lasts {tick_s} s and a trace has one sample a tick. \
@@ -437,26 +463,24 @@ fn about(facts: &Facts, keys: &Keys) -> String {
 
 fn describe_emotion(name: &str) -> String {
     let mut parts = vec![format!("emotion state {name}")];
-    parts.extend(terms::nearest_category(name).map(|term| format!("nearest: {}", term.in_words())));
+    if let Some(term) = terms::nearest_category(name) {
+        parts.push(format!("nearest: {}", term.in_words()));
+    }
     if let Some(schema) = Schemata::standard().get(name) {
-        parts.push(format!(
-            "face: {}",
-            format!("{:?}", schema.facial_expression).to_lowercase()
-        ));
+        let face = format!("{:?}", schema.facial_expression);
+        parts.push(format!("face: {}", face.to_lowercase()));
     }
     parts.join("; ")
 }
 
 fn describe_tendency(tendency: ActionTendency) -> String {
     let mut parts = vec![format!("action tendency {}", tendency.name())];
-    parts.extend(
-        tendency
-            .function()
-            .map(|function| format!("function: {function}")),
-    );
-    parts.extend(
-        terms::nearest_tendency(tendency).map(|term| format!("nearest: {}", term.in_words())),
-    );
+    if let Some(function) = tendency.function() {
+        parts.push(format!("function: {function}"));
+    }
+    if let Some(term) = terms::nearest_tendency(tendency) {
+        parts.push(format!("nearest: {}", term.in_words()));
+    }
     parts.join("; ")
 }
 
@@ -474,6 +498,7 @@ fn write_descriptor<W: Write>(
 ) -> io::Result<()> {
     let element = xml.create_element(descriptor.kind.element());
     let element = element.with_attribute(("name", descriptor.name.as_str()));
+
     match (&descriptor.scale, trace) {
         (Scale::Value(value), _) => element
             .with_attribute(("value", terms::scale_value(*value).as_str()))
@@ -485,8 +510,9 @@ fn write_descriptor<W: Write>(
                 .write_empty()
                 .map(drop)
         })?,
-        (Scale::Unsaid, _) | (Scale::Trace, None) => element.write_empty()?,
+        (Scale::Unknown, _) | (Scale::Trace, None) => element.write_empty()?,
     };
+
     Ok(())
 }
 
@@ -497,7 +523,7 @@ fn write_reference<W: Write>(xml: &mut Writer<W>, uri: &str, role: &str) -> io::
     Ok(())
 }
 
-/// A vocabulary has at least one item.
+/// Writes a vocabulary, unless it is empty: the schema requires an item.
 fn write_vocabulary<W: Write>(
     xml: &mut Writer<W>,
     kind: &str,
@@ -507,16 +533,17 @@ fn write_vocabulary<W: Write>(
     if items.is_empty() {
         return Ok(());
     }
+
     xml.create_element("vocabulary")
         .with_attributes([("type", kind), ("id", id)])
         .write_inner_content(|xml| {
             for (name, text) in items {
-                let item = xml
-                    .create_element("item")
-                    .with_attribute(("name", name.as_str()));
+                let item = xml.create_element("item");
+                let item = item.with_attribute(("name", name.as_str()));
                 item.write_inner_content(|xml| write_info(xml, &text))?;
             }
             Ok(())
         })?;
+
     Ok(())
 }

@@ -5,39 +5,37 @@ use std::collections::{BTreeMap, BTreeSet};
 use protocol::messages::StateVariables;
 use protocol::{RobotName, Tick};
 
-use super::notes::note;
-
-/// The variables by which a robot publishes how strongly it feels, and how its need compares with what can be done.
+/// State variables with the intensity of a robot's emotion, and with the ratio of its need to what can be done.
 const INTENSITY: &str = "intensity";
 const NEED_RATIO: &str = "need_ratio";
 
-/// How a robot without emotions names its state.
+/// Emotion state of a robot without emotions.
 const NEUTRAL: &str = "NEUTRAL";
 
-/// What a robot showed of itself in a tick.
+/// What a robot published in a tick.
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(super) struct RobotState {
     pub(super) name: RobotName,
-    /// Whether its report is missing, so that the rest is older.
+    /// Whether its report is missing, so that the other fields are older than the tick.
     pub(super) missed: bool,
     pub(super) emotion: String,
     pub(super) behavior: String,
-    /// What it published; `None` where that is not known.
+    /// Its state variables; `None` where the record has none.
     pub(super) variables: Option<StateVariables>,
 }
 
-impl Seen {
-    /// A number that it published, if it is one.
-    fn number(&self, name: &str) -> Option<f64> {
+impl RobotState {
+    /// A state variable that is a number.
+    pub(super) fn number(&self, name: &str) -> Option<f64> {
         self.variables.as_ref()?.get(name)?.as_f64()
     }
 
-    /// A text that it published, if it is one.
+    /// A state variable that is a text.
     pub(super) fn text(&self, name: &str) -> Option<&str> {
         self.variables.as_ref()?.get(name)?.as_str()
     }
 
-    /// A flag that it published.
+    /// A state variable that is `true`.
     pub(super) fn flag(&self, name: &str) -> bool {
         self.variables
             .as_ref()
@@ -45,17 +43,31 @@ impl Seen {
             .unwrap_or(false)
     }
 
-    /// A number that it published, as people write it.
-    pub(super) fn number_in_words(&self, name: &str) -> Option<String> {
-        self.number(name).map(|number| number.to_string())
+    /// Intensity, if it is between 0 and 1; outside of this range the number has another meaning.
+    fn intensity(&self) -> Option<f64> {
+        self.number(INTENSITY)
+            .filter(|value| (0.0..=1.0).contains(value))
+    }
+
+    /// Ratio of the need to what can be done, if it is not negative.
+    fn need_ratio(&self) -> Option<f64> {
+        self.number(NEED_RATIO).filter(|value| *value >= 0.0)
+    }
+
+    fn has_emotion(&self) -> bool {
+        !self.emotion.is_empty() && self.emotion != NEUTRAL
     }
 }
 
-/// A number for every tick of an episode, or nothing: a trace has no holes.
+/// A number for every tick of an episode, or none at all: EmotionML has no traces with gaps.
 #[derive(Debug)]
 pub(super) struct Trace(Option<Vec<f64>>);
 
 impl Trace {
+    fn begin(first: Option<f64>) -> Self {
+        Self(first.map(|value| vec![value]))
+    }
+
     fn push(&mut self, value: Option<f64>) {
         match (&mut self.0, value) {
             (Some(values), Some(value)) => values.push(value),
@@ -63,11 +75,14 @@ impl Trace {
         }
     }
 
-    /// Repeats the last number for ticks in which nothing was heard.
+    /// Repeats the last number for ticks without a report.
     fn hold(&mut self, ticks: u64) {
-        if let Some(values) = &mut self.0 {
-            let last = values.last().copied();
-            (0..ticks).for_each(|_| values.extend(last));
+        if let Some(values) = &mut self.0
+            && let Some(last) = values.last().copied()
+        {
+            for _ in 0..ticks {
+                values.push(last);
+            }
         }
     }
 
@@ -80,128 +95,122 @@ impl Trace {
 /// One emotion of one robot, from its beginning to its end.
 #[derive(Debug)]
 pub(super) struct Episode {
-    /// The robot in the first tick of it.
-    pub(super) begun: Seen,
-    /// The robot in the tick before: an emotion comes from what was done then.
-    pub(super) before: Seen,
+    /// The robot in the first tick.
+    pub(super) begun: RobotState,
+    /// The robot in the tick before the first, in which the cause of the emotion lies.
+    pub(super) before: RobotState,
     /// First tick.
     pub(super) first: Tick,
-    /// Last tick in which the robot was heard.
+    /// Last tick with a report of the robot.
     pub(super) last: Tick,
-    /// How strongly it was felt, 0 to 1.
+    /// Intensity, 0 to 1.
     pub(super) intensity: Trace,
-    /// How the robot's need compared with what could be done.
+    /// Ratio of the robot's need to what could be done.
     pub(super) need_ratio: Trace,
 }
 
 impl Episode {
-    fn begin(tick: Tick, before: Seen, begun: Seen) -> Self {
-        let trace = || Trace(Some(Vec::new()));
-        let mut episode = Self {
+    fn begin(tick: Tick, before: RobotState, begun: RobotState) -> Self {
+        let intensity = Trace::begin(begun.intensity());
+        let need_ratio = Trace::begin(begun.need_ratio());
+        Self {
             begun,
             before,
             first: tick,
             last: tick,
-            intensity: trace(),
-            need_ratio: trace(),
-        };
-        let (intensity, need_ratio) = measures(&episode.begun);
-        episode.intensity.push(intensity);
-        episode.need_ratio.push(need_ratio);
-        episode
+            intensity,
+            need_ratio,
+        }
     }
 
-    fn go_on(&mut self, tick: Tick, seen: &Seen) {
-        let unheard = tick.saturating_sub(self.last + 1);
-        let (intensity, need_ratio) = measures(seen);
-        for (trace, value) in [
-            (&mut self.intensity, intensity),
-            (&mut self.need_ratio, need_ratio),
-        ] {
-            trace.hold(unheard);
-            trace.push(value);
-        }
+    fn extend(&mut self, tick: Tick, robot: &RobotState) {
+        let missed = tick.saturating_sub(self.last + 1);
+        self.intensity.hold(missed);
+        self.need_ratio.hold(missed);
+
+        self.intensity.push(robot.intensity());
+        self.need_ratio.push(robot.need_ratio());
         self.last = tick;
     }
-}
-
-/// Intensity and need ratio. A number outside of its range means something else than it does here.
-fn measures(seen: &Seen) -> (Option<f64>, Option<f64>) {
-    let intensity = seen
-        .number(INTENSITY)
-        .filter(|value| (0.0..=1.0).contains(value));
-    let need_ratio = seen.number(NEED_RATIO).filter(|value| *value >= 0.0);
-    (intensity, need_ratio)
 }
 
 /// The episodes in progress.
 #[derive(Debug, Default)]
 pub(super) struct Episodes {
-    robots: BTreeMap<RobotName, (Seen, Option<Episode>)>,
-    /// Of whom something was said already.
+    /// Latest state and episode in progress of each robot.
+    robots: BTreeMap<RobotName, (RobotState, Option<Episode>)>,
+    /// Robots with a note; each has at most one.
     noted: BTreeSet<RobotName>,
+    /// What the document cannot express, for people.
+    pub(super) notes: Vec<String>,
 }
 
 impl Episodes {
-    /// Takes in a robot of a tick; returns the episode that it ended.
+    /// Adds the state of a robot in a tick. Returns the episode that it ends.
     ///
-    /// Ticks without a report belong to the episode if the next report still names the same emotion. If it does not, or
-    /// none comes, nobody knows when the emotion ended, and the episode ends with the last report.
-    pub(super) fn see(&mut self, tick: Tick, seen: Seen) -> Option<Episode> {
-        if seen.missed {
+    /// Ticks without a report belong to the episode if the next report has the same emotion. Otherwise the end of the
+    /// emotion is not known, and the episode ends with the last report.
+    pub(super) fn add(&mut self, tick: Tick, robot: RobotState) -> Option<Episode> {
+        if robot.missed {
             return None;
         }
-        self.note_oddities(&seen);
-        let feels = !seen.emotion.is_empty() && seen.emotion != NEUTRAL;
-        let Some((before, episode)) = self.robots.get_mut(&seen.name) else {
-            let episode = feels.then(|| Episode::begin(tick, seen.clone(), seen.clone()));
-            self.robots.insert(seen.name.clone(), (seen, episode));
+        self.note(&robot);
+
+        let Some((before, episode)) = self.robots.get_mut(&robot.name) else {
+            let begun = begin(tick, &robot, &robot);
+            self.robots.insert(robot.name.clone(), (robot, begun));
             return None;
         };
+
         let mut ended = None;
         match episode {
-            Some(episode) if episode.begun.emotion == seen.emotion => episode.go_on(tick, &seen),
-            episode => {
-                let begun = feels.then(|| Episode::begin(tick, before.clone(), seen.clone()));
-                ended = std::mem::replace(episode, begun);
+            Some(episode) if episode.begun.emotion == robot.emotion => {
+                episode.extend(tick, &robot);
             }
+            episode => ended = std::mem::replace(episode, begin(tick, before, &robot)),
         }
-        *before = seen;
+        *before = robot;
         ended
     }
 
-    /// The episodes that the end of the run ended, by robot.
+    /// The episodes in progress at the end of the run, by robot.
     pub(super) fn end(self) -> impl Iterator<Item = Episode> {
         self.robots.into_values().filter_map(|(_, episode)| episode)
     }
 
-    fn note_oddities(&mut self, seen: &Seen) {
-        let is_without = seen.emotion.is_empty() || seen.emotion == NEUTRAL;
-        let lacks_intensity = seen.variables.is_some() && measures(seen).0.is_none();
-        if !(is_without || lacks_intensity) || !self.noted.insert(seen.name.clone()) {
+    /// Notes what is missing of a robot, once.
+    fn note(&mut self, robot: &RobotState) {
+        let lacks_emotion = !robot.has_emotion();
+        let lacks_intensity = robot.variables.is_some() && robot.intensity().is_none();
+        if !(lacks_emotion || lacks_intensity) || !self.noted.insert(robot.name.clone()) {
             return;
         }
-        let name = &seen.name;
-        if is_without {
-            note(&format!(
-                "{name} has a state without emotion, {:?}, which is left out",
-                seen.emotion
-            ));
+
+        let name = &robot.name;
+        let emotion = &robot.emotion;
+        self.notes.push(if lacks_emotion {
+            format!("{name} has a state without emotion, {emotion:?}, which is left out")
         } else {
-            note(&format!(
-                "{name} does not publish `{INTENSITY}` between 0 and 1 in every tick; its emotions have no intensity then"
-            ));
-        }
+            format!(
+                "{name} does not publish `{INTENSITY}` between 0 and 1 in every tick; episodes with such ticks have no intensity"
+            )
+        });
     }
+}
+
+/// The episode that begins with a state, if the robot has an emotion.
+fn begin(tick: Tick, before: &RobotState, robot: &RobotState) -> Option<Episode> {
+    let has_emotion = robot.has_emotion();
+    has_emotion.then(|| Episode::begin(tick, before.clone(), robot.clone()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn seen(emotion: &str, intensity: f64) -> Seen {
+    fn seen(emotion: &str, intensity: f64) -> RobotState {
         let variables = [(INTENSITY.to_owned(), intensity.into())].into();
-        Seen {
+        RobotState {
             name: RobotName::new("Butler").unwrap(),
             missed: false,
             emotion: emotion.to_owned(),
@@ -210,8 +219,8 @@ mod tests {
         }
     }
 
-    fn missed(emotion: &str) -> Seen {
-        Seen {
+    fn missed(emotion: &str) -> RobotState {
+        RobotState {
             missed: true,
             ..seen(emotion, 0.0)
         }
@@ -220,23 +229,25 @@ mod tests {
     /// Emotion, first and last tick, intensities.
     type Short = (String, Tick, Tick, Option<Vec<f64>>);
 
-    fn episodes(ticks: Vec<Seen>) -> Vec<Short> {
+    fn episodes(ticks: Vec<RobotState>) -> Vec<Short> {
         let mut episodes = Episodes::default();
-        let mut all: Vec<Episode> = (0..)
-            .zip(ticks)
-            .filter_map(|(tick, seen)| episodes.see(tick, seen))
-            .collect();
+        let mut all = Vec::new();
+        for (tick, robot) in (0..).zip(ticks) {
+            all.extend(episodes.add(tick, robot));
+        }
         all.extend(episodes.end());
-        let short = |episode: Episode| {
-            let intensity = episode.intensity.values().map(<[f64]>::to_vec);
-            (
-                episode.begun.emotion,
-                episode.first,
-                episode.last,
-                intensity,
-            )
-        };
+
         all.into_iter().map(short).collect()
+    }
+
+    fn short(episode: Episode) -> Short {
+        let intensity = episode.intensity.values().map(<[f64]>::to_vec);
+        (
+            episode.begun.emotion,
+            episode.first,
+            episode.last,
+            intensity,
+        )
     }
 
     #[test]
@@ -250,11 +261,12 @@ mod tests {
             ("HAPPY".to_owned(), 0, 1, Some(vec![0.0, 0.1])),
             ("CONFIDENT".to_owned(), 2, 2, Some(vec![0.3])),
         ];
+
         assert_eq!(found, expected);
     }
 
     #[test]
-    fn what_was_not_heard_is_held_between_reports_and_not_made_up_after_the_last() {
+    fn missed_ticks_repeat_the_last_report_if_the_next_one_has_the_same_emotion() {
         let found = episodes(vec![
             seen("A", 0.1),
             missed("A"),
@@ -262,10 +274,12 @@ mod tests {
             seen("A", 0.4),
             missed("A"),
         ]);
+
         assert_eq!(
             found,
             [("A".to_owned(), 0, 3, Some(vec![0.1, 0.1, 0.1, 0.4]))]
         );
+
         let found = episodes(vec![seen("A", 0.1), missed("A"), seen("B", 0.4)]);
         assert_eq!(
             found,
@@ -277,13 +291,14 @@ mod tests {
     }
 
     #[test]
-    fn a_trace_has_no_holes_and_no_numbers_of_another_scale() {
+    fn a_trace_has_no_gaps_and_no_numbers_of_another_scale() {
         let found = episodes(vec![
             seen("A", 0.1),
             seen("A", 70.0),
             seen("A", 0.2),
             seen("B", 1.0),
         ]);
+
         assert_eq!(
             found,
             [

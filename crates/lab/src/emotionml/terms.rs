@@ -1,13 +1,13 @@
-//! What this project's words are in EmotionML: nearest terms of W3C's vocabularies (Working Group Note, 1 April 2014),
-//! degrees as numbers, names and texts as XML allows them.
+//! Maps terms of this project to EmotionML: the nearest terms of W3C's vocabularies (Working Group Note, 1 April 2014),
+//! degrees as numbers, and names and texts in characters that XML allows.
 //!
-//! Which term is nearest is chosen here \[I\], as are all numbers.
+//! The choice of the nearest terms and all numbers are ours \[I\].
 
 use std::fmt::Write;
 
 use affect::akr::{ActionTendency, Certainty, Degree, Novelty};
 
-/// Where W3C's vocabularies are; the id of one follows.
+/// URI of W3C's vocabularies, to which the id of one is appended.
 const W3C: &str = "http://www.w3.org/TR/emotion-voc/xml#";
 
 /// A term of one of W3C's vocabularies.
@@ -19,12 +19,12 @@ pub(super) struct Term {
 }
 
 impl Term {
-    /// The vocabulary, as a `*-set` attribute refers to it.
+    /// URI of the vocabulary, for a `*-set` attribute.
     pub(super) fn set(self) -> String {
         format!("{W3C}{}", self.vocabulary)
     }
 
-    /// For people: `worried of everyday-categories`.
+    /// Name and vocabulary for people, as in `worried of everyday-categories`.
     pub(super) fn in_words(self) -> String {
         format!("{} of {}", self.name, self.vocabulary)
     }
@@ -44,7 +44,7 @@ pub(super) const CHANGEABILITY: Term = term("ema-appraisals", "changeability");
 pub(super) const URGENCY: Term = term("ema-appraisals", "urgency");
 pub(super) const DESIRABILITY: Term = term("ema-appraisals", "desirability");
 
-/// The category that is nearest to an emotion of the standard schemata.
+/// The nearest category of an emotion of the standard schemata.
 pub(super) fn nearest_category(emotion: &str) -> Option<Term> {
     Some(match emotion {
         "HAPPY" => term("everyday-categories", "happy"),
@@ -58,14 +58,14 @@ pub(super) fn nearest_category(emotion: &str) -> Option<Term> {
     })
 }
 
-/// The action tendency that is nearest.
+/// The nearest action tendency of W3C.
 pub(super) fn nearest_tendency(tendency: ActionTendency) -> Option<Term> {
     tendency
         .emotionml()
         .map(|name| term("frijda-action-tendencies", name))
 }
 
-/// A degree on the scale of EmotionML: equal steps.
+/// A degree on the scale of EmotionML, 0 to 1 in equal steps.
 pub(super) fn degree(degree: Degree) -> f64 {
     match degree {
         Degree::None => 0.0,
@@ -75,7 +75,7 @@ pub(super) fn degree(degree: Degree) -> f64 {
     }
 }
 
-/// Unpredictability: the opposite of certainty.
+/// Unpredictability, 0 to 1: the opposite of certainty.
 pub(super) fn unpredictability(certainty: Certainty) -> f64 {
     match certainty {
         Certainty::Certain => 0.0,
@@ -83,7 +83,7 @@ pub(super) fn unpredictability(certainty: Certainty) -> f64 {
     }
 }
 
-/// Unexpectedness.
+/// Unexpectedness, 0 to 1: whether an event differs from what was expected.
 pub(super) fn unexpectedness(novelty: Novelty) -> f64 {
     match novelty {
         Novelty::Match => 0.0,
@@ -91,14 +91,14 @@ pub(super) fn unexpectedness(novelty: Novelty) -> f64 {
     }
 }
 
-/// A number between 0 and 1 as it is written: to the seven digits that the schema's single precision holds.
+/// Formats a number between 0 and 1 with the seven digits of the schema's single precision.
 pub(super) fn scale_value(value: f64) -> String {
     // Adding zero turns -0 into 0.
     ((value.clamp(0.0, 1.0) * 1e6).round() / 1e6 + 0.0).to_string()
 }
 
-/// A name as a vocabulary may hold it, an `NMTOKEN`: letters, digits, `.`, `-` and `_` stand for themselves, everything
-/// else is `_x` and its code point, with an underscore at the end. Different names stay different.
+/// Encodes a name as an `NMTOKEN`, as vocabularies require. ASCII letters, digits, `.`, `-` and `_` are kept; any other
+/// character becomes `_x`, its code point and `_`. Different names have different tokens.
 pub(super) fn token(name: &str) -> String {
     let mut token = String::new();
     let mut rest = name.chars().peekable();
@@ -110,19 +110,16 @@ pub(super) fn token(name: &str) -> String {
             let _ = write!(token, "_x{:X}_", u32::from(char));
         }
     }
+
     token
 }
 
-/// A text as a document may hold it: what is no character of XML 1.0 is shown as missing.
+/// Replaces characters that XML 1.0 does not allow.
 pub(super) fn text(raw: &str) -> String {
-    let is_char = |char: char| matches!(char, '\t' | '\n' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'..);
     raw.chars()
-        .map(|char| {
-            if is_char(char) {
-                char
-            } else {
-                char::REPLACEMENT_CHARACTER
-            }
+        .map(|char| match char {
+            '\t' | '\n' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'.. => char,
+            _ => char::REPLACEMENT_CHARACTER,
         })
         .collect()
 }
@@ -145,6 +142,7 @@ mod tests {
         assert_eq!(token("VERY_CONTENT-2.1"), "VERY_CONTENT-2.1");
         assert_eq!(token("si content!"), "si_x20_content_x21_");
         assert_eq!(token("ému"), "_xE9_mu");
+
         let names = [
             "a b",
             "a_x20_b",
@@ -161,12 +159,12 @@ mod tests {
         let tokens: std::collections::BTreeSet<String> =
             names.iter().map(|name| token(name)).collect();
         assert_eq!(tokens.len(), names.len());
-        let is_plain = |token: &String| {
-            token
-                .chars()
-                .all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c))
-        };
-        assert!(tokens.iter().all(is_plain), "{tokens:?}");
+
+        for token in &tokens {
+            let mut characters = token.chars();
+            let is_plain = characters.all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c));
+            assert!(is_plain, "{token}");
+        }
     }
 
     #[test]

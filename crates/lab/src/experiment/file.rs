@@ -1,4 +1,4 @@
-//! The experiment file. It is read as it is written, then checked; what is wrong is shown where it stands.
+//! The experiment file: read as written, then checked. Errors show the place in the file.
 
 use std::path::{Path, PathBuf};
 
@@ -25,37 +25,37 @@ const SHIPPED: [(&str, &str); 2] = [
 /// An experiment, checked.
 #[derive(Debug, Clone)]
 pub struct Experiment {
-    /// What is to be learned.
+    /// The question that the experiment answers.
     pub question: String,
-    /// What is done and what is not, in a sentence; `{from}` is when it begins.
+    /// The procedure in a sentence, in which `{from}` is replaced by the begin of the factor.
     pub procedure: String,
     /// The scenario that is changed.
     pub scenario: PathBuf,
-    /// Runs of each arm under each condition, with the seeds 1, 2, 3 and so on.
+    /// Number of runs of each arm under each condition, with the seeds 1, 2, 3 and so on.
     pub seeds: u64,
     /// Simulated time of each run, seconds.
     pub duration_s: f64,
-    /// What is done to all arms alike.
+    /// The independent variable, the same for all arms.
     pub factor: Factor,
-    /// What is compared.
+    /// The sets of changes that are compared.
     pub arms: Vec<Arm>,
-    /// What is measured in each run.
+    /// The numbers of each run.
     pub measures: Vec<Measure>,
 }
 
-/// What is varied, and done to all arms alike.
+/// The independent variable of an experiment, the same for all arms.
 #[derive(Debug, Clone)]
 pub struct Factor {
     /// Head of the column with its values.
     pub name: String,
     /// Its values, in the order of the table.
     pub values: Vec<Value>,
-    /// When it begins, simulated seconds. A factor with a beginning lasts for its value, which is a time; one without
-    /// lasts for the whole run.
+    /// Begin, simulated seconds. The value of a factor with a begin is its duration; a factor without one lasts for the
+    /// whole run.
     pub begins_s: Option<f64>,
     /// Changes of the scenario, in which `{value}`, `{from}` and `{until}` are replaced.
     set: Vec<String>,
-    /// The same where the value is zero.
+    /// Changes of the scenario that replace `set` where the value is zero.
     set_at_zero: Option<Vec<String>>,
 }
 
@@ -68,25 +68,25 @@ pub enum Value {
     Time(f64),
 }
 
-/// A row of an experiment: one value of its factor.
+/// One value of the factor and its changes of the scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Condition {
-    /// As the table names it.
+    /// The value as text.
     pub name: String,
     /// Changes of the scenario.
     pub set: Vec<Override>,
-    /// When it begins and when it is over, simulated seconds.
+    /// Begin and end, simulated seconds.
     pub time_s: (f64, f64),
 }
 
 /// A set of changes under comparison.
 #[derive(Debug, Clone)]
 pub struct Arm {
-    /// As tables name it.
+    /// Name in tables.
     pub name: String,
-    /// What it is, in words.
+    /// Description for people.
     pub what: String,
-    /// How the scenario is changed to make it.
+    /// Changes of the scenario.
     pub set: Vec<Override>,
 }
 
@@ -115,7 +115,7 @@ struct RawFactor {
     set_at_zero: Option<Vec<String>>,
 }
 
-/// As people write it: a number, or a time.
+/// A value as written in the file.
 #[derive(Debug, Deserialize)]
 #[serde(
     untagged,
@@ -160,6 +160,7 @@ impl Experiment {
                 return Self::parse(&source, folder).map(Some);
             }
         }
+
         Ok(None)
     }
 
@@ -175,8 +176,27 @@ impl Experiment {
             return Err(FileError::at(source, Some(raw.seeds.span()), &reason));
         }
 
+        let factor_span = raw.factor.span();
+        let experiment = Self {
+            question: raw.question,
+            procedure: raw.procedure,
+            scenario: folder.join(raw.scenario),
+            seeds: raw.seeds.into_inner(),
+            duration_s: raw.duration.0,
+            factor: Factor::from(raw.factor.into_inner()),
+            arms: Self::parse_arms(source, raw.arms)?,
+            measures: Self::parse_measures(source, raw.measures)?,
+        };
+
+        experiment
+            .conditions()
+            .map_err(|reason| FileError::at(source, Some(factor_span), &reason))?;
+        Ok(experiment)
+    }
+
+    fn parse_arms(source: &Source, raw: Vec<RawArm>) -> Result<Vec<Arm>, FileError> {
         let mut arms = Vec::new();
-        for arm in raw.arms {
+        for arm in raw {
             let mut set = Vec::new();
             for change in arm.set {
                 let parsed = change.get_ref().parse().map_err(|reason: String| {
@@ -190,9 +210,15 @@ impl Experiment {
                 set,
             });
         }
+        Ok(arms)
+    }
 
+    fn parse_measures(
+        source: &Source,
+        raw: Vec<Spanned<Measure>>,
+    ) -> Result<Vec<Measure>, FileError> {
         let mut measures = Vec::new();
-        for measure in raw.measures {
+        for measure in raw {
             let span = measure.span();
             let measure = measure.into_inner();
             measure
@@ -200,28 +226,13 @@ impl Experiment {
                 .map_err(|error| FileError::at(source, Some(span), &error.to_string()))?;
             measures.push(measure);
         }
-
-        let factor_span = raw.factor.span();
-        let experiment = Self {
-            question: raw.question,
-            procedure: raw.procedure,
-            scenario: folder.join(raw.scenario),
-            seeds: raw.seeds.into_inner(),
-            duration_s: raw.duration.0,
-            factor: Factor::from(raw.factor.into_inner()),
-            arms,
-            measures,
-        };
-        experiment
-            .conditions()
-            .map_err(|reason| FileError::at(source, Some(factor_span), &reason))?;
-        Ok(experiment)
+        Ok(measures)
     }
 
-    /// The rows of the experiment, in the order of its values.
+    /// The conditions of the experiment in the order of the values.
     ///
     /// # Errors
-    /// The change that is not of the form `path=value`, or a value that does not fit the factor.
+    /// If a change is not of the form `path=value`, or a value does not fit the factor.
     pub fn conditions(&self) -> Result<Vec<Condition>, String> {
         let mut conditions = Vec::new();
         for value in &self.factor.values {
@@ -230,7 +241,7 @@ impl Experiment {
         Ok(conditions)
     }
 
-    /// What is done and what is not, in a sentence.
+    /// The procedure in a sentence.
     #[must_use]
     pub fn explained(&self) -> String {
         match self.factor.begins_s {
@@ -249,6 +260,7 @@ impl From<RawFactor> for Factor {
                 RawValue::Time(time) => Value::Time(time.0),
             });
         }
+
         Self {
             name: raw.name,
             values,
@@ -261,12 +273,12 @@ impl From<RawFactor> for Factor {
 
 impl Factor {
     fn condition(&self, value: Value, duration_s: f64) -> Result<Condition, String> {
-        let time_s = match (self.begins_s, value) {
+        let (from_s, until_s) = match (self.begins_s, value) {
             (Some(from_s), Value::Time(lasting_s)) => (from_s, from_s + lasting_s),
             (None, _) => (0.0, duration_s),
             (Some(_), Value::Number(number)) => {
                 return Err(format!(
-                    "what begins lasts for a time, and {number} is none"
+                    "a factor with `begins` lasts for a time, and {number} is not a time"
                 ));
             }
         };
@@ -275,7 +287,6 @@ impl Factor {
             Some(at_zero) if value.is_zero() => at_zero,
             _ => &self.set,
         };
-        let (from_s, until_s) = time_s;
         let mut set = Vec::new();
         for change in template {
             let change = change
@@ -288,7 +299,7 @@ impl Factor {
         Ok(Condition {
             name: value.to_string(),
             set,
-            time_s,
+            time_s: (from_s, until_s),
         })
     }
 }
@@ -300,7 +311,7 @@ impl Value {
         }
     }
 
-    /// As it stands in a scenario file.
+    /// The value in a scenario file.
     fn in_toml(self) -> String {
         match self {
             Self::Number(number) => format!("{number:?}"),
@@ -344,8 +355,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_shown_where_it_stands() {
+    fn errors_show_the_reason() {
         let (path, text) = SHIPPED[0];
+
         for (from, to, reason) in [
             ("seeds = 32", "seeds = 2", "at least 8 seeds"),
             ("question", "qestion", "unknown field"),

@@ -1,23 +1,23 @@
-//! What is measured in a run: a number of its summary, or how often a robot entered a behavior.
+//! Measures of a run: a number of its summary, or how often a robot entered a behavior.
 
 use protocol::{Event, RobotName};
 use serde::Deserialize;
 use serde_json::Value;
 use simulator::{Simulation, Summary, TickRecord};
 
-/// One number of each run.
+/// A definition of one number of each run.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measure {
-    /// Its key in JSON.
+    /// Key of the number in the JSON.
     pub name: String,
-    /// Head of its column in the table; without it the number is in the JSON only.
+    /// Head of the column in the table; without it the number is in the JSON only.
     pub column: Option<String>,
-    /// A number of the summary by its path, parts joined by `.`. A part `*` is the sum over all entries.
+    /// Path of a number in the summary, parts joined by `.`. A part `*` is the sum over all entries.
     summary: Option<String>,
-    /// How often a robot entered a behavior.
+    /// Counts how often a robot entered a behavior.
     entered: Option<Entered>,
-    /// Which part of the run counts, for `entered`.
+    /// Part of the run in which `entered` counts.
     when: Option<When>,
 }
 
@@ -38,13 +38,13 @@ pub enum When {
     After,
 }
 
-/// A measure is not one, or a run does not have it.
+/// A measure that is not defined properly, or that a run does not have.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MeasureError {
-    /// It names no source of its number, or two.
+    /// It has neither `summary` nor `entered`, or both.
     #[error("a measure has either `summary` or `entered`")]
     NotOne,
-    /// Events happen at a time.
+    /// It counts events without naming the part of the run.
     #[error("a count of events needs `when`: \"during\" or \"after\"")]
     NoTime,
     /// The summary of the run has no such number.
@@ -53,7 +53,7 @@ pub enum MeasureError {
 }
 
 impl Measure {
-    /// Checks that it can be made.
+    /// Checks that it has exactly one source, and a part of the run if it counts events.
     pub(super) fn check(&self) -> Result<(), MeasureError> {
         match (&self.summary, &self.entered) {
             (Some(_), None) => Ok(()),
@@ -64,11 +64,11 @@ impl Measure {
     }
 }
 
-/// A measure of one run that is being played.
+/// The state of a measure while a run is played.
 #[derive(Debug)]
 pub struct Probe<'a> {
     measure: &'a Measure,
-    /// When the condition begins and when it is over, simulated seconds.
+    /// Begin and end of the condition, simulated seconds.
     time_s: (f64, f64),
     count: u64,
 }
@@ -82,22 +82,14 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// Takes a tick into account.
+    /// Counts the events of a tick.
     pub(super) fn tick(&mut self, simulation: &Simulation, record: &TickRecord) {
         let Some(entered) = &self.measure.entered else {
             return;
         };
-        let (from_s, until_s) = self.time_s;
-        let at_s = simulation.time_s(record.tick);
-        let counts = match self.measure.when {
-            Some(When::During) => (from_s..until_s).contains(&at_s),
-            Some(When::After) => at_s >= until_s,
-            None => true,
-        };
-        if !counts {
+        if !self.is_counting(simulation.time_s(record.tick)) {
             return;
         }
-
         for event in &record.events {
             if let Event::Behavior { robot, to, .. } = event
                 && *robot == entered.robot
@@ -108,7 +100,16 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// The number, from the summary of the run as JSON.
+    fn is_counting(&self, at_s: f64) -> bool {
+        let (from_s, until_s) = self.time_s;
+        match self.measure.when {
+            Some(When::During) => (from_s..until_s).contains(&at_s),
+            Some(When::After) => at_s >= until_s,
+            None => true,
+        }
+    }
+
+    /// The number at the end of the run, the summary of which is given as JSON.
     pub(super) fn value(&self, summary: &Value) -> Result<f64, MeasureError> {
         let Some(path) = &self.measure.summary else {
             return Ok(self.count as f64);
@@ -123,14 +124,18 @@ fn sum(value: &Value, path: &[&str]) -> Option<f64> {
     let Some((first, rest)) = path.split_first() else {
         return value.as_f64();
     };
+
     let table = value.as_object()?;
+
     if *first != "*" {
         return sum(table.get(*first)?, rest);
     }
+
     let mut total = 0.0;
     for entry in table.values() {
         total += sum(entry, rest)?;
     }
+
     Some(total)
 }
 

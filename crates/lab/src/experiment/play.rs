@@ -1,4 +1,4 @@
-//! Playing an experiment: every arm under every condition with every seed, and what it came to.
+//! Plays an experiment: every arm under every condition with every seed, and the estimates over the seeds.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,20 +15,20 @@ use super::measure::{Probe, as_json};
 use crate::run::play;
 use crate::statistics::Estimate;
 
-/// How an experiment is played.
+/// Options of an experiment.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The scenario, instead of the experiment's own.
+    /// The scenario, which replaces the experiment's own.
     pub scenario: PathBuf,
-    /// Runs of each arm under each condition.
+    /// Number of runs of each arm under each condition.
     pub seeds: u64,
-    /// Runs at the same time; the result does not depend on it.
+    /// Number of runs at the same time; the result does not depend on it.
     pub jobs: usize,
-    /// Further changes of the scenario, in every arm.
+    /// Further changes of the scenario in every arm.
     pub set: Vec<Override>,
 }
 
-/// What came of one run.
+/// Measures of one run.
 #[derive(Debug, Clone, Serialize)]
 pub struct Outcome {
     /// Name of the condition.
@@ -44,7 +44,7 @@ pub struct Outcome {
     pub measures: BTreeMap<String, f64>,
 }
 
-/// What came of all runs of an arm under one condition.
+/// Estimates over all runs of an arm under one condition.
 #[derive(Debug, Clone, Serialize)]
 pub struct Cell {
     /// Name of the condition.
@@ -63,6 +63,21 @@ struct Unit<'a> {
     seed: u64,
 }
 
+/// The runs of an experiment; each is taken by one worker.
+struct Queue<'a> {
+    units: &'a [Unit<'a>],
+    next: AtomicUsize,
+}
+
+impl<'a> Queue<'a> {
+    /// The next run and its index.
+    fn next(&self) -> Option<(usize, &'a Unit<'a>)> {
+        let index = self.next.fetch_add(1, Ordering::Relaxed);
+        let unit = self.units.get(index)?;
+        Some((index, unit))
+    }
+}
+
 impl Experiment {
     /// Number of runs that [`Self::play`] makes.
     #[must_use]
@@ -71,52 +86,37 @@ impl Experiment {
         cells as u64 * options.seeds
     }
 
-    /// Plays every run of the experiment; `played` is called after each. The outcomes are in a fixed order whatever the
+    /// Plays every run of the experiment and calls `played` after each. The order of the outcomes does not depend on the
     /// number of jobs.
     ///
     /// # Errors
-    /// The first scenario that cannot be used, or run that fails, in that order.
+    /// If a scenario cannot be used or a run fails; the first one in the order of the outcomes.
     pub fn play(
         &self,
         options: &Options,
         played: &(impl Fn() + Sync),
     ) -> miette::Result<Vec<Outcome>> {
         let conditions = self.conditions().map_err(|reason| miette!("{reason}"))?;
-        let mut units = Vec::new();
-        for condition in &conditions {
-            for arm in &self.arms {
-                for seed in 1..=options.seeds {
-                    units.push(Unit {
-                        condition,
-                        arm,
-                        seed,
-                    });
-                }
-            }
-        }
+        let units = self.units(&conditions, options.seeds);
 
-        // A mistake in the scenario is reported once, before anything starts.
+        // An error in the scenario is reported once, before anything starts.
         if let Some(unit) = units.first() {
             self.scenario(options, unit)?;
         }
 
-        let next = AtomicUsize::new(0);
-        let work = || {
-            let mut done = Vec::new();
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(unit) = units.get(index) else {
-                    return done;
-                };
-                done.push((index, self.one(options, unit)));
-                played();
-            }
+        let queue = Queue {
+            units: &units,
+            next: AtomicUsize::new(0),
         };
         let mut done = std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..options.jobs).map(|_| scope.spawn(work)).collect();
+            let mut workers = Vec::new();
+            for _ in 0..options.jobs {
+                workers.push(scope.spawn(|| self.work(options, &queue, played)));
+            }
+
             let mut done = Vec::new();
             for worker in workers {
-                done.extend(worker.join().map_err(|_| broken())?);
+                done.extend(worker.join().map_err(|_| panicked())?);
             }
             miette::Result::<_>::Ok(done)
         })?;
@@ -125,20 +125,50 @@ impl Experiment {
         done.into_iter().map(|(_, outcome)| outcome).collect()
     }
 
+    fn units<'a>(&'a self, conditions: &'a [Condition], seeds: u64) -> Vec<Unit<'a>> {
+        let mut units = Vec::new();
+        for condition in conditions {
+            for arm in &self.arms {
+                for seed in 1..=seeds {
+                    units.push(Unit {
+                        condition,
+                        arm,
+                        seed,
+                    });
+                }
+            }
+        }
+        units
+    }
+
+    /// Plays units of the queue until it is empty; returns outcomes with the indices of their units.
+    fn work(
+        &self,
+        options: &Options,
+        queue: &Queue<'_>,
+        played: &impl Fn(),
+    ) -> Vec<(usize, miette::Result<Outcome>)> {
+        let mut done = Vec::new();
+        while let Some((index, unit)) = queue.next() {
+            done.push((index, self.one(options, unit)));
+            played();
+        }
+        done
+    }
+
     fn scenario(&self, options: &Options, unit: &Unit<'_>) -> miette::Result<Scenario> {
         let mut set = options.set.clone();
         set.extend(unit.arm.set.iter().cloned());
         set.extend(unit.condition.set.iter().cloned());
-        set.push(
-            "record.frames=false"
-                .parse()
-                .map_err(|reason| miette!("{reason}"))?,
-        );
+        let no_frames = "record.frames=false".parse();
+        set.push(no_frames.map_err(|reason| miette!("{reason}"))?);
+
         let changes = Changes {
             seed: Some(unit.seed),
             duration_s: Some(self.duration_s),
             set,
         };
+
         Ok(Scenario::load(&options.scenario, &changes)?)
     }
 
@@ -186,34 +216,42 @@ impl Experiment {
     pub fn estimate(&self, outcomes: &[Outcome]) -> Vec<Cell> {
         let mut cells = Vec::new();
         for value in &self.factor.values {
-            let condition = value.to_string();
             for arm in &self.arms {
-                let runs: Vec<&Outcome> = outcomes
-                    .iter()
-                    .filter(|run| run.condition == condition && run.arm == arm.name)
-                    .collect();
-                let mut measures = BTreeMap::new();
-                for measure in &self.measures {
-                    let values: Vec<f64> =
-                        runs.iter().map(|run| run.measures[&measure.name]).collect();
-                    measures.insert(measure.name.clone(), Estimate::of(&values));
-                }
-                cells.push(Cell {
-                    condition: condition.clone(),
-                    arm: arm.name.clone(),
-                    measures,
-                });
+                cells.push(self.cell(value.to_string(), arm, outcomes));
             }
         }
         cells
     }
 
-    /// What is compared with what, in words.
+    fn cell(&self, condition: String, arm: &Arm, outcomes: &[Outcome]) -> Cell {
+        let mut runs = Vec::new();
+        for run in outcomes {
+            if run.condition == condition && run.arm == arm.name {
+                runs.push(run);
+            }
+        }
+
+        let mut measures = BTreeMap::new();
+        for measure in &self.measures {
+            let values = runs.iter().map(|run| run.measures[&measure.name]);
+            let values: Vec<f64> = values.collect();
+            measures.insert(measure.name.clone(), Estimate::of(&values));
+        }
+        Cell {
+            condition,
+            arm: arm.name.clone(),
+            measures,
+        }
+    }
+
+    /// Describes the runs and the arms, for people.
     #[must_use]
     pub fn compared(&self, options: &Options) -> String {
         let seeds = options.seeds;
         let mut text = format!(
-            "{}: {seeds} runs of {} s for each line, seeds 1 to {seeds}. Runs with the same seed begin alike\nand have the same chance, whatever the arm. {}\nMean and 95 % confidence interval over the seeds.\n\n",
+            "{}: {seeds} runs of {} s for each line, seeds 1 to {seeds}. Runs with the same seed begin alike\n\
+             and have the same chance in every arm. {}\n\
+             Mean and 95 % confidence interval over the seeds.\n\n",
             options.scenario.display(),
             self.duration_s,
             self.explained(),
@@ -221,10 +259,11 @@ impl Experiment {
         for arm in &self.arms {
             text += &format!("  {:<13} {}\n", arm.name, arm.what);
         }
+
         text
     }
 }
 
-fn broken() -> miette::Report {
-    miette!("a run ended in a panic; its message stands above")
+fn panicked() -> miette::Report {
+    miette!("a run panicked; the message of the panic is above")
 }

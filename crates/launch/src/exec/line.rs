@@ -1,4 +1,4 @@
-//! What is said over the pipes: one JSON object a line.
+//! The lines on the pipes: one JSON object each.
 
 use std::collections::BTreeMap;
 
@@ -15,17 +15,17 @@ use serde_json::Value;
 
 use crate::lines::harmless;
 
-/// Characters of a bad line that are quoted.
+/// Most characters of a bad line in an error.
 const QUOTED: usize = 200;
-/// What a program may say.
+/// The lines that a program may write, for errors.
 const EXPECTED: &str = "expected is one JSON object a line with a \"type\" of query, percept, random, command, log, panel or \
                         done";
 
-/// What the program is told.
+/// A line to the program.
 #[derive(Debug, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-pub(super) enum Told<'a> {
-    /// Back to the initial state.
+pub(super) enum ToProgram<'a> {
+    /// Begin of an epoch, or of an incarnation.
     Init {
         protocol: u32,
         run: &'a RunName,
@@ -46,7 +46,7 @@ pub(super) enum Told<'a> {
         #[serde(skip_serializing_if = "Option::is_none")]
         last_state_variables: Option<&'a StateVariables>,
     },
-    /// A tick.
+    /// Begin of a tick.
     Tick {
         tick: Tick,
         location: Point,
@@ -57,16 +57,16 @@ pub(super) enum Told<'a> {
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         sensed: &'a [SensedRobot],
     },
-    /// What became of a query.
+    /// The answer to `query`, `percept` or `random`.
     Answer {
         #[serde(flatten)]
         result: Answered,
     },
-    /// The end.
+    /// The last line.
     End { reason: EndReason },
 }
 
-/// A command that arrived.
+/// A command that the robot has received.
 #[derive(Debug, Serialize)]
 pub(super) struct Arrived {
     pub(super) from: RobotName,
@@ -74,7 +74,7 @@ pub(super) struct Arrived {
     pub(super) command: String,
 }
 
-/// An answer, or why there is none.
+/// The value of an answer, or an error.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Answered {
@@ -82,19 +82,19 @@ pub(super) enum Answered {
     Error(&'static str),
 }
 
-/// Why a program is to end.
+/// Why a program has to exit.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum EndReason {
     /// The run is over.
     Finished,
-    /// Somebody stopped the run.
+    /// The run has been stopped.
     Stopped,
-    /// The run could not go on.
+    /// The run has been aborted.
     Aborted,
-    /// This robot is asked to end by a signal.
+    /// A signal ends this robot.
     Interrupted,
-    /// This robot cannot go on.
+    /// This robot has failed.
     Failed,
 }
 
@@ -108,8 +108,8 @@ impl From<End> for EndReason {
     }
 }
 
-impl<'a> Told<'a> {
-    /// The line with which an epoch, or an incarnation, begins.
+impl<'a> ToProgram<'a> {
+    /// The line `init` for a welcome.
     pub(super) fn init(welcome: &'a Welcome, tick: Tick, sensed: &'a [SensedRobot]) -> Self {
         Self::Init {
             protocol: welcome.protocol,
@@ -137,7 +137,7 @@ impl<'a> Told<'a> {
 
     /// The line, with its end.
     pub(super) fn line(&self) -> Vec<u8> {
-        // Structs of numbers, texts and maps with texts as keys: there is nothing that JSON cannot write.
+        // All keys are texts, so serialization cannot fail.
         let line = serde_json::to_vec(self);
         let mut line = line.unwrap_or_else(|error| unreachable!("a line is always JSON: {error}"));
         line.push(b'\n');
@@ -145,13 +145,13 @@ impl<'a> Told<'a> {
     }
 }
 
-/// What the program says.
+/// A line from the program.
 #[derive(Debug)]
-pub(super) enum Said {
+pub(super) enum FromProgram {
     Query(Query),
     Percept,
     Random,
-    Command(Order),
+    Command(CommandRequest),
     Log(Log),
     Panel(Panel),
     Done(Done),
@@ -166,7 +166,7 @@ pub(super) struct Query {
 
 /// A command to another robot.
 #[derive(Debug, Deserialize)]
-pub(super) struct Order {
+pub(super) struct CommandRequest {
     pub(super) to: String,
     pub(super) command: String,
 }
@@ -177,10 +177,10 @@ pub(super) struct Log {
     pub(super) text: String,
 }
 
-/// The end of a tick: where it wants to be, and what others may learn.
+/// The line `done`, which ends a tick: the proposed location and the published state.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Done {
-    /// `None`: it stays.
+    /// Proposed location; `None` to stay.
     pub(super) proposal: Option<Point>,
     pub(super) speed_mps: f64,
     pub(super) direction_rad: f64,
@@ -201,36 +201,37 @@ struct RawDone {
     state_variables: BTreeMap<String, Value>,
 }
 
-impl Said {
+impl FromProgram {
     /// Reads a line.
     ///
     /// # Errors
-    /// What is wrong with the line, which is quoted, and what is expected.
+    /// A sentence that quotes the line and names what is expected.
     pub(super) fn read(line: &[u8]) -> Result<Self, String> {
         parse(line)
             .map_err(|reason| format!("its line {} is not understood: {reason}", quote(line)))
     }
 
-    /// Whether what it says becomes part of the report of the tick.
+    /// Whether the line becomes part of the report of the tick.
     pub(super) fn is_reported(&self) -> bool {
         matches!(self, Self::Command(_) | Self::Log(_) | Self::Done(_))
     }
 }
 
-fn parse(line: &[u8]) -> Result<Said, String> {
+fn parse(line: &[u8]) -> Result<FromProgram, String> {
     let value: Value = serde_json::from_slice(line)
-        .map_err(|error| format!("it is no JSON ({error}); {EXPECTED}"))?;
+        .map_err(|error| format!("it is not valid JSON ({error}); {EXPECTED}"))?;
     let Some(kind) = value.get("type").and_then(Value::as_str) else {
         return Err(format!("it has no type; {EXPECTED}"));
     };
+
     Ok(match kind {
-        "query" => Said::Query(fields(&value)?),
-        "percept" => Said::Percept,
-        "random" => Said::Random,
-        "command" => Said::Command(check_order(fields(&value)?)?),
-        "log" => Said::Log(fields(&value)?),
-        "panel" => Said::Panel(check(fields(&value)?)?),
-        "done" => Said::Done(check_done(fields(&value)?)?),
+        "query" => FromProgram::Query(fields(&value)?),
+        "percept" => FromProgram::Percept,
+        "random" => FromProgram::Random,
+        "command" => FromProgram::Command(check_order(fields(&value)?)?),
+        "log" => FromProgram::Log(fields(&value)?),
+        "panel" => FromProgram::Panel(check(fields(&value)?)?),
+        "done" => FromProgram::Done(check_done(fields(&value)?)?),
         unknown => return Err(format!("there is no type {unknown:?}; {EXPECTED}")),
     })
 }
@@ -249,7 +250,7 @@ fn check<M: Message>(message: M) -> Result<M, String> {
     Ok(message)
 }
 
-fn check_order(order: Order) -> Result<Order, String> {
+fn check_order(order: CommandRequest) -> Result<CommandRequest, String> {
     match order.command.len() {
         0..=MAX_TEXT_BYTES => Ok(order),
         length => Err(format!(
@@ -259,20 +260,13 @@ fn check_order(order: Order) -> Result<Order, String> {
 }
 
 fn check_done(raw: RawDone) -> Result<Done, String> {
-    let variable = |(name, value): (String, Value)| match value {
-        Value::Bool(flag) => Ok((name, Variable::Flag(flag))),
-        Value::String(text) => Ok((name, Variable::Text(text))),
-        Value::Number(number) => Ok((name, Variable::Number(number.as_f64().unwrap_or(f64::NAN)))),
-        _ => Err(format!(
-            "field state_variables.{name}: a number, a text, true or false is expected"
-        )),
-    };
-    let state_variables: StateVariables = raw
-        .state_variables
-        .into_iter()
-        .map(variable)
-        .collect::<Result<_, _>>()?;
-    // The limits are those of what others will read.
+    let mut state_variables = StateVariables::new();
+    for (name, value) in raw.state_variables {
+        let variable = variable(&name, value)?;
+        state_variables.insert(name, variable);
+    }
+
+    // The limits are those of the message that other robots receive.
     let state = check(PublicState {
         epoch: 0,
         tick: 0,
@@ -283,6 +277,7 @@ fn check_done(raw: RawDone) -> Result<Done, String> {
         emotion_state: raw.emotion_state,
         behavior_state: raw.behavior_state,
     })?;
+
     Ok(Done {
         proposal: raw.proposal,
         speed_mps: state.speed_mps,
@@ -293,14 +288,24 @@ fn check_done(raw: RawDone) -> Result<Done, String> {
     })
 }
 
-/// The beginning of a line, to be shown.
+fn variable(name: &str, value: Value) -> Result<Variable, String> {
+    match value {
+        Value::Bool(flag) => Ok(Variable::Flag(flag)),
+        Value::String(text) => Ok(Variable::Text(text)),
+        Value::Number(number) => Ok(Variable::Number(number.as_f64().unwrap_or(f64::NAN))),
+        _ => Err(format!(
+            "field state_variables.{name}: a number, a text, true or false is expected"
+        )),
+    }
+}
+
+/// The beginning of a line, in quotes and without control characters.
 pub(super) fn quote(line: &[u8]) -> String {
     // A character has at most four bytes.
     let beginning = String::from_utf8_lossy(&line[..line.len().min(4 * QUOTED)]);
-    let shown: String = harmless(beginning.trim_end())
-        .chars()
-        .take(QUOTED)
-        .collect();
+    let beginning = harmless(beginning.trim_end());
+    let shown: String = beginning.chars().take(QUOTED).collect();
+
     let is_whole = shown.len() >= String::from_utf8_lossy(line).trim_end().len();
     format!("`{shown}{}`", if is_whole { "" } else { "..." })
 }
@@ -309,23 +314,30 @@ pub(super) fn quote(line: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    /// Programs without a JSON reader search these lines: the order of the fields is part of the contract.
+    fn line(message: &ToProgram<'_>) -> String {
+        String::from_utf8(message.line()).unwrap()
+    }
+
+    /// Programs without a JSON parser search these lines, so the order of the fields is part of the contract.
     #[test]
-    fn lines_are_as_the_contract_has_them() {
+    fn the_line_init_is_that_of_the_contract() {
         let welcome = r#"{"answer":"welcome","protocol":2,"run":"r","name":"A","generation":2,"epoch":3,"tick":4,"seed":5,
             "stream":"robot/A#2","tick_s":0.5,"field_m":[9,8.5],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":2},
             "roster":["A","B"],"parameters":{"v_mps":1e-7}}"#;
         let welcome: Welcome = serde_json::from_str(welcome).unwrap();
-        let line = |told: &Told<'_>| String::from_utf8(told.line()).unwrap();
         assert_eq!(
-            line(&Told::init(&welcome, 6, &[])),
+            line(&ToProgram::init(&welcome, 6, &[])),
             "{\"type\":\"init\",\"protocol\":2,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
              \"stream\":\"robot/A#2\",\"tick_s\":0.5,\"field_m\":[9.0,8.5],\"body_m\":0.6,\"sensing_range_m\":2.0,\
              \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
         );
-        let (tick, location) = (6, Point::new(1.0, 2.0));
-        let quiet = Told::Tick {
-            tick,
+    }
+
+    #[test]
+    fn the_line_tick_is_that_of_the_contract() {
+        let location = Point::new(1.0, 2.0);
+        let quiet = ToProgram::Tick {
+            tick: 6,
             location,
             blocked: false,
             commands: &[],
@@ -335,48 +347,55 @@ mod tests {
             line(&quiet),
             "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0}}\n"
         );
-        let (from, command) = (RobotName::new("B").unwrap(), "say \"x\":\n".to_owned());
+
         let commands = [Arrived {
-            from,
+            from: RobotName::new("B").unwrap(),
             performative: Performative::Achieve,
-            command,
+            command: "say \"x\":\n".to_owned(),
         }];
         let sensed = [SensedRobot {
             name: RobotName::new("B").unwrap(),
             location,
         }];
+        let busy = ToProgram::Tick {
+            tick: 6,
+            location,
+            blocked: true,
+            commands: &commands,
+            sensed: &sensed,
+        };
         assert_eq!(
-            line(&Told::Tick {
-                tick,
-                location,
-                blocked: true,
-                commands: &commands,
-                sensed: &sensed
-            }),
+            line(&busy),
             "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0},\"blocked\":true,\"commands\":[{\"from\":\"B\",\
              \"performative\":\"achieve\",\"command\":\"say \\\"x\\\":\\n\"}],\"sensed\":[{\"name\":\"B\",\"location\":\
              {\"x\":1.0,\"y\":2.0}}]}\n"
         );
-        let answer = |result| line(&Told::Answer { result });
+    }
+
+    #[test]
+    fn the_lines_answer_and_end_are_those_of_the_contract() {
+        let value = ToProgram::Answer {
+            result: Answered::Value(0.1.into()),
+        };
+        assert_eq!(line(&value), "{\"type\":\"answer\",\"value\":0.1}\n");
+
+        let error = ToProgram::Answer {
+            result: Answered::Error("too early"),
+        };
         assert_eq!(
-            answer(Answered::Value(0.1.into())),
-            "{\"type\":\"answer\",\"value\":0.1}\n"
-        );
-        assert_eq!(
-            answer(Answered::Error("too early")),
+            line(&error),
             "{\"type\":\"answer\",\"error\":\"too early\"}\n"
         );
-        assert_eq!(
-            line(&Told::End {
-                reason: EndReason::Finished
-            }),
-            "{\"type\":\"end\",\"reason\":\"finished\"}\n"
-        );
+
+        let end = ToProgram::End {
+            reason: EndReason::Finished,
+        };
+        assert_eq!(line(&end), "{\"type\":\"end\",\"reason\":\"finished\"}\n");
     }
 
     #[test]
     fn a_tick_may_end_with_no_more_than_its_type() {
-        let Said::Done(done) = Said::read(b"{\"type\":\"done\"}\n").unwrap() else {
+        let FromProgram::Done(done) = FromProgram::read(b"{\"type\":\"done\"}\n").unwrap() else {
             panic!("it is done")
         };
         assert_eq!(
@@ -384,7 +403,7 @@ mod tests {
             (None, 0.0, "")
         );
         let text = br#"{"type":"done","new":1,"proposal":{"x":1,"y":-0.1},"state_variables":{"a":7,"b":true,"c":"d"}}"#;
-        let Said::Done(done) = Said::read(text).unwrap() else {
+        let FromProgram::Done(done) = FromProgram::read(text).unwrap() else {
             panic!("it is done")
         };
         assert_eq!(done.proposal, Some(Point::new(1.0, -0.1)));
@@ -399,14 +418,14 @@ mod tests {
 
     #[test]
     fn a_bad_line_is_quoted_in_part_and_harmless() {
-        let wrong =
-            Said::read(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes()).unwrap_err();
+        let wrong = FromProgram::read(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes())
+            .unwrap_err();
         assert!(
             wrong.starts_with("its line `\u{fffd}[2J\u{e9}\u{e9}"),
             "{wrong}"
         );
         assert!(
-            wrong.contains("\u{e9}...` is not understood: it is no JSON"),
+            wrong.contains("\u{e9}...` is not understood: it is not valid JSON"),
             "{wrong}"
         );
         assert!(

@@ -1,9 +1,9 @@
-//! The program: its start, its pipes, its end.
+//! The process of the program: its start, its pipes, its end.
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -14,141 +14,141 @@ use nix::unistd::Pid;
 use protocol::RobotName;
 use robot::Stopper;
 
-use super::line::{EndReason, Told};
+use super::line::{EndReason, ToProgram};
 use crate::ending::Ended;
 use crate::lines::Lines;
 use crate::tail::Tail;
 
-/// Signals that ask to end.
+/// Signals that end this process, and the program with it.
 pub(super) const ASKING: [Signal; 3] = [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP];
-/// How long a program that is told to end has for it.
+/// How long a program may take to exit before it is killed.
 pub(super) const END_PATIENCE: Duration = Duration::from_secs(2);
 /// Longest line that a program may write, bytes.
 pub(super) const MAX_LINE: usize = 1 << 20;
-/// Lines that are read before the program must wait for them to be heeded.
+/// Capacity of the queue of lines; the program blocks while it is full.
 const QUEUE: usize = 16;
-/// Longest wait for the rest of what a program wrote that is over, should somebody else hold its pipes.
+/// Longest wait for the rest of the output of an exited program, in case another process holds its pipes.
 const REST_OF_OUTPUT: Duration = Duration::from_secs(2);
-/// A program that answers a tick and dies has answered it: so long its robot stays, unless the next clock comes, for its
-/// report to get through. The middleware may let its leaving overtake it.
+/// How long the robot stays in the run after its program has exited. A program that answers a tick and exits has answered
+/// it, and the report needs this time, because zenoh may let the undeclared token overtake it.
 const LAST_REPORT: Duration = Duration::from_secs(1);
 
-/// What is heard of the program.
+/// An event of the program.
 #[derive(Debug)]
-pub(super) enum Heard {
-    /// A line, without its end.
+pub(super) enum ProgramEvent {
+    /// A line.
     Line(Vec<u8>),
-    /// A line that is longer than [`MAX_LINE`]: its beginning.
+    /// The beginning of a line that is longer than [`MAX_LINE`].
     TooLong(Vec<u8>),
-    /// It has closed its output.
+    /// It has closed its standard output.
     Closed,
-    /// It is over.
+    /// It has exited.
     Ended,
-    /// It is to end, because this process is.
+    /// A signal ends this process, and the program with it.
     Interrupted,
 }
 
-/// The program, as this process holds it.
+/// The process of the program.
 pub(super) struct Program {
     child: Mutex<Child>,
     /// `None` once it has been closed.
     stdin: Mutex<Option<ChildStdin>>,
     tail: Tail,
     status: Mutex<Option<ExitStatus>>,
-    /// Told when there is a status.
+    /// Notified when `status` is set.
     ended: Condvar,
-    heard: SyncSender<Heard>,
+    queue: SyncSender<ProgramEvent>,
 }
 
 impl Program {
-    /// Starts the program. What it says comes out of the second; its end also stops the robot's loop.
+    /// Starts the program. Returns it and its events. Its exit also stops the robot's loop.
     pub(super) fn start(
         name: &RobotName,
         command: &[OsString],
         stopper: Arc<OnceLock<Stopper>>,
-    ) -> miette::Result<(Arc<Self>, Receiver<Heard>)> {
-        let own = std::env::current_exe()
-            .into_diagnostic()
-            .wrap_err("this program does not find itself")?;
-        let mut child = Command::new(own)
-            .args(["exec-start", &std::process::id().to_string(), "--"])
-            .args(command)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .into_diagnostic()
-            .wrap_err("the program cannot be started")?;
-        let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
-            unreachable!("all three are piped")
-        };
+    ) -> miette::Result<(Arc<Self>, Receiver<ProgramEvent>)> {
+        let mut child = spawn(command)?;
         let pid = i32::try_from(child.id())
             .into_diagnostic()
             .wrap_err("the system's process id")?;
-        let (tell, heard) = std::sync::mpsc::sync_channel(QUEUE);
+        let stdin = child.stdin.take();
+        let stdout = child.stdout.take();
+        let stderr = child.stderr.take();
+
+        let (queue, events) = sync_channel(QUEUE);
         let program = Arc::new(Self {
             child: Mutex::new(child),
-            stdin: Mutex::new(Some(stdin)),
+            stdin: Mutex::new(stdin),
             tail: Tail::default(),
             status: Mutex::new(None),
             ended: Condvar::new(),
-            heard: tell.clone(),
+            queue: queue.clone(),
         });
-        // Dropped when there is nothing more to read.
-        let (reading, rest) = std::sync::mpsc::sync_channel::<()>(1);
-        let (also_reading, tail, name) = (reading.clone(), program.tail.clone(), name.clone());
-        std::thread::spawn(move || {
-            read_lines(stdout, &tell);
-            drop(reading);
-        });
-        std::thread::spawn(move || {
-            forward(stderr, &name, &tail);
-            drop(also_reading);
-        });
-        let kept = program.clone();
-        std::thread::spawn(move || kept.keep(Pid::from_raw(pid), &rest, &stopper));
-        Ok((program, heard))
+
+        // Each reader drops its sender at the end of its pipe, which closes `rest`.
+        let (reading, rest) = sync_channel::<()>(1);
+        if let Some(stdout) = stdout {
+            let reading = reading.clone();
+            std::thread::spawn(move || {
+                read_lines(stdout, &queue);
+                drop(reading);
+            });
+        }
+        if let Some(stderr) = stderr {
+            let tail = program.tail.clone();
+            let name = name.clone();
+            std::thread::spawn(move || {
+                forward(stderr, &name, &tail);
+                drop(reading);
+            });
+        }
+
+        let watched = program.clone();
+        std::thread::spawn(move || watched.watch(Pid::from_raw(pid), &rest, &stopper));
+        Ok((program, events))
     }
 
-    /// Waits for its end, and for what it had to say.
-    fn keep(&self, pid: Pid, rest: &Receiver<()>, stopper: &OnceLock<Stopper>) {
-        // It stays a zombie, so that its process id is nobody else's, until whoever might kill it knows.
+    /// Waits for the exit of the program and the rest of its output, then reports the exit.
+    fn watch(&self, pid: Pid, rest: &Receiver<()>, stopper: &OnceLock<Stopper>) {
+        // The exited process stays a zombie until `child` is locked, so `kill` cannot hit a reused process id.
         while waitid(Id::Pid(pid), WaitPidFlag::WEXITED | WaitPidFlag::WNOWAIT)
             == Err(nix::errno::Errno::EINTR)
         {}
+
         let status = lock(&self.child).wait();
-        let _somebody_else_holds_its_pipes =
+        let _another_process_holds_its_pipes =
             rest.recv_timeout(REST_OF_OUTPUT) == Err(RecvTimeoutError::Timeout);
         *lock(&self.status) = status.ok();
         self.ended.notify_all();
-        // Between two ticks nobody listens to the program.
+
+        // Between two ticks no thread receives events of the program.
         if let Some(stopper) = stopper.get().cloned() {
             std::thread::spawn(move || {
                 std::thread::sleep(LAST_REPORT);
                 stopper.stop();
             });
         }
-        let _over = self.heard.send(Heard::Ended);
+
+        let _over = self.queue.send(ProgramEvent::Ended);
     }
 
     /// Writes a line to the program.
     ///
     /// # Errors
-    /// It does not read any more.
-    pub(super) fn tell(&self, told: &Told<'_>) -> std::io::Result<()> {
+    /// If its standard input is closed.
+    pub(super) fn send(&self, message: &ToProgram<'_>) -> std::io::Result<()> {
         match lock(&self.stdin).as_mut() {
-            Some(stdin) => stdin.write_all(&told.line()),
+            Some(stdin) => stdin.write_all(&message.line()),
             None => Err(std::io::ErrorKind::BrokenPipe.into()),
         }
     }
 
-    /// How it ended, if it has.
+    /// Its exit status, if it has exited.
     pub(super) fn status(&self) -> Option<ExitStatus> {
         *lock(&self.status)
     }
 
-    /// Waits for its end.
+    /// Waits for its exit; returns `None` after `patience`.
     pub(super) fn wait(&self, patience: Duration) -> Option<ExitStatus> {
         let waited = self
             .ended
@@ -156,92 +156,115 @@ impl Program {
         *waited.unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// Whether it was ended by a signal that asks to.
-    pub(super) fn was_asked_to_end(&self) -> bool {
+    /// Whether one of the signals in [`ASKING`] has killed it.
+    pub(super) fn was_ended_by_signal(&self) -> bool {
         use std::os::unix::process::ExitStatusExt;
         let signal = self.status().and_then(|status| status.signal());
         signal.is_some_and(|signal| ASKING.iter().any(|asking| *asking as i32 == signal))
     }
 
-    /// What became of a program that says no more: how it ended and what it complained of, or `otherwise`.
-    pub(super) fn account_or(&self, otherwise: &str) -> String {
+    /// Explains why the program writes no more lines: its exit status and the last lines of its error output, or
+    /// `otherwise` if it is still running.
+    pub(super) fn explain_end(&self, otherwise: &str) -> String {
         let Some(status) = self.wait(REST_OF_OUTPUT) else {
             return otherwise.to_owned();
         };
+
         let ended = format!("its program {} before the run did", Ended::Exited(status));
-        match self.tail.lines() {
-            lines if lines.is_empty() => format!("{ended}, and wrote no errors"),
-            lines => format!(
-                "{ended}; the last lines that it wrote as errors:\n  {}",
-                lines.join("\n  ")
-            ),
+
+        let lines = self.tail.lines();
+        if lines.is_empty() {
+            return format!("{ended}, and wrote no errors");
         }
+        let lines = lines.join("\n  ");
+        format!("{ended}; the last lines that it wrote as errors:\n  {lines}")
     }
 
-    /// Wakes whoever waits for the program in the middle of a tick.
+    /// Interrupts a tick that waits for the program.
     pub(super) fn interrupt(&self) {
-        // A full queue is being read.
-        let _woken = self.heard.try_send(Heard::Interrupted);
+        // If the queue is full, the tick is not waiting.
+        let _woken = self.queue.try_send(ProgramEvent::Interrupted);
     }
 
-    /// Tells it to end, gives it time to, and kills it if it does not.
+    /// Sends the line `end` and closes the pipe; kills the program if it does not exit in time.
     pub(super) fn end(self: &Arc<Self>, reason: EndReason) {
-        // A program that does not read holds this thread until it is killed.
+        // A program that does not read blocks this thread until it is killed.
         let program = self.clone();
         std::thread::spawn(move || {
-            let _gone = program.tell(&Told::End { reason });
+            let _gone = program.send(&ToProgram::End { reason });
             drop(lock(&program.stdin).take());
         });
+
         if self.wait(END_PATIENCE).is_none() {
             self.kill();
             self.wait(END_PATIENCE);
         }
     }
 
-    /// Kills it.
+    /// Kills the program.
     pub(super) fn kill(&self) {
-        // One that is over already needs no signal.
+        // Killing a program that has exited fails, which is fine.
         let _gone = lock(&self.child).kill();
     }
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What is kept here is replaced as a whole: a panic leaves nothing half done.
+    // Values are replaced as a whole, so a panic leaves a consistent one.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Reads what the program says, line by line. A queue that nobody reads is the end of this process.
-fn read_lines(stdout: ChildStdout, heard: &SyncSender<Heard>) {
+/// Starts the program by way of `cars exec-start`, with all three standard streams as pipes.
+fn spawn(command: &[OsString]) -> miette::Result<Child> {
+    let own = std::env::current_exe()
+        .into_diagnostic()
+        .wrap_err("the path of this program is not known")?;
+
+    Command::new(own)
+        .args(["exec-start", &std::process::id().to_string(), "--"])
+        .args(command)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .into_diagnostic()
+        .wrap_err("the program cannot be started")
+}
+
+/// Queues the lines of the program's standard output until its end. The queue is closed only when this process ends.
+fn read_lines(stdout: ChildStdout, queue: &SyncSender<ProgramEvent>) {
     let mut stdout = BufReader::new(stdout);
     loop {
-        let mut line = Vec::new();
-        let read = stdout
-            .by_ref()
-            .take(MAX_LINE as u64 + 1)
-            .read_until(b'\n', &mut line);
-        let (word, is_over) = match read {
-            Ok(1..) if line.ends_with(b"\n") => (Heard::Line(line), false),
-            Ok(1..) if line.len() > MAX_LINE => (Heard::TooLong(line), true),
-            // The last line, which has no end.
-            Ok(1..) => (Heard::Line(line), false),
-            Ok(0) | Err(_) => (Heard::Closed, true),
-        };
-        if heard.send(word).is_err() || is_over {
+        let event = read_line(&mut stdout);
+        let is_last = !matches!(event, ProgramEvent::Line(_));
+        if queue.send(event).is_err() || is_last {
             return;
         }
     }
 }
 
-/// Hands the program's error output on, line by line.
+/// The next line; the last one may have no end.
+fn read_line(stdout: &mut BufReader<ChildStdout>) -> ProgramEvent {
+    let mut line = Vec::new();
+    let mut limited = stdout.by_ref().take(MAX_LINE as u64 + 1);
+    match limited.read_until(b'\n', &mut line) {
+        Ok(0) | Err(_) => ProgramEvent::Closed,
+        Ok(_) if line.len() > MAX_LINE && !line.ends_with(b"\n") => ProgramEvent::TooLong(line),
+        Ok(_) => ProgramEvent::Line(line),
+    }
+}
+
+/// Copies the program's error output line by line to this process's, and keeps the last lines.
 fn forward(mut stderr: ChildStderr, name: &RobotName, tail: &Tail) {
-    let (mut buffer, mut lines) = (vec![0; 16 * 1024], Lines::default());
+    let mut buffer = vec![0; 16 * 1024];
+    let mut lines = Lines::default();
     let show = |line: String| {
-        // Who reads ours may be gone; the program is not to notice.
+        // A closed error output of this process must not affect the program.
         let _unread = writeln!(std::io::stderr(), "{name}: {line}");
         tail.push(line);
     };
     while let Ok(read @ 1..) = stderr.read(&mut buffer) {
         lines.push(&buffer[..read], show);
     }
+
     lines.finish(show);
 }

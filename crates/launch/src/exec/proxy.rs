@@ -1,4 +1,4 @@
-//! The robot that lets a program decide. Its whole exchange with the program happens once a tick.
+//! The robot whose decisions are made by a program: one exchange of lines in each tick.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
@@ -9,78 +9,83 @@ use protocol::random::unit;
 use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 use serde_json::Value;
 
-use super::line::{Answered, Arrived, Done, Query, Said, Told, quote};
-use super::program::{Heard, MAX_LINE, Program};
+use super::line::{Answered, Arrived, Done, FromProgram, Query, ToProgram, quote};
+use super::program::{MAX_LINE, Program, ProgramEvent};
 
-/// Most lines that a program may say in a tick.
+/// Most lines that a program may write in a tick.
 const MAX_LINES: usize = 1 << 16;
-/// Most commands that it may send in a tick: what a report holds.
+/// Most commands that it may send in a tick, as a report allows.
 const MAX_COMMANDS: usize = protocol::messages::MAX_ENTRIES;
-/// Most bytes of its lines that become part of the report, with room for what the report adds.
+/// Most bytes of its lines that become part of the report. The rest of a message is for the other fields of the report.
 const MAX_REPORTED: usize = MAX_MESSAGE_BYTES - (1 << 17);
 
 /// A robot whose program is another process.
 pub(super) struct Proxy {
     program: Arc<Program>,
-    heard: Receiver<Heard>,
+    events: Receiver<ProgramEvent>,
     /// Whether the line `init` was the last one that the program was sent, so that it may be answering it.
     is_initializing: bool,
-    /// What the program said last.
+    /// The last line `done`.
     done: Done,
     panel: Panel,
 }
 
 impl Proxy {
-    pub(super) fn new(program: Arc<Program>, heard: Receiver<Heard>) -> Self {
+    pub(super) fn new(program: Arc<Program>, events: Receiver<ProgramEvent>) -> Self {
         Self {
             program,
-            heard,
+            events,
             is_initializing: false,
             done: Done::default(),
             panel: Panel::default(),
         }
     }
 
-    /// Tells the program something.
-    fn tell(&self, told: &Told<'_>) -> Result<(), String> {
-        self.program.tell(told).map_err(|error| {
-            self.program.account_or(&format!(
-                "its program has closed its standard input ({error})"
-            ))
+    /// Sends a line to the program.
+    fn send(&self, message: &ToProgram<'_>) -> Result<(), String> {
+        self.program.send(message).map_err(|error| {
+            let closed = format!("its program has closed its standard input ({error})");
+            self.program.explain_end(&closed)
         })
     }
 
-    /// Begins a tick: nothing may have been said since the last one.
-    fn begin(&self, told: &Told<'_>) -> Result<(), String> {
-        match self.heard.try_recv() {
-            Err(TryRecvError::Empty) => self.tell(told),
-            Err(TryRecvError::Disconnected) => Err(self.mishap(Heard::Ended)),
-            Ok(Heard::Line(line)) => Err(format!(
+    /// Begins a tick. The program must not have written lines since the last one.
+    fn begin(&self, message: &ToProgram<'_>) -> Result<(), String> {
+        match self.events.try_recv() {
+            Err(TryRecvError::Empty) => self.send(message),
+            Err(TryRecvError::Disconnected) => Err(self.failure(ProgramEvent::Ended)),
+            Ok(ProgramEvent::Line(line)) => Err(format!(
                 "its program said {} outside a tick; it may speak between a line init or tick and its own line done only",
                 quote(&line)
             )),
-            Ok(heard) => Err(self.mishap(heard)),
+            Ok(event) => Err(self.failure(event)),
         }
     }
 
-    /// Heeds what the program says, until it is done.
+    /// Carries out the lines of the program until its line `done`.
     fn converse(&mut self, cars: &mut Cars<'_>) -> Result<Done, String> {
-        let (mut commands, mut reported) = (0, 0);
+        let mut commands = 0;
+        let mut reported = 0;
         for _ in 0..MAX_LINES {
-            let line = match self.heard.recv() {
-                Ok(Heard::Line(line)) => line,
-                other => return Err(self.mishap(other.unwrap_or(Heard::Ended))),
+            let line = match self.events.recv() {
+                Ok(ProgramEvent::Line(line)) => line,
+                other => return Err(self.failure(other.unwrap_or(ProgramEvent::Ended))),
             };
-            let said = Said::read(&line)?;
-            reported += if said.is_reported() { line.len() } else { 0 };
-            commands += usize::from(matches!(said, Said::Command(_)));
+
+            let message = FromProgram::read(&line)?;
+            if message.is_reported() {
+                reported += line.len();
+            }
+            if matches!(message, FromProgram::Command(_)) {
+                commands += 1;
+            }
             if commands > MAX_COMMANDS || reported > MAX_REPORTED {
                 return Err(format!(
                     "its program said too much for one tick: {commands} commands and {reported} bytes of commands, log \
                      lines and done; allowed are {MAX_COMMANDS} and {MAX_REPORTED}"
                 ));
             }
-            if let Some(done) = self.heed(cars, said)? {
+            if let Some(done) = self.carry_out(cars, message)? {
                 return Ok(done);
             }
         }
@@ -89,43 +94,49 @@ impl Proxy {
         ))
     }
 
-    fn heed(&mut self, cars: &mut Cars<'_>, said: Said) -> Result<Option<Done>, String> {
-        match said {
-            Said::Query(query) => self.answer(ask(cars, &query))?,
-            Said::Percept => {
+    fn carry_out(
+        &mut self,
+        cars: &mut Cars<'_>,
+        message: FromProgram,
+    ) -> Result<Option<Done>, String> {
+        match message {
+            FromProgram::Query(query) => self.answer(ask(cars, &query))?,
+            FromProgram::Percept => {
                 let bodies = serde_json::json!({ "bodies": cars.bodies() });
                 self.answer(Ok(bodies))?;
             }
-            Said::Random => self.answer(Ok(unit(cars.random()).into()))?,
-            Said::Command(order) => {
+            FromProgram::Random => self.answer(Ok(unit(cars.random()).into()))?,
+            FromProgram::Command(order) => {
                 if let Err(error) = cars.set_robot_command(&order.to, order.command) {
                     cars.log(format!("error: a command is not sent: {error}"));
                 }
             }
-            Said::Log(log) => cars.log(log.text),
-            Said::Panel(panel) => self.panel = panel,
-            Said::Done(done) => return Ok(Some(done)),
+            FromProgram::Log(log) => cars.log(log.text),
+            FromProgram::Panel(panel) => self.panel = panel,
+            FromProgram::Done(done) => return Ok(Some(done)),
         }
         Ok(None)
     }
 
     fn answer(&self, result: Result<Value, &'static str>) -> Result<(), String> {
-        self.tell(&Told::Answer {
+        self.send(&ToProgram::Answer {
             result: result.map_or_else(Answered::Error, Answered::Value),
         })
     }
 
-    /// Why the program cannot go on.
-    fn mishap(&self, heard: Heard) -> String {
-        match heard {
-            Heard::TooLong(line) => {
+    /// Why the program cannot continue.
+    fn failure(&self, event: ProgramEvent) -> String {
+        match event {
+            ProgramEvent::TooLong(line) => {
                 format!("its line {} is longer than {MAX_LINE} bytes", quote(&line))
             }
-            Heard::Interrupted => "it is asked to end".to_owned(),
-            Heard::Closed => self
+            ProgramEvent::Interrupted => "it is asked to end".to_owned(),
+            ProgramEvent::Closed => self
                 .program
-                .account_or("its program has closed its standard output"),
-            Heard::Line(_) | Heard::Ended => self.program.account_or("its program is over"),
+                .explain_end("its program has closed its standard output"),
+            ProgramEvent::Line(_) | ProgramEvent::Ended => {
+                self.program.explain_end("its program is over")
+            }
         }
     }
 
@@ -133,7 +144,7 @@ impl Proxy {
     fn exchange(&mut self, cars: &mut Cars<'_>) -> Result<Done, String> {
         if cars.tick() > 0 {
             let commands: Vec<Arrived> = cars.commands().iter().map(arrived).collect();
-            let told = Told::Tick {
+            let told = ToProgram::Tick {
                 tick: cars.tick(),
                 location: cars.location(),
                 blocked: cars.was_blocked(),
@@ -143,7 +154,7 @@ impl Proxy {
 
             // What the program says after an `init` in the middle of a run may arrive before this line is sent.
             if self.is_initializing {
-                self.tell(&told)?;
+                self.send(&told)?;
             } else {
                 self.begin(&told)?;
             }
@@ -191,7 +202,7 @@ impl Robot for Proxy {
         self.panel = Panel::default();
 
         let welcome = cars.welcome();
-        let begun = self.begin(&Told::init(welcome, cars.tick(), cars.sensed_robots()));
+        let begun = self.begin(&ToProgram::init(welcome, cars.tick(), cars.sensed_robots()));
         self.is_initializing = true;
         if let Err(reason) = begun {
             cars.give_up(reason);

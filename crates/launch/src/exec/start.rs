@@ -1,4 +1,4 @@
-//! The first moments of a program: between being a process and being the program.
+//! `cars exec-start`: ties this process to `cars exec`, then replaces itself by the program.
 
 use std::convert::Infallible;
 use std::ffi::OsString;
@@ -9,21 +9,21 @@ use nix::unistd::getppid;
 /// Exit status of shells where a command is not found.
 const NOT_FOUND: u8 = 127;
 
-/// This process does not become the program.
+/// Why this process cannot become the program.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// `cars exec` is gone already.
+    /// `cars exec` has exited already.
     #[error("the process that asked for the program has ended")]
     ParentGone,
     /// The command names no program.
     #[error("no program is given")]
     NoProgram,
-    /// The system does not start it.
+    /// The system cannot start the program.
     #[error("{program} cannot be started: {error}")]
     NotStarted {
-        /// As given.
+        /// The program as given.
         program: String,
-        /// Why.
+        /// The system's reason.
         error: std::io::Error,
     },
 }
@@ -39,19 +39,18 @@ impl StartError {
     }
 }
 
-/// Sees to it that this process ends with `cars exec` (process id `parent`), however that ends, and becomes the program.
-/// What must happen between `fork` and `exec` is unsafe code; a process that becomes another program does the same
-/// without.
+/// Makes the kernel kill this process when `cars exec` (process id `parent`) exits, and becomes the program. Setting this
+/// between `fork` and `exec` would need unsafe code; a process that replaces itself does not.
 ///
 /// # Errors
-/// [`StartError`] if this process cannot become the program; otherwise this function does not return.
+/// [`StartError`] if this process cannot become the program; otherwise the function does not return.
 pub fn start(parent: i32, command: &[OsString]) -> Result<Infallible, StartError> {
     #[cfg(target_os = "linux")]
     if let Err(error) = nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGKILL) {
-        tracing::warn!("this program will not be ended where cars exec is killed: {error}");
+        tracing::warn!("this program will survive if cars exec is killed: {error}");
     }
 
-    // It may have been killed before the line above.
+    // The parent may have exited before the line above.
     if getppid().as_raw() != parent {
         return Err(StartError::ParentGone);
     }

@@ -29,6 +29,7 @@ fn load(text: &str) -> Result<LaunchFile, FileError> {
         },
         Path::new("launch"),
     )?;
+
     file.check_robots(&scenario())?;
     Ok(file)
 }
@@ -67,6 +68,7 @@ fn a_file_means_what_it_says() {
     let file = load(&format!("speed = 20\n{BOTH}")).unwrap();
     assert_eq!(file.scenario, Path::new("configs/hall.toml"));
     assert_eq!(file.speed, Some(Speed(Some(20.0))));
+
     let butler = &file.processes[0];
     assert_eq!(butler.command, ["cars-butler"]);
     assert_eq!(butler.robots, [RobotName::new("Butler").unwrap()]);
@@ -74,6 +76,7 @@ fn a_file_means_what_it_says() {
         (butler.restart, butler.is_required, butler.is_extern),
         (Restart::Never, true, false)
     );
+
     let file = load(&format!(
         "speed = \"max\"\n[simulator]\nenv = {{ RUST_LOG = \"debug\" }}\n{BOTH}\
          restart = \"on-failure\"\nbackoff = \"250 ms\"\nrequired = false\nextern = true\n"
@@ -81,6 +84,7 @@ fn a_file_means_what_it_says() {
     let file = file.unwrap();
     assert_eq!(file.speed, Some(Speed(None)));
     assert_eq!(file.simulator.env["RUST_LOG"], "debug");
+
     let leguin = &file.processes[1];
     assert_eq!(
         (leguin.restart, leguin.is_required, leguin.is_extern),
@@ -96,6 +100,7 @@ fn the_console_runs_unless_it_is_not_wanted() {
         (console.command, console.is_required),
         (vec!["cars-console".to_owned()], false)
     );
+
     let bound = load(&format!("[console]\nbind = \"127.0.0.1:8080\"\n{BOTH}"))
         .unwrap()
         .console
@@ -124,6 +129,7 @@ fn a_misspelt_key_is_shown_with_file_line_and_caret() {
         .lines()
         .position(|line| line.contains("comand = ["))
         .expect("the line is shown");
+
     assert!(shown.contains("launch/x.toml:4:1"), "{shown}");
     assert!(
         shown.lines().nth(line + 1).unwrap().contains('^'),
@@ -144,6 +150,7 @@ fn every_robot_is_run_by_exactly_one_process() {
             "command = [\"cars-leguin\"]",
         ],
     );
+
     let again =
         "[[process]]\nname = \"again\"\ncommand = [\"x\"]\nrobots = [\"Leguin\", \"Butler\"]\n";
     check(
@@ -153,6 +160,7 @@ fn every_robot_is_run_by_exactly_one_process() {
             "robot Butler is run by process Butler already",
         ],
     );
+
     let stranger = "[[process]]\nname = \"Vonda\"\ncommand = [\"cars-vonda\"]\n";
     check(
         &format!("{BOTH}{stranger}"),

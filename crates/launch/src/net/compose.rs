@@ -1,4 +1,4 @@
-//! Links of containers: the compose file of the launch, and `docker network disconnect`.
+//! Links of containers: the exported compose file, cut by `docker network disconnect`.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -11,18 +11,18 @@ use tempfile::NamedTempFile;
 use super::links::{Links, Start};
 use super::shape::{Flow, Shape};
 
-/// The network of the compose file that the processes are in.
+/// The network of the compose file that connects the processes.
 const NETWORK: &str = "cars";
 
-/// Containers of a launch, as one project of compose.
+/// The containers of a launch, which are one project of compose.
 #[derive(Debug)]
 pub(super) struct Compose {
     /// `docker-compose`, or `docker compose`.
     tool: &'static [&'static str],
     project: String,
-    /// Removed when it is dropped.
+    /// The compose file, removed on drop.
     file: NamedTempFile,
-    /// Containers that are disconnected, with the addresses to give them back.
+    /// Disconnected containers with their addresses, by process.
     away: BTreeMap<String, Away>,
 }
 
@@ -34,31 +34,33 @@ struct Away {
 
 impl Compose {
     pub(super) fn new(start: &Start) -> miette::Result<Self> {
-        let is_as_it_is = start.options.changes().is_empty();
-        if !is_as_it_is || start.options.out != Path::new("runs") || !start.more.is_empty() {
-            let help = "containers read the scenario file as it is: change it there; runs are kept in ./runs";
+        let is_unchanged = start.options.changes().is_empty();
+        if !is_unchanged || start.options.out != Path::new("runs") || !start.more.is_empty() {
+            let help = "containers read the scenario file itself: change it there; runs are kept in ./runs";
             return Err(miette!(
                 help = help,
                 "with --via compose only --run and --speed can be chosen"
             ));
         }
+
         let project = format!("carsnet{}", std::process::id());
         let own = std::env::current_exe().into_diagnostic()?;
-        let text = output(
-            Command::new(own)
-                .args(start.args(&[]))
-                .args(["--export", "compose"]),
-        )?;
-        // Made anew under a name that cannot be foreseen: a link that waits there is not followed.
+        let mut export = Command::new(own);
+        export.args(start.args(&[])).args(["--export", "compose"]);
+        let text = output(&mut export)?;
+
+        // A new file with a random name: an existing symbolic link is not followed.
         let mut file = tempfile::Builder::new()
             .prefix(&project)
             .suffix(".yml")
             .tempfile()
             .into_diagnostic()
             .wrap_err("making a compose file")?;
+
         file.write_all(text.as_bytes())
             .into_diagnostic()
             .wrap_err_with(|| file.path().display().to_string())?;
+
         Ok(Self {
             tool: tool()?,
             project,
@@ -67,17 +69,38 @@ impl Compose {
         })
     }
 
-    /// Compose, for this project; paths in the file are relative to the current folder.
+    /// A command of compose for this project. Paths in the compose file are relative to the current folder.
     fn compose(&self, args: &[&str]) -> Command {
         let mut command = Command::new(self.tool[0]);
-        command.args(&self.tool[1..]).args([
-            "--project-name",
-            &self.project,
-            "--project-directory",
-            ".",
-        ]);
-        command.arg("--file").arg(self.file.path()).args(args);
         command
+            .args(&self.tool[1..])
+            .args(["--project-name", &self.project])
+            .args(["--project-directory", "."])
+            .arg("--file")
+            .arg(self.file.path())
+            .args(args);
+        command
+    }
+
+    fn disconnect(&mut self, process: &str) -> miette::Result<()> {
+        let network = self.network();
+        let container = output(&mut self.compose(&["ps", "-q", &process.to_lowercase()]))?;
+        let format = format!("{{{{(index .NetworkSettings.Networks {network:?}).IPAddress}}}}");
+        let address = output(Command::new("docker").args(["inspect", "-f", &format, &container]))?;
+        docker_network(&["disconnect", &network, &container])?;
+
+        self.away
+            .insert(process.to_owned(), Away { container, address });
+        Ok(())
+    }
+
+    /// Connects a container with the address that it had before.
+    fn connect(&mut self, process: &str) -> miette::Result<()> {
+        let Some(Away { container, address }) = self.away.remove(process) else {
+            return Ok(());
+        };
+        let network = self.network();
+        docker_network(&["connect", "--ip", &address, &network, &container])
     }
 
     fn network(&self) -> String {
@@ -99,62 +122,54 @@ impl Links for Compose {
     }
 
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
-        let network = self.network();
-        let mut docker = Command::new("docker");
-        docker.arg("network");
         if shape.flow == Flow::Open {
-            let Some(Away { container, address }) = self.away.remove(process) else {
-                return Ok(());
-            };
-            output(docker.args(["connect", "--ip", &address, &network, &container]))?;
+            self.connect(process)
         } else {
-            let container = output(&mut self.compose(&["ps", "-q", &process.to_lowercase()]))?;
-            let format = format!("{{{{(index .NetworkSettings.Networks {network:?}).IPAddress}}}}");
-            let address =
-                output(Command::new("docker").args(["inspect", "-f", &format, &container]))?;
-            output(docker.args(["disconnect", &network, &container]))?;
-            self.away
-                .insert(process.to_owned(), Away { container, address });
+            self.disconnect(process)
         }
-        Ok(())
     }
 }
 
-/// Compose, under whichever name it is there.
+/// The command of compose on this machine.
 fn tool() -> miette::Result<&'static [&'static str]> {
     let tools: [&[&str]; 2] = [&["docker-compose"], &["docker", "compose"]];
-    let is_there = |tool: &&&[&str]| {
-        let mut command = Command::new(tool[0]);
-        command
-            .args(&tool[1..])
-            .arg("version")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
-    };
-    let help = "install docker and docker-compose (Debian: apt install docker.io docker-compose)";
-    tools
-        .iter()
-        .find(is_there)
-        .copied()
-        .ok_or_else(|| miette!(help = help, "there is no docker-compose here"))
+    let found = tools.into_iter().find(|tool| is_installed(tool));
+    found.ok_or_else(|| {
+        let help =
+            "install docker and docker-compose (Debian: apt install docker.io docker-compose)";
+        miette!(help = help, "docker-compose is not installed")
+    })
 }
 
-/// What a command prints; it must succeed.
+fn is_installed(tool: &[&str]) -> bool {
+    let mut command = Command::new(tool[0]);
+    command
+        .args(&tool[1..])
+        .arg("version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+fn docker_network(args: &[&str]) -> miette::Result<()> {
+    let mut command = Command::new("docker");
+    command.arg("network").args(args);
+    output(&mut command).map(drop)
+}
+
+/// Runs a command, which must succeed, and returns its output.
 fn output(command: &mut Command) -> miette::Result<String> {
-    let said = format!("{command:?}");
+    let line = format!("{command:?}");
     let output = command
         .stdin(Stdio::null())
         .output()
         .into_diagnostic()
-        .wrap_err_with(|| said.clone())?;
+        .wrap_err_with(|| line.clone())?;
+
     if !output.status.success() {
-        return Err(miette!(
-            "{said}: {}",
-            String::from_utf8_lossy(&output.stderr).trim()
-        ));
+        let error = String::from_utf8_lossy(&output.stderr);
+        return Err(miette!("{line}: {}", error.trim()));
     }
-    Ok(String::from_utf8_lossy(&output.stdout)
-        .trim_end()
-        .to_owned())
+    let text = String::from_utf8_lossy(&output.stdout);
+    Ok(text.trim_end().to_owned())
 }

@@ -1,11 +1,11 @@
-//! What all that goes through a proxy asks for its way.
+//! The shape of a proxied link, and when its bytes may pass.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::shape::{Flow, Shape};
 
-/// The shape of a link, and those who wait for it to change.
+/// The shape of a link. Threads can wait for it to change.
 #[derive(Debug, Default)]
 pub(super) struct Gate {
     state: Mutex<State>,
@@ -15,7 +15,7 @@ pub(super) struct Gate {
 #[derive(Debug, Default)]
 struct State {
     shape: Shape,
-    /// When somebody first came to the gate.
+    /// When the first connection was accepted.
     first_use: Option<Instant>,
 }
 
@@ -24,52 +24,49 @@ impl Gate {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the link is like now.
+    /// The current shape.
     pub(super) fn shape(&self) -> Shape {
         self.state().shape
     }
 
-    /// From now on it is like this.
+    /// Changes the shape.
     pub(super) fn set(&self, shape: Shape) {
         self.state().shape = shape;
         self.changed.notify_all();
     }
 
-    /// Notes that the link is used.
+    /// Records the use of the link.
     pub(super) fn touch(&self) {
         self.state().first_use.get_or_insert_with(Instant::now);
         self.changed.notify_all();
     }
 
-    /// Waits until the link is used.
+    /// Waits for the first use of the link.
     pub(super) fn wait_for_use(&self) -> Instant {
         let mut state = self.state();
         loop {
-            match state.first_use {
-                Some(at) => return at,
-                None => {
-                    state = self
-                        .changed
-                        .wait(state)
-                        .unwrap_or_else(PoisonError::into_inner);
-                }
+            if let Some(at) = state.first_use {
+                return at;
             }
+            state = self.wait(state);
         }
     }
 
-    /// Waits while the link is cut. Who goes through a closed one finds out at the socket.
+    /// Waits while the link is cut. Reading and writing fail on a closed link, so it needs no wait.
     pub(super) fn pass(&self) {
         let mut state = self.state();
         while state.shape.flow == Flow::Cut {
-            state = self
-                .changed
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
+            state = self.wait(state);
         }
+    }
+
+    fn wait<'a>(&self, state: MutexGuard<'a, State>) -> MutexGuard<'a, State> {
+        let state = self.changed.wait(state);
+        state.unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// When pieces that follow one another leave a link.
+/// Computes when successive pieces leave a link. Pieces keep their order.
 #[derive(Debug)]
 pub(super) struct Pace {
     last: Instant,
@@ -82,30 +79,29 @@ impl Pace {
         }
     }
 
-    /// When what came at `now` may leave a link with this shape; `luck` is from 0 to 1. Nothing overtakes anything.
+    /// When a piece that arrives at `now` may leave a link with this shape. `luck`, from 0 to 1, is its part of the jitter.
     pub(super) fn due(&mut self, now: Instant, shape: Shape, luck: f64) -> Instant {
-        self.last = self
-            .last
-            .max(now + shape.delay + shape.jitter.mul_f64(luck));
+        let due = now + shape.delay + shape.jitter.mul_f64(luck);
+        self.last = self.last.max(due);
         self.last
     }
 
-    /// When `bytes` that begin to leave at `now` have left.
+    /// When `bytes` that begin to leave at `now` have been sent.
     pub(super) fn sent(&mut self, now: Instant, shape: Shape, bytes: usize) -> Instant {
         self.last = self.last.max(now) + transmission(shape, bytes);
         self.last
     }
 }
 
-/// How long a link takes to send so many bytes.
+/// How long a link takes to send this number of bytes.
 fn transmission(shape: Shape, bytes: usize) -> Duration {
+    let Some(bps) = shape.bandwidth_bps else {
+        return Duration::ZERO;
+    };
+
     let bits = u64::try_from(bytes).unwrap_or(u64::MAX).saturating_mul(8);
-    // A bandwidth so small that this overflows sends nothing in anybody's lifetime.
-    let nanos = |bps: u64| bits.saturating_mul(1_000_000_000).checked_div(bps);
-    shape
-        .bandwidth_bps
-        .and_then(nanos)
-        .map_or(Duration::ZERO, Duration::from_nanos)
+    let nanos = bits.saturating_mul(1_000_000_000).checked_div(bps);
+    Duration::from_nanos(nanos.unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -116,33 +112,29 @@ mod tests {
     fn pieces_are_late_and_in_order() {
         let ms = Duration::from_millis;
         let mut pace = Pace::new();
-        let (now, shape) = (
-            pace.last,
-            Shape {
-                delay: ms(50),
-                jitter: ms(10),
-                ..Shape::default()
-            },
-        );
+        let now = pace.last;
+        let shape = Shape {
+            delay: ms(50),
+            jitter: ms(10),
+            ..Shape::default()
+        };
         assert_eq!(pace.due(now, shape, 1.0), now + ms(60));
         assert_eq!(
             pace.due(now + ms(5), shape, 0.0),
             now + ms(60),
-            "nothing overtakes anything"
+            "pieces keep their order"
         );
         assert_eq!(pace.due(now + ms(20), shape, 0.0), now + ms(70));
     }
 
     #[test]
-    fn a_narrow_link_takes_its_time_for_each_byte() {
+    fn bandwidth_limits_every_byte() {
         let mut pace = Pace::new();
-        let (now, shape) = (
-            pace.last,
-            Shape {
-                bandwidth_bps: Some(8000),
-                ..Shape::default()
-            },
-        );
+        let now = pace.last;
+        let shape = Shape {
+            bandwidth_bps: Some(8000),
+            ..Shape::default()
+        };
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_millis(500));
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_secs(1));
         assert_eq!(

@@ -1,4 +1,4 @@
-//! What links of a launch are, whatever they are made of.
+//! The interface of all kinds of links.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,20 +6,22 @@ use std::process::Command;
 use protocol::RunName;
 
 use super::shape::Shape;
-use crate::link::Link;
+use crate::link::ProcessLink;
 use crate::options::RunOptions;
 
-/// A launch to be started.
+/// A launch to be started over links.
 pub(super) struct Start<'a> {
+    /// The launch file.
     pub(super) file: &'a Path,
     pub(super) run: &'a RunName,
     pub(super) options: &'a RunOptions,
+    /// Further arguments of `cars launch`.
     pub(super) more: &'a [String],
 }
 
 impl Start<'_> {
-    /// Arguments of `cars`, to launch over these links.
-    pub(super) fn args(&self, links: &[Link]) -> Vec<String> {
+    /// Arguments of `cars` for a launch over these links.
+    pub(super) fn args(&self, links: &[ProcessLink]) -> Vec<String> {
         let mut args = vec!["launch".to_owned(), self.file.display().to_string()];
         args.extend(self.options.to_args(self.run));
         args.extend(links.iter().map(|link| format!("--link={link}")));
@@ -28,10 +30,10 @@ impl Start<'_> {
     }
 }
 
-/// Links of a launch, one for each process; dropped, they are gone.
+/// The links of a launch, one for each process. They are removed on drop.
 pub(super) trait Links {
-    /// What launches over them.
+    /// The command that starts the launch over these links.
     fn command(&self, start: &Start) -> miette::Result<Command>;
-    /// From now on the link of this process is like this.
+    /// Changes the shape of a process's link.
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()>;
 }

@@ -1,5 +1,6 @@
-//! Links that are the kernel's own: each process in a network namespace, all of them cabled to a switch in one more, and a
-//! link is cut by taking the switch's port down, which is what pulling the cable does. Nothing outside can reach them.
+//! Links of the kernel: each process runs in a network namespace, and a veth pair connects it to a bridge in another
+//! namespace. A link is cut by setting its port of the bridge down, like pulling a cable. The namespaces have no other
+//! interfaces.
 //!
 //! ```text
 //!   simulator and launcher   Butler     Leguin
@@ -16,22 +17,22 @@ use miette::{IntoDiagnostic, WrapErr, miette};
 use super::links::{Links, Start};
 use super::shape::{Flow, Shape};
 use crate::file::Process;
-use crate::link::Link;
+use crate::link::ProcessLink;
 
-/// First part of the names of all namespaces made here; the id of the process that made them follows.
+/// Prefix of the names of all namespaces; the id of this process follows.
 const PREFIX: &str = "cars-";
-/// Network of the hosts. It exists in the namespaces only.
+/// Prefix of the addresses, which exist only in the namespaces.
 const NETWORK: &str = "10.77.0";
 const PORT: u16 = 7447;
-/// Most processes that find an address.
+/// Most processes with an address.
 const MAX_PROCESSES: usize = 250;
-/// Milliseconds between two queries of a host for another one's hardware address. The kernel's second would be most of
-/// the time that a healed link takes to be used again.
-const ASK_FOR_ADDRESS_AGAIN_MS: &str = "100";
+/// Milliseconds between two ARP requests. The kernel's default of one second would be most of the time that a healed link
+/// needs.
+const ARP_RETRY_MS: u32 = 100;
 
 const NO_CONSOLE: &str = "--no-console";
 
-/// Namespaces of a launch: the simulator's, one for each process, and the switch.
+/// The namespaces of a launch: one for the simulator, one for each process, and one for the bridge.
 #[derive(Debug)]
 pub(super) struct Namespaces {
     prefix: String,
@@ -45,15 +46,14 @@ impl Namespaces {
                 "more than {MAX_PROCESSES} processes do not fit into one network"
             ));
         }
+
         remove_abandoned();
-        let processes = processes
-            .iter()
-            .map(|process| process.name.clone())
-            .collect();
-        // From here on whatever was made is removed, also if the rest cannot be made.
+        let names = processes.iter().map(|process| process.name.clone());
+
+        // Its drop removes what has been made, also if `make` fails.
         let namespaces = Self {
             prefix: format!("{PREFIX}{}-", std::process::id()),
-            processes,
+            processes: names.collect(),
         };
         namespaces.make().map_err(|error| {
             miette!(
@@ -61,55 +61,39 @@ impl Namespaces {
                 "{error}"
             )
         })?;
+
         Ok(namespaces)
     }
 
     fn make(&self) -> Result<(), String> {
         let switch = self.switch();
-        ip(&["netns", "add", &switch])?;
-        ip(&[
-            "-n",
-            &switch,
-            "link",
-            "add",
-            "name",
-            "hub",
-            "type",
-            "bridge",
-            "forward_delay",
-            "0",
-        ])?;
-        ip(&["-n", &switch, "link", "set", "hub", "up"])?;
-        (0..=self.processes.len()).try_for_each(|index| self.cable(&switch, index))
+        ip(&format!("netns add {switch}"))?;
+        let bridge = "link add name hub type bridge forward_delay 0";
+        ip(&format!("-n {switch} {bridge}"))?;
+        ip(&format!("-n {switch} link set hub up"))?;
+
+        for index in 0..=self.processes.len() {
+            self.connect(&switch, index)?;
+        }
+        Ok(())
     }
 
-    /// A host, and its cable to the switch.
-    fn cable(&self, switch: &str, index: usize) -> Result<(), String> {
-        let (host, port) = (self.host(index), port(index));
-        ip(&["netns", "add", &host])?;
-        ip(&["-n", &host, "link", "set", "lo", "up"])?;
-        ip(&[
-            "-n", switch, "link", "add", &port, "type", "veth", "peer", "name", "eth0", "netns",
-            &host,
-        ])?;
-        ip(&["-n", switch, "link", "set", &port, "master", "hub", "up"])?;
-        ip(&[
-            "-n",
-            &host,
-            "addr",
-            "add",
-            &format!("{}/24", address(index)),
-            "dev",
-            "eth0",
-        ])?;
-        ip(&["-n", &host, "link", "set", "eth0", "up"])?;
-        let retrans = ["retrans", ASK_FOR_ADDRESS_AGAIN_MS];
-        ip(&[
-            ["-n", &host, "ntable", "change"].as_slice(),
-            &["name", "arp_cache", "dev", "eth0"],
-            &retrans,
-        ]
-        .concat())
+    /// Makes the namespace of a host, and the veth pair to the bridge.
+    fn connect(&self, switch: &str, index: usize) -> Result<(), String> {
+        let host = self.host(index);
+        let port = port(index);
+        let address = address(index);
+        ip(&format!("netns add {host}"))?;
+        ip(&format!("-n {host} link set lo up"))?;
+
+        let pair = format!("type veth peer name eth0 netns {host}");
+        ip(&format!("-n {switch} link add {port} {pair}"))?;
+        ip(&format!("-n {switch} link set {port} master hub up"))?;
+
+        ip(&format!("-n {host} addr add {address}/24 dev eth0"))?;
+        ip(&format!("-n {host} link set eth0 up"))?;
+        let arp = format!("name arp_cache dev eth0 retrans {ARP_RETRY_MS}");
+        ip(&format!("-n {host} ntable change {arp}"))
     }
 
     fn switch(&self) -> String {
@@ -126,8 +110,8 @@ impl Drop for Namespaces {
     fn drop(&mut self) {
         let hosts = (0..=self.processes.len()).map(|index| self.host(index));
         for namespace in hosts.chain([self.switch()]) {
-            // One that was never made cannot be removed.
-            if let Err(error) = ip(&["netns", "del", &namespace]) {
+            // Removing fails for a namespace that was not made.
+            if let Err(error) = ip(&format!("netns del {namespace}")) {
                 tracing::debug!("{error}");
             }
         }
@@ -137,41 +121,45 @@ impl Drop for Namespaces {
 impl Links for Namespaces {
     fn command(&self, start: &Start) -> miette::Result<Command> {
         let endpoint = format!("tcp/{}:{PORT}", address(0));
-        let link = |(index, process): (usize, &String)| Link {
-            process: process.clone(),
-            endpoint: endpoint.clone(),
-            namespace: Some(self.host(index + 1)),
-        };
-        let links: Vec<Link> = self.processes.iter().enumerate().map(link).collect();
+        let mut links = Vec::new();
+        for (index, process) in self.processes.iter().enumerate() {
+            links.push(ProcessLink {
+                process: process.clone(),
+                endpoint: endpoint.clone(),
+                namespace: Some(self.host(index + 1)),
+            });
+        }
+
         let own = std::env::current_exe()
             .into_diagnostic()
-            .wrap_err("where this program is")?;
+            .wrap_err("the path of this program is not known")?;
         let mut command = Command::new("ip");
         command
             .args(["netns", "exec", &self.host(0)])
             .arg(own)
-            .args(start.args(&links));
-        // Nobody else is in this network.
-        command
+            .args(start.args(&links))
             .arg(format!("--listen={endpoint}"))
+            // Only this launch is in the network.
             .arg("--insecure");
         if !start.more.iter().any(|arg| arg == NO_CONSOLE) {
-            // A browser would not reach it there.
+            // A browser could not reach the console in the namespace.
             command.arg(NO_CONSOLE);
         }
+
         Ok(command)
     }
 
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
         let index = self.processes.iter().position(|name| name == process);
         let index = index.ok_or_else(|| miette!("no link of {process}"))?;
-        let state = if shape.flow == Flow::Open {
-            "up"
-        } else {
-            "down"
+        let switch = self.switch();
+        let port = port(index + 1);
+        let state = match shape.flow {
+            Flow::Open => "up",
+            Flow::Cut | Flow::Closed => "down",
         };
-        ip(&["-n", &self.switch(), "link", "set", &port(index + 1), state])
-            .map_err(|error| miette!("{error}"))
+
+        ip(&format!("-n {switch} link set {port} {state}")).map_err(|error| miette!("{error}"))
     }
 }
 
@@ -183,41 +171,40 @@ fn address(index: usize) -> String {
     format!("{NETWORK}.{}", index + 1)
 }
 
-/// Namespaces whose maker was killed before it could remove them.
+/// Removes the namespaces of processes that were killed.
 fn remove_abandoned() {
-    let listed = Command::new("ip")
-        .args(["netns", "list"])
-        .output()
-        .map(|output| output.stdout);
-    let listed = String::from_utf8_lossy(&listed.unwrap_or_default()).into_owned();
-    let maker = |name: &str| {
-        name.strip_prefix(PREFIX)?
-            .split_once('-')?
-            .0
-            .parse::<u32>()
-            .ok()
+    let Ok(output) = Command::new("ip").args(["netns", "list"]).output() else {
+        return;
     };
-    for name in listed
-        .lines()
-        .filter_map(|line| line.split_whitespace().next())
-    {
+
+    let listed = String::from_utf8_lossy(&output.stdout);
+    for line in listed.lines() {
+        let name = line.split_whitespace().next().unwrap_or_default();
         let is_abandoned =
             maker(name).is_some_and(|pid| !Path::new(&format!("/proc/{pid}")).exists());
-        if is_abandoned && let Err(error) = ip(&["netns", "del", name]) {
+        if is_abandoned && let Err(error) = ip(&format!("netns del {name}")) {
             tracing::warn!("{error}");
         }
     }
 }
 
-fn ip(args: &[&str]) -> Result<(), String> {
-    let said = format!("ip {}", args.join(" "));
-    let output = Command::new("ip").args(args).stdin(Stdio::null()).output();
-    let output = output.map_err(|error| format!("{said}: {error}"))?;
+/// The id of the process that has made a namespace; `None` for namespaces of other programs.
+fn maker(name: &str) -> Option<u32> {
+    let (pid, _) = name.strip_prefix(PREFIX)?.split_once('-')?;
+    pid.parse().ok()
+}
+
+/// Runs `ip` with these arguments, separated by spaces.
+fn ip(args: &str) -> Result<(), String> {
+    let output = Command::new("ip")
+        .args(args.split(' '))
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| format!("ip {args}: {error}"))?;
     if output.status.success() {
         return Ok(());
     }
-    Err(format!(
-        "{said}: {}",
-        String::from_utf8_lossy(&output.stderr).trim()
-    ))
+
+    let error = String::from_utf8_lossy(&output.stderr);
+    Err(format!("ip {args}: {}", error.trim()))
 }

@@ -1,11 +1,6 @@
-//! The plan of faults: which link, when, for how long, what. Times are of the wall clock, from the moment when the clock
-//! of the run first ran.
+//! The plan of faults: link, begin, duration and shape. Times are wall clock, from the first tick of the run.
 //!
-//! A plan is a file, or what a scenario's own partitions come to on real links.
-
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
-use std::time::Duration;
+//! A plan is a file, or is made from the partitions of a scenario.
 
 use config::units::Time;
 use config::{FileError, Source};
@@ -13,19 +8,22 @@ use protocol::{RobotName, Tick};
 use serde::Deserialize;
 use simulator::Scenario;
 use simulator::scenario::network::Partition;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::time::{Duration, Instant};
 use toml::Spanned;
 
 use super::shape::{Flow, Shape, duration};
 
-/// Faults, checked.
+/// A plan of faults that has been checked.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    faults: Vec<Fault>,
+    faults: Vec<LinkFault>,
 }
 
-/// One fault of one link.
+/// One fault of the link of one robot.
 #[derive(Debug, Clone, PartialEq)]
-struct Fault {
+struct LinkFault {
     robot: RobotName,
     begin: Duration,
     end: Duration,
@@ -48,7 +46,7 @@ struct RawFault {
     r#do: Spanned<RawShape>,
 }
 
-/// As people write it.
+/// A shape as written in the file.
 #[derive(Debug, Deserialize)]
 #[serde(
     untagged,
@@ -75,128 +73,113 @@ struct Slow {
 }
 
 impl Plan {
-    /// Reads a plan for links of these robots.
+    /// Reads a plan for the links of these robots.
     ///
     /// # Errors
-    /// [`FileError`] with line and caret, also about a robot that has no link.
+    /// [`FileError`] with line and caret, also for a robot without a link.
     pub fn load(path: &Path, robots: &BTreeSet<RobotName>) -> Result<Self, FileError> {
         Self::parse(&Source::read(path)?, robots)
     }
 
-    /// The partitions of a scenario as cuts of real links, at `speed` simulated seconds a second. Every link leads to the
-    /// simulator, so whoever is cut off from the others there is cut off from it, too: the largest group, the first of
-    /// equals, keeps its links, and all other groups lose theirs.
+    /// The partitions of a scenario as cuts of real links, at `speed` simulated seconds per second. Every link leads to the
+    /// simulator, so a robot that is cut off from the others is cut off from the simulator, too. The largest group keeps
+    /// its links (the first one of equals), and all other groups lose theirs.
     ///
     /// # Errors
-    /// There is no partition, or one that real links cannot be: in one direction, or of one kind of message.
+    /// If there is no partition, or one that a real link cannot have: in one direction, or of one kind of message.
     pub(super) fn of_partitions(scenario: &Scenario, speed: f64) -> Result<Self, FileError> {
         let partitions = &scenario.network.partitions;
         if partitions.is_empty() {
-            return Err(
-                FileError::new("the scenario has no partition that could be played")
-                    .with_help("name a plan of faults by --plan; docs/links.md says how one looks"),
-            );
+            let error = FileError::new("the scenario has no partition to play");
+            let help = "name a plan of faults by --plan; its format is in docs/links.md";
+            return Err(error.with_help(help));
         }
-        let wall = |tick: Tick| Duration::try_from_secs_f64(tick as f64 * scenario.tick_s / speed);
+
         let mut faults = Vec::new();
         for partition in partitions {
-            if partition.one_way || !(partition.commands && partition.queries) {
-                return Err(FileError::new(
-                    "a real link is cut in both directions and for all messages",
-                )
-                .with_help(
-                    "a partition in one direction, or of one kind of message, is simulated only",
-                ));
+            check_partition(partition)?;
+            let begin = wall_time(scenario, partition.from, speed)?;
+            let end = match partition.until {
+                Some(until) => wall_time(scenario, until, speed)?,
+                None => NEVER,
+            };
+            for robot in cut_off(partition) {
+                faults.push(LinkFault {
+                    robot: robot.clone(),
+                    begin,
+                    end,
+                    shape: Shape::of_flow(Flow::Cut),
+                });
             }
-            let begin = wall(partition.from);
-            let end = partition.until.map_or(Ok(NEVER), wall);
-            let (Ok(begin), Ok(end)) = (begin, end) else {
-                return Err(FileError::new("at this speed a partition never comes"));
-            };
-            let shape = Shape {
-                flow: Flow::Cut,
-                ..Shape::default()
-            };
-            let cut = |robot: &RobotName| Fault {
-                robot: robot.clone(),
-                begin,
-                end,
-                shape,
-            };
-            faults.extend(cut_off(partition).map(cut));
         }
         Ok(Self { faults })
     }
 
     fn parse(source: &Source, robots: &BTreeSet<RobotName>) -> Result<Self, FileError> {
         let raw: RawPlan = source.parse()?;
-        let faults = raw
-            .faults
-            .into_iter()
-            .map(|fault| check(source, fault, robots));
-        Ok(Self {
-            faults: faults.collect::<Result<_, _>>()?,
-        })
+        let mut faults = Vec::new();
+        for fault in raw.faults {
+            faults.push(check(source, fault, robots)?);
+        }
+        Ok(Self { faults })
     }
 
-    /// Those whose links it touches.
+    /// Robots with faults of their links.
     pub(super) fn robots(&self) -> BTreeSet<&RobotName> {
         self.faults.iter().map(|fault| &fault.robot).collect()
     }
 
-    /// Moments at which something begins or ends, in order.
+    /// Times at which a fault begins or ends, in order.
     pub(super) fn changes(&self) -> BTreeSet<Duration> {
-        self.faults
-            .iter()
-            .flat_map(|fault| [fault.begin, fault.end])
-            .collect()
+        let faults = self.faults.iter();
+        faults.flat_map(|fault| [fault.begin, fault.end]).collect()
     }
 
-    /// What the link of a robot is like at a moment.
+    /// The shape of a robot's link at a time: all current faults together.
     pub(super) fn shape(&self, robot: &RobotName, at: Duration) -> Shape {
-        let active =
-            |fault: &&Fault| fault.robot == *robot && (fault.begin..fault.end).contains(&at);
-        self.faults
-            .iter()
-            .filter(active)
-            .map(|fault| fault.shape)
-            .fold(Shape::default(), Shape::and)
-    }
-
-    /// Refuses what can only be played through a proxy.
-    pub(super) fn check_cuts_only(&self, via: &str) -> Result<(), FileError> {
-        match self.faults.iter().find(|fault| !fault.shape.is_plain_cut()) {
-            None => Ok(()),
-            Some(Fault { robot, shape, .. }) => {
-                let text =
-                    format!("the link of {robot} is to be \"{shape}\": {via} can only be cut");
-                Err(FileError::new(text).with_help("play this plan with --via proxy"))
+        let mut shape = Shape::default();
+        for fault in &self.faults {
+            if fault.robot == *robot && (fault.begin..fault.end).contains(&at) {
+                shape = shape.and(fault.shape);
             }
         }
+        shape
     }
 
-    /// Plays it from `begun` on: calls `apply` for every link that changes, with the time since `begun`, until all is
-    /// done or `is_over`.
+    /// Refuses a plan with faults that only a proxy can play.
+    pub(super) fn check_cuts_only(&self, via: &str) -> Result<(), FileError> {
+        for LinkFault { robot, shape, .. } in &self.faults {
+            if !shape.is_plain_cut() {
+                let text = format!(
+                    "the link of {robot} is \"{shape}\" in the plan: {via} can only be cut"
+                );
+                return Err(FileError::new(text).with_help("play this plan with --via proxy"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Plays the plan, the times of which begin at `begun`. Calls `apply` for every change of a link with the time since
+    /// `begun`, until the last change or until `is_over`.
     ///
     /// # Errors
     /// The first error of `apply`.
     pub fn play<E>(
         &self,
-        begun: std::time::Instant,
+        begun: Instant,
         mut apply: impl FnMut(&RobotName, Shape, Duration) -> Result<(), E>,
         mut is_over: impl FnMut() -> bool,
     ) -> Result<(), E> {
         let mut now: BTreeMap<&RobotName, Shape> = BTreeMap::new();
         for at in self.changes() {
-            while let Some(left) = at
-                .checked_sub(begun.elapsed())
-                .filter(|left| !left.is_zero())
-            {
+            while begun.elapsed() < at {
                 if is_over() {
                     return Ok(());
                 }
+                let left = at.saturating_sub(begun.elapsed());
                 std::thread::sleep(left.min(LOOK_AGAIN));
             }
+
             for robot in self.robots() {
                 let shape = self.shape(robot, at);
                 if now.insert(robot, shape).unwrap_or_default() != shape {
@@ -204,94 +187,103 @@ impl Plan {
                 }
             }
         }
+
         Ok(())
     }
 }
 
-/// While a plan waits for its next moment it looks this often whether the run is over.
+/// How often the end of the run is checked while a plan waits for its next change.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
-/// The end of what lasts until the run is over.
+/// The end of a fault without one.
 const NEVER: Duration = Duration::from_secs(u32::MAX as u64);
 
-/// Robots that a partition leaves without a link to the simulator.
-fn cut_off(partition: &Partition) -> impl Iterator<Item = &RobotName> {
-    // Of equals `max_by_key` gives the last, so they are looked at from the end.
-    let largest = partition
-        .groups
-        .iter()
-        .enumerate()
-        .rev()
-        .max_by_key(|(_, group)| group.len());
-    let kept = largest.map(|(index, _)| index);
-    let others = partition
-        .groups
-        .iter()
-        .enumerate()
-        .filter(move |(index, _)| Some(*index) != kept);
-    others.flat_map(|(_, group)| group)
+/// Refuses a partition that a real link cannot have.
+fn check_partition(partition: &Partition) -> Result<(), FileError> {
+    if !partition.one_way && partition.commands && partition.queries {
+        return Ok(());
+    }
+
+    let error = FileError::new("a real link is cut in both directions and for all messages");
+    let help = "a partition in one direction, or of one kind of message, can only be simulated";
+    Err(error.with_help(help))
 }
 
-fn check(source: &Source, raw: RawFault, robots: &BTreeSet<RobotName>) -> Result<Fault, FileError> {
-    let refuse = |span, reason: &str| FileError::at(source, Some(span), reason);
-    let time = |time: &Spanned<Time>| {
-        duration(*time.get_ref()).map_err(|reason| refuse(time.span(), &reason))
-    };
-    let robot = raw.robot.get_ref().clone();
-    if !robots.contains(&robot) {
+/// The wall-clock time of a tick at `speed` simulated seconds per second.
+fn wall_time(scenario: &Scenario, tick: Tick, speed: f64) -> Result<Duration, FileError> {
+    Duration::try_from_secs_f64(tick as f64 * scenario.tick_s / speed)
+        .map_err(|_| FileError::new("at this speed a partition never comes"))
+}
+
+/// Robots that a partition leaves without a link to the simulator: those of all groups but the largest.
+fn cut_off(partition: &Partition) -> Vec<&RobotName> {
+    let groups = || partition.groups.iter().enumerate();
+    // `max_by_key` returns the last of equals, so the groups are reversed.
+    let largest = groups().rev().max_by_key(|(_, group)| group.len());
+    let kept = largest.map(|(index, _)| index);
+
+    let others = groups().filter(|(index, _)| Some(*index) != kept);
+    others.flat_map(|(_, group)| group).collect()
+}
+
+fn check(
+    source: &Source,
+    raw: RawFault,
+    robots: &BTreeSet<RobotName>,
+) -> Result<LinkFault, FileError> {
+    let robot = raw.robot.get_ref();
+    if !robots.contains(robot) {
         let names: Vec<&str> = robots.iter().map(RobotName::as_str).collect();
-        return Err(refuse(
-            raw.robot.span(),
-            &format!("there is no link of a robot {robot}"),
-        )
-        .with_help(format!("there are links of {}", names.join(", "))));
+        let text = format!("there is no link of a robot {robot}");
+        return Err(FileError::at(source, Some(raw.robot.span()), &text)
+            .with_help(format!("there are links of {}", names.join(", "))));
     }
-    let (begin, length) = (time(&raw.at)?, time(&raw.r#for)?);
+
+    let begin = time(source, &raw.at)?;
+    let length = time(source, &raw.r#for)?;
+    let length_span = Some(raw.r#for.span());
     if length.is_zero() {
-        return Err(refuse(raw.r#for.span(), "a fault lasts for more than zero"));
+        let text = "a fault lasts for more than zero";
+        return Err(FileError::at(source, length_span, text));
     }
-    let end = begin
-        .checked_add(length)
-        .ok_or_else(|| refuse(raw.r#for.span(), "this never ends"))?;
-    let span = raw.r#do.span();
-    let shape = shape(raw.r#do.into_inner()).map_err(|reason| refuse(span, &reason))?;
-    Ok(Fault {
-        robot,
+
+    let span = Some(raw.r#do.span());
+    Ok(LinkFault {
+        robot: raw.robot.into_inner(),
         begin,
-        end,
-        shape,
+        end: begin
+            .checked_add(length)
+            .ok_or_else(|| FileError::at(source, length_span, "this never ends"))?,
+        shape: shape(raw.r#do.into_inner())
+            .map_err(|reason| FileError::at(source, span, &reason))?,
     })
+}
+
+fn time(source: &Source, time: &Spanned<Time>) -> Result<Duration, FileError> {
+    duration(*time.get_ref()).map_err(|reason| FileError::at(source, Some(time.span()), &reason))
 }
 
 fn shape(raw: RawShape) -> Result<Shape, String> {
     let slow = match raw {
-        RawShape::Word(Word::Cut) => {
-            return Ok(Shape {
-                flow: Flow::Cut,
-                ..Shape::default()
-            });
-        }
-        RawShape::Word(Word::Close) => {
-            return Ok(Shape {
-                flow: Flow::Closed,
-                ..Shape::default()
-            });
-        }
+        RawShape::Word(Word::Cut) => return Ok(Shape::of_flow(Flow::Cut)),
+        RawShape::Word(Word::Close) => return Ok(Shape::of_flow(Flow::Closed)),
         RawShape::Slow(slow) => slow,
     };
-    let time = |time: Option<Time>| time.map_or(Ok(Duration::ZERO), duration);
     let shape = Shape {
-        delay: time(slow.delay)?,
-        jitter: time(slow.jitter)?,
+        delay: slow.delay.map_or(Ok(Duration::ZERO), duration)?,
+        jitter: slow.jitter.map_or(Ok(Duration::ZERO), duration)?,
         bandwidth_bps: slow.bandwidth_bps,
         ..Shape::default()
     };
+
     if slow.bandwidth_bps == Some(0) {
         return Err("a bandwidth is above zero; to let nothing through, write \"cut\"".to_owned());
     }
+
     if shape == Shape::default() {
         return Err("this fault does nothing".to_owned());
     }
+
     Ok(shape)
 }
 
@@ -315,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_says_what_each_link_is_like_at_each_moment() {
+    fn a_plan_has_the_shape_of_each_link_at_each_time() {
         let text = fault("Leguin", "5 s", "5 s", "\"cut\"")
             + &fault(
                 "Leguin",
@@ -326,11 +318,12 @@ mod tests {
             + &fault("Butler", "1 s", "1 s", "{ bandwidth_bps = 64000 }");
         let plan = parse(&text).unwrap();
         let shown = |robot: &str, s: u64| {
-            plan.shape(&RobotName::new(robot).unwrap(), Duration::from_secs(s))
-                .to_string()
+            let robot = RobotName::new(robot).unwrap();
+            plan.shape(&robot, Duration::from_secs(s)).to_string()
         };
         let times: Vec<u64> = plan.changes().iter().map(Duration::as_secs).collect();
         assert_eq!(times, [1, 2, 5, 8, 10, 12]);
+
         let leguin: Vec<String> = times.iter().map(|s| shown("Leguin", *s)).collect();
         let slow = "delay 50ms, jitter 10ms";
         assert_eq!(
@@ -344,10 +337,9 @@ mod tests {
                 "whole"
             ]
         );
-        assert_eq!(
-            (shown("Butler", 1), shown("Butler", 2)),
-            ("bandwidth 64000 bit/s".into(), "whole".into())
-        );
+
+        assert_eq!(shown("Butler", 1), "bandwidth 64000 bit/s");
+        assert_eq!(shown("Butler", 2), "whole");
         assert!(plan.check_cuts_only("a namespace's link").is_err());
     }
 
@@ -360,25 +352,16 @@ mod tests {
     }
 
     fn scenario(network: &str) -> Scenario {
-        let robots: String = ["A", "B", "C"]
-            .iter()
-            .enumerate()
-            .map(|(i, name)| {
-                format!(
-                    "[[robot]]\nname = \"{name}\"\nat = [\"{} m\", \"2 m\"]\n",
-                    2 + 2 * i
-                )
-            })
-            .collect();
-        let text = format!("seed = 5\ntick = \"0.5 s\"\n{network}\n{robots}");
-        Scenario::parse(
-            &Source {
-                name: "scenario.toml".to_owned(),
-                text,
-            },
-            Path::new("."),
-        )
-        .unwrap()
+        let mut text = format!("seed = 5\ntick = \"0.5 s\"\n{network}\n");
+        for (name, x_m) in [("A", 2), ("B", 4), ("C", 6)] {
+            text += &format!("[[robot]]\nname = \"{name}\"\nat = [\"{x_m} m\", \"2 m\"]\n");
+        }
+        let source = Source {
+            name: "scenario.toml".to_owned(),
+            text,
+        };
+
+        Scenario::parse(&source, Path::new(".")).unwrap()
     }
 
     #[test]
@@ -389,28 +372,28 @@ mod tests {
             scenario(&format!("{head}{more}\n"))
         };
         let plan = Plan::of_partitions(&partition("until = \"100 s\""), 20.0).unwrap();
-        let cut = |s: u64| {
-            plan.shape(&RobotName::new("A").unwrap(), Duration::from_secs(s))
-                .to_string()
-        };
-        assert_eq!(
-            [cut(2), cut(3), cut(4), cut(5)],
-            ["whole", "cut", "cut", "whole"]
-        );
+        let a = RobotName::new("A").unwrap();
+        for (s, shape) in [(2, "whole"), (3, "cut"), (4, "cut"), (5, "whole")] {
+            let found = plan.shape(&a, Duration::from_secs(s));
+            assert_eq!(found.to_string(), shape, "{s} s");
+        }
         assert_eq!(plan.robots().len(), 1, "the larger group keeps its links");
+
         let endless = Plan::of_partitions(&partition(""), 20.0).unwrap();
         assert!(endless.changes().contains(&NEVER));
+
         for refused in ["one_way = true", "cuts = [\"queries\"]"] {
             assert!(
                 Plan::of_partitions(&partition(refused), 20.0).is_err(),
                 "{refused}"
             );
         }
+
         assert!(Plan::of_partitions(&scenario(""), 20.0).is_err());
     }
 
     #[test]
-    fn what_is_wrong_is_shown_where_it_stands() {
+    fn errors_show_the_reason() {
         for (text, reason) in [
             (
                 fault("Vonda", "5 s", "5 s", "\"cut\""),
@@ -445,8 +428,9 @@ mod tests {
     fn a_plan_is_played_in_order_and_ends_when_the_run_does() {
         let text = fault("Leguin", "0.01 s", "0.02 s", "\"cut\"")
             + &fault("Butler", "0.02 s", "9 min", "\"cut\"");
-        let (plan, mut seen) = (parse(&text).unwrap(), Vec::new());
-        let begun = std::time::Instant::now();
+        let plan = parse(&text).unwrap();
+        let mut seen = Vec::new();
+        let begun = Instant::now();
         let played: Result<(), ()> = plan.play(
             begun,
             |robot, shape, _| {
@@ -455,14 +439,8 @@ mod tests {
             },
             || begun.elapsed() > Duration::from_millis(200),
         );
-        assert_eq!(
-            (played, seen),
-            (
-                Ok(()),
-                ["Leguin cut", "Butler cut", "Leguin whole"]
-                    .map(str::to_owned)
-                    .to_vec()
-            )
-        );
+
+        assert_eq!(played, Ok(()));
+        assert_eq!(seen, ["Leguin cut", "Butler cut", "Leguin whole"]);
     }
 }

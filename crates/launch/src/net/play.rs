@@ -1,14 +1,4 @@
-//! A launch over links of its own, with a plan of faults played on them.
-
-use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom, Write};
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
-use std::time::{Duration, SystemTime};
+//! Launches over links of its own and plays a plan of faults on them.
 
 use bus::endpoint::is_tls;
 use miette::{IntoDiagnostic, WrapErr, miette};
@@ -18,6 +8,15 @@ use protocol::RobotName;
 use serde::Serialize;
 use simulator::RunFolder;
 use simulator::recorder::EVENTS;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::time::{Duration, Instant, SystemTime};
 
 use super::compose::Compose;
 use super::links::{Links, Start};
@@ -26,25 +25,25 @@ use super::plan::Plan;
 use super::proxy::{self, Proxy};
 use super::shape::Shape;
 use crate::endpoint;
-use crate::file::{LaunchFile, Process};
-use crate::link::Link;
+use crate::file::LaunchFile;
+use crate::link::ProcessLink;
 use crate::options::RunOptions;
 
-/// What was done to which link and when, in the folder of the run.
+/// The record of all changes of links, in the folder of the run.
 const LINKS: &str = "links.jsonl";
-/// The end of a record in which its last line is looked for.
+/// Number of bytes at the end of a record in which its last line is searched.
 const TAIL_BYTES: u64 = 16 * 1024;
-/// How often to look whether the clock has begun to run.
+/// How often to check for the first tick.
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
-/// A launch over links of its own, with faults on them.
+/// A launch with faults of real links.
 #[derive(Debug)]
 pub struct Play {
     /// The launch file.
     pub file: PathBuf,
-    /// The plan of faults; without one the partitions of the scenario are played, and not simulated in addition.
+    /// The plan of faults. Without one, the partitions of the scenario are played on the links instead of being simulated.
     pub plan: Option<PathBuf>,
-    /// What the links are made of.
+    /// The kind of links.
     pub via: Via,
     /// Options of the execution.
     pub options: RunOptions,
@@ -52,12 +51,12 @@ pub struct Play {
     pub launch_args: Vec<String>,
 }
 
-/// What links are made of.
+/// Kinds of links.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Via {
-    /// A TCP proxy for each process: cut, close, delay, jitter, bandwidth. Needs nothing.
+    /// A TCP proxy for each process: cut, close, delay, jitter, bandwidth. Needs no privileges.
     Proxy,
-    /// A network namespace for each process and a virtual cable to it: cut. Needs root and `ip` (iproute2).
+    /// A network namespace for each process, connected by a veth pair: cut. Needs root and `ip` (iproute2).
     Namespaces,
     /// A container for each process: cut, by `docker network disconnect`. Needs docker and the image `cars:local`.
     Compose,
@@ -70,16 +69,15 @@ struct Proxies {
 }
 
 impl Proxies {
-    /// What is encrypted passes a proxy as it is.
+    /// Starts a proxy for each process. TLS passes a proxy unchanged.
     fn new(file: &LaunchFile) -> miette::Result<Self> {
         let port = endpoint::free_port().into_diagnostic()?;
         let endpoint = endpoint::loopback(port, file.secure.is_some());
-        let proxy = |process: &Process| Ok((process.name.clone(), proxy::on_loopback(&endpoint)?));
-        let proxies = file
-            .processes
-            .iter()
-            .map(proxy)
-            .collect::<miette::Result<_>>()?;
+        let mut proxies = BTreeMap::new();
+        for process in &file.processes {
+            let proxy = proxy::on_loopback(&endpoint)?;
+            proxies.insert(process.name.clone(), proxy);
+        }
         Ok(Self { endpoint, proxies })
     }
 }
@@ -87,32 +85,36 @@ impl Proxies {
 impl Links for Proxies {
     fn command(&self, start: &Start) -> miette::Result<Command> {
         let is_secured = is_tls(&self.endpoint);
-        let link = |(process, proxy): (&String, &Proxy)| Link {
-            process: process.clone(),
-            endpoint: endpoint::loopback(proxy.address().port(), is_secured),
-            namespace: None,
-        };
-        let links: Vec<Link> = self.proxies.iter().map(link).collect();
+        let mut links = Vec::new();
+        for (process, proxy) in &self.proxies {
+            links.push(ProcessLink {
+                process: process.clone(),
+                endpoint: endpoint::loopback(proxy.address().port(), is_secured),
+                namespace: None,
+            });
+        }
+
         let mut command = Command::new(std::env::current_exe().into_diagnostic()?);
         command
             .args(start.args(&links))
             .arg(format!("--listen={}", self.endpoint));
+
         Ok(command)
     }
 
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
-        self.proxies
-            .get(process)
-            .map(|proxy| proxy.set(shape))
-            .ok_or_else(|| miette!("no link of {process}"))
+        let proxy = self.proxies.get(process);
+        let proxy = proxy.ok_or_else(|| miette!("no link of {process}"))?;
+        proxy.set(shape);
+        Ok(())
     }
 }
 
-/// Launches, plays the faults, and waits for the end. `report` receives a line for each change of a link. Returns the
-/// exit status of the launch.
+/// Launches, plays the faults, and waits for the end of the launch. `report` receives a line for each change of a link.
+/// Returns the exit status of the launch.
 ///
 /// # Errors
-/// If a file cannot be used, if the links cannot be made, or if a fault cannot be played.
+/// If a file cannot be used, the links cannot be made, or a fault cannot be played.
 pub fn play(play: &Play, report: impl FnMut(String)) -> miette::Result<u8> {
     let file = LaunchFile::load(&play.file)?;
     let run = play.options.run_name(&play.file).into_diagnostic()?;
@@ -121,18 +123,15 @@ pub fn play(play: &Play, report: impl FnMut(String)) -> miette::Result<u8> {
     let mut options = play.options.clone();
     let plan = match &play.plan {
         Some(plan) => Plan::load(plan, &process_of.keys().cloned().collect())?,
-        None => {
-            let plan = partitions(&file, &options)?;
-            // Containers read the scenario as it is.
-            if play.via != Via::Compose {
-                let change = WITHOUT_PARTITIONS
-                    .parse()
-                    .map_err(|error| miette!("{error}"))?;
-                options.set.push(change);
-            }
-            plan
-        }
+        None => partitions(&file, &options)?,
     };
+    // Containers read the scenario file itself.
+    if play.plan.is_none() && play.via != Via::Compose {
+        let change = WITHOUT_PARTITIONS.parse();
+        options
+            .set
+            .push(change.map_err(|error| miette!("{error}"))?);
+    }
 
     let start = Start {
         file: &play.file,
@@ -146,18 +145,16 @@ pub fn play(play: &Play, report: impl FnMut(String)) -> miette::Result<u8> {
     let folder = RunFolder::new(&play.options.out, &run);
     let begun = SystemTime::now();
     let mut launch = signals.spawn(links.command(&start)?)?;
-    let played = wait_for_clock(&mut launch, &folder.file(EVENTS), begun).and_then(|runs| {
-        if runs {
-            let stage = Stage {
-                plan: &plan,
-                process_of: &process_of,
-                folder: &folder,
-            };
-            stage.play(links.as_mut(), &mut launch, report)
-        } else {
-            Ok(())
-        }
-    });
+    let player = Player {
+        plan: &plan,
+        process_of: &process_of,
+        folder: &folder,
+    };
+    let played = match wait_for_clock(&mut launch, &folder.file(EVENTS), begun) {
+        Ok(true) => player.play(links.as_mut(), &mut launch, report),
+        Ok(false) => Ok(()),
+        Err(error) => Err(error),
+    };
     if played.is_err() {
         signals.end();
     }
@@ -166,7 +163,7 @@ pub fn play(play: &Play, report: impl FnMut(String)) -> miette::Result<u8> {
     played.map(|()| exit_code(status))
 }
 
-/// The process that runs each robot: robots of one process share its link.
+/// The process of each robot. Robots of one process share its link.
 fn process_of(file: &LaunchFile) -> BTreeMap<RobotName, String> {
     let mut process_of = BTreeMap::new();
     for process in &file.processes {
@@ -198,48 +195,44 @@ fn make_links(
     }
 }
 
-/// Certificates name the hosts by which a simulator is reached, and those of these links are made anew each time.
+/// Refuses secured launches: the addresses of these links are not in the certificate of the simulator.
 fn check_not_secured(file: &LaunchFile) -> miette::Result<()> {
-    let help =
-        "play it --via proxy, or leave out `secure`: nobody else is in the network of these links";
-    if file.secure.is_some() {
-        Err(miette!(
-            help = help,
-            "a secured launch has no certificate there"
-        ))
-    } else {
-        Ok(())
+    if file.secure.is_none() {
+        return Ok(());
     }
+
+    let help = "play it --via proxy, or leave out `secure`: the network of these links is private";
+    Err(miette!(
+        help = help,
+        "certificates do not have the addresses of these links"
+    ))
 }
 
-/// A change of a scenario: no partition is simulated.
+/// Change of a scenario that removes its partitions.
 const WITHOUT_PARTITIONS: &str = "network.partition=[]";
 
 /// The partitions of the scenario, as faults of real links.
 fn partitions(file: &LaunchFile, options: &RunOptions) -> miette::Result<Plan> {
     let scenario = file.load_scenario(&options.changes())?;
     let Some(speed) = options.speed.or(file.speed).and_then(|speed| speed.0) else {
-        let help = "say --speed 20, for example";
         return Err(miette!(
-            help = help,
-            "as fast as it goes, nobody knows when a partition would come"
+            help = "for example --speed 20",
+            "without a speed, partitions have no time on the wall clock"
         ));
     };
     Ok(Plan::of_partitions(&scenario, speed)?)
 }
 
-/// Waits until the first tick is in the record. Returns whether it came before the end of the launch.
+/// Waits until the first tick is in the record. Returns `false` if the launch ends before.
 fn wait_for_clock(launch: &mut Child, events: &Path, begun: SystemTime) -> miette::Result<bool> {
-    let is_new = || {
-        events
-            .metadata()
-            .and_then(|file| file.modified())
-            .is_ok_and(|at| at >= begun)
-    };
     loop {
-        if is_new() && last_tick(events).is_some_and(|tick| tick > 0) {
+        // Until the simulator replaces it, the record is that of an earlier run.
+        let modified = events.metadata().and_then(|file| file.modified());
+        let is_new = modified.is_ok_and(|at| at >= begun);
+        if is_new && last_tick(events).is_some_and(|tick| tick > 0) {
             return Ok(true);
         }
+
         if launch.try_wait().into_diagnostic()?.is_some() {
             return Ok(false);
         }
@@ -251,48 +244,44 @@ fn wait_for_clock(launch: &mut Child, events: &Path, begun: SystemTime) -> miett
 fn last_tick(events: &Path) -> Option<u64> {
     let mut file = File::open(events).ok()?;
     let length = file.metadata().ok()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES)))
-        .ok()?;
+    let begin = length.saturating_sub(TAIL_BYTES);
+    file.seek(SeekFrom::Start(begin)).ok()?;
     let mut tail = Vec::new();
     file.read_to_end(&mut tail).ok()?;
-    let line = tail
-        .strip_suffix(b"\n")
-        .unwrap_or(&tail)
-        .rsplit(|byte| *byte == b'\n')
-        .next()?;
-    serde_json::from_slice::<serde_json::Value>(line)
-        .ok()?
-        .get("tick")?
-        .as_u64()
+
+    let lines = tail.strip_suffix(b"\n").unwrap_or(&tail);
+    let line = lines.rsplit(|byte| *byte == b'\n').next()?;
+    let line: serde_json::Value = serde_json::from_slice(line).ok()?;
+    line.get("tick")?.as_u64()
 }
 
-/// A line of what was done.
+/// A line of [`LINKS`].
 #[derive(Debug, Serialize)]
-struct Done<'a> {
-    /// Seconds of the wall clock since the clock first ran.
+struct LinkRecord<'a> {
+    /// Wall clock since the first tick, s.
     time_s: f64,
     robot: &'a RobotName,
     link: Shape,
-    /// The last tick that was in the record by then.
+    /// The last tick in the record at that time.
     tick: Option<u64>,
 }
 
-/// What faults are played on.
-struct Stage<'a> {
+/// Plays a plan on the links of a launch.
+struct Player<'a> {
     plan: &'a Plan,
     process_of: &'a BTreeMap<RobotName, String>,
     folder: &'a RunFolder,
 }
 
-impl Stage<'_> {
-    /// Plays the plan from now on.
+impl Player<'_> {
+    /// Plays the plan, the times of which begin now.
     fn play(
         &self,
         links: &mut dyn Links,
         launch: &mut Child,
         mut report: impl FnMut(String),
     ) -> miette::Result<()> {
-        let begun = std::time::Instant::now();
+        let begun = Instant::now();
         let path = self.folder.file(LINKS);
         let mut record = File::create(&path)
             .into_diagnostic()
@@ -301,34 +290,32 @@ impl Stage<'_> {
         let apply = |robot: &RobotName, shape: Shape, _| {
             links.set(&self.process_of[robot], shape)?;
 
-            let time_s = begun.elapsed().as_secs_f64();
-            let tick = last_tick(&self.folder.file(EVENTS));
-            report(format!("{time_s:.3} s: the link of {robot} is {shape}"));
-            let line = serde_json::to_string(&Done {
-                time_s,
+            let entry = LinkRecord {
+                time_s: begun.elapsed().as_secs_f64(),
                 robot,
                 link: shape,
-                tick,
-            })
-            .into_diagnostic()?;
+                tick: last_tick(&self.folder.file(EVENTS)),
+            };
+            let time_s = entry.time_s;
+            report(format!("{time_s:.3} s: the link of {robot} is {shape}"));
+            let line = serde_json::to_string(&entry).into_diagnostic()?;
             writeln!(record, "{line}")
                 .into_diagnostic()
                 .wrap_err_with(|| path.display().to_string())
         };
-        // A launch that cannot be asked is over.
-        self.plan
-            .play(begun, apply, || !matches!(launch.try_wait(), Ok(None)))
+        // If the state of the launch cannot be read, it is over.
+        let is_over = || !matches!(launch.try_wait(), Ok(None));
+        self.plan.play(begun, apply, is_over)
     }
 }
 
 fn exit_code(status: ExitStatus) -> u8 {
-    let code = status
-        .code()
-        .or_else(|| status.signal().map(|signal| 128 + signal));
+    let signal = status.signal().map(|signal| 128 + signal);
+    let code = status.code().or(signal);
     code.and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
 }
 
-/// Ctrl-C and SIGTERM go to the launch, which ends in good order; then the links are taken down.
+/// Forwards Ctrl-C and SIGTERM to the launch, which ends the run. The links are removed after that.
 struct Signals {
     launch: Arc<AtomicI32>,
     is_asked: Arc<AtomicBool>,
@@ -340,29 +327,33 @@ impl Signals {
             launch: Arc::default(),
             is_asked: Arc::default(),
         };
-        let (launch, is_asked) = (signals.launch.clone(), signals.is_asked.clone());
+        let launch = signals.launch.clone();
+        let is_asked = signals.is_asked.clone();
         ctrlc::set_handler(move || {
             is_asked.store(true, Ordering::SeqCst);
             terminate(launch.load(Ordering::SeqCst));
         })
         .into_diagnostic()?;
+
         Ok(signals)
     }
 
     fn spawn(&self, mut command: Command) -> miette::Result<Child> {
-        // In a group of its own: Ctrl-C reaches it once, by way of this process.
+        // In a process group of its own it receives Ctrl-C only through this process.
         let program = command.get_program().to_owned();
-        let child = command.process_group(0).spawn();
-        let child = child
+        let child = command
+            .process_group(0)
+            .spawn()
             .into_diagnostic()
             .wrap_err_with(|| format!("starting {}", program.display()))?;
-        self.launch.store(
-            i32::try_from(child.id()).into_diagnostic()?,
-            Ordering::SeqCst,
-        );
+        let pid = i32::try_from(child.id()).into_diagnostic()?;
+        self.launch.store(pid, Ordering::SeqCst);
+
+        // A signal may have come before the process id was stored.
         if self.is_asked.load(Ordering::SeqCst) {
             self.end();
         }
+
         Ok(child)
     }
 
@@ -371,7 +362,7 @@ impl Signals {
     }
 }
 
-/// A launch that is over already needs no signal.
+/// Sends SIGTERM to a launch, if it has been started.
 fn terminate(launch: i32) {
     if launch > 0 {
         let _over = kill(Pid::from_raw(launch), Signal::SIGTERM);
@@ -387,6 +378,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join(EVENTS);
         assert_eq!(last_tick(&file), None);
+
         for (text, tick) in [
             ("", None),
             ("{\"tick\":0,\"event\":\"joined\"}\n", Some(0)),
@@ -396,6 +388,7 @@ mod tests {
             std::fs::write(&file, text).unwrap();
             assert_eq!(last_tick(&file), tick, "{text}");
         }
+
         std::fs::write(&file, "{\"tick\":1}\n".repeat(5000) + "{\"tick\":2}\n").unwrap();
         assert_eq!(last_tick(&file), Some(2));
     }

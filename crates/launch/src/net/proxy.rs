@@ -1,5 +1,5 @@
-//! A TCP proxy that breaks on request. It needs no rights and no tools, only that a robot connects to it instead of to
-//! the simulator. What it cannot do is lose single packets: TCP would send them again.
+//! A TCP proxy with faults on request. It needs no privileges: a robot connects to it instead of to the simulator. It cannot
+//! lose single packets, because it forwards streams.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -17,26 +17,26 @@ use super::gate::{Gate, Pace};
 use super::plan::Plan;
 use super::shape::{Flow, Shape};
 
-/// Connections at the same time; more are turned away. A robot needs one, and in a long cut it tries once a second.
+/// Most connections at the same time; further ones are closed. A robot needs one, and makes one a second during a cut.
 const MAX_CONNECTIONS: usize = 256;
-/// Most bytes in a piece.
+/// Most bytes of a piece.
 const PIECE_BYTES: usize = 16 * 1024;
-/// Pieces on their way in one direction of a connection; then the sender waits.
+/// Most pieces under way in one direction of a connection; the sender waits while there are more.
 const MAX_PIECES: usize = 256;
-/// Longest wait for the other side to take a connection.
+/// Longest wait for a connection to the target.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// A narrow link sends this part of its bits per second at once.
+/// A link with limited bandwidth sends in slices; this is their number per second.
 const SLICES_PER_S: u64 = 20;
 
 /// An endpoint is not an address of TCP.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no address such as tcp/127.0.0.1:7447")]
+#[error("{0:?} is not an address such as tcp/127.0.0.1:7447")]
 pub struct AddressError(String);
 
-/// The address of an endpoint of TCP, or of TLS, which passes a proxy as it is.
+/// The address of an endpoint of TCP, or of TLS, which passes a proxy unchanged.
 ///
 /// # Errors
-/// [`AddressError`] if it is another kind of endpoint, or names its host.
+/// [`AddressError`] if the protocol is another one, or the host is a name.
 pub fn address(endpoint: &str) -> Result<SocketAddr, AddressError> {
     let bad = || AddressError(endpoint.to_owned());
     let (protocol, address) = endpoint.split_once('/').ok_or_else(bad)?;
@@ -46,7 +46,7 @@ pub fn address(endpoint: &str) -> Result<SocketAddr, AddressError> {
     address.parse().map_err(|_| bad())
 }
 
-/// A proxy at work, to the end of the process.
+/// A running proxy. It runs until the end of the process.
 #[derive(Debug)]
 pub struct Proxy {
     local: SocketAddr,
@@ -54,21 +54,29 @@ pub struct Proxy {
     open: Arc<Connections>,
 }
 
-/// Both sides of every connection, to close them.
+/// Both sockets of every connection, to close them.
 #[derive(Debug, Default)]
 struct Connections(Mutex<BTreeMap<u64, Vec<TcpStream>>>);
 
 impl Connections {
+    fn close_all(&self) {
+        self.with(|open| {
+            for side in open.values().flatten() {
+                let _is_closed_already = side.shutdown(Shutdown::Both);
+            }
+        });
+    }
+
     fn with<T>(&self, f: impl FnOnce(&mut BTreeMap<u64, Vec<TcpStream>>) -> T) -> T {
         f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 impl Proxy {
-    /// Begins to forward from one address to the other.
+    /// Starts to forward from one address to the other.
     ///
     /// # Errors
-    /// If the address cannot be listened at.
+    /// If the address cannot be bound.
     pub fn start(listen: SocketAddr, to: SocketAddr) -> std::io::Result<Self> {
         let listener = TcpListener::bind(listen)?;
         let proxy = Self {
@@ -76,25 +84,26 @@ impl Proxy {
             gate: Arc::default(),
             open: Arc::default(),
         };
-        let (gate, open) = (proxy.gate.clone(), proxy.open.clone());
+        let gate = proxy.gate.clone();
+        let open = proxy.open.clone();
         std::thread::spawn(move || accept(&listener, to, &gate, &open));
         Ok(proxy)
     }
 
-    /// Where it listens.
+    /// The address at which it listens.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.local
     }
 
-    /// What the link is like now.
+    /// The current shape of the link.
     #[must_use]
     pub fn shape(&self) -> Shape {
         self.gate.shape()
     }
 
-    /// Plays the faults of a plan, from the first connection on, to their end. `apply` receives each shape, and the time
-    /// since that connection.
+    /// Plays the faults of a plan, the times of which begin with the first connection. `apply` receives each shape and the
+    /// time since then.
     pub fn play(&self, plan: &Plan, mut apply: impl FnMut(Shape, Duration)) {
         let apply = |_: &RobotName, shape: Shape, at: Duration| {
             apply(shape, at);
@@ -103,19 +112,13 @@ impl Proxy {
         let Ok(()) = plan.play(self.gate.wait_for_use(), apply, || false);
     }
 
-    /// From now on the link is like this.
+    /// Changes the shape of the link.
     pub fn set(&self, shape: Shape) {
         self.gate.set(shape);
         if shape.flow == Flow::Closed {
-            self.open
-                .with(|open| open.values().flatten().for_each(close));
+            self.open.close_all();
         }
     }
-}
-
-/// A side that is closed already needs no more.
-fn close(side: &TcpStream) {
-    let _gone = side.shutdown(Shutdown::Both);
 }
 
 fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<Connections>) {
@@ -123,22 +126,25 @@ fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<C
         let client = match listener.accept() {
             Ok((client, _)) => client,
             Err(error) => {
-                // Out of file descriptors, most likely: some will be free again.
-                eprintln!("a connection could not be accepted: {error}");
+                // Most likely there are no free file descriptors at the moment.
+                tracing::warn!("a connection could not be accepted: {error}");
                 std::thread::sleep(CONNECT_TIMEOUT);
                 continue;
             }
         };
+
         let is_full = open.with(|open| open.len() >= MAX_CONNECTIONS);
         if is_full || gate.shape().flow == Flow::Closed {
-            continue; // Dropped, and so closed.
+            continue; // Dropping the socket closes it.
         }
         gate.touch();
         let Ok(own) = client.try_clone() else {
             continue;
         };
         open.with(|open| open.insert(id, vec![own]));
-        let (gate, open) = (gate.clone(), open.clone());
+
+        let gate = gate.clone();
+        let open = open.clone();
         std::thread::spawn(move || {
             if let Err(error) = forward(id, client, to, &gate, &open) {
                 tracing::debug!("a connection through the proxy: {error}");
@@ -148,7 +154,7 @@ fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<C
     }
 }
 
-/// One connection, to its end.
+/// Forwards one connection to its end.
 fn forward(
     id: u64,
     client: TcpStream,
@@ -156,7 +162,7 @@ fn forward(
     gate: &Arc<Gate>,
     open: &Connections,
 ) -> std::io::Result<()> {
-    // Who connects into a cut is heard of on the other side when it heals.
+    // During a cut, the connection to the target is made when the cut heals.
     gate.pass();
     let server = TcpStream::connect_timeout(&to, CONNECT_TIMEOUT)?;
     server.set_nodelay(true)?;
@@ -166,23 +172,26 @@ fn forward(
     if !is_open || gate.shape().flow == Flow::Closed {
         return Ok(());
     }
+
+    let number = id.wrapping_mul(2);
     let there = pipe(
         client.try_clone()?,
         server.try_clone()?,
         gate.clone(),
-        id.wrapping_mul(2),
+        number,
     );
-    let back = pipe(server, client, gate.clone(), id.wrapping_mul(2) + 1);
+    let back = pipe(server, client, gate.clone(), number + 1);
     for writer in [there, back] {
         drop(writer.join());
     }
     Ok(())
 }
 
-/// A piece on its way, and when it may arrive.
+/// When a piece may arrive, and its bytes.
 type Piece = (Instant, Vec<u8>);
 
-/// One direction: one thread reads, one writes, and between them is the length of the link. Returns the writer.
+/// One direction: one thread reads, another one writes, and the queue between them holds delayed pieces. Returns the
+/// writer. `number` names the stream of random numbers.
 fn pipe(
     from: TcpStream,
     to: TcpStream,
@@ -196,50 +205,66 @@ fn pipe(
 }
 
 fn read(mut from: TcpStream, send: &SyncSender<Piece>, gate: &Gate, number: u64) {
-    let (mut luck, mut pace) = (stream(number, "proxy"), Pace::new());
+    let mut luck = stream(number, "proxy");
+    let mut pace = Pace::new();
     let mut buffer = vec![0; PIECE_BYTES];
+
     loop {
         gate.pass();
-        // An error is an end, too: the other side is told by closing.
+        // After an error the writer closes the other side, as at the end.
         let Ok(bytes @ 1..) = from.read(&mut buffer) else {
             return;
         };
         let due = pace.due(Instant::now(), gate.shape(), unit(&mut luck));
         if send.send((due, buffer[..bytes].to_vec())).is_err() {
-            return; // The writer has gone: nobody listens on the other side.
+            return; // The writer has ended because the other side is closed.
         }
     }
 }
 
 fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
     let mut pace = Pace::new();
-    let is_whole = pieces.iter().all(|(due, piece)| {
+    let mut written = Ok(());
+    for (due, piece) in pieces {
         sleep_until(due);
-        let bps = gate.shape().bandwidth_bps.unwrap_or(u64::MAX);
-        let slice = usize::try_from(bps / 8 / SLICES_PER_S)
-            .unwrap_or(usize::MAX)
-            .max(1);
-        piece.chunks(slice).all(|slice| {
-            gate.pass();
-            sleep_until(pace.sent(Instant::now(), gate.shape(), slice.len()));
-            gate.pass();
-            to.write_all(slice).is_ok()
-        })
-    });
+        written = write_piece(&mut to, &piece, &mut pace, gate);
+        if written.is_err() {
+            break;
+        }
+    }
     gate.pass();
-    // The end of one direction leaves the other one open; a failure ends both.
-    let _gone = to.shutdown(if is_whole {
-        Shutdown::Write
-    } else {
-        Shutdown::Both
-    });
+
+    // The end of one direction leaves the other one open; a failure closes both.
+    let how = match written {
+        Ok(()) => Shutdown::Write,
+        Err(_) => Shutdown::Both,
+    };
+    let _is_closed_already = to.shutdown(how);
+}
+
+/// Writes a piece in slices, as slowly as the bandwidth requires.
+fn write_piece(
+    to: &mut TcpStream,
+    piece: &[u8],
+    pace: &mut Pace,
+    gate: &Gate,
+) -> std::io::Result<()> {
+    let bps = gate.shape().bandwidth_bps.unwrap_or(u64::MAX);
+    let slice_bytes = usize::try_from(bps / 8 / SLICES_PER_S).unwrap_or(usize::MAX);
+    for slice in piece.chunks(slice_bytes.max(1)) {
+        gate.pass();
+        sleep_until(pace.sent(Instant::now(), gate.shape(), slice.len()));
+        gate.pass();
+        to.write_all(slice)?;
+    }
+    Ok(())
 }
 
 fn sleep_until(due: Instant) {
     std::thread::sleep(due.saturating_duration_since(Instant::now()));
 }
 
-/// A proxy on a free port of loopback.
+/// Starts a proxy on a free port of the loopback interface.
 pub(super) fn on_loopback(to: &str) -> miette::Result<Proxy> {
     let to = address(to).into_diagnostic()?;
     Proxy::start(SocketAddr::from(([127, 0, 0, 1], 0)), to)
@@ -253,7 +278,7 @@ mod tests {
 
     const SHORT: Duration = Duration::from_millis(150);
 
-    /// A server, a proxy before it, and a client: what each side of the link holds.
+    /// A proxy with a connection through it: the sockets of client and server.
     fn link() -> (Proxy, TcpStream, TcpStream) {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let proxy =
@@ -264,6 +289,7 @@ mod tests {
             side.set_read_timeout(Some(Duration::from_secs(20)))
                 .unwrap();
         }
+
         (proxy, client, server)
     }
 
@@ -286,6 +312,7 @@ mod tests {
         let (proxy, mut client, mut server) = link();
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
+
         proxy.set(Shape {
             flow: Flow::Cut,
             ..Shape::default()
@@ -294,23 +321,20 @@ mod tests {
         server.write_all(b"back").unwrap();
         assert!(
             is_silent(&mut server) && is_silent(&mut client),
-            "nothing comes through a cut"
+            "nothing passes a cut"
         );
+
         proxy.set(Shape::default());
-        assert_eq!(
-            (receive(&mut server, 3), receive(&mut client, 4)),
-            (b"two".to_vec(), b"back".to_vec())
-        );
+        assert_eq!(receive(&mut server, 3), b"two");
+        assert_eq!(receive(&mut client, 4), b"back");
+
         drop(client);
-        assert_eq!(
-            server.read(&mut [0]).unwrap(),
-            0,
-            "the end comes through, too"
-        );
+        let end = server.read(&mut [0]).unwrap();
+        assert_eq!(end, 0, "the end passes, too");
     }
 
     #[test]
-    fn who_connects_into_a_cut_gets_through_when_it_heals() {
+    fn a_connection_during_a_cut_is_made_when_it_heals() {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let proxy =
             Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
@@ -322,28 +346,24 @@ mod tests {
         client.write_all(b"hello").unwrap();
         listener.set_nonblocking(true).unwrap();
         std::thread::sleep(SHORT);
-        assert!(listener.accept().is_err(), "nobody has come through");
+        assert!(listener.accept().is_err(), "a connection passed the cut");
         listener.set_nonblocking(false).unwrap();
         proxy.set(Shape::default());
         assert_eq!(receive(&mut listener.accept().unwrap().0, 5), b"hello");
     }
 
     #[test]
-    fn closing_tells_both_sides_and_turns_newcomers_away() {
+    fn closing_ends_all_connections_and_refuses_new_ones() {
         let (proxy, mut client, mut server) = link();
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
+
         proxy.set(Shape {
             flow: Flow::Closed,
             ..Shape::default()
         });
-        assert_eq!(
-            (
-                server.read(&mut [0]).unwrap(),
-                client.read(&mut [0]).unwrap()
-            ),
-            (0, 0)
-        );
+        assert_eq!(server.read(&mut [0]).unwrap(), 0);
+        assert_eq!(client.read(&mut [0]).unwrap(), 0);
         let mut newcomer = TcpStream::connect(proxy.local).unwrap();
         newcomer
             .set_read_timeout(Some(Duration::from_secs(20)))
@@ -352,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_link_is_slow_and_a_narrow_one_narrow() {
+    fn delay_and_bandwidth_take_effect() {
         let (proxy, mut client, mut server) = link();
         let delay = Duration::from_millis(80);
         proxy.set(Shape {
@@ -365,11 +385,8 @@ mod tests {
         receive(&mut server, 4);
         server.write_all(b"pong").unwrap();
         receive(&mut client, 4);
-        assert!(
-            sent.elapsed() >= 2 * delay,
-            "there and back took {:?}",
-            sent.elapsed()
-        );
+        let took = sent.elapsed();
+        assert!(took >= 2 * delay, "the round trip took {took:?}");
         // 4,000 bytes at 80 kbit/s: 0.4 s.
         proxy.set(Shape {
             bandwidth_bps: Some(80_000),
@@ -378,15 +395,12 @@ mod tests {
         let sent = Instant::now();
         client.write_all(&[7; 4000]).unwrap();
         assert_eq!(receive(&mut server, 4000), [7; 4000]);
-        assert!(
-            sent.elapsed() >= Duration::from_millis(390),
-            "it took {:?}",
-            sent.elapsed()
-        );
+        let took = sent.elapsed();
+        assert!(took >= Duration::from_millis(390), "it took {took:?}");
     }
 
     #[test]
-    fn megabytes_come_through_whole_although_buffers_are_bounded() {
+    fn megabytes_pass_unchanged_although_buffers_are_bounded() {
         let (_proxy, mut client, mut server) = link();
         let sent: Vec<u8> = (0..9_000_000_u32)
             .map(|i| i.to_le_bytes()[i as usize % 3])
@@ -396,11 +410,12 @@ mod tests {
             client.write_all(&copy).unwrap();
             client.shutdown(Shutdown::Write).unwrap();
         });
+
         std::thread::sleep(SHORT);
         let mut received = Vec::new();
         server.read_to_end(&mut received).unwrap();
         sender.join().unwrap();
-        assert!(sent == received, "what came is not what was sent");
+        assert!(sent == received, "the bytes received are not those sent");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What a link does to what is sent over it.
+//! The shape of a link: flow, delay, jitter and bandwidth.
 
 use std::str::FromStr;
 use std::time::Duration;
@@ -6,58 +6,64 @@ use std::time::Duration;
 use config::units::Time;
 use serde::Serialize;
 
-/// Whether anything comes through.
+/// Whether bytes pass a link.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Flow {
-    /// Everything.
+    /// All bytes pass.
     #[default]
     Open,
-    /// Nothing, and nobody is told: a cable that is pulled.
+    /// No bytes pass and connections stay open, like a pulled cable.
     Cut,
-    /// Nothing, and both sides are told: a box in the middle that is restarted.
+    /// Connections are closed and new ones refused, like a restarting middlebox.
     Closed,
 }
 
-/// What a link does to what is sent over it; by default nothing.
+/// The shape of a link; by default it is open and unlimited.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Shape {
-    /// Whether anything comes through.
+    /// Whether bytes pass.
     pub flow: Flow,
-    /// Added to the way of every byte, in both directions.
+    /// Delay of every byte in each direction.
     pub delay: Duration,
-    /// At most this much more, drawn anew for every piece; nothing overtakes anything.
+    /// Most additional delay, drawn for every piece. Pieces keep their order.
     pub jitter: Duration,
     /// Bits per second in each direction, if limited.
     pub bandwidth_bps: Option<u64>,
 }
 
 impl Shape {
-    /// Both at the same time.
+    /// A link with this flow, without delay and limit.
+    pub(super) fn of_flow(flow: Flow) -> Self {
+        Self {
+            flow,
+            ..Self::default()
+        }
+    }
+
+    /// The shape of a link with two faults at the same time.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
+        let bandwidths = self.bandwidth_bps.into_iter().chain(other.bandwidth_bps);
         Self {
             flow: self.flow.max(other.flow),
             delay: self.delay + other.delay,
             jitter: self.jitter + other.jitter,
-            bandwidth_bps: self
-                .bandwidth_bps
-                .into_iter()
-                .chain(other.bandwidth_bps)
-                .min(),
+            bandwidth_bps: bandwidths.min(),
         }
     }
 
-    /// Whether it is nothing but open or cut.
+    /// Whether it is open or cut, without delay and limit.
     pub(super) fn is_plain_cut(self) -> bool {
-        self == Self {
-            flow: self.flow,
-            ..Self::default()
-        } && self.flow != Flow::Closed
+        self.flow != Flow::Closed && self == Self::of_flow(self.flow)
     }
 }
 
 impl std::fmt::Display for Shape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if *self == Self::default() {
+            return f.write_str("whole");
+        }
+
         let mut parts = Vec::new();
         match self.flow {
             Flow::Open => {}
@@ -70,11 +76,10 @@ impl std::fmt::Display for Shape {
         if !self.jitter.is_zero() {
             parts.push(format!("jitter {:?}", self.jitter));
         }
-        parts.extend(
-            self.bandwidth_bps
-                .map(|bps| format!("bandwidth {bps} bit/s")),
-        );
-        f.write_str(if parts.is_empty() { "whole" } else { "" })?;
+        if let Some(bps) = self.bandwidth_bps {
+            parts.push(format!("bandwidth {bps} bit/s"));
+        }
+
         f.write_str(&parts.join(", "))
     }
 }
@@ -85,29 +90,29 @@ impl Serialize for Shape {
     }
 }
 
-/// A change that a person types.
+/// A change of a link that a person types.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Order {
-    /// Whether anything comes through.
+pub enum LinkOrder {
+    /// Whether bytes pass.
     Flow(Flow),
-    /// How late everything is.
+    /// Delay and jitter.
     Delay {
-        /// Added to the way of every byte.
+        /// Delay of every byte.
         delay: Duration,
-        /// At most this much more.
+        /// Most additional delay.
         jitter: Duration,
     },
     /// Bits per second, if limited.
     Bandwidth(Option<u64>),
-    /// Nothing changes.
+    /// No change; the shape is printed.
     Status,
 }
 
 /// A line is not an order.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OrderError {
-    /// No order begins like this.
-    #[error("{0:?} is none of: {ORDERS}")]
+    /// There is no such order.
+    #[error("{0:?} is not one of: {ORDERS}")]
     Unknown(String),
     /// A bandwidth is a whole number of bits per second.
     #[error("{0:?} is not a number of bits per second above zero")]
@@ -117,30 +122,27 @@ pub enum OrderError {
     Time(String),
 }
 
-/// All that can be typed.
+/// The syntax of all orders.
 const ORDERS: &str = "cut, close, heal, delay TIME [JITTER], bandwidth BITS_PER_SECOND|off, status";
 
-impl Order {
-    /// The link with this change.
+impl LinkOrder {
+    /// The shape with this change.
     #[must_use]
-    pub fn apply(self, shape: Shape) -> Shape {
+    pub fn apply(self, mut shape: Shape) -> Shape {
         match self {
-            Self::Flow(flow) => Shape { flow, ..shape },
-            Self::Delay { delay, jitter } => Shape {
-                delay,
-                jitter,
-                ..shape
-            },
-            Self::Bandwidth(bandwidth_bps) => Shape {
-                bandwidth_bps,
-                ..shape
-            },
-            Self::Status => shape,
+            Self::Flow(flow) => shape.flow = flow,
+            Self::Delay { delay, jitter } => {
+                shape.delay = delay;
+                shape.jitter = jitter;
+            }
+            Self::Bandwidth(bandwidth_bps) => shape.bandwidth_bps = bandwidth_bps,
+            Self::Status => {}
         }
+        shape
     }
 }
 
-impl FromStr for Order {
+impl FromStr for LinkOrder {
     type Err = OrderError;
 
     fn from_str(line: &str) -> Result<Self, OrderError> {
@@ -149,21 +151,28 @@ impl FromStr for Order {
             ["cut"] => Ok(Self::Flow(Flow::Cut)),
             ["close"] => Ok(Self::Flow(Flow::Closed)),
             ["heal"] => Ok(Self::Flow(Flow::Open)),
-            ["delay", delay] => Ok(Self::Delay {
-                delay: time(delay)?,
-                jitter: Duration::ZERO,
-            }),
-            ["delay", delay, jitter] => Ok(Self::Delay {
-                delay: time(delay)?,
-                jitter: time(jitter)?,
-            }),
+            ["delay", delay] => Self::delay(delay, "0s"),
+            ["delay", delay, jitter] => Self::delay(delay, jitter),
             ["bandwidth", "off"] => Ok(Self::Bandwidth(None)),
-            ["bandwidth", bps] => match bps.parse() {
-                Ok(bps @ 1..) => Ok(Self::Bandwidth(Some(bps))),
-                _ => Err(OrderError::Bandwidth((*bps).to_owned())),
-            },
+            ["bandwidth", bps] => Self::bandwidth(bps),
             ["status"] => Ok(Self::Status),
             _ => Err(OrderError::Unknown(line.to_owned())),
+        }
+    }
+}
+
+impl LinkOrder {
+    fn delay(delay: &str, jitter: &str) -> Result<Self, OrderError> {
+        Ok(Self::Delay {
+            delay: time(delay)?,
+            jitter: time(jitter)?,
+        })
+    }
+
+    fn bandwidth(bps: &str) -> Result<Self, OrderError> {
+        match bps.parse() {
+            Ok(bps @ 1..) => Ok(Self::Bandwidth(Some(bps))),
+            _ => Err(OrderError::Bandwidth(bps.to_owned())),
         }
     }
 }
@@ -173,7 +182,7 @@ fn time(text: &str) -> Result<Duration, OrderError> {
     duration(time).map_err(OrderError::Time)
 }
 
-/// A time that is not below zero.
+/// A time that is not negative.
 pub(super) fn duration(time: Time) -> Result<Duration, String> {
     Duration::try_from_secs_f64(time.0).map_err(|_| "a time here is zero or more".to_owned())
 }
@@ -185,7 +194,7 @@ mod tests {
     const MS: Duration = Duration::from_millis(1);
 
     #[test]
-    fn what_is_typed_changes_one_thing_and_leaves_the_others() {
+    fn an_order_changes_one_property_and_keeps_the_others() {
         let mut shape = Shape::default();
         for (line, shown) in [
             ("delay 50ms 10ms", "delay 50ms, jitter 10ms"),
@@ -203,9 +212,10 @@ mod tests {
             ("delay 0s", "whole"),
             ("close", "closed"),
         ] {
-            shape = line.parse::<Order>().unwrap().apply(shape);
+            shape = line.parse::<LinkOrder>().unwrap().apply(shape);
             assert_eq!(shape.to_string(), shown, "after {line}");
         }
+
         for line in [
             "",
             "cut it",
@@ -215,12 +225,12 @@ mod tests {
             "bandwidth 0",
             "bandwidth -1",
         ] {
-            assert!(line.parse::<Order>().is_err(), "{line:?}");
+            assert!(line.parse::<LinkOrder>().is_err(), "{line:?}");
         }
     }
 
     #[test]
-    fn of_two_faults_at_once_both_are_felt() {
+    fn two_faults_at_the_same_time_add_up() {
         let slow = Shape {
             delay: 50 * MS,
             bandwidth_bps: Some(1000),
@@ -238,15 +248,10 @@ mod tests {
             bandwidth_bps: Some(10),
             ..Shape::default()
         };
+
         assert_eq!(slow.and(cut), both);
         assert_eq!(cut.and(slow), both);
-        assert!(
-            !both.is_plain_cut()
-                && Shape {
-                    flow: Flow::Cut,
-                    ..Shape::default()
-                }
-                .is_plain_cut()
-        );
+        assert!(!both.is_plain_cut());
+        assert!(Shape::of_flow(Flow::Cut).is_plain_cut());
     }
 }

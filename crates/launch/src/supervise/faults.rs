@@ -1,108 +1,104 @@
-//! What a scenario has in store for the robots' processes, done to the real ones.
+//! Carries out the faults that a scenario orders for the robots' processes.
 
 use std::time::Duration;
 
+use super::{FaultsDone, Shutdown, Supervisor, SupervisorEvent};
 use nix::sys::signal::Signal;
+use protocol::RobotName;
 use protocol::messages::{FaultKind, ProcessOrder};
 
-use super::{Done, Event, Stage, Supervisor};
-
-/// A slowed process stands still for this long, and goes on for as long as the second says \[I\].
+/// How long a slowed process is stopped at a time \[I\].
 const SLOW_STOP: Duration = Duration::from_millis(40);
+/// How long it runs in between \[I\].
 const SLOW_GO: Duration = Duration::from_millis(10);
 
 impl Supervisor {
-    /// Carries orders out, and says so. What has been done already is not done again.
-    pub(super) fn on_faults(&mut self, orders: &[ProcessOrder], done: Done) {
-        if self.stage != Stage::Running {
+    /// Carries orders out and reports it. Orders are idempotent, because the simulator may repeat them.
+    pub(super) fn on_faults(&mut self, orders: &[ProcessOrder], done: FaultsDone) {
+        if self.stage != Shutdown::Running {
             return;
         }
+
         for order in orders {
-            let runs = |kept: &super::Kept| kept.planned.robots.contains(&order.robot);
-            let Some(index) = self
-                .kept
-                .iter()
-                .position(runs)
-                .filter(|index| !self.kept[*index].planned.is_extern)
-            else {
-                self.tell.notice(format!(
-                    "{} is not run by this launcher: its fault is yours to bring about",
-                    order.robot
-                ));
-                continue;
-            };
-            if order.begins {
-                self.begin_fault(index, order);
-            } else {
-                self.end_fault(index, order.kind);
+            let robot = &order.robot;
+            match self.index_of(robot) {
+                Some(index) if order.begins => self.begin_fault(index, order),
+                Some(index) => self.end_fault(index, order.kind),
+                None => self.notice(format!(
+                    "{robot} is not started by this launcher: carry its fault out yourself"
+                )),
             }
         }
         (done.0)();
     }
 
+    /// The process of a robot, unless the user starts it.
+    fn index_of(&self, robot: &RobotName) -> Option<usize> {
+        let mut processes = self.processes.iter();
+        let index = processes.position(|process| process.planned.robots.contains(robot))?;
+        (!self.processes[index].planned.is_extern).then_some(index)
+    }
+
     fn begin_fault(&mut self, index: usize, order: &ProcessOrder) {
-        let kept = &mut self.kept[index];
+        let process = &mut self.processes[index];
         match order.kind {
-            FaultKind::Crash if kept.is_down => return,
+            FaultKind::Crash if process.is_down => return,
             FaultKind::Crash => {
-                kept.is_down = true;
-                self.signal(index, Signal::SIGKILL);
+                process.is_down = true;
+                process.signal(Signal::SIGKILL);
             }
-            FaultKind::Hang => self.signal(index, Signal::SIGSTOP),
-            FaultKind::Slow if kept.is_slow => return,
+            FaultKind::Hang => process.signal(Signal::SIGSTOP),
+            FaultKind::Slow if process.is_slow => return,
             FaultKind::Slow => {
-                kept.is_slow = true;
+                process.is_slow = true;
                 self.pulse(index, true);
             }
         }
-        if let Some(wall) = order
-            .for_s
-            .and_then(|for_s| Duration::try_from_secs_f64(for_s).ok())
-        {
-            self.after(wall, Event::FaultOver(index, order.kind));
+
+        let duration = order.for_s.map(Duration::try_from_secs_f64);
+        if let Some(Ok(duration)) = duration {
+            self.after(duration, SupervisorEvent::FaultOver(index, order.kind));
         }
     }
 
-    /// A fault is over, by order or by the wall clock.
+    /// Ends a fault, by order or after its wall-clock duration.
     pub(super) fn end_fault(&mut self, index: usize, kind: FaultKind) {
-        let kept = &mut self.kept[index];
+        let process = &mut self.processes[index];
+
         match kind {
-            FaultKind::Crash if kept.is_down && kept.group.is_some() => {
-                // Its end has not been noticed yet.
-                self.after(SLOW_GO, Event::FaultOver(index, kind));
+            FaultKind::Crash if process.is_down && process.group.is_some() => {
+                // The exit of the killed process has not been handled yet.
+                self.after(SLOW_GO, SupervisorEvent::FaultOver(index, kind));
             }
-            FaultKind::Crash if kept.is_down => {
-                kept.is_down = false;
-                if self.stage == Stage::Running {
+            FaultKind::Crash if process.is_down => {
+                process.is_down = false;
+                if self.stage == Shutdown::Running {
                     self.start(index);
                 }
             }
             FaultKind::Crash => {}
-            FaultKind::Hang => self.signal(index, Signal::SIGCONT),
+            FaultKind::Hang => process.signal(Signal::SIGCONT),
             FaultKind::Slow => {
-                kept.is_slow = false;
-                self.signal(index, Signal::SIGCONT);
+                process.is_slow = false;
+                process.signal(Signal::SIGCONT);
             }
         }
     }
 
-    /// Stops a slowed process, or lets it go on for a moment.
+    /// Stops or continues a slowed process, and schedules the opposite.
     pub(super) fn pulse(&mut self, index: usize, stops: bool) {
-        if !self.kept[index].is_slow || self.stage != Stage::Running {
+        if !self.processes[index].is_slow || self.stage != Shutdown::Running {
             return;
         }
-        let (signal, wait) = if stops {
-            (Signal::SIGSTOP, SLOW_STOP)
-        } else {
-            (Signal::SIGCONT, SLOW_GO)
-        };
-        self.signal(index, signal);
-        self.after(wait, Event::Pulse(index, !stops));
-    }
 
-    fn signal(&self, index: usize, signal: Signal) {
-        if let Some(group) = self.kept[index].group {
-            group.signal(signal);
+        let next = SupervisorEvent::Pulse(index, !stops);
+        let process = &self.processes[index];
+        if stops {
+            process.signal(Signal::SIGSTOP);
+            self.after(SLOW_STOP, next);
+        } else {
+            process.signal(Signal::SIGCONT);
+            self.after(SLOW_GO, next);
         }
     }
 }

@@ -8,7 +8,7 @@ use nix::unistd::Pid;
 
 use super::super::plan::CommandLine;
 use super::super::restart::Restart;
-use super::super::screen::{Look, Screen};
+use super::super::screen::{Screen, ScreenOptions};
 use super::*;
 
 /// Longer than any test may take.
@@ -67,16 +67,17 @@ impl Hall {
                 self.planned.clone(),
                 self.folder.path(),
                 self.grace,
-                screen.tell(),
+                screen.handle(),
             );
             let queue = supervisor.queue();
             let running = tokio::spawn(supervisor.run());
             Self::ready(self.folder.path(), ready).await;
             for signal in signals {
-                queue.send(Event::Asked(*signal)).unwrap();
+                queue.send(SupervisorEvent::Asked(*signal)).unwrap();
             }
             running.await.unwrap()
         });
+
         screen.finish();
         outcome
     }
@@ -89,8 +90,8 @@ fn runtime() -> tokio::runtime::Runtime {
         .unwrap()
 }
 
-fn quiet() -> Look {
-    Look {
+fn quiet() -> ScreenOptions {
+    ScreenOptions {
         names: Vec::new(),
         is_quiet: true,
         has_colors_out: false,
@@ -116,7 +117,7 @@ fn shell(name: &str, script: &str) -> Planned {
     }
 }
 
-/// Whether the process whose number is in a file is still there; one that nobody has reaped yet is not.
+/// Whether the process with this id is running. A zombie is not.
 fn is_alive(pid: &str) -> bool {
     let pid: i32 = pid.trim().parse().expect("a process wrote its number");
     let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
@@ -159,6 +160,7 @@ fn who_watches_is_told_when_the_run_is_over_and_does_not_end_it() {
         .with(broken);
     let told = hall.path("told");
     let outcome = hall.run(&[], &[]);
+
     assert_eq!((outcome.failure, outcome.asked), (None, None));
     assert!(told.exists());
 }
@@ -186,6 +188,7 @@ fn the_first_required_failure_ends_the_run_in_good_order() {
         "stopped\n",
         "the simulator was to write its record"
     );
+
     let mut log: Vec<String> = hall.read("Butler.log").lines().map(str::to_owned).collect();
     log.sort();
     assert_eq!(log, ["one", "plain", "two"]);
@@ -222,6 +225,7 @@ fn a_program_that_cannot_be_started_is_a_failure() {
         .run(&[], &[])
         .failure
         .unwrap();
+
     assert_eq!(failure.code, 126);
     assert!(
         failure
@@ -254,6 +258,7 @@ fn a_failed_robot_is_restarted_and_the_run_goes_on() {
         grace: Duration::from_millis(100),
         ..hall
     };
+
     assert_eq!(hall.run(&[], &[]).failure, None);
     assert_eq!(hall.read("starts"), "up\nup\nup\n");
 }
@@ -303,9 +308,10 @@ fn asked_once_all_are_ended_also_one_that_is_stopped() {
     ));
     let begun = Instant::now();
     let outcome = hall.run(&["up", "stopped"], &[Signal::SIGINT]);
+
     assert!(
         begun.elapsed() < Duration::from_secs(10),
-        "nobody had to be killed"
+        "a process had to be killed"
     );
     assert_eq!(
         (outcome.failure, outcome.asked),
@@ -328,7 +334,7 @@ fn asked_twice_all_are_killed_at_once() {
 }
 
 #[test]
-fn nobody_is_left_behind_when_the_launcher_gives_up_in_the_middle() {
+fn no_process_is_left_behind_when_the_launcher_panics() {
     let hall = Hall::new(FOREVER).with(shell("Butler", DEAF));
     let screen = Screen::open(quiet());
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -338,15 +344,17 @@ fn nobody_is_left_behind_when_the_launcher_gives_up_in_the_middle() {
                 hall.planned.clone(),
                 hall.folder.path(),
                 grace,
-                screen.tell(),
+                screen.handle(),
             );
             tokio::spawn(supervisor.run());
             Hall::ready(hall.folder.path(), &["deaf"]).await;
             panic!("as a defect of the launcher would");
         });
     }));
+
     assert!(result.is_err());
     assert_gone(&hall.read("own"));
     assert_gone(&hall.read("grandchild"));
+
     screen.finish();
 }

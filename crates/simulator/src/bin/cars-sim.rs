@@ -43,7 +43,7 @@ struct Args {
     /// Changes of the scenario, for example `guests.count=50`.
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<Override>,
-    /// Wait for `start` once everybody is there.
+    /// Wait for `start` once all robots have joined.
     #[arg(long)]
     paused: bool,
     /// A configuration file of the middleware instead of the built-in settings.
@@ -52,8 +52,8 @@ struct Args {
     /// The operator's configuration file of a secured run: `cars ctl` and others find it by the run's folder.
     #[arg(long, value_name = "FILE")]
     operator_config: Option<PathBuf>,
-    /// Listen where other machines can connect, without certificates: whoever reaches that address may control the run
-    /// and pose as any robot.
+    /// Listen where other machines can connect, without certificates. Any program that connects there can control the run
+    /// and take the place of any robot.
     #[arg(long)]
     insecure: bool,
 }
@@ -70,7 +70,9 @@ fn main() -> miette::Result<ExitCode> {
         .without_time()
         .with_target(false)
         .init();
+
     let summary = run(&args)?;
+
     Ok(if summary.end == Some(End::Aborted) {
         ExitCode::FAILURE
     } else {
@@ -88,6 +90,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
             set: args.set.clone(),
         },
     )?;
+
     // Before anything is made: a refusal leaves nothing behind.
     check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
     let folder = RunFolder::new(&args.out, &args.run);
@@ -106,14 +109,17 @@ fn run(args: &Args) -> miette::Result<Summary> {
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;
     let inbox = server.inbox();
     ctrlc::set_handler(move || inbox.send(Event::Terminate)).into_diagnostic()?;
+
     if let Some(file) = &args.operator_config {
         write_line(
             &folder.file(OPERATOR_CONFIG),
             &std::path::absolute(file).into_diagnostic()?.display(),
         )?;
     }
+
     write_line(&folder.file(ENDPOINT), &connectable(&args.listen))?;
     let outcome = server.run(scenario, &folder).into_diagnostic();
+
     for name in [ENDPOINT, OPERATOR_CONFIG]
         .map(|name| folder.file(name))
         .iter()
@@ -123,6 +129,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
             tracing::debug!(%error, "{} is gone already", name.display());
         }
     }
+
     outcome
 }
 

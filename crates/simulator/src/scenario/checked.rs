@@ -1,4 +1,4 @@
-//! What a scenario means: SI units, defaults filled in, every name and number legal.
+//! A checked scenario: SI units, defaults filled in, all names and numbers valid.
 
 use std::collections::BTreeMap;
 
@@ -9,13 +9,13 @@ use world::{Field, Guests, Hall};
 use super::fault::Fault;
 use super::network::Network;
 
-/// Seed where neither the file nor the command line gives one: a run is reproducible unless somebody asks for chance.
+/// Seed if neither the file nor the command line gives one. It is fixed, so runs are reproducible by default.
 pub const DEFAULT_SEED: u64 = 1;
 
-/// What is simulated, checked and complete.
+/// A scenario, checked and complete.
 #[derive(Debug, Clone)]
 pub struct Scenario {
-    /// Where all chance of the run comes from.
+    /// Source of all random numbers of the run.
     pub seed: u64,
     /// Length of a tick, simulated seconds.
     pub tick_s: f64,
@@ -25,7 +25,7 @@ pub struct Scenario {
     pub field_m: [f64; 2],
     /// Side of every body, meters.
     pub body_m: f64,
-    /// A robot that proposes to move faster is not advanced, m/s.
+    /// Highest speed, m/s. A faster move is refused.
     pub max_speed_mps: f64,
     /// Distance within which robots sense other bodies, meters.
     pub sensing_range_m: f64,
@@ -33,26 +33,26 @@ pub struct Scenario {
     pub guests: Guests,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<Point>,
-    /// The roster, by name.
+    /// The robots by name.
     pub robots: BTreeMap<RobotName, RobotSpec>,
-    /// What the clock does about robots that are late.
+    /// Rules for late robots.
     pub lateness: Lateness,
     /// The network between the robots.
     pub network: Network,
-    /// What befalls the robots' processes, in the order in which it begins.
+    /// Faults of the robots' processes in the order of their begins.
     pub faults: Vec<Fault>,
-    /// What is kept of the run.
+    /// Contents of the record.
     pub record: Record,
 }
 
-/// What is kept of a run, beside its events and its summary.
+/// Contents of the record beside events and summary.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Record {
-    /// Whether the readable log is written.
+    /// Whether the log is written.
     pub log: bool,
-    /// Its name in the run's folder.
+    /// Name of the log in the run's folder.
     pub log_name: String,
-    /// Whether the field is recorded after every tick, for the console to play again.
+    /// Whether every tick is recorded, for replay in the console.
     pub frames: bool,
 }
 
@@ -69,35 +69,35 @@ impl Default for Record {
 /// A robot of the scenario.
 #[derive(Debug, Clone)]
 pub struct RobotSpec {
-    /// Which kind of robot it is; the launcher and `cars run` know how to make one.
+    /// Class of the robot, by which `cars run` and rosters find its program.
     pub class: String,
-    /// Where it starts, meters.
+    /// Initial location, meters.
     pub at: Point,
-    /// What it is told about itself; lengths, speeds and times are SI numbers.
+    /// Parameters of the robot; lengths, speeds and times are SI numbers.
     pub parameters: Parameters,
 }
 
-/// What the clock does about robots that are late.
+/// Rules for late robots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lateness {
-    /// For robots that have no rule of their own.
+    /// Rule for robots without one of their own.
     pub on_late: OnLate,
-    /// For single robots.
+    /// Rules of single robots.
     pub own: BTreeMap<RobotName, OnLate>,
-    /// After how long without a report a robot is late, seconds of wall clock.
+    /// Time without a report after which a robot is late, seconds of wall clock.
     pub deadline_s: f64,
-    /// After this many missed ticks in a row a robot is lost, where the clock goes on without it.
+    /// Number of consecutive missed ticks after which a robot is lost, if the clock continues without it.
     pub lose_after: u32,
 }
 
 impl Lateness {
-    /// What the clock does when this robot is late.
+    /// The rule for a robot.
     #[must_use]
     pub fn of(&self, robot: &RobotName) -> OnLate {
         self.own.get(robot).copied().unwrap_or(self.on_late)
     }
 
-    /// The same for the lock-step.
+    /// The rules as the lock-step takes them.
     #[must_use]
     pub fn to_lockstep(&self) -> lockstep::Lateness {
         let deadline = std::time::Duration::try_from_secs_f64(self.deadline_s);
@@ -112,7 +112,7 @@ impl Lateness {
 }
 
 impl Scenario {
-    /// How long it simulates, seconds.
+    /// Simulated duration, seconds.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.ticks as f64 * self.tick_s
@@ -124,33 +124,32 @@ impl Scenario {
         self.robots.keys().cloned().collect()
     }
 
-    /// The environment that it starts from; robots in the order of their names.
+    /// The initial environment; robots are in the order of their names.
     #[must_use]
     pub fn hall(&self) -> Hall {
+        let field = Field {
+            size_m: (self.field_m[0], self.field_m[1]),
+            body_m: self.body_m,
+        };
+        let robots = self.robots.values().map(|robot| to_world(robot.at));
+
         Hall {
-            field: Field {
-                size_m: (self.field_m[0], self.field_m[1]),
-                body_m: self.body_m,
-            },
+            field,
             obstacles: self.obstacles.iter().copied().map(to_world).collect(),
             guests: self.guests,
-            robots: self
-                .robots
-                .values()
-                .map(|robot| to_world(robot.at))
-                .collect(),
+            robots: robots.collect(),
             tick_s: self.tick_s,
             max_speed_mps: self.max_speed_mps,
         }
     }
 }
 
-/// The same place for the environment.
-fn to_world(point: Point) -> world::Point {
+/// A point for the environment.
+pub(crate) fn to_world(point: Point) -> world::Point {
     world::Point::new(point.x, point.y)
 }
 
-/// The same place for the wire.
+/// A point for messages.
 pub(crate) fn to_wire(point: world::Point) -> Point {
     Point::new(point.x, point.y)
 }

@@ -1,29 +1,54 @@
-//! `[[fault]]`: what befalls the robots' processes. The launcher does it to the real process, at a tick at which the clock
-//! is held for it.
+//! `[[fault]]`: faults of the robots' processes. The simulator holds the clock at a tick while the launcher carries them out
+//! on the real processes.
 
-use protocol::messages::FaultKind;
+use protocol::messages::{FaultKind, ProcessOrder};
 use protocol::{RobotName, Tick};
 
 /// A fault of one robot's process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
-    /// Whose process.
+    /// Robot whose process has the fault.
     pub robot: RobotName,
-    /// What befalls it.
+    /// Crash, hang or slow.
     pub kind: FaultKind,
-    /// Tick before whose clock it begins.
+    /// It begins before the clock of this tick.
     pub at: Tick,
-    /// When it is over.
+    /// End of the fault.
     pub end: FaultEnd,
 }
 
-/// When a fault is over.
+impl Fault {
+    /// The order to begin the fault.
+    pub(crate) fn begin_order(&self) -> ProcessOrder {
+        let for_s = match self.end {
+            FaultEnd::After(wall_s) => Some(wall_s),
+            FaultEnd::At(_) | FaultEnd::Never => None,
+        };
+        self.order(true, for_s)
+    }
+
+    /// The order to end the fault.
+    pub(crate) fn end_order(&self) -> ProcessOrder {
+        self.order(false, None)
+    }
+
+    fn order(&self, begins: bool, for_s: Option<f64>) -> ProcessOrder {
+        ProcessOrder {
+            robot: self.robot.clone(),
+            kind: self.kind,
+            begins,
+            for_s,
+        }
+    }
+}
+
+/// The end of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FaultEnd {
-    /// Before the clock of this tick; the clock is held until the robot is back.
+    /// It ends before the clock of this tick, which is held until the robot has rejoined.
     At(Tick),
-    /// After this time of wall clock, seconds.
+    /// It ends after this time of wall clock, seconds.
     After(f64),
-    /// Not at all.
+    /// It does not end.
     Never,
 }

@@ -1,36 +1,35 @@
-//! `[network]`: the network between the robots as an experimental variable.
+//! `[network]`: loss, delay and partitions of the network between the robots.
 
 use protocol::{RobotName, Tick};
 use world::Triangular;
 
-/// The network between robots. Its chance is drawn from the seed, message by message.
+/// The network between the robots. Every message draws its own random numbers from the seed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Network {
-    /// What befalls commands on links that no entry of `links` says something else about.
+    /// Loss and delay of commands on links without a rule in `links`.
     pub commands: Channel,
-    /// What befalls queries; delay and duplication mean nothing for them.
+    /// Loss of queries on links without a rule in `links`. Queries have no delay and no duplication.
     pub queries: Channel,
-    /// What befalls messages on one link; a later entry for the same link counts.
-    pub links: Vec<Link>,
-    /// When who is cut off from whom.
+    /// Rules of single links; of two rules for the same link, the later one holds.
+    pub links: Vec<LinkRule>,
+    /// Partitions of the network.
     pub partitions: Vec<Partition>,
 }
 
-/// What befalls messages of one kind on a link, message by message.
+/// Loss, duplication and delay of messages of one kind on a link.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Channel {
     /// Probability that a message is lost, 0 to 1.
     pub loss: f64,
     /// Probability that a message arrives twice, 0 to 1.
     pub duplication: f64,
-    /// How much later than at the next tick a message arrives, seconds; `None` is not at all.
+    /// Additional delay after the next tick, seconds; `None` for no delay.
     pub delay_s: Option<Triangular>,
-    /// Times in which more is lost than at others.
+    /// Bursts of loss.
     pub burst: Option<Burst>,
 }
 
-/// Bursts of loss: a link is good or bad, and changes with these probabilities from one tick to the next (Gilbert 1960,
-/// Elliott 1963).
+/// Bursts of loss: a link is good or bad, and changes with these probabilities at every tick (Gilbert 1960, Elliott 1963).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Burst {
     /// Probability that a good link turns bad at a tick.
@@ -41,29 +40,29 @@ pub struct Burst {
     pub loss: f64,
 }
 
-/// One directed link.
+/// Rules of one directed link.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Link {
-    /// The sender, or who asks.
+pub struct LinkRule {
+    /// Sender of commands and queries.
     pub from: RobotName,
-    /// The target, or who is asked.
+    /// Target of commands and queries.
     pub to: RobotName,
-    /// What befalls commands on it; as everywhere else if nothing is said.
+    /// Loss and delay of commands, instead of those of the network.
     pub commands: Option<Channel>,
-    /// What befalls queries on it; as everywhere else if nothing is said.
+    /// Loss of queries, instead of that of the network.
     pub queries: Option<Channel>,
 }
 
-/// A time in which nothing passes between groups of robots. Robots of no group are not concerned.
+/// A partition: for some time no messages pass between groups of robots. Robots in no group are not affected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Partition {
-    /// Who can still reach one another.
+    /// Groups of robots that can reach each other.
     pub groups: Vec<Vec<RobotName>>,
-    /// First tick of it.
+    /// First tick of the partition.
     pub from: Tick,
-    /// First tick after it; `None` if it lasts to the end.
+    /// First tick after the partition; `None` if it lasts to the end of the run.
     pub until: Option<Tick>,
-    /// Whether only earlier groups are cut off from later ones, and not the other way.
+    /// Whether only messages from earlier to later groups are cut.
     pub one_way: bool,
     /// Whether commands are cut.
     pub commands: bool,
@@ -72,66 +71,51 @@ pub struct Partition {
 }
 
 impl Network {
-    /// What befalls commands from one robot to another.
+    /// Loss and delay of commands from one robot to another.
     #[must_use]
     pub fn commands(&self, from: &RobotName, to: &RobotName) -> Channel {
-        self.last_said(from, to, |link| link.commands)
-            .unwrap_or(self.commands)
+        let rule = self.rules(from, to).find_map(|rule| rule.commands);
+        rule.unwrap_or(self.commands)
     }
 
-    /// What befalls queries of one robot to another.
+    /// Loss of queries from one robot to another.
     #[must_use]
     pub fn queries(&self, from: &RobotName, to: &RobotName) -> Channel {
-        self.last_said(from, to, |link| link.queries)
-            .unwrap_or(self.queries)
+        let rule = self.rules(from, to).find_map(|rule| rule.queries);
+        rule.unwrap_or(self.queries)
     }
 
-    fn last_said(
-        &self,
-        from: &RobotName,
-        to: &RobotName,
-        what: impl Fn(&Link) -> Option<Channel>,
-    ) -> Option<Channel> {
-        let on_link = self
-            .links
-            .iter()
-            .rev()
-            .filter(|link| link.from == *from && link.to == *to);
-        on_link.filter_map(what).next()
+    /// The rules of a link, the last one first.
+    fn rules(&self, from: &RobotName, to: &RobotName) -> impl Iterator<Item = &LinkRule> {
+        let last_first = self.links.iter().rev();
+        last_first.filter(move |rule| rule.from == *from && rule.to == *to)
     }
 
-    /// Whether anything is ever said about queries, so that a verdict on them is worth its cost.
+    /// Whether any link can lose queries. If not, the medium need not decide about them.
     #[must_use]
     pub fn touches_queries(&self) -> bool {
         let own = self.queries != Channel::default();
         own || self.links.iter().any(|link| link.queries.is_some())
     }
 
-    /// Whether any link has bursts, so that their coming and going is worth its cost.
+    /// Whether any link has bursts.
     #[must_use]
     pub fn has_bursts(&self) -> bool {
-        let on_links = self
-            .links
-            .iter()
+        let links = self.links.iter();
+        let own = links
             .flat_map(|link| [link.commands, link.queries])
             .flatten();
-        on_links
-            .chain([self.commands, self.queries])
-            .any(|channel| channel.burst.is_some())
+        let mut all = own.chain([self.commands, self.queries]);
+        all.any(|channel| channel.burst.is_some())
     }
 
-    /// How long a command may be on its way, ticks.
+    /// Longest delay of a command, ticks.
     #[must_use]
     pub fn longest_delay(&self, tick_s: f64) -> Tick {
-        let channels = self
-            .links
-            .iter()
-            .filter_map(|link| link.commands)
-            .chain([self.commands]);
-        let longest_s = channels
-            .filter_map(|channel| Some(channel.delay_s?.max()))
-            .fold(0.0, f64::max);
-        ticks(longest_s, tick_s)
+        let own = self.links.iter().filter_map(|link| link.commands);
+        let all = own.chain([self.commands]);
+        let delays_s = all.filter_map(|channel| Some(channel.delay_s?.max()));
+        ticks(delays_s.fold(0.0, f64::max), tick_s)
     }
 }
 
@@ -142,7 +126,7 @@ impl Partition {
         self.from <= tick && self.until.is_none_or(|until| tick < until)
     }
 
-    /// Whether it stands between two robots, in this direction.
+    /// Whether it cuts messages from one robot to another.
     #[must_use]
     pub fn separates(&self, from: &RobotName, to: &RobotName) -> bool {
         let group = |robot| self.groups.iter().position(|group| group.contains(robot));
@@ -154,7 +138,7 @@ impl Partition {
     }
 }
 
-/// A time as whole ticks, the nearest ones.
+/// A time in ticks, rounded to the nearest.
 pub(crate) fn ticks(time_s: f64, tick_s: f64) -> Tick {
     (time_s / tick_s).round() as Tick
 }

@@ -1,21 +1,21 @@
-//! Whether everything of a scenario has room. The environment numbers its robots; errors here name them.
+//! Checks that all bodies of a scenario can be placed. The environment numbers its robots; the errors here name them.
 
 use protocol::RobotName;
 use world::{HallError, World};
 
 use super::checked::Scenario;
 
-/// The hall of a scenario cannot be placed.
+/// A body of a scenario cannot be placed.
 #[derive(Debug, Clone)]
 pub(super) struct PlacingError {
     error: HallError,
-    /// The robot that has no place.
+    /// The robot that cannot be placed.
     robot: Option<RobotName>,
-    /// The robot that is in its place.
+    /// The robot that it overlaps.
     other: Option<RobotName>,
 }
 
-/// Places everything once.
+/// Places all bodies once.
 pub(super) fn check(scenario: &Scenario) -> Result<(), PlacingError> {
     let stream = protocol::random::stream(scenario.seed, "guests");
     match World::new(&scenario.hall(), stream) {
@@ -52,17 +52,19 @@ impl PlacingError {
         }
     }
 
-    /// The field of a set-up that has to change.
+    /// The field of a set-up with the error.
     pub(super) fn field(&self) -> String {
         if let Some(robot) = &self.robot {
             return format!("robots.{robot}");
         }
+
         let field = match self.error {
             HallError::ObstacleOffField { .. } => "obstacles",
             HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => "guests",
             HallError::OutOfRange { name, .. } if name.contains("guest") => "guest_speed_mps",
             _ => "field_m",
         };
+
         field.to_owned()
     }
 }
@@ -72,6 +74,7 @@ impl std::fmt::Display for PlacingError {
         let Some(robot) = &self.robot else {
             return self.error.fmt(f);
         };
+
         match (&self.error, &self.other) {
             (HallError::RobotOnRobot { at, .. }, Some(other)) => {
                 write!(f, "robot {robot} at {at} m overlaps robot {other}")

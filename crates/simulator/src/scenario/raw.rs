@@ -1,4 +1,4 @@
-//! A scenario file as it is written. Unknown keys are refused; what is wrong is shown where it stands.
+//! A scenario file as written. Unknown keys are refused; errors show the place in the file.
 
 mod fault;
 mod network;
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, Source, seed};
-use protocol::RobotName;
 use protocol::messages::{OnLate, Parameters, Point};
+use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use world::Triangular;
@@ -20,11 +20,11 @@ use network::NetworkTable;
 use range::Range;
 
 use super::checked::{self, DEFAULT_SEED, Lateness, Record, RobotSpec};
-use super::network::Network;
 use super::placing;
 
-/// Largest scenario: more than any experiment asks for, less than would exhaust a machine.
+/// Most ticks of a scenario.
 const MAX_TICKS: f64 = 1e9;
+/// Most robots of a scenario.
 const MAX_ROBOTS: usize = 1024;
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -79,13 +79,6 @@ struct RecordTable {
     frames: Option<bool>,
 }
 
-/// A triangular distribution in SI units, not checked yet.
-struct Triangle {
-    min: f64,
-    mode: f64,
-    max: f64,
-}
-
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Obstacle {
@@ -104,202 +97,207 @@ struct Robot {
     params: toml::Table,
 }
 
-/// Hors d'oeuvres at a reception: guests that stroll. [I] The seed names the distributions and no numbers.
+/// Speed of strolling guests [I]. The paper names the distributions but no numbers.
 const GUEST_SPEED: Range<Speed> = Range {
     min: Speed(0.06096),
     mode: Speed(0.3048),
     max: Speed(0.6096),
 };
+/// Duration of a guest's straight walk [I].
 const GUEST_DURATION: Range<Time> = Range {
     min: Time(2.0),
     mode: Time(5.0),
     max: Time(10.0),
 };
-/// Everything occupies 2 ft by 2 ft [D: seed, "Obstacles"].
+/// Length of a tick [I].
+const TICK: Time = Time(0.5);
+/// Duration of a run [I].
+const DURATION: Time = Time(600.0);
+/// Side of every body, 2 ft [D: paper, "Obstacles"].
 const BODY: Length = Length(0.6096);
-/// 50 ft by 50 ft [D: seed, "Experimental Results"].
+/// Size of the field, 50 ft by 50 ft [D: paper, "Experimental Results"].
 const FIELD: [Length; 2] = [Length(15.24), Length(15.24)];
-/// 10 ft/s [I]: a brisk run; the fastest shipped robot drives at 4.5 ft/s.
+/// Highest speed, 10 ft/s [I]. The fastest shipped robot drives at 4.5 ft/s.
 const MAX_SPEED: Speed = Speed(3.048);
-/// Seconds of wall clock [I].
-const DEADLINE_S: f64 = 2.0;
-/// Ticks [I].
-const LOSE_AFTER: f64 = 10.0;
-/// 6 ft [I].
+/// Time without a report after which a robot is late, seconds of wall clock [I].
+const DEADLINE: Time = Time(2.0);
+/// Consecutive missed ticks after which a robot is lost [I].
+const LOSE_AFTER: u32 = 10;
+/// Sensing range, 6 ft [I].
 const SENSING_RANGE: Length = Length(1.8288);
 
 impl Scenario {
-    /// Refuses to name files: what comes from outside must not make this process read them.
+    /// Refuses a scenario that names files, so that an untrusted text cannot make this process read them.
     pub(super) fn refuse_files(self, source: &Source) -> Result<Self, FileError> {
-        match self
-            .robots
-            .iter()
-            .find(|robot| robot.get_ref().params_from.is_some())
-        {
-            Some(robot) => {
+        for robot in &self.robots {
+            if robot.get_ref().params_from.is_some() {
                 let reason = "`params_from` names a file; write its parameters out under `params`";
-                Err(FileError::at(source, Some(robot.span()), reason))
+                return Err(FileError::at(source, Some(robot.span()), reason));
             }
-            None => Ok(self),
         }
+        Ok(self)
     }
 
-    /// From what is written to what it means.
+    /// Checks the scenario and fills in defaults. Files that it names are relative to `folder`.
     pub(super) fn check(
         self,
         source: &Source,
         folder: &Path,
     ) -> Result<checked::Scenario, FileError> {
-        let seed = match &self.seed {
-            Some(seed) => seed::check(*seed.get_ref())
-                .map_err(|error| FileError::at(source, Some(seed.span()), &error.to_string()))?,
-            None => DEFAULT_SEED,
-        };
-        let tick_s = positive(source, self.tick.as_ref(), 0.5, |time| time.0, "a tick")?;
-        let duration_s = positive(
-            source,
-            self.duration.as_ref(),
-            600.0,
-            |time| time.0,
-            "the duration",
-        )?;
-        let ticks = (duration_s / tick_s).round();
-        if ticks > MAX_TICKS {
-            let span = self.duration.as_ref().map(Spanned::span);
-            return Err(FileError::at(source, span, "more than a billion ticks"));
-        }
+        let seed = self.seed(source)?;
+        let tick_s = self.tick_s(source)?;
+        let ticks = self.ticks(source, tick_s)?;
+        let lateness = self.lateness(source)?;
+        let sensing_range = self.sensing.as_ref().map(|table| &table.range);
+        let sensing_range_m = positive(source, sensing_range, SENSING_RANGE, "the range")?.0;
+        let guests = self.guests(source)?;
+        let guests_span = self.guests.as_ref().map(Spanned::span);
+        let obstacles = self.obstacles.iter().map(|obstacle| point(obstacle.at));
+        let obstacles = obstacles.collect();
+
         let field = self.field.as_ref().map(Spanned::get_ref);
-        let (speed, duration) = self.guest_courses(source)?;
-        let sensing_range_m = positive(
-            source,
-            self.sensing.as_ref().map(|table| &table.range),
-            SENSING_RANGE.0,
-            |range| range.0,
-            "the range",
-        )?;
-        let own = self.robots.iter().map(Spanned::get_ref);
-        let lateness = Lateness {
-            on_late: self.on_late.unwrap_or(OnLate::Wait),
-            own: own
-                .filter_map(|robot| Some((robot.name.clone(), robot.on_late?)))
-                .collect(),
-            deadline_s: positive(
-                source,
-                self.deadline.as_ref(),
-                DEADLINE_S,
-                |time| time.0,
-                "the deadline",
-            )?,
-            lose_after: positive(
-                source,
-                self.lose_after.as_ref(),
-                LOSE_AFTER,
-                |n| f64::from(*n),
-                "lose_after",
-            )? as u32,
-        };
+        let size = field.map_or(FIELD, |field| field.size);
+        let body = field.and_then(|field| field.body).unwrap_or(BODY);
+        let max_speed = field.and_then(|field| field.max_speed);
+
+        let robots = robots(self.robots, source, folder)?;
+        let record = record(self.record, source)?;
+        let network = network::check(self.network, &robots, tick_s, source)?;
+        let faults = fault::check(self.faults, &robots, &lateness, tick_s, source)?;
         let scenario = checked::Scenario {
             seed,
             tick_s,
-            ticks: ticks as u64,
-            field_m: field
-                .map_or(FIELD, |field| field.size)
-                .map(|length| length.0),
-            body_m: field.and_then(|field| field.body).unwrap_or(BODY).0,
-            max_speed_mps: field
-                .and_then(|field| field.max_speed)
-                .unwrap_or(MAX_SPEED)
-                .0,
+            ticks,
+            field_m: size.map(|length| length.0),
+            body_m: body.0,
+            max_speed_mps: max_speed.unwrap_or(MAX_SPEED).0,
             sensing_range_m,
-            guests: world::Guests {
-                count: self
-                    .guests
-                    .as_ref()
-                    .map_or(0, |guests| guests.get_ref().count),
-                speed_mps: speed,
-                duration_s: duration,
-            },
-            obstacles: self
-                .obstacles
-                .iter()
-                .map(|obstacle| point(obstacle.at))
-                .collect(),
+            guests,
+            obstacles,
             lateness,
-            robots: robots(self.robots, source, folder)?,
-            network: Network::default(),
-            faults: Vec::new(),
-            record: record(self.record, source)?,
-        };
-        let network = network::check(self.network, &scenario.robots, tick_s, source)?;
-        let faults = fault::check(
-            self.faults,
-            &scenario.robots,
-            &scenario.lateness,
-            tick_s,
-            source,
-        )?;
-        let scenario = checked::Scenario {
+            robots,
             network,
             faults,
-            ..scenario
+            record,
         };
-        check_hall(&scenario, source, self.guests.as_ref().map(Spanned::span))?;
+
+        // A hall that cannot be placed is refused before anything starts.
+        placing::check(&scenario)
+            .map_err(|error| FileError::at(source, guests_span, &error.to_string()))?;
         Ok(scenario)
     }
 
-    fn guest_courses(&self, source: &Source) -> Result<(Triangular, Triangular), FileError> {
+    fn seed(&self, source: &Source) -> Result<u64, FileError> {
+        let Some(seed) = &self.seed else {
+            return Ok(DEFAULT_SEED);
+        };
+        seed::check(*seed.get_ref())
+            .map_err(|error| FileError::at(source, Some(seed.span()), &error.to_string()))
+    }
+
+    fn tick_s(&self, source: &Source) -> Result<f64, FileError> {
+        Ok(positive(source, self.tick.as_ref(), TICK, "a tick")?.0)
+    }
+
+    fn ticks(&self, source: &Source, tick_s: f64) -> Result<Tick, FileError> {
+        let duration = self.duration.as_ref();
+        let duration_s = positive(source, duration, DURATION, "the duration")?.0;
+        let ticks = (duration_s / tick_s).round();
+        if ticks > MAX_TICKS {
+            let span = duration.map(Spanned::span);
+            return Err(FileError::at(source, span, "more than a billion ticks"));
+        }
+        Ok(ticks as Tick)
+    }
+
+    fn lateness(&self, source: &Source) -> Result<Lateness, FileError> {
+        let mut own = BTreeMap::new();
+        for robot in &self.robots {
+            let robot = robot.get_ref();
+            if let Some(on_late) = robot.on_late {
+                own.insert(robot.name.clone(), on_late);
+            }
+        }
+
+        let deadline = self.deadline.as_ref();
+        Ok(Lateness {
+            on_late: self.on_late.unwrap_or(OnLate::Wait),
+            own,
+            deadline_s: positive(source, deadline, DEADLINE, "the deadline")?.0,
+            lose_after: positive(source, self.lose_after.as_ref(), LOSE_AFTER, "lose_after")?,
+        })
+    }
+
+    fn guests(&self, source: &Source) -> Result<world::Guests, FileError> {
         let guests = self.guests.as_ref().map(Spanned::get_ref);
         let speed = guests.and_then(|guests| guests.speed.as_ref());
         let duration = guests.and_then(|guests| guests.duration.as_ref());
-        let shape = |raw: Triangle, span| {
-            Triangular::new(raw.min, raw.mode, raw.max)
-                .map_err(|error| FileError::at(source, span, &error.to_string()))
-        };
-        let drawn = speed.map_or(GUEST_SPEED, |speed| *speed.get_ref());
-        let speed = Triangle {
-            min: drawn.min.0,
-            mode: drawn.mode.0,
-            max: drawn.max.0,
-        };
-        let speed = shape(
-            speed,
-            guests
-                .and_then(|guests| guests.speed.as_ref())
-                .map(Spanned::span),
-        )?;
-        let drawn = duration.map_or(GUEST_DURATION, |duration| *duration.get_ref());
-        let lasting = Triangle {
-            min: drawn.min.0,
-            mode: drawn.mode.0,
-            max: drawn.max.0,
-        };
-        Ok((speed, shape(lasting, duration.map(Spanned::span))?))
+
+        Ok(world::Guests {
+            count: guests.map_or(0, |guests| guests.count),
+            speed_mps: triangular(source, speed, GUEST_SPEED)?,
+            duration_s: triangular(source, duration, GUEST_DURATION)?,
+        })
     }
 }
 
-/// Places everything once, so that a hall that cannot be placed is refused before anything starts.
-fn check_hall(
-    scenario: &checked::Scenario,
+/// A distribution in SI units, or its default.
+fn triangular<Q: Quantity>(
     source: &Source,
-    guests: Option<std::ops::Range<usize>>,
-) -> Result<(), FileError> {
-    match placing::check(scenario) {
-        Ok(()) => Ok(()),
-        Err(error) => Err(FileError::at(source, guests, &error.to_string())),
+    raw: Option<&Spanned<Range<Q>>>,
+    default: Range<Q>,
+) -> Result<Triangular, FileError> {
+    let span = raw.map(Spanned::span);
+    let Range { min, mode, max } = raw.map_or(default, |range| *range.get_ref());
+    Triangular::new(min.number(), mode.number(), max.number())
+        .map_err(|error| FileError::at(source, span, &error.to_string()))
+}
+
+/// A value with a number that can be checked.
+trait Quantity: Copy {
+    /// The number in SI units.
+    fn number(self) -> f64;
+}
+
+impl Quantity for Time {
+    fn number(self) -> f64 {
+        self.0
+    }
+}
+
+impl Quantity for Speed {
+    fn number(self) -> f64 {
+        self.0
+    }
+}
+
+impl Quantity for Length {
+    fn number(self) -> f64 {
+        self.0
+    }
+}
+
+impl Quantity for u32 {
+    fn number(self) -> f64 {
+        f64::from(self)
     }
 }
 
 fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError> {
-    let standard = Record::default();
-    let Some(raw) = raw else { return Ok(standard) };
+    let default = Record::default();
+    let Some(raw) = raw else {
+        return Ok(default);
+    };
+
     if let Some(name) = &raw.log_name {
         crate::files::check_log_name(name.get_ref())
             .map_err(|error| FileError::at(source, Some(name.span()), &error.to_string()))?;
     }
+
     Ok(Record {
-        log: raw.log.unwrap_or(standard.log),
-        log_name: raw.log_name.map_or(standard.log_name, Spanned::into_inner),
-        frames: raw.frames.unwrap_or(standard.frames),
+        log: raw.log.unwrap_or(default.log),
+        log_name: raw.log_name.map_or(default.log_name, Spanned::into_inner),
+        frames: raw.frames.unwrap_or(default.frames),
     })
 }
 
@@ -310,37 +308,42 @@ fn robots(
 ) -> Result<BTreeMap<RobotName, RobotSpec>, FileError> {
     let mut robots = BTreeMap::new();
     for entry in raw {
-        let (span, robot) = (entry.span(), entry.into_inner());
-        let refuse = |reason: &str| FileError::at(source, Some(span.clone()), reason);
+        let span = Some(entry.span());
+        let robot = entry.into_inner();
         if robot.name.is_operator() {
-            return Err(refuse(
-                "the name `operator` is kept for commands from outside the roster",
-            ));
+            let reason = "the name `operator` is kept for commands from outside the roster";
+            return Err(FileError::at(source, span, reason));
         }
         if robots.len() == MAX_ROBOTS {
-            return Err(refuse("more than 1024 robots"));
+            return Err(FileError::at(source, span, "more than 1024 robots"));
         }
-        let mut parameters = Parameters::new();
-        if let Some(file) = &robot.params_from {
-            let read = Source::read(&folder.join(file)).and_then(|file| file.parse());
-            parameters.extend(to_parameters(
-                &read.map_err(|error| error.named_by(&source.name))?,
-            ));
-        }
-        parameters.extend(to_parameters(&robot.params));
-        let class = robot
-            .class
-            .unwrap_or_else(|| robot.name.as_str().to_owned());
-        let spec = RobotSpec {
-            class,
-            at: point(robot.at),
-            parameters,
-        };
-        if robots.insert(robot.name.clone(), spec).is_some() {
-            return Err(refuse(&format!("a second robot called {}", robot.name)));
+
+        let name = robot.name.clone();
+        let spec = spec(robot, source, folder)?;
+        if robots.insert(name.clone(), spec).is_some() {
+            let reason = format!("a second robot called {name}");
+            return Err(FileError::at(source, span, &reason));
         }
     }
     Ok(robots)
+}
+
+/// The specification of a robot. Its own parameters replace those of the file that it names.
+fn spec(robot: Robot, source: &Source, folder: &Path) -> Result<RobotSpec, FileError> {
+    let mut parameters = Parameters::new();
+    if let Some(file) = &robot.params_from {
+        let read = Source::read(&folder.join(file)).and_then(|file| file.parse());
+        let table = read.map_err(|error| error.named_by(&source.name))?;
+        parameters.extend(to_parameters(&table));
+    }
+    parameters.extend(to_parameters(&robot.params));
+
+    let class = robot.class;
+    Ok(RobotSpec {
+        class: class.unwrap_or_else(|| robot.name.as_str().to_owned()),
+        at: point(robot.at),
+        parameters,
+    })
 }
 
 fn point([x, y]: [Length; 2]) -> Point {
@@ -348,31 +351,29 @@ fn point([x, y]: [Length; 2]) -> Point {
 }
 
 /// A value that must be positive and finite, or its default.
-fn positive<T>(
+fn positive<T: Quantity>(
     source: &Source,
     value: Option<&Spanned<T>>,
-    default: f64,
-    number: impl Fn(&T) -> f64,
+    default: T,
     what: &str,
-) -> Result<f64, FileError> {
+) -> Result<T, FileError> {
     let Some(spanned) = value else {
         return Ok(default);
     };
-    let value = number(spanned.get_ref());
-    if value > 0.0 && value.is_finite() {
+
+    let value = *spanned.get_ref();
+    let number = value.number();
+    if number > 0.0 && number.is_finite() {
         return Ok(value);
     }
-    Err(FileError::at(
-        source,
-        Some(spanned.span()),
-        &format!("{what} must be more than zero"),
-    ))
+    let text = format!("{what} must be more than zero");
+    Err(FileError::at(source, Some(spanned.span()), &text))
 }
 
-/// Parameters as they travel: JSON, every text that is a quantity turned into its SI number.
+/// Parameters as JSON for the welcome of a robot. Texts that are quantities become SI numbers.
 fn to_parameters(table: &toml::Table) -> Parameters {
-    table
-        .iter()
+    let entries = table.iter();
+    entries
         .map(|(key, value)| (key.clone(), to_json(value)))
         .collect()
 }
@@ -397,97 +398,92 @@ fn to_json(value: &toml::Value) -> serde_json::Value {
 
 impl From<&checked::Scenario> for Scenario {
     fn from(scenario: &checked::Scenario) -> Self {
-        let spanned = |value| Some(Spanned::new(0..0, value));
-        let range = |shape: &Triangular| (shape.min(), shape.mode(), shape.max());
-        let (min, mode, max) = range(&scenario.guests.speed_mps);
-        let speed = Range {
-            min: Speed(min),
-            mode: Speed(mode),
-            max: Speed(max),
+        let tick_s = scenario.tick_s;
+        let lateness = &scenario.lateness;
+        let field = FieldTable {
+            size: scenario.field_m.map(Length),
+            body: Some(Length(scenario.body_m)),
+            max_speed: Some(Speed(scenario.max_speed_mps)),
         };
-        let (min, mode, max) = range(&scenario.guests.duration_s);
-        let duration = Range {
-            min: Time(min),
-            mode: Time(mode),
-            max: Time(max),
+        let record = RecordTable {
+            log: Some(scenario.record.log),
+            log_name: Some(unplaced(scenario.record.log_name.clone())),
+            frames: Some(scenario.record.frames),
         };
+
+        let faults = scenario.faults.iter();
+        let faults = faults.map(|fault| unplaced(FaultTable::of(fault, tick_s)));
+        let obstacles = scenario.obstacles.iter();
+        let obstacles = obstacles.map(|at| Obstacle { at: lengths(*at) });
+        let robots = scenario.robots.iter();
+        let robots = robots.map(|(name, spec)| unplaced(Robot::of(name, spec, lateness)));
+
         Self {
-            seed: Some(Spanned::new(0..0, scenario.seed)),
-            tick: spanned(Time(scenario.tick_s)),
-            duration: spanned(Time(scenario.duration_s())),
-            on_late: Some(scenario.lateness.on_late),
-            deadline: spanned(Time(scenario.lateness.deadline_s)),
-            lose_after: Some(Spanned::new(0..0, scenario.lateness.lose_after)),
-            field: Some(Spanned::new(
-                0..0,
-                FieldTable {
-                    size: scenario.field_m.map(Length),
-                    body: Some(Length(scenario.body_m)),
-                    max_speed: Some(Speed(scenario.max_speed_mps)),
-                },
-            )),
+            seed: Some(unplaced(scenario.seed)),
+            tick: Some(unplaced(Time(tick_s))),
+            duration: Some(unplaced(Time(scenario.duration_s()))),
+            on_late: Some(lateness.on_late),
+            deadline: Some(unplaced(Time(lateness.deadline_s))),
+            lose_after: Some(unplaced(lateness.lose_after)),
+            field: Some(unplaced(field)),
             sensing: Some(SensingTable {
-                range: Spanned::new(0..0, Length(scenario.sensing_range_m)),
+                range: unplaced(Length(scenario.sensing_range_m)),
             }),
-            guests: Some(Spanned::new(
-                0..0,
-                GuestsTable {
-                    count: scenario.guests.count,
-                    speed: Some(Spanned::new(0..0, speed)),
-                    duration: Some(Spanned::new(0..0, duration)),
-                },
-            )),
-            network: NetworkTable::of(&scenario.network, scenario.tick_s),
-            faults: scenario
-                .faults
-                .iter()
-                .map(|entry| Spanned::new(0..0, FaultTable::of(entry, scenario.tick_s)))
-                .collect(),
-            record: Some(RecordTable {
-                log: Some(scenario.record.log),
-                log_name: Some(Spanned::new(0..0, scenario.record.log_name.clone())),
-                frames: Some(scenario.record.frames),
-            }),
-            obstacles: scenario
-                .obstacles
-                .iter()
-                .map(|at| Obstacle {
-                    at: [Length(at.x), Length(at.y)],
-                })
-                .collect(),
-            robots: scenario
-                .robots
-                .iter()
-                .map(|(name, spec)| {
-                    let on_late = scenario.lateness.own.get(name).copied();
-                    Spanned::new(
-                        0..0,
-                        Robot {
-                            on_late,
-                            ..Robot::from((name, spec))
-                        },
-                    )
-                })
-                .collect(),
+            guests: Some(unplaced(GuestsTable::from(&scenario.guests))),
+            network: NetworkTable::of(&scenario.network, tick_s),
+            record: Some(record),
+            faults: faults.collect(),
+            obstacles: obstacles.collect(),
+            robots: robots.collect(),
         }
     }
 }
 
-impl From<(&RobotName, &RobotSpec)> for Robot {
-    fn from((name, spec): (&RobotName, &RobotSpec)) -> Self {
-        let params = spec
-            .parameters
-            .iter()
-            .filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
+impl From<&world::Guests> for GuestsTable {
+    fn from(guests: &world::Guests) -> Self {
+        let speed = &guests.speed_mps;
+        let speed = Range {
+            min: Speed(speed.min()),
+            mode: Speed(speed.mode()),
+            max: Speed(speed.max()),
+        };
+        let duration = &guests.duration_s;
+        let duration = Range {
+            min: Time(duration.min()),
+            mode: Time(duration.mode()),
+            max: Time(duration.max()),
+        };
+
+        Self {
+            count: guests.count,
+            speed: Some(unplaced(speed)),
+            duration: Some(unplaced(duration)),
+        }
+    }
+}
+
+impl Robot {
+    fn of(name: &RobotName, spec: &RobotSpec, lateness: &Lateness) -> Self {
+        let parameters = spec.parameters.iter();
+        let params = parameters.filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
         Self {
             name: name.clone(),
             class: Some(spec.class.clone()),
-            at: [Length(spec.at.x), Length(spec.at.y)],
-            on_late: None,
+            at: lengths(spec.at),
+            on_late: lateness.own.get(name).copied(),
             params_from: None,
             params: params.collect(),
         }
     }
+}
+
+fn lengths(at: Point) -> [Length; 2] {
+    [Length(at.x), Length(at.y)]
+}
+
+/// A value that has no place in a file, because the table is written from a scenario.
+fn unplaced<T>(value: T) -> Spanned<T> {
+    Spanned::new(0..0, value)
 }
 
 /// The inverse of [`to_json`]; parameters come from TOML, which has no `null`.

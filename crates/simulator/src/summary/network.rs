@@ -1,4 +1,4 @@
-//! What the network did to the robots' messages, and what they could know of one another meanwhile.
+//! Metrics of the network: losses, delays, cuts, and how old the robots' knowledge of each other was.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,49 +11,48 @@ use crate::simulation::Simulation;
 /// Metrics of the network of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct NetworkSummary {
-    /// What became of messages, by `Sender -> Target`; links over which nothing was said and of which nothing was
-    /// missed are left out.
+    /// Metrics of the links, by `Sender -> Target`. Links without messages are left out.
     pub links: BTreeMap<String, LinkSummary>,
-    /// Every cut link, in the order in which they were cut.
+    /// All cuts in their order.
     pub cuts: Vec<CutSummary>,
 }
 
-/// What became of the messages of one directed link.
+/// Metrics of one directed link.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LinkSummary {
     /// Commands that were sent.
     pub sent: u64,
-    /// Commands that arrived; one that came twice counts twice.
+    /// Commands that arrived; a duplicated command counts twice.
     pub delivered: u64,
-    /// Commands that the medium lost, by cause.
+    /// Commands that were lost, by cause.
     pub dropped: BTreeMap<Cause, u64>,
-    /// Commands that the medium held back.
+    /// Commands that were delayed.
     pub delayed: u64,
-    /// Commands that the medium doubled.
+    /// Commands that were duplicated.
     pub duplicated: u64,
-    /// Ticks in which the sender could not ask the target anything.
+    /// Ticks in which the sender could not query the target.
     pub unreachable_ticks: u64,
-    /// Longest time for which what the sender knew of the target by asking was out of date, simulated seconds.
+    /// Longest time for which the sender could not query the target, simulated seconds.
     pub longest_stale_s: f64,
     #[serde(skip)]
     stale_ticks: u64,
 }
 
-/// A cut link.
+/// A cut of a link.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CutSummary {
-    /// Who could not reach the other.
+    /// Sender of the lost messages.
     pub from: RobotName,
-    /// The other.
+    /// Their target.
     pub to: RobotName,
-    /// When it was cut, simulated seconds.
+    /// Begin of the cut, simulated seconds.
     pub from_s: f64,
-    /// When it was healed; absent if it was not.
+    /// End of the cut, simulated seconds; absent if it did not end.
     pub until_s: Option<f64>,
-    /// How long after the cut the first message did not come through, simulated seconds; absent if none was sent. Where
-    /// queries are cut, who asks every tick knows at once.
+    /// Time from the begin to the first lost message, simulated seconds; absent if none was sent. It is 0 if queries are
+    /// cut, because a robot that queries every tick notices at once.
     pub detected_after_s: Option<f64>,
-    /// How long after the healing the first command came through, simulated seconds; absent if none was sent.
+    /// Time from the end to the first delivered command, simulated seconds; absent if none was sent.
     pub healed_after_s: Option<f64>,
 }
 
@@ -61,25 +60,13 @@ impl NetworkSummary {
     /// Counts an event.
     pub(super) fn count(&mut self, simulation: &Simulation, tick: Tick, event: &Event) {
         let now_s = simulation.time_s(tick);
+
         match event {
             Event::CommandSent { from, to, .. } => self.link(from, to).sent += 1,
-            Event::CommandDelivered { from, to, .. } => {
-                self.link(from, to).delivered += 1;
-                let cut = self.cuts.iter_mut().rev().find(|cut| cut.is_of(from, to));
-                if let Some((cut, until_s)) =
-                    cut.and_then(|cut| cut.until_s.map(|until_s| (cut, until_s)))
-                {
-                    cut.healed_after_s.get_or_insert(now_s - until_s);
-                }
-            }
+            Event::CommandDelivered { from, to, .. } => self.count_delivered(from, to, now_s),
             Event::CommandDropped {
                 from, to, because, ..
-            } => {
-                *self.link(from, to).dropped.entry(*because).or_default() += 1;
-                if let (Cause::Partition, Some(cut)) = (because, self.open_cut(from, to)) {
-                    cut.detected_after_s.get_or_insert(now_s - cut.from_s);
-                }
-            }
+            } => self.count_dropped(from, to, *because, now_s),
             Event::CommandDelayed { from, to, .. } => self.link(from, to).delayed += 1,
             Event::CommandDuplicated { from, to, .. } => self.link(from, to).duplicated += 1,
             Event::LinkCut {
@@ -95,30 +82,45 @@ impl NetworkSummary {
         }
     }
 
-    fn begin_cut(&mut self, from: &RobotName, to: &RobotName, from_s: f64, queries: bool) {
-        let cut = match self.open_cut(from, to) {
-            Some(cut) => cut,
-            None => {
-                let (from, to) = (from.clone(), to.clone());
-                let (until_s, detected_after_s, healed_after_s) = (None, None, None);
-                self.cuts.push(CutSummary {
-                    from,
-                    to,
-                    from_s,
-                    until_s,
-                    detected_after_s,
-                    healed_after_s,
-                });
-                let last = self.cuts.len() - 1;
-                &mut self.cuts[last]
-            }
-        };
-        if queries {
-            cut.detected_after_s.get_or_insert(from_s - cut.from_s);
+    fn count_delivered(&mut self, from: &RobotName, to: &RobotName, now_s: f64) {
+        self.link(from, to).delivered += 1;
+
+        let last_first = self.cuts.iter_mut().rev();
+        if let Some(cut) = last_first.into_iter().find(|cut| cut.is_of(from, to))
+            && let Some(until_s) = cut.until_s
+        {
+            cut.healed_after_s.get_or_insert(now_s - until_s);
         }
     }
 
-    /// Ages what each robot knows of those it cannot ask in this tick.
+    fn count_dropped(&mut self, from: &RobotName, to: &RobotName, because: Cause, now_s: f64) {
+        *self.link(from, to).dropped.entry(because).or_default() += 1;
+
+        if because == Cause::Partition
+            && let Some(cut) = self.open_cut(from, to)
+        {
+            cut.detected_after_s.get_or_insert(now_s - cut.from_s);
+        }
+    }
+
+    fn begin_cut(&mut self, from: &RobotName, to: &RobotName, now_s: f64, queries: bool) {
+        if self.open_cut(from, to).is_none() {
+            self.cuts.push(CutSummary {
+                from: from.clone(),
+                to: to.clone(),
+                from_s: now_s,
+                until_s: None,
+                detected_after_s: None,
+                healed_after_s: None,
+            });
+        }
+
+        if queries && let Some(cut) = self.open_cut(from, to) {
+            cut.detected_after_s.get_or_insert(now_s - cut.from_s);
+        }
+    }
+
+    /// Counts for each pair of robots the ticks since the last one in which a query was possible.
     fn count_staleness(&mut self, simulation: &Simulation) {
         let tick_s = simulation.scenario().tick_s;
         let mut aged = BTreeSet::new();
@@ -131,11 +133,12 @@ impl NetworkSummary {
                 aged.insert(key(asker, target));
             }
         }
-        let fresh = self
-            .links
-            .iter_mut()
-            .filter(|(name, _)| !aged.contains(*name));
-        fresh.for_each(|(_, link)| link.stale_ticks = 0);
+
+        for (name, link) in &mut self.links {
+            if !aged.contains(name) {
+                link.stale_ticks = 0;
+            }
+        }
     }
 
     fn link(&mut self, from: &RobotName, to: &RobotName) -> &mut LinkSummary {
@@ -143,10 +146,8 @@ impl NetworkSummary {
     }
 
     fn open_cut(&mut self, from: &RobotName, to: &RobotName) -> Option<&mut CutSummary> {
-        self.cuts
-            .iter_mut()
-            .rev()
-            .find(|cut| cut.is_of(from, to) && cut.until_s.is_none())
+        let mut last_first = self.cuts.iter_mut().rev();
+        last_first.find(|cut| cut.is_of(from, to) && cut.until_s.is_none())
     }
 }
 

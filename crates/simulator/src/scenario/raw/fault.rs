@@ -1,4 +1,4 @@
-//! `[[fault]]` as it is written.
+//! The table `[[fault]]` as written in the file.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use super::super::network::ticks;
 
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 10_000;
-/// A fault that ends by the wall clock ends within this time, seconds.
+/// Longest fault that ends by the wall clock, seconds.
 const MAX_WALL_S: f64 = 3600.0;
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -30,7 +30,7 @@ pub(super) struct FaultTable {
     lasting: Option<Time>,
 }
 
-/// The faults, in the order in which they begin.
+/// Checks the faults; returns them in the order of their begins.
 pub(super) fn check(
     raw: Vec<Spanned<FaultTable>>,
     robots: &BTreeMap<RobotName, RobotSpec>,
@@ -39,25 +39,23 @@ pub(super) fn check(
     source: &Source,
 ) -> Result<Vec<Fault>, FileError> {
     if let Some(extra) = raw.get(MAX_FAULTS) {
-        return Err(FileError::at(
-            source,
-            Some(extra.span()),
-            "more than 10000 faults",
-        ));
+        let span = Some(extra.span());
+        return Err(FileError::at(source, span, "more than 10000 faults"));
     }
+
     let mut faults = Vec::new();
     for entry in raw {
-        let span = entry.span();
-        faults.push(
-            one(entry.into_inner(), robots, lateness, tick_s)
-                .map_err(|reason| FileError::at(source, Some(span), &reason))?,
-        );
+        let span = Some(entry.span());
+        let fault = check_fault(entry.into_inner(), robots, lateness, tick_s);
+        faults.push(fault.map_err(|reason| FileError::at(source, span, &reason))?);
     }
+
     faults.sort_by_key(|fault| fault.at);
+
     Ok(faults)
 }
 
-fn one(
+fn check_fault(
     raw: FaultTable,
     robots: &BTreeMap<RobotName, RobotSpec>,
     lateness: &Lateness,
@@ -67,41 +65,20 @@ fn one(
     if !robots.contains_key(&robot) {
         return Err(format!("no robot of this scenario is called {robot}"));
     }
+
     let at = ticks(raw.at.0, tick_s);
     if at < 1 {
         return Err("a fault begins after the first tick".to_owned());
     }
-    let end = match (raw.until, raw.lasting) {
-        (Some(_), Some(_)) => {
-            return Err("`until` is simulated time, `for` is wall clock: say one".to_owned());
-        }
-        (Some(until), None) => FaultEnd::At(ticks(until.0, tick_s)),
-        (None, Some(lasting)) if lasting.0 > 0.0 && lasting.0 <= MAX_WALL_S => {
-            FaultEnd::After(lasting.0)
-        }
-        (None, Some(_)) => return Err("`for` is more than zero and at most an hour".to_owned()),
-        (None, None) => FaultEnd::Never,
-    };
+
+    let end = end(raw.until, raw.lasting, tick_s)?;
     if let FaultEnd::At(until) = end
         && until <= at
     {
         return Err("it ends before it begins: `until` comes after `at`".to_owned());
     }
-    // Where the clock waits for a robot, simulated time stands still until it is back.
-    let needs_wall = raw.kind != FaultKind::Slow && lateness.of(&robot) == OnLate::Wait;
-    if needs_wall && !matches!(end, FaultEnd::After(_)) {
-        return Err(format!(
-            "the clock waits for {robot} for ever: say `for` (wall clock), or on_late = \"continue\""
-        ));
-    }
-    // Where the clock goes on without a robot, the wall clock would decide in which tick it is back.
-    let goes_on = lateness.of(&robot) == OnLate::Continue;
-    if goes_on && matches!(end, FaultEnd::After(_)) {
-        return Err(format!(
-            "`for` is wall clock, and with on_late = \"continue\" the clock goes on without {robot}: the same seed would \
-             not give the same run; say `until` (simulated time)"
-        ));
-    }
+    check_end(&robot, raw.kind, end, lateness.of(&robot))?;
+
     Ok(Fault {
         robot,
         kind: raw.kind,
@@ -110,21 +87,63 @@ fn one(
     })
 }
 
+/// The end of a fault. `until` is simulated time, `lasting` is wall clock.
+fn end(until: Option<Time>, lasting: Option<Time>, tick_s: f64) -> Result<FaultEnd, String> {
+    match (until, lasting) {
+        (Some(_), Some(_)) => {
+            Err("`until` is simulated time, `for` is wall clock: say one".to_owned())
+        }
+        (Some(until), None) => Ok(FaultEnd::At(ticks(until.0, tick_s))),
+        (None, Some(lasting)) if lasting.0 > 0.0 && lasting.0 <= MAX_WALL_S => {
+            Ok(FaultEnd::After(lasting.0))
+        }
+        (None, Some(_)) => Err("`for` is more than zero and at most an hour".to_owned()),
+        (None, None) => Ok(FaultEnd::Never),
+    }
+}
+
+/// Checks that the clock that ends the fault is running, and that the same seed gives the same run.
+fn check_end(
+    robot: &RobotName,
+    kind: FaultKind,
+    end: FaultEnd,
+    on_late: OnLate,
+) -> Result<(), String> {
+    let is_by_wall = matches!(end, FaultEnd::After(_));
+
+    // While the clock waits for a robot, simulated time does not advance.
+    let is_held = kind != FaultKind::Slow && on_late == OnLate::Wait;
+    if is_held && !is_by_wall {
+        return Err(format!(
+            "the clock waits for {robot} for ever: say `for` (wall clock), or on_late = \"continue\""
+        ));
+    }
+
+    // If the clock continues without a robot, the wall clock would decide in which tick the robot returns.
+    if on_late == OnLate::Continue && is_by_wall {
+        return Err(format!(
+            "`for` is wall clock, and with on_late = \"continue\" the clock continues without {robot}: the same seed would \
+             not give the same run; say `until` (simulated time)"
+        ));
+    }
+    Ok(())
+}
+
 impl FaultTable {
     pub(super) fn of(fault: &Fault, tick_s: f64) -> Self {
-        let time = |tick: u64| Time(tick as f64 * tick_s);
-        let (until, lasting) = match fault.end {
-            FaultEnd::At(tick) => (Some(time(tick)), None),
-            FaultEnd::After(wall_s) => (None, Some(Time(wall_s))),
-            FaultEnd::Never => (None, None),
-        };
-        let robot = Spanned::new(0..0, fault.robot.clone());
-        Self {
-            robot,
+        let mut table = Self {
+            robot: Spanned::new(0..0, fault.robot.clone()),
             kind: fault.kind,
-            at: time(fault.at),
-            until,
-            lasting,
+            at: Time(fault.at as f64 * tick_s),
+            until: None,
+            lasting: None,
+        };
+
+        match fault.end {
+            FaultEnd::At(tick) => table.until = Some(Time(tick as f64 * tick_s)),
+            FaultEnd::After(wall_s) => table.lasting = Some(Time(wall_s)),
+            FaultEnd::Never => {}
         }
+        table
     }
 }

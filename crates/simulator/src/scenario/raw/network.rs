@@ -1,6 +1,6 @@
-//! `[network]` as it is written.
+//! The table `[network]` as written in the file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use config::units::Time;
 use config::{FileError, Source};
@@ -10,10 +10,11 @@ use toml::Spanned;
 use world::Triangular;
 
 use super::super::checked::RobotSpec;
-use super::super::network::{Burst, Channel, Link, Network, Partition, ticks};
+use super::super::network::{Burst, Channel, LinkRule, Network, Partition, ticks};
 use super::range::Range;
+use super::unplaced;
 
-/// Longest time for which a command can be held back: whoever sends it must be able to repeat it until then.
+/// Longest delay of a command, ticks.
 const MAX_DELAY_TICKS: u64 = 1000;
 /// Most links and partitions.
 const MAX_ENTRIES: usize = 10_000;
@@ -79,14 +80,14 @@ enum Cuts {
     Queries,
 }
 
-/// Where a network is checked: the file, the roster, the length of a tick.
+/// What a network is checked against: the file, the roster, the length of a tick.
 struct Checker<'a> {
     source: &'a Source,
     robots: &'a BTreeMap<RobotName, RobotSpec>,
     tick_s: f64,
 }
 
-/// The network, every link between two robots of the roster, every probability one.
+/// Checks the network: all links are between robots of the roster, and all probabilities between 0 and 1.
 pub(super) fn check(
     raw: Option<Spanned<NetworkTable>>,
     robots: &BTreeMap<RobotName, RobotSpec>,
@@ -96,36 +97,31 @@ pub(super) fn check(
     let Some(raw) = raw else {
         return Ok(Network::default());
     };
-    let (span, raw) = (raw.span(), raw.into_inner());
+
+    let span = Some(raw.span());
+    let raw = raw.into_inner();
     if raw.links.len().max(raw.partitions.len()) > MAX_ENTRIES {
-        return Err(FileError::at(
-            source,
-            Some(span),
-            "more than 10000 links or partitions",
-        ));
+        let text = "more than 10000 links or partitions";
+        return Err(FileError::at(source, span, text));
     }
+
     let checker = Checker {
         source,
         robots,
         tick_s,
     };
-    let commands = checker.commands(raw.commands)?.unwrap_or_default();
-    let queries = checker.queries(raw.queries)?.unwrap_or_default();
-    let links = raw
-        .links
-        .into_iter()
-        .map(|link| checker.link(link.into_inner()));
-    let links = links.collect::<Result<_, _>>()?;
-    let partitions = raw
-        .partitions
-        .into_iter()
-        .map(|partition| checker.partition(partition));
-    Ok(Network {
-        commands,
-        queries,
-        links,
-        partitions: partitions.collect::<Result<_, _>>()?,
-    })
+    let mut network = Network {
+        commands: checker.commands(raw.commands)?.unwrap_or_default(),
+        queries: checker.queries(raw.queries)?.unwrap_or_default(),
+        ..Network::default()
+    };
+    for link in raw.links {
+        network.links.push(checker.link(link.into_inner())?);
+    }
+    for partition in raw.partitions {
+        network.partitions.push(checker.partition(partition)?);
+    }
+    Ok(network)
 }
 
 impl Checker<'_> {
@@ -142,13 +138,12 @@ impl Checker<'_> {
         Err(self.refuse(span, &format!("no robot of this scenario is called {name}")))
     }
 
-    fn link(&self, raw: LinkTable) -> Result<Link, FileError> {
-        let (commands, queries) = (self.commands(raw.commands)?, self.queries(raw.queries)?);
-        Ok(Link {
+    fn link(&self, raw: LinkTable) -> Result<LinkRule, FileError> {
+        Ok(LinkRule {
+            commands: self.commands(raw.commands)?,
+            queries: self.queries(raw.queries)?,
             from: self.known(raw.from)?,
             to: self.known(raw.to)?,
-            commands,
-            queries,
         })
     }
 
@@ -160,7 +155,7 @@ impl Checker<'_> {
     fn queries(&self, raw: Option<Spanned<ChannelTable>>) -> Result<Option<Channel>, FileError> {
         let Some(raw) = raw else { return Ok(None) };
         if raw.get_ref().delay.is_some() || raw.get_ref().duplication.is_some() {
-            let reason = "queries are answered within their tick or not at all: only loss and bursts befall them";
+            let reason = "queries are answered within their tick or not at all: they have only loss and bursts";
             return Err(self.refuse(raw.span(), reason));
         }
         self.channel(raw.span(), raw.get_ref()).map(Some)
@@ -171,88 +166,89 @@ impl Checker<'_> {
         span: std::ops::Range<usize>,
         raw: &ChannelTable,
     ) -> Result<Channel, FileError> {
-        let refuse = |reason: &str| self.refuse(span.clone(), reason);
-        let probability =
-            |what: &str, value: Option<f64>, default: f64| match value.unwrap_or(default) {
-                value if (0.0..=1.0).contains(&value) => Ok(value),
-                _ => Err(refuse(&format!("{what} is a probability, from 0 to 1"))),
-            };
-        let burst = |burst: &BurstTable| {
-            Ok(Burst {
-                enter: probability("burst.enter", Some(burst.enter), 0.0)?,
-                leave: probability("burst.leave", Some(burst.leave), 0.0)?,
-                loss: probability("burst.loss", burst.loss, 1.0)?,
-            })
-        };
-        let delay = |delay: &Delay| {
-            let Range { min, mode, max } = match delay {
-                Delay::Constant(time) => Range {
-                    min: *time,
-                    mode: *time,
-                    max: *time,
-                },
-                Delay::Triangular(range) => *range,
-            };
-            if ticks(max.0, self.tick_s) > MAX_DELAY_TICKS {
-                return Err(refuse("a delay is at most 1000 ticks"));
-            }
-            Triangular::new(min.0, mode.0, max.0)
-                .map_err(|error| refuse(&format!("delay: {error}")))
-        };
+        self.try_channel(raw)
+            .map_err(|reason| self.refuse(span, &reason))
+    }
+
+    fn try_channel(&self, raw: &ChannelTable) -> Result<Channel, String> {
         Ok(Channel {
-            loss: probability("loss", raw.loss, 0.0)?,
-            duplication: probability("duplication", raw.duplication, 0.0)?,
-            delay_s: raw.delay.as_ref().map(delay).transpose()?,
+            loss: probability("loss", raw.loss.unwrap_or(0.0))?,
+            duplication: probability("duplication", raw.duplication.unwrap_or(0.0))?,
+            delay_s: raw.delay.as_ref().map(|raw| self.delay(raw)).transpose()?,
             burst: raw.burst.as_ref().map(burst).transpose()?,
         })
+    }
+
+    fn delay(&self, raw: &Delay) -> Result<Triangular, String> {
+        let Range { min, mode, max } = match raw {
+            Delay::Constant(time) => Range {
+                min: *time,
+                mode: *time,
+                max: *time,
+            },
+            Delay::Triangular(range) => *range,
+        };
+
+        if ticks(max.0, self.tick_s) > MAX_DELAY_TICKS {
+            return Err("a delay is at most 1000 ticks".to_owned());
+        }
+        Triangular::new(min.0, mode.0, max.0).map_err(|error| format!("delay: {error}"))
     }
 
     fn partition(&self, raw: Spanned<PartitionTable>) -> Result<Partition, FileError> {
         let span = raw.span();
         let raw = raw.into_inner();
-        let groups: Vec<Vec<RobotName>> = raw
-            .groups
-            .into_iter()
-            .map(|group| group.into_iter().map(|name| self.known(name)).collect())
-            .collect::<Result<_, _>>()?;
-        let mut named: Vec<&RobotName> = groups.iter().flatten().collect();
-        named.sort();
-        if let Some(twice) = named.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(self.refuse(span, &format!("{} is in two groups", twice[0])));
-        }
-        if groups.iter().filter(|group| !group.is_empty()).count() < 2 {
-            return Err(self.refuse(
-                span,
-                "a partition needs two groups, for example [[\"Butler\"], [\"Leguin\"]]",
-            ));
-        }
-        let (from, until) = (
-            self.tick(&span, raw.from)?,
-            raw.until.map(|time| self.tick(&span, time)),
-        );
-        let until = until.transpose()?;
+        let groups = self.groups(&span, raw.groups)?;
+
+        let from = self.tick(&span, raw.from)?;
+        let until = raw.until.map(|time| self.tick(&span, time)).transpose()?;
         if until.is_some_and(|until| until <= from) {
             return Err(self.refuse(span, "it ends before it begins: `until` comes after `from`"));
         }
+
         let cuts = raw
             .cuts
             .unwrap_or_else(|| vec![Cuts::Commands, Cuts::Queries]);
         if cuts.is_empty() {
-            return Err(self.refuse(
-                span,
-                "it cuts nothing: name \"commands\", \"queries\" or both",
-            ));
+            let reason = "it cuts nothing: name \"commands\", \"queries\" or both";
+            return Err(self.refuse(span, reason));
         }
-        let is_cut = |what| cuts.contains(&what);
-        let (commands, queries) = (is_cut(Cuts::Commands), is_cut(Cuts::Queries));
+
         Ok(Partition {
             groups,
             from,
             until,
             one_way: raw.one_way.unwrap_or(false),
-            commands,
-            queries,
+            commands: cuts.contains(&Cuts::Commands),
+            queries: cuts.contains(&Cuts::Queries),
         })
+    }
+
+    /// Checks that there are at least two groups, and that no robot is in two of them.
+    fn groups(
+        &self,
+        span: &std::ops::Range<usize>,
+        raw: Vec<Vec<Spanned<RobotName>>>,
+    ) -> Result<Vec<Vec<RobotName>>, FileError> {
+        let mut groups = Vec::new();
+        let mut named = BTreeSet::new();
+        for raw_group in raw {
+            let mut group = Vec::new();
+            for name in raw_group {
+                let name = self.known(name)?;
+                if !named.insert(name.clone()) {
+                    return Err(self.refuse(span.clone(), &format!("{name} is in two groups")));
+                }
+                group.push(name);
+            }
+            groups.push(group);
+        }
+
+        if groups.iter().filter(|group| !group.is_empty()).count() < 2 {
+            let reason = "a partition needs two groups, for example [[\"Butler\"], [\"Leguin\"]]";
+            return Err(self.refuse(span.clone(), reason));
+        }
+        Ok(groups)
     }
 
     fn tick(&self, span: &std::ops::Range<usize>, time: Time) -> Result<u64, FileError> {
@@ -269,70 +265,84 @@ impl NetworkTable {
         if *network == Network::default() {
             return None;
         }
-        let spanned = |channel| Spanned::new(0..0, ChannelTable::from(channel));
-        let link = |link: &Link| LinkTable {
-            from: Spanned::new(0..0, link.from.clone()),
-            to: Spanned::new(0..0, link.to.clone()),
-            commands: link.commands.map(spanned),
-            queries: link.queries.map(spanned),
-        };
+
+        let links = network.links.iter().map(LinkTable::from);
+        let partitions = network.partitions.iter();
+        let partitions = partitions.map(|partition| PartitionTable::of(partition, tick_s));
+        Some(unplaced(Self {
+            commands: Some(unplaced(network.commands.into())),
+            queries: Some(unplaced(network.queries.into())),
+            links: links.map(unplaced).collect(),
+            partitions: partitions.map(unplaced).collect(),
+        }))
+    }
+}
+
+impl From<&LinkRule> for LinkTable {
+    fn from(link: &LinkRule) -> Self {
+        let channel = |channel: Channel| unplaced(channel.into());
+        Self {
+            from: unplaced(link.from.clone()),
+            to: unplaced(link.to.clone()),
+            commands: link.commands.map(channel),
+            queries: link.queries.map(channel),
+        }
+    }
+}
+
+impl PartitionTable {
+    fn of(partition: &Partition, tick_s: f64) -> Self {
+        let mut groups = Vec::new();
+        for group in &partition.groups {
+            groups.push(group.iter().cloned().map(unplaced).collect());
+        }
+
+        let mut cuts = Vec::new();
+        if partition.commands {
+            cuts.push(Cuts::Commands);
+        }
+        if partition.queries {
+            cuts.push(Cuts::Queries);
+        }
+
         let time = |tick: u64| Time(tick as f64 * tick_s);
-        let partition = |partition: &Partition| PartitionTable {
-            groups: partition
-                .groups
-                .iter()
-                .map(|group| {
-                    group
-                        .iter()
-                        .map(|name| Spanned::new(0..0, name.clone()))
-                        .collect()
-                })
-                .collect(),
+        Self {
+            groups,
             from: time(partition.from),
             until: partition.until.map(time),
             one_way: Some(partition.one_way),
-            cuts: Some(
-                [
-                    (partition.commands, Cuts::Commands),
-                    (partition.queries, Cuts::Queries),
-                ]
-                .into_iter()
-                .filter_map(|(is_cut, what)| is_cut.then_some(what))
-                .collect(),
-            ),
-        };
-        let table = Self {
-            commands: Some(spanned(network.commands)),
-            queries: Some(spanned(network.queries)),
-            links: network
-                .links
-                .iter()
-                .map(|entry| Spanned::new(0..0, link(entry)))
-                .collect(),
-            partitions: network
-                .partitions
-                .iter()
-                .map(|entry| Spanned::new(0..0, partition(entry)))
-                .collect(),
-        };
-        Some(Spanned::new(0..0, table))
+            cuts: Some(cuts),
+        }
     }
+}
+
+fn probability(what: &str, value: f64) -> Result<f64, String> {
+    if (0.0..=1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{what} is a probability, from 0 to 1"))
+    }
+}
+
+fn burst(raw: &BurstTable) -> Result<Burst, String> {
+    Ok(Burst {
+        enter: probability("burst.enter", raw.enter)?,
+        leave: probability("burst.leave", raw.leave)?,
+        loss: probability("burst.loss", raw.loss.unwrap_or(1.0))?,
+    })
 }
 
 impl From<Channel> for ChannelTable {
     fn from(channel: Channel) -> Self {
-        let delay = |delay: Triangular| {
-            Delay::Triangular(Range {
-                min: Time(delay.min()),
-                mode: Time(delay.mode()),
-                max: Time(delay.max()),
-            })
-        };
-        let said = |value: f64| (value > 0.0).then_some(value);
+        let delay = channel.delay_s.map(|delay| Range {
+            min: Time(delay.min()),
+            mode: Time(delay.mode()),
+            max: Time(delay.max()),
+        });
         Self {
-            loss: said(channel.loss),
-            duplication: said(channel.duplication),
-            delay: channel.delay_s.map(delay),
+            loss: Some(channel.loss).filter(|loss| *loss > 0.0),
+            duplication: Some(channel.duplication).filter(|duplication| *duplication > 0.0),
+            delay: delay.map(Delay::Triangular),
             burst: channel.burst.map(|burst| BurstTable {
                 enter: burst.enter,
                 leave: burst.leave,

@@ -1,4 +1,4 @@
-//! A triangular distribution as it is written.
+//! A triangular distribution as written in the file.
 
 use serde::{Deserialize, Serialize};
 

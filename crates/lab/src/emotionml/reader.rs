@@ -1,4 +1,4 @@
-//! What a run left of its robots' emotions, tick by tick: its recording, or, where it has none, its events.
+//! Reads the states of a run's robots tick by tick, from its recording, or from its events if it has no recording.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -13,61 +13,60 @@ use serde::de::DeserializeOwned;
 use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
 use simulator::{RunFolder, Scenario};
 
-use super::episode::Seen;
-use super::notes::note;
-
-/// Longest line of a record: a thousand robots and guests that publish much take a hundredth of it.
+use super::episode::RobotState;
+/// Longest line of a record, bytes; a tick of a thousand robots that publish much takes a hundredth of it.
 const MAX_LINE_BYTES: u64 = 1 << 28;
 
-/// What holds for the whole run.
+/// Facts that hold for the whole run.
 #[derive(Debug, Clone)]
 pub(super) struct Facts {
     pub(super) run: RunName,
-    /// Which of the run's epochs; events do not say it.
+    /// Epoch of the record; events do not contain it.
     pub(super) epoch: Option<Epoch>,
     pub(super) seed: u64,
     /// Length of a tick, simulated seconds.
     pub(super) tick_s: f64,
     /// Name of the file that was read.
     pub(super) file: &'static str,
-    /// What each robot was told about itself, as far as the run's scenario is there.
+    /// Parameters of each robot; empty if the scenario of the run cannot be read.
     pub(super) parameters: BTreeMap<RobotName, Parameters>,
 }
 
 /// The robots after a tick.
 #[derive(Debug)]
-pub(super) struct Moment {
+pub(super) struct Snapshot {
     pub(super) tick: Tick,
-    pub(super) robots: Vec<Seen>,
+    pub(super) robots: Vec<RobotState>,
 }
 
 /// A record that is being read.
-pub(super) struct Source {
+pub(super) struct Reader {
     lines: Lines,
     facts: Facts,
     /// The tick that must come next.
     due: Tick,
-    /// Only where events are read.
+    /// The states so far, if events are read.
     replay: Option<Replay>,
+    /// What the record lacks, for people.
+    notes: Vec<String>,
 }
 
-impl Source {
+impl Reader {
     /// Opens the recording of a run, or its events.
     ///
     /// # Errors
-    /// Neither is there, or what is there does not begin as it should.
+    /// If neither exists, or its first line is not the expected one.
     pub(super) fn open(folder: &RunFolder) -> miette::Result<Self> {
-        let [recording, events] = [RECORDING, EVENTS].map(|name| folder.file(name));
+        let recording = folder.file(RECORDING);
         if recording.exists() {
             return Self::recording(folder, Lines::open(recording)?);
         }
+
+        let events = folder.file(EVENTS);
         if events.exists() {
-            note(&format!(
-                "{} has no {RECORDING} (`[record] frames = false`?): read from {EVENTS}, without intensities",
-                folder.path().display()
-            ));
             return Self::events(folder, Lines::open(events)?);
         }
+
         let folder = folder.path().display();
         Err(miette!(
             help = "is it the folder of a run?",
@@ -77,15 +76,17 @@ impl Source {
 
     fn recording(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
         let header: RecordingHeader = lines.first()?;
+        let mut notes = Vec::new();
         let facts = Facts {
             run: header.run,
             epoch: Some(header.epoch),
             seed: header.seed,
             tick_s: header.tick_s,
             file: RECORDING,
-            parameters: parameters(folder),
+            parameters: parameters(folder, &mut notes),
         };
-        Self::begin(lines, facts, None)
+
+        Self::begin(lines, facts, None, notes)
     }
 
     fn events(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
@@ -99,35 +100,45 @@ impl Source {
                 lines.path.display()
             ));
         };
-        let (run, file) = (name(folder)?, EVENTS);
+
+        let mut notes = vec![format!(
+            "{} has no {RECORDING} (`[record] frames = false`?): read from {EVENTS}, without intensities",
+            folder.path().display()
+        )];
         let facts = Facts {
-            run,
+            run: name(folder)?,
             epoch: None,
             seed,
             tick_s,
-            file,
-            parameters: parameters(folder),
+            file: EVENTS,
+            parameters: parameters(folder, &mut notes),
         };
-        Self::begin(lines, facts, Some(Replay::default()))
+
+        Self::begin(lines, facts, Some(Replay::default()), notes)
     }
 
-    fn begin(lines: Lines, facts: Facts, replay: Option<Replay>) -> miette::Result<Self> {
-        if facts.tick_s > 0.0 && facts.tick_s.is_finite() {
-            return Ok(Self {
-                lines,
-                facts,
-                due: 0,
-                replay,
-            });
+    fn begin(
+        lines: Lines,
+        facts: Facts,
+        replay: Option<Replay>,
+        notes: Vec<String>,
+    ) -> miette::Result<Self> {
+        let tick_s = facts.tick_s;
+        if !(tick_s > 0.0 && tick_s.is_finite()) {
+            let path = lines.path.display();
+            return Err(miette!("{path}: a tick cannot last {tick_s} s"));
         }
-        Err(miette!(
-            "{}: a tick of {} s cannot be",
-            lines.path.display(),
-            facts.tick_s
-        ))
+
+        Ok(Self {
+            lines,
+            facts,
+            due: 0,
+            replay,
+            notes,
+        })
     }
 
-    /// What holds for the whole run.
+    /// Facts that hold for the whole run.
     pub(super) fn facts(&self) -> &Facts {
         &self.facts
     }
@@ -137,45 +148,60 @@ impl Source {
         &self.lines.path
     }
 
+    /// What the record lacks, for people.
+    pub(super) fn into_notes(mut self) -> Vec<String> {
+        if self.lines.is_incomplete {
+            let path = self.path().display();
+            let note = format!("the last line of {path} is incomplete and left out");
+            self.notes.push(note);
+        }
+        self.notes
+    }
+
     /// The next tick; `None` after the last complete one.
     ///
     /// # Errors
-    /// A line that is no record, or a tick that is not the next one.
-    pub(super) fn next(&mut self) -> miette::Result<Option<Moment>> {
-        let Some(moment) = self.read()? else {
+    /// If a line cannot be decoded, or has another tick than the next one.
+    pub(super) fn next(&mut self) -> miette::Result<Option<Snapshot>> {
+        let Some(snapshot) = self.read()? else {
             return Ok(None);
         };
-        if moment.tick != self.due {
-            let (path, line) = (self.path().display(), self.lines.number);
+
+        if snapshot.tick != self.due {
             return Err(miette!(
-                "{path}, line {line}: tick {} where {} is due",
-                moment.tick,
+                "{}, line {}: tick {} where {} is due",
+                self.path().display(),
+                self.lines.number,
+                snapshot.tick,
                 self.due
             ));
         }
+
         self.due += 1;
-        Ok(Some(moment))
+        Ok(Some(snapshot))
     }
 
-    fn read(&mut self) -> miette::Result<Option<Moment>> {
+    fn read(&mut self) -> miette::Result<Option<Snapshot>> {
         let Some(replay) = &mut self.replay else {
             let recorded: Option<RecordedTick> = self.lines.next()?;
-            return Ok(recorded.map(|recorded| Moment {
+            return Ok(recorded.map(|recorded| Snapshot {
                 tick: recorded.tick,
-                robots: recorded.robots.into_iter().map(Seen::from).collect(),
+                robots: recorded.robots.into_iter().map(RobotState::from).collect(),
             }));
         };
+
         while let Some(line) = self.lines.next::<Line>()? {
             let tick = line.tick;
-            if let Some(robots) = replay.take(line.event) {
-                return Ok(Some(Moment { tick, robots }));
+            if let Some(robots) = replay.apply(line.event) {
+                return Ok(Some(Snapshot { tick, robots }));
             }
         }
+
         Ok(None)
     }
 }
 
-impl From<RecordedRobot> for Seen {
+impl From<RecordedRobot> for RobotState {
     fn from(robot: RecordedRobot) -> Self {
         Self {
             name: robot.name,
@@ -187,92 +213,94 @@ impl From<RecordedRobot> for Seen {
     }
 }
 
-/// The states of the robots, from events that say only what changes.
+/// The states of the robots, restored from events, which contain only changes.
 #[derive(Debug, Default)]
 struct Replay {
-    robots: BTreeMap<RobotName, Seen>,
+    robots: BTreeMap<RobotName, RobotState>,
     lost: BTreeSet<RobotName>,
 }
 
 impl Replay {
-    /// Takes in an event; returns the robots if it completes a tick.
-    fn take(&mut self, event: Event) -> Option<Vec<Seen>> {
+    /// Applies an event. Returns the robots if the event completes a tick.
+    fn apply(&mut self, event: Event) -> Option<Vec<RobotState>> {
         match event {
             Event::Joined { robot, .. } => {
                 self.lost.remove(&robot);
-                self.of(robot);
+                self.state_of(robot);
             }
             Event::Lost { robot } => {
                 self.lost.insert(robot);
             }
-            Event::Missed { robot } => self.of(robot).missed = true,
-            Event::Emotion { robot, to, .. } => self.of(robot).emotion = to,
-            Event::Behavior { robot, to, .. } => self.of(robot).behavior = to,
-            Event::Tick { .. } => {
-                let lost = &self.lost;
-                let shown = self.robots.values().map(|robot| Seen {
-                    missed: robot.missed || lost.contains(&robot.name),
-                    ..robot.clone()
-                });
-                let shown = shown.collect();
-                self.robots
-                    .values_mut()
-                    .for_each(|robot| robot.missed = false);
-                return Some(shown);
-            }
+            Event::Missed { robot } => self.state_of(robot).missed = true,
+            Event::Emotion { robot, to, .. } => self.state_of(robot).emotion = to,
+            Event::Behavior { robot, to, .. } => self.state_of(robot).behavior = to,
+            Event::Tick { .. } => return Some(self.end_tick()),
             _ => {}
         }
+
         None
     }
 
-    fn of(&mut self, name: RobotName) -> &mut Seen {
-        let unknown = Seen {
+    /// The robots of a complete tick. Misses do not carry over to the next one.
+    fn end_tick(&mut self) -> Vec<RobotState> {
+        let mut robots = Vec::new();
+        for robot in self.robots.values_mut() {
+            let mut shown = robot.clone();
+            shown.missed |= self.lost.contains(&robot.name);
+            robots.push(shown);
+            robot.missed = false;
+        }
+        robots
+    }
+
+    /// The state of a robot; a new one is empty.
+    fn state_of(&mut self, name: RobotName) -> &mut RobotState {
+        let empty = RobotState {
             name: name.clone(),
             missed: false,
             emotion: String::new(),
             behavior: String::new(),
             variables: None,
         };
-        self.robots.entry(name).or_insert(unknown)
+        self.robots.entry(name).or_insert(empty)
     }
 }
 
-/// The run's name, which is that of its folder.
+/// The name of a run is that of its folder.
 fn name(folder: &RunFolder) -> miette::Result<RunName> {
     let path = folder.path().canonicalize().into_diagnostic()?;
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
     RunName::new(&name)
-        .map_err(|error| miette!("{} has not the name of a run: {error}", path.display()))
+        .map_err(|error| miette!("{} is not named like a run: {error}", path.display()))
 }
 
-/// What each robot was told about itself; a run without its scenario says less of its robots.
-fn parameters(folder: &RunFolder) -> BTreeMap<RobotName, Parameters> {
-    let file = folder.file(SCENARIO);
-    match Scenario::load(&file, &Changes::default()) {
-        Ok(scenario) => scenario
-            .robots
-            .into_iter()
-            .map(|(name, robot)| (name, robot.parameters))
-            .collect(),
+/// The parameters of each robot, from the scenario of the run if it can be read.
+fn parameters(folder: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<RobotName, Parameters> {
+    let mut parameters = BTreeMap::new();
+    match Scenario::load(&folder.file(SCENARIO), &Changes::default()) {
+        Ok(scenario) => {
+            for (name, robot) in scenario.robots {
+                parameters.insert(name, robot.parameters);
+            }
+        }
         Err(error) => {
-            note(&format!(
-                "{}: goals and the scale of needs are not known",
-                error.in_words()
+            let reason = error.in_words();
+            notes.push(format!(
+                "{reason}: goals and the scale of needs are not known"
             ));
-            BTreeMap::new()
         }
     }
+    parameters
 }
 
-/// A file of one JSON value a line.
+/// A file with one JSON value a line.
 struct Lines {
     reader: BufReader<File>,
     path: PathBuf,
+    /// Number of the line that was read last, from 1.
     number: u64,
+    /// Whether the last line has no end: it is being written, or the run was interrupted while writing it.
+    is_incomplete: bool,
 }
 
 impl Lines {
@@ -283,17 +311,17 @@ impl Lines {
             reader: BufReader::new(file),
             path,
             number: 0,
+            is_incomplete: false,
         })
     }
 
-    /// The line with which the file has to begin.
+    /// The first line, which must exist.
     fn first<T: DeserializeOwned>(&mut self) -> miette::Result<T> {
         self.next()?
             .ok_or_else(|| miette!("{} holds no run yet", self.path.display()))
     }
 
-    /// The next line; `None` at the end. A last line without its end was being written when the run broke off, or is
-    /// being written now.
+    /// The next line; `None` at the end of the file or at an incomplete last line.
     fn next<T: DeserializeOwned>(&mut self) -> miette::Result<Option<T>> {
         let mut bytes = Vec::new();
         let read = self
@@ -304,14 +332,12 @@ impl Lines {
         read.map_err(|error| miette!("cannot read {}: {error}", self.path.display()))?;
         self.number += 1;
         let is_whole = bytes.ends_with(b"\n") || bytes.len() as u64 == MAX_LINE_BYTES;
+
         match serde_json::from_slice(&bytes) {
             Ok(value) => Ok(Some(value)),
             Err(_) if bytes.is_empty() => Ok(None),
             Err(_) if !is_whole => {
-                note(&format!(
-                    "the last line of {} is incomplete and left out",
-                    self.path.display()
-                ));
+                self.is_incomplete = true;
                 Ok(None)
             }
             Err(error) => Err(miette!(
@@ -327,17 +353,17 @@ impl Lines {
 mod tests {
     use super::*;
 
-    /// What is known of a robot's emotion after each tick; `None` where it was not heard.
-    fn heard(events: Vec<Event>) -> Vec<Option<String>> {
+    /// Emotion of the only robot after each tick; `None` without a report.
+    fn emotions(events: Vec<Event>) -> Vec<Option<String>> {
         let mut replay = Replay::default();
-        let ticks = events.into_iter().filter_map(|event| replay.take(event));
+        let ticks = events.into_iter().filter_map(|event| replay.apply(event));
         ticks
             .map(|robots| (!robots[0].missed).then(|| robots[0].emotion.clone()))
             .collect()
     }
 
     #[test]
-    fn events_say_who_was_heard_in_which_tick() {
+    fn events_tell_ticks_with_and_without_a_report_apart() {
         let robot = || RobotName::new("Butler").unwrap();
         let tick = || Event::Tick {
             digest: String::new(),
@@ -352,7 +378,7 @@ mod tests {
             generation,
             at: Default::default(),
         };
-        let heard = heard(vec![
+        let found = emotions(vec![
             joined(None),
             emotion("HAPPY"),
             tick(),
@@ -367,9 +393,11 @@ mod tests {
             emotion("CONCERNED"),
             tick(),
         ]);
-        let (happy, concerned) = (Some("HAPPY".to_owned()), Some("CONCERNED".to_owned()));
+
+        let happy = Some("HAPPY".to_owned());
+        let concerned = Some("CONCERNED".to_owned());
         assert_eq!(
-            heard,
+            found,
             [
                 happy.clone(),
                 happy.clone(),

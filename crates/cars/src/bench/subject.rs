@@ -1,21 +1,18 @@
-//! What is measured, and what each is compared with.
-
-use super::programs::Programs;
-use super::{Bench, lockstep, star, tcp};
+//! The subjects of the benchmark, and the floor that each is compared with.
 
 /// Number of robots in the crowd of Butlers and Leguins.
 pub(super) const CROWD: usize = 64;
 /// Number of processes of the raw TCP barrier.
 const TCP_PROCESSES: usize = 2;
 
-/// Something with a barrier, measured in ticks per second.
+/// A barrier that is measured in ticks per second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Subject {
-    /// A barrier with nothing in it but TCP.
+    /// One write and one read over TCP for each process and tick.
     Tcp { processes: usize },
-    /// A barrier with nothing in it but zenoh.
+    /// One put in each direction over zenoh for each client and tick.
     Star { clients: usize },
-    /// The lock-step with robots that only answer, a process each.
+    /// The lock-step with idle robots, a process each.
     Lockstep { robots: usize },
     /// Butlers and Leguins in pairs, a process each.
     Crowd { robots: usize },
@@ -46,8 +43,8 @@ impl std::fmt::Display for Subject {
 }
 
 impl Subject {
-    /// What the same machine does at most, with as many processes. The hall in one process has no floor: nothing
-    /// crosses a process boundary.
+    /// The bare zenoh star with as many processes: no lock-step over zenoh is faster on the same machine. The hall in one
+    /// process has no floor, because nothing crosses a process boundary.
     pub(super) fn floor(self) -> Option<Self> {
         match self {
             Self::Lockstep { robots }
@@ -60,36 +57,24 @@ impl Subject {
         }
     }
 
-    /// What TCP does at most, for subjects with two robots.
+    /// The raw TCP barrier, for subjects with two processes.
     pub(super) fn second_floor(self) -> Option<Self> {
         let has_two = match self {
             Self::Star { clients } => clients == TCP_PROCESSES,
             Self::Tcp { .. } => false,
-            _ => self
-                .floor()
-                .is_some_and(|star| star.second_floor().is_some()),
+            Self::Lockstep { .. } | Self::Crowd { .. } | Self::Hall { .. } => {
+                let star = self.floor();
+                star.is_some_and(|star| star.second_floor().is_some())
+            }
         };
+
         has_two.then_some(Self::Tcp {
             processes: TCP_PROCESSES,
         })
     }
 
-    /// Whether it is measured with the project's programs, and so with each build.
-    pub(super) fn is_of_the_project(self) -> bool {
+    /// Whether the programs of the project run in it, so that builds can be compared.
+    pub(super) fn runs_the_project(self) -> bool {
         !matches!(self, Self::Tcp { .. } | Self::Star { .. })
-    }
-
-    /// Ticks per second, with these programs.
-    pub(super) fn measure(self, bench: &Bench<'_>, programs: &Programs) -> miette::Result<f64> {
-        match self {
-            Self::Tcp { processes } => tcp::measure(processes, bench.ticks_with(processes)),
-            Self::Star { clients } => star::measure(clients, bench.ticks_with(clients)),
-            Self::Lockstep { robots } => lockstep::bare(bench, programs, robots),
-            Self::Crowd { robots } => lockstep::crowd(bench, programs, robots),
-            Self::Hall { place, .. } => match place {
-                HallPlace::Processes => lockstep::hall(bench, programs),
-                HallPlace::OneProcess => lockstep::hall_in_one_process(bench, programs),
-            },
-        }
     }
 }
