@@ -7,7 +7,6 @@ use protocol::messages::{
     Awaited, Control, ControlAnswer, End, FieldError, Phase, RobotStatus, Setup, SetupAnswer,
     Status,
 };
-use protocol::random::MAX_SEED;
 use protocol::{RobotName, decode, encode};
 
 use super::process::{Interrupt, Server};
@@ -284,9 +283,10 @@ fn next_scenario(
     seed: Option<u64>,
     setup: Option<&Setup>,
 ) -> Result<Scenario, Refusal> {
-    if seed.is_some_and(|seed| seed > MAX_SEED) {
-        return Err(format!("a seed is at most {MAX_SEED}").into());
+    if let Some(seed) = seed {
+        config::seed::check(seed).map_err(|error| error.to_string())?;
     }
+
     let next = setup.map_or_else(|| Ok(running.clone()), |setup| running.with_setup(setup));
     let next = next.map_err(|fields| Refusal {
         explanation: fields
