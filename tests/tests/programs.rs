@@ -20,7 +20,7 @@ const C: &str = "sdk/stdio/c/leguin.c";
 const ANY_LANGUAGE: &str = "launch/any_language.toml";
 const MIXED: &str = "launch/mixed.toml";
 
-/// Whether a test cannot run for want of a tool. It says so on a user's machine, and fails where everything must be there.
+/// Whether a test cannot run because a tool is missing. It prints this on a user's machine, and fails in CI.
 fn lacks(tool: &str, is_there: bool, remedy: &str) -> bool {
     if is_there {
         return false;
@@ -83,7 +83,7 @@ fn said(output: &Output) -> String {
     format!("{}\n{out}\n{err}", output.status)
 }
 
-/// The commands that the head of a launch file tells to type before the first launch.
+/// The commands in the head of a launch file, to be typed before the first launch.
 fn commands_of(launch_file: &str) -> Vec<String> {
     let text = std::fs::read_to_string(root().join(launch_file)).unwrap();
     let commands = text
@@ -105,6 +105,11 @@ fn compiled(lab: &Lab, options: &str) -> PathBuf {
     program
 }
 
+/// An entry of a launch file, restarted when it fails.
+fn process_of(name: &str, command: &str) -> String {
+    format!("[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n")
+}
+
 /// A launch of a scenario in which `program`, or the SDK's own where there is none, is Leguin, and Vonda.
 struct Cast {
     lab: Lab,
@@ -120,14 +125,10 @@ impl Cast {
             "scenario = {:?}\n[console]\nenabled = false\n",
             scenario.display().to_string()
         );
-        let process = |name: &str, command: &str| {
-            format!(
-                "[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n"
-            )
-        };
-        let mut text = head + &process("Butler", r#"["cars-butler"]"#) + &process("Leguin", leguin);
+        let mut text =
+            head + &process_of("Butler", r#"["cars-butler"]"#) + &process_of("Leguin", leguin);
         if has_vonda {
-            text += &process("Vonda", leguin);
+            text += &process_of("Vonda", leguin);
         }
         let file = lab.write("launch.toml", &text).display().to_string();
         Self {
@@ -158,7 +159,9 @@ impl Cast {
         let mut launch = vec!["launch", &self.file, "--run", "in-c", "--speed", "max"];
         launch.extend(more);
         self.lab.ok(&launch);
-        let (in_rust, in_c) = (self.lab.bytes("in-rust"), self.lab.bytes("in-c"));
+
+        let in_rust = self.lab.bytes("in-rust");
+        let in_c = self.lab.bytes("in-c");
         assert_same(
             (&format!("{scenario} {more:?} in Rust"), &in_rust),
             ("with C", &in_c),
@@ -166,7 +169,7 @@ impl Cast {
     }
 }
 
-/// As the page says.
+/// The options of the page.
 const PLAIN: &str = "-std=c11 -O2 -ffp-contract=off";
 
 #[test]
@@ -213,7 +216,7 @@ fn her_parameters_and_vonda_mean_the_same_in_c() {
             "robot.Leguin.params.affect=off",
             "robot.Vonda.params.schematic=off",
         ],
-        // Of somebody who is not there nothing is known: she searches.
+        // The waiter is not of the roster: she searches.
         &[
             "robot.Leguin.params.waiter=Nobody",
             "robot.Leguin.params.turn_mean_s=2.0",
@@ -314,8 +317,8 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
     }
 }
 
-/// What may be told to Leguin; every query of hers has an answer here.
-const TOLD: &[&str] = &[
+/// A session with Leguin; every query of hers has an answer here.
+const SESSION: &[&str] = &[
     r#"{"type":"init","protocol":2,"run":"r","name":"Leguin","generation":1,"epoch":1,"tick":0,"seed":42,"stream":"robot/Leguin","tick_s":0.5,"field_m":[15.24,15.24],"body_m":0.6096,"sensing_range_m":1.8288,"location":{"x":1.2192,"y":1.2192},"roster":["Butler","Leguin"],"parameters":{"waiter":"Butler","affect":"on","dynamics":{"label_cuts":[0.2,0.4,0.6,0.8]}}}"#,
     r#"{"type":"tick","tick":1,"location":{"x":1.2192,"y":1.2192},"commands":[{"from":"Butler","performative":"achieve","command":"refill"},{"from":"Bot","performative":"achieve","command":"\u00e9\ud83d\ude00 \"\\\u0007\u0000\n 0123456789012345678901234567890123456789012345678901234567890"}],"sensed":[{"name":"Vonda","location":{"x":1.0,"y":2e0}}]}"#,
     r#"{"type":"answer","value":{"epoch":1,"tick":0,"location":{"x":7.62,"y":7.62},"state_variables":{"need":true,"refiller":"Leguin"}}}"#,
@@ -342,10 +345,11 @@ fn damaged(chance: &mut Stream) -> Vec<u8> {
         "[[[[[[[[[[[[",
         "99999999999999999999",
     ];
-    let mut session = TOLD.join("\n").into_bytes();
+    let mut session = SESSION.join("\n").into_bytes();
     let mut below = |count: usize| (unit(chance) * count as f64) as usize;
     for _ in 0..1 + below(4) {
-        let (at, len) = (below(session.len()), below(12));
+        let at = below(session.len());
+        let len = below(12);
         let end = (at + len).min(session.len());
         match below(5) {
             0 => session[at] = u8::try_from(below(256)).unwrap(),
@@ -359,8 +363,8 @@ fn damaged(chance: &mut Stream) -> Vec<u8> {
     session
 }
 
-/// What becomes of a program that is told all of this at once.
-fn told(program: &Path, session: &[u8]) -> Output {
+/// Runs a program with all of this on its standard input.
+fn run_with(program: &Path, session: &[u8]) -> Output {
     let mut command = Command::new(program);
     command
         .env("ASAN_OPTIONS", "exitcode=99")
@@ -380,7 +384,7 @@ fn told(program: &Path, session: &[u8]) -> Output {
 }
 
 #[test]
-fn nothing_that_she_is_told_breaks_leguin_in_c() {
+fn no_input_breaks_leguin_in_c() {
     const STRICT: &str = "-std=c11 -O1 -g -Wall -Wextra -Wshadow -Wconversion -pedantic -Werror \
                           -fsanitize=address,undefined -fno-sanitize-recover=all";
     if lacks_compiler() {
@@ -405,7 +409,7 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
     cast.is_the_run_in_rust(&["--seed", "4", "--duration", "120 s"]);
 
     let program = cast.lab.out().join("leguin");
-    let whole = told(&program, TOLD.join("\n").as_bytes());
+    let whole = run_with(&program, SESSION.join("\n").as_bytes());
     assert!(whole.status.success(), "{}", said(&whole));
     assert_eq!(
         String::from_utf8_lossy(&whole.stdout)
@@ -419,11 +423,9 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
     let mut refused = 0;
     for _ in 0..300 {
         let session = damaged(&mut chance);
-        let output = told(&program, &session);
-        let (status, text) = (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr),
-        );
+        let output = run_with(&program, &session);
+        let status = output.status.code();
+        let text = String::from_utf8_lossy(&output.stderr);
         let is_refusal =
             status == Some(1) && text.starts_with("leguin: ") && text.lines().count() == 1;
         assert!(
@@ -484,7 +486,7 @@ fn the_page_makes_a_robot_from_nothing() {
     );
 }
 
-/// Compiles the robot in TypeScript as the launch file says; `npx` would fetch the compiler that the console's check has.
+/// Compiles the robot in TypeScript as the launch file states; `npx` would fetch the compiler that the console's check has.
 fn companion_is_compiled() {
     static DONE: OnceLock<()> = OnceLock::new();
     DONE.get_or_init(|| {
@@ -533,7 +535,7 @@ fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
         let way_m = way_m(&lab, "any-first", robot);
         assert!(way_m > 20.0, "{robot} moved by {way_m} m in 300 s");
     }
-    // They speak with one another.
+    // They send each other commands.
     for part in [
         r#""command_sent","from":"Nora","to":"Tove""#,
         "nods to Nora",
@@ -549,7 +551,9 @@ fn robots_over_stdin_and_stdout_keep_the_rules_of_the_protocol() {
     }
     companion_is_compiled();
     let cast = Cast::in_c("configs/three_robots.toml", true, PLAIN);
-    let (in_c, any_language) = (PathBuf::from(&cast.file), root().join(ANY_LANGUAGE));
+    let in_c = PathBuf::from(&cast.file);
+    let any_language = root().join(ANY_LANGUAGE);
+
     std::thread::scope(|scope| {
         for robot in ["Leguin", "Vonda"] {
             scope.spawn(|| assert_conforms(&in_c, robot));
@@ -627,7 +631,7 @@ fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
 }
 
 #[test]
-fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
+fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
     if lacks_compiler() || lacks_node() || lacks_typescript() {
         return;
     }
@@ -641,21 +645,21 @@ fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
         stdio.join("bash/stroller.sh"),
     ];
     for program in programs {
-        let end = told(&program, b"{\"type\":\"end\",\"reason\":\"finished\"}\n");
+        let end = run_with(&program, b"{\"type\":\"end\",\"reason\":\"finished\"}\n");
         assert!(
             end.status.success() && end.stdout.is_empty(),
             "{}: {}",
             program.display(),
             said(&end)
         );
-        let silence = told(&program, b"");
+        let silence = run_with(&program, b"");
         assert!(
             silence.status.success() && silence.stdout.is_empty(),
             "{}: {}",
             program.display(),
             said(&silence)
         );
-        let rubbish = told(&program, b"rubbish\n");
+        let rubbish = run_with(&program, b"rubbish\n");
         assert_eq!(
             rubbish.status.code(),
             Some(1),
@@ -665,7 +669,7 @@ fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
         );
         assert!(
             !rubbish.stderr.is_empty(),
-            "{} says nothing about rubbish",
+            "{} does not report rubbish",
             program.display()
         );
     }

@@ -83,7 +83,7 @@ fn check(args: &ConformArgs) -> miette::Result<Report> {
     }
     // What the user says goes first.
     for role in setting.cast.values_mut() {
-        role.hears.splice(0..0, args.says.iter().cloned());
+        role.understands.splice(0..0, args.says.iter().cloned());
     }
     setting.commands.splice(0..0, args.says.iter().cloned());
     let (program, arguments) = args
@@ -118,7 +118,7 @@ fn stage(setting: &mut Setting, file: &Path) -> miette::Result<()> {
     let performances = lab::performances(scenario, setting.ticks)?;
     for (name, performance) in performances.into_iter().flatten() {
         if let Some(role) = setting.cast.get_mut(&name) {
-            role.hears = performance.commands;
+            role.understands = performance.commands;
             role.states = performance.states;
         }
     }

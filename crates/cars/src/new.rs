@@ -62,6 +62,8 @@ struct Skeleton {
     more: &'static [(&'static str, &'static str)],
     /// `command` of the launch file.
     command: &'static str,
+    /// The same, to be typed where `cars new` was.
+    typed: &'static str,
     /// What comes before the launch.
     build: &'static str,
     /// Where to go on.
@@ -86,6 +88,7 @@ impl Language {
                     (".gitignore", "/target\n/runs\n"),
                 ],
                 command: r#"["./target/release/@PACKAGE@"]"#,
+                typed: "@FOLDER@/target/release/@PACKAGE@",
                 build: "cargo build --release --manifest-path @FOLDER@/Cargo.toml",
                 hint: "`docs/new-robot.md` of the CARS project makes a robot with an emotion of its own;\n\
                        `cargo doc --open -p robot` says what a robot can do in a tick.",
@@ -95,6 +98,7 @@ impl Language {
                 program: ("robot.py", include_str!("new/python/robot.py")),
                 more: &[],
                 command: r#"["./robot.py"]"#,
+                typed: "@FOLDER@/robot.py",
                 build: "pip install @CARS@/sdk/python",
                 hint: "`sdk/python/README.md` of the CARS project says what a robot can do in a tick.",
             },
@@ -103,6 +107,7 @@ impl Language {
                 program: ("robot.c", include_str!("new/c/robot.c")),
                 more: &[],
                 command: r#"["cars", "exec", "--", "./robot"]"#,
+                typed: "cars exec --name @NAME@ -- @FOLDER@/robot",
                 // A product and a sum that are rounded once would be another number on some machines.
                 build: "cc -std=c11 -O2 -ffp-contract=off -Wall -Wextra -o @FOLDER@/robot @FOLDER@/robot.c -lm",
                 hint: OVER_PIPES,
@@ -112,6 +117,7 @@ impl Language {
                 program: ("robot.sh", include_str!("new/bash/robot.sh")),
                 more: &[],
                 command: r#"["cars", "exec", "--", "./robot.sh"]"#,
+                typed: "cars exec --name @NAME@ -- @FOLDER@/robot.sh",
                 build: "",
                 hint: OVER_PIPES,
             },
@@ -120,6 +126,7 @@ impl Language {
                 program: ("robot.mjs", include_str!("new/node/robot.mjs")),
                 more: &[],
                 command: r#"["cars", "exec", "--", "./robot.mjs"]"#,
+                typed: "cars exec --name @NAME@ -- @FOLDER@/robot.mjs",
                 build: "",
                 hint: OVER_PIPES,
             },
@@ -169,6 +176,7 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
     let steps = steps.join("\n");
     let fill = |text: &str| {
         let command_and_steps = text.replace("@COMMAND@", skeleton.command);
+        let command_and_steps = command_and_steps.replace("@PROGRAM@", skeleton.typed);
         let text = command_and_steps.replace("@STEPS@", &format!("```sh\n{steps}\n```"));
         text.replace("@LANGUAGE@", skeleton.language)
             .replace("@FILE@", skeleton.program.0)

@@ -10,19 +10,29 @@
 //! late. Such a rule is checked by playing the same ticks twice, with the disturbance and without it: reports and commands
 //! must be the same, which the promise of the project (same seed, same run) makes fair.
 
+mod body;
 mod cast;
 mod checks;
 mod comparison;
+mod findings;
+mod flushing;
 mod kit;
+mod load;
+mod patience;
 mod process;
 mod reading;
 mod report;
 mod rules;
 mod script;
+mod seen;
 mod setting;
 mod stage;
+mod transcript;
+mod wire;
 
-pub use kit::{CannotRun, check};
+pub use checks::check;
+pub use flushing::unflushed;
+pub use kit::CannotRun;
 pub use report::{AnswerTimes, Failure, Outcome, Report, Verdict};
 pub use rules::{PAGE, RULES, Rule};
 pub use setting::{Role, Setting};
