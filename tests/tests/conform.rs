@@ -52,7 +52,9 @@ fn program(name: &str) -> String {
 fn cars(more: &[&str], command: &[&str]) -> std::process::Output {
     let (name, arguments) = command.split_first().unwrap();
     let mut cars = Command::new(programs().join("cars"));
+    // Whether Python flushes is for each program to decide.
     cars.current_dir(root())
+        .env_remove("PYTHONUNBUFFERED")
         .arg("conform")
         .args(more)
         .arg("--")
