@@ -125,11 +125,13 @@ impl Cast {
             "scenario = {:?}\n[console]\nenabled = false\n",
             scenario.display().to_string()
         );
+
         let mut text =
             head + &process_of("Butler", r#"["cars-butler"]"#) + &process_of("Leguin", leguin);
         if has_vonda {
             text += &process_of("Vonda", leguin);
         }
+
         let file = lab.write("launch.toml", &text).display().to_string();
         Self {
             lab,
@@ -177,6 +179,7 @@ fn leguin_in_c_is_leguin_in_rust_byte_for_byte() {
     if lacks_compiler() {
         return;
     }
+
     for (scenario, has_vonda) in [
         ("configs/hors_doeuvres.toml", false),
         ("configs/partition.toml", false),
@@ -186,6 +189,7 @@ fn leguin_in_c_is_leguin_in_rust_byte_for_byte() {
         let cast = Cast::in_c(scenario, has_vonda, PLAIN);
         for seed in ["1", "2", "2002"] {
             cast.is_the_run_in_rust(&["--seed", seed]);
+
             // Nothing would be shown by runs in which she does nothing.
             let text = String::from_utf8(cast.lab.bytes("in-c")).unwrap();
             for part in [
@@ -204,6 +208,7 @@ fn her_parameters_and_vonda_mean_the_same_in_c() {
     if lacks_compiler() {
         return;
     }
+
     let cast = Cast::in_c("configs/three_robots.toml", true, PLAIN);
     let shorter = ["--duration", "200 s", "--seed", "5"];
     for changes in [
@@ -243,9 +248,11 @@ fn no_compiler_fuses_her_arithmetic() {
     if lacks_compiler() {
         return;
     }
+
     // Where the machine can fuse, this asks for it.
     Cast::in_c("configs/hors_doeuvres.toml", false, "-O3 -march=native")
         .is_the_run_in_rust(&["--seed", "3"]);
+
     let mut sloppy = Command::new("cc");
     let output = sloppy
         .current_dir(root())
@@ -274,6 +281,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
         let cast = Cast::new(lab, "configs/hors_doeuvres.toml", false, command);
         let fault =
             "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"60 s\", for = \"0.1 s\" }]";
+
         let args = [
             "--set",
             fault,
@@ -287,6 +295,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
         ];
         let name = format!("over-{run}");
         let args: Vec<&str> = ["launch", &cast.file].into_iter().chain(args).collect();
+
         let mut launch = cast.lab.start(&name, &args);
         let ctl = |args: &[&str]| {
             let args: Vec<&str> = ["ctl"]
@@ -300,6 +309,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
                 .output()
                 .is_ok_and(|output| output.status.success())
         };
+
         // Into the first epoch, back to the beginning, and through the second one with its crash.
         eventually("the first ticks", || ctl(&["step", "50"]).then_some(()));
         eventually("the second epoch", || ctl(&["init"]).then_some(()));
@@ -308,6 +318,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
         cast.lab.bytes(&name)
     });
     assert_same(("in Rust", &in_rust), ("in C", &in_c));
+
     let text = String::from_utf8(in_c).unwrap();
     for part in [
         "is back, and takes over where the last one was lost",
@@ -330,6 +341,11 @@ const SESSION: &[&str] = &[
     r#"{"type":"end","reason":"finished"}"#,
 ];
 
+/// A whole number below `count`, by chance.
+fn below(count: usize, chance: &mut Stream) -> usize {
+    (unit(chance) * count as f64) as usize
+}
+
 /// The session with a few bytes changed, doubled, cut out, or replaced by what parsers stumble over.
 fn damaged(chance: &mut Stream) -> Vec<u8> {
     const STUMBLING: &[&str] = &[
@@ -346,16 +362,16 @@ fn damaged(chance: &mut Stream) -> Vec<u8> {
         "99999999999999999999",
     ];
     let mut session = SESSION.join("\n").into_bytes();
-    let mut below = |count: usize| (unit(chance) * count as f64) as usize;
-    for _ in 0..1 + below(4) {
-        let at = below(session.len());
-        let len = below(12);
+    for _ in 0..1 + below(4, chance) {
+        let at = below(session.len(), chance);
+        let len = below(12, chance);
         let end = (at + len).min(session.len());
-        match below(5) {
-            0 => session[at] = u8::try_from(below(256)).unwrap(),
+
+        match below(5, chance) {
+            0 => session[at] = u8::try_from(below(256, chance)).unwrap(),
             1 => drop(session.drain(at..end)),
             2 => drop(session.splice(at..at, session[at..end].to_vec())),
-            3 => drop(session.splice(at..at, STUMBLING[below(STUMBLING.len())].bytes())),
+            3 => drop(session.splice(at..at, STUMBLING[below(STUMBLING.len(), chance)].bytes())),
             _ => drop(session.splice(at..at, vec![b'['; 100 * len])),
         }
         session.push(b'\n');
@@ -373,11 +389,13 @@ fn run_with(program: &Path, session: &[u8]) -> Output {
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
+
     let mut child = command.spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     let session = session.to_vec();
     // It may end before it has read everything.
     let writer = std::thread::spawn(move || input.write_all(&session).is_ok());
+
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
     output
@@ -451,17 +469,20 @@ fn the_page_makes_a_robot_from_nothing() {
     ) {
         return;
     }
+
     let page = std::fs::read_to_string(root().join("sdk/stdio/README.md")).unwrap();
     let mut blocks = page.split("\n```").skip(1).step_by(2);
     let [program, scenario, launch] = ["python\n", "toml\n", "toml\n"].map(|language| {
         let block = blocks.next().and_then(|block| block.strip_prefix(language));
         block.unwrap_or_else(|| panic!("no block of {language}"))
     });
+
     let lab = Lab::new();
     let program = lab.write("walker.py", &format!("{program}\n"));
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
     lab.write("walk.toml", scenario);
     let launch = lab.write("walk-launch.toml", launch).display().to_string();
+
     lab.ok(&[
         "launch",
         &launch,
@@ -473,6 +494,7 @@ fn the_page_makes_a_robot_from_nothing() {
         "--run",
         "page",
     ]);
+
     // Half a meter a second, but where a guest is in the way.
     let way_m = way_m(&lab, "page", "Walker");
     assert!(
@@ -496,6 +518,16 @@ fn companion_is_compiled() {
     });
 }
 
+/// What a robot changed to in a run: its emotions, or its behaviors.
+fn changes(events: &[serde_json::Value], kind: &str, robot: &str) -> Vec<String> {
+    events
+        .iter()
+        .filter(|event| event["event"] == kind && event["robot"] == robot)
+        .filter(|event| event["from"].is_string())
+        .map(|event| event["to"].as_str().unwrap().to_owned())
+        .collect()
+}
+
 #[test]
 fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
     if lacks_node() || lacks_typescript() {
@@ -515,21 +547,13 @@ fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
 
     let events = lab.events("any-first");
     for (robot, felt) in [("Nora", "LONELY"), ("Tove", "WORRIED"), ("Bruno", "GRUMPY")] {
-        let changes = |kind: &str| {
-            let own = events
-                .iter()
-                .filter(|event| event["event"] == kind && event["robot"] == robot);
-            own.filter(|event| event["from"].is_string())
-                .map(|event| event["to"].as_str().unwrap())
-                .collect::<Vec<_>>()
-        };
+        let emotions = changes(&events, "emotion", robot);
         assert!(
-            changes("emotion").contains(&felt),
-            "{robot} never was {felt}: {:?}",
-            changes("emotion")
+            emotions.iter().any(|emotion| emotion == felt),
+            "{robot} never was {felt}: {emotions:?}"
         );
         assert!(
-            !changes("behavior").is_empty(),
+            !changes(&events, "behavior", robot).is_empty(),
             "{robot} did the same all the time"
         );
         let way_m = way_m(&lab, "any-first", robot);
@@ -549,6 +573,7 @@ fn robots_over_stdin_and_stdout_keep_the_rules_of_the_protocol() {
     if lacks_compiler() || lacks_node() || lacks_typescript() {
         return;
     }
+
     companion_is_compiled();
     let cast = Cast::in_c("configs/three_robots.toml", true, PLAIN);
     let in_c = PathBuf::from(&cast.file);
@@ -573,21 +598,19 @@ fn a_robot_in_perl_draws_and_keeps_the_rules() {
     }
     let wanderer = root().join("sdk/stdio/perl/wanderer.pl");
     ok(Command::new(&wanderer).args(["--check", "docs/vectors/streams.json"]));
+
     let lab = Lab::new();
     let scenario = "[[robot]]\nname = \"Wanda\"\nat = [\"25 ft\", \"25 ft\"]\n[[robot]]\nname = \"Wim\"\nat = [\"9 ft\", \"9 ft\"]\n";
     lab.write("stroll.toml", scenario);
-    let process = |name: &str| {
-        let program = wanderer.display();
-        format!(
-            "[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"{program}\"]\n"
-        )
-    };
-    let launch = format!(
-        "scenario = \"stroll.toml\"\n{}{}",
-        process("Wanda"),
-        process("Wim")
-    );
+    let mut launch = "scenario = \"stroll.toml\"\n".to_owned();
+    for name in ["Wanda", "Wim"] {
+        launch += &format!(
+            "[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"{}\"]\n",
+            wanderer.display()
+        );
+    }
     let launch = lab.write("stroll-launch.toml", &launch);
+
     for run in ["perl-first", "perl-second"] {
         lab.ok(&[
             "launch",
@@ -603,6 +626,7 @@ fn a_robot_in_perl_draws_and_keeps_the_rules() {
         ("the first launch", &lab.bytes("perl-first")),
         ("the second", &lab.bytes("perl-second")),
     );
+
     assert!(way_m(&lab, "perl-first", "Wanda") > 20.0);
     assert_conforms(&launch, "Wanda");
 }
@@ -624,6 +648,7 @@ fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
             ))
         })
         .collect();
+
     places
         .windows(2)
         .map(|pair| (pair[1].0 - pair[0].0).abs() + (pair[1].1 - pair[0].1).abs())
@@ -636,6 +661,7 @@ fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
         return;
     }
     companion_is_compiled();
+
     let lab = Lab::new();
     let stdio = root().join("sdk/stdio");
     let programs = [
@@ -652,6 +678,7 @@ fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
             program.display(),
             said(&end)
         );
+
         let silence = run_with(&program, b"");
         assert!(
             silence.status.success() && silence.stdout.is_empty(),
@@ -659,6 +686,7 @@ fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
             program.display(),
             said(&silence)
         );
+
         let rubbish = run_with(&program, b"rubbish\n");
         assert_eq!(
             rubbish.status.code(),
@@ -684,10 +712,12 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
     if lacks_compiler() || lacks("Python with zenoh", has_zenoh, "`pip install ./sdk/python`") {
         return;
     }
+
     let compile = commands_of(MIXED)
         .into_iter()
         .find(|command| command.starts_with("cc "));
     ok(Command::new("sh").args(["-c", &compile.unwrap()]));
+
     let lab = Lab::new();
     for (run, more) in [
         ("mixed", &[][..]),
@@ -703,6 +733,7 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
             .copied()
             .collect();
         lab.ok(&local);
+
         let launch = [
             "launch",
             MIXED,
@@ -718,6 +749,7 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
             .env("PYTHONPATH", root().join("sdk/python/src"))
             .env("PYTHONDONTWRITEBYTECODE", "1");
         ok(&mut launch);
+
         assert_same(
             ("all in Rust", &lab.bytes(&alone)),
             ("in three languages", &lab.bytes(run)),

@@ -13,7 +13,7 @@ const ALLOWED: [(&str, &[&str]); 15] = [
     ("config", &["protocol"]),
     ("bus", &["protocol"]),
     ("robot", &["bus", "lockstep", "protocol"]),
-    ("robots", &["robot", "affect", "lockstep"]),
+    ("robots", &["robot", "affect", "lockstep", "protocol"]),
     (
         "simulator",
         &["world", "bus", "config", "lockstep", "protocol"],

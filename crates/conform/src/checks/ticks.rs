@@ -86,7 +86,8 @@ pub(super) fn usual(
 }
 
 fn cannot_run(failure: Failure) -> CannotRun {
-    CannotRun::Robot(format!("{}: {}", failure.expected, failure.came))
+    let Failure { expected, came } = failure;
+    CannotRun::Robot(format!("{expected}: {came}"))
 }
 
 fn expect(holds: bool, expected: String, came: String) -> Result<(), Failure> {
