@@ -44,7 +44,7 @@ pub(crate) struct Script {
 }
 
 /// What a check does between the ticks. None of it may make a difference to the robot.
-pub(crate) trait Twist {
+pub(crate) trait Disturbance {
     /// Before a tick is granted.
     fn before(&mut self, _stage: &mut Stage<'_>, _tick: Tick) -> Result<(), Failure> {
         Ok(())
@@ -61,10 +61,10 @@ pub(crate) trait Twist {
     }
 }
 
-/// No twist at all.
+/// No disturbance at all.
 pub(crate) struct Straight;
 
-impl Twist for Straight {}
+impl Disturbance for Straight {}
 
 impl Script {
     /// The usual ticks: a few commands among them.
@@ -138,11 +138,11 @@ pub(crate) fn usual(kit: &Kit) -> Result<&Transcript, Failure> {
 pub(crate) fn play(
     stage: &mut Stage<'_>,
     script: &Script,
-    twist: &mut dyn Twist,
+    disturbance: &mut dyn Disturbance,
 ) -> Result<Transcript, Failure> {
     let mut transcript = Transcript::new();
     for _ in 0..=script.ticks {
-        transcript.push(step(stage, script, twist)?);
+        transcript.push(step(stage, script, disturbance)?);
     }
 
     Ok(transcript)
@@ -152,14 +152,14 @@ pub(crate) fn play(
 pub(crate) fn step(
     stage: &mut Stage<'_>,
     script: &Script,
-    twist: &mut dyn Twist,
+    disturbance: &mut dyn Disturbance,
 ) -> Result<Entry, Failure> {
     let epoch = stage.epoch();
     let tick = stage.next_tick();
     let news = news_of(stage, script, tick);
-    twist.before(stage, tick)?;
+    disturbance.before(stage, tick)?;
     stage.open(&news)?;
-    twist.during(stage, tick)?;
+    disturbance.during(stage, tick)?;
 
     let done = stage.complete()?;
     stage.body.proposal = done.report.proposal;
@@ -173,7 +173,7 @@ pub(crate) fn step(
         index: done.index,
         took: done.took,
     };
-    twist.after(stage, &entry)?;
+    disturbance.after(stage, &entry)?;
 
     Ok(entry)
 }

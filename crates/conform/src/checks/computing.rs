@@ -13,7 +13,7 @@ use protocol::Tick;
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Script, Twist, play, seated};
+use crate::script::{Disturbance, Script, play, seated};
 use crate::stage::{Options, Stage};
 use crate::transcript::Entry;
 
@@ -35,13 +35,13 @@ struct Pair {
 
 /// Queries the robot in each tick as long as it takes.
 #[derive(Default)]
-struct Curious {
+struct QueriesDuringTicks {
     pairs: Vec<Pair>,
     /// By tick, how long the robot had for an answer that came after its report.
     late: BTreeMap<Tick, Duration>,
 }
 
-impl Twist for Curious {
+impl Disturbance for QueriesDuringTicks {
     fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
         self.pairs.clear();
         loop {
@@ -107,8 +107,8 @@ pub(super) fn check(kit: &Kit) -> Result<(), Failure> {
 /// Plays the usual ticks. The ticks in which an answer came after the report although there was time for it before.
 fn late_ticks(kit: &Kit) -> Result<BTreeMap<Tick, Duration>, Failure> {
     let mut stage = seated(kit, Options::default())?;
-    let mut curious = Curious::default();
-    play(&mut stage, &Script::usual(kit), &mut curious)?;
+    let mut queries = QueriesDuringTicks::default();
+    play(&mut stage, &Script::usual(kit), &mut queries)?;
 
-    Ok(curious.late)
+    Ok(queries.late)
 }

@@ -72,7 +72,7 @@ pub(super) fn gone(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 /// A robot that lost its simulator, and is to wait so long for it.
-fn bereft(kit: &Kit, gone_patience_s: u32) -> Result<Stage<'_>, Failure> {
+fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Stage<'_>, Failure> {
     let options = Options {
         gone_patience_s,
         ..Options::default()
@@ -85,7 +85,7 @@ fn bereft(kit: &Kit, gone_patience_s: u32) -> Result<Stage<'_>, Failure> {
 
 /// It does not end before its patience is over. There is so much of it that no machine uses it up meanwhile.
 fn gone_for_a_while(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = bereft(kit, LONG_GONE_S)?;
+    let mut stage = without_simulator(kit, LONG_GONE_S)?;
     stage.pass(HASTY);
     let expected =
         format!("it waits {LONG_GONE_S} s (CARS_GONE_PATIENCE_S) for a simulator that is gone");
@@ -97,7 +97,7 @@ fn gone_for_a_while(kit: &Kit) -> Result<(), Failure> {
 
 /// The simulator is back before the robot's patience is over, and the time is over when its patience would have been.
 fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), Failure> {
-    let mut stage = bereft(kit, gone_patience_s)?;
+    let mut stage = without_simulator(kit, gone_patience_s)?;
     let patience = Duration::from_secs(gone_patience_s.into());
     stage.pass(patience / 4);
     stage.show_simulator(true)?;
@@ -111,7 +111,7 @@ fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), Failure> {
 
 /// The simulator does not come back.
 fn gone_forever(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = bereft(kit, GONE_S)?;
+    let mut stage = without_simulator(kit, GONE_S)?;
     let expected = format!("its process ends when the simulator was gone for {GONE_S} s");
     let patience = PATIENCE + Duration::from_secs(GONE_S.into());
     let status = stage.until_ended(&expected, patience)?;

@@ -10,7 +10,7 @@ use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Script, Straight, Twist, play, seated, usual};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
 use crate::stage::{Options, Stage};
 use crate::transcript::Entry;
 use crate::wire::Joining;
@@ -124,7 +124,7 @@ fn moves(stage: &mut Stage<'_>, seed: u64, stream: String) -> Result<Moves, Fail
 pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// At tick 0 the robot is welcomed to the epoch that is over before it is welcomed to the next one.
     struct WrongWelcome;
-    impl Twist for WrongWelcome {
+    impl Disturbance for WrongWelcome {
         fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             if tick > 0 {
                 return Ok(());

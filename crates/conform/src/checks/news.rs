@@ -9,7 +9,7 @@ use crate::comparison::demand_same;
 use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Script, Straight, Twist, play, seated, usual};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
 use crate::stage::{Options, Stage};
 
 /// A report that must not come has come after this time.
@@ -21,7 +21,7 @@ const LATE_UP_TO: Tick = 14;
 pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// The news of the first ticks come after their clock, and after news of other ticks and epochs.
     struct LateNews;
-    impl Twist for LateNews {
+    impl Disturbance for LateNews {
         fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             stage.withholds_news = tick <= LATE_UP_TO;
             Ok(())

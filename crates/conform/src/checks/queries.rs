@@ -13,7 +13,7 @@ use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::Failure;
-use crate::script::{Script, Straight, Twist, play, seated, usual};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
 use crate::stage::{Options, Stage};
 use crate::transcript::Entry;
 
@@ -32,8 +32,8 @@ const DEFERRED: Duration = Duration::from_secs(1);
 /// How often a query of a robot that waits is repeated whose time was up.
 const ATTEMPTS: usize = 4;
 
-/// Asks after every tick, and follows as others do.
-struct Asker {
+/// Queries the state after each tick, and compares it with what was put for subscribers.
+struct StateQueries {
     findings: Findings,
     /// The state of the tick before.
     before: Option<PublicState>,
@@ -50,15 +50,15 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
             ..Options::default()
         },
     )?;
-    let mut asker = Asker {
+    let mut queries = StateQueries {
         findings: Findings::default(),
         before: None,
         location: stage.template.location,
     };
 
-    let played = play(&mut stage, &Script::usual(kit), &mut asker);
+    let played = play(&mut stage, &Script::usual(kit), &mut queries);
     wire::check(&stage, findings);
-    findings.0.extend(asker.findings.0);
+    findings.0.extend(queries.findings.0);
     if stage.seen.states.is_empty() {
         let came = "in none of the ticks, although there is a subscriber";
         findings.fail(
@@ -125,7 +125,7 @@ pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState
     }
 }
 
-impl Twist for Asker {
+impl Disturbance for StateQueries {
     fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
         let epoch = entry.epoch;
         let tick = entry.tick;
@@ -161,7 +161,7 @@ impl Twist for Asker {
     }
 }
 
-impl Asker {
+impl StateQueries {
     /// It stands where it was put, and else where it proposed.
     fn check_location(&mut self, entry: &Entry, now: &PublicState) {
         let tick = entry.tick;
@@ -379,7 +379,7 @@ pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
 
     let (mut stage, is_asking) = waiting::for_another(kit)?;
     if !is_asking {
-        let reason = "nothing speaks against it, but the robot queried no other one, so that this was not seen while it \
+        let reason = "no fault was found, but the robot queried no other one, so that this was not checked while it \
                       waits for another robot's answer";
         findings.skip("query.at-once", reason);
         return Ok(());
@@ -523,7 +523,7 @@ fn demand_one_reply(stage: &Stage<'_>, what: &str, patience: Duration) -> Result
 /// Queried for what does not exist, it gives no answer and goes on.
 pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Odd;
-    impl Twist for Odd {
+    impl Disturbance for Odd {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
             if !entry.tick.is_multiple_of(8) {
                 return Ok(());

@@ -11,7 +11,7 @@ use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Script, Twist, play, seated, usual};
+use crate::script::{Disturbance, Script, play, seated, usual};
 use crate::seen::{Answer, Sent};
 use crate::stage::{Options, Stage};
 use crate::transcript::Entry;
@@ -26,7 +26,7 @@ const COMMANDS_PATIENCE: Duration = Duration::from_secs(2);
 /// A clock that comes again is answered as before, and a tick is done once.
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Again;
-    impl Twist for Again {
+    impl Disturbance for Again {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
             if entry.tick.is_multiple_of(EVERY) || !entry.commands.is_empty() {
                 repeat(stage, entry)?;
@@ -137,7 +137,7 @@ fn count_of(stage: &Stage<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
 pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// Reports that had come for the late clocks' epochs and ticks before they were put.
     struct Late(Vec<((Epoch, Tick), usize)>);
-    impl Twist for Late {
+    impl Disturbance for Late {
         fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             if tick < 6 || !tick.is_multiple_of(EVERY) {
                 return Ok(());

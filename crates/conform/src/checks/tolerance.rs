@@ -7,7 +7,7 @@ use crate::comparison::demand_same;
 use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Script, Straight, Twist, play, seated, usual};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
 use crate::stage::{Options, Stage};
 
 /// Later versions of the contract add fields: everything that the robot receives carries some.
@@ -39,7 +39,7 @@ pub(super) fn integers(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 /// Messages that cannot be understood change nothing, and are reported.
 pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Rubbish;
-    impl Twist for Rubbish {
+    impl Disturbance for Rubbish {
         fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             if tick % 4 != 1 {
                 return Ok(());
