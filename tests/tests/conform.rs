@@ -3,13 +3,15 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use conform::{PAGE, RULES, Rule, Setting, Verdict};
-use system_tests::{programs, root};
+use system_tests::{Lab, programs, root};
 
 /// Robots that pass: what to call it, more arguments of `cars conform`, the command from the project's root.
 const ROBOTS: [(&str, &[&str], &[&str]); 7] = [
@@ -50,7 +52,9 @@ fn program(name: &str) -> String {
 fn cars(more: &[&str], command: &[&str]) -> std::process::Output {
     let (name, arguments) = command.split_first().unwrap();
     let mut cars = Command::new(programs().join("cars"));
+    // Whether Python flushes is for each program to decide.
     cars.current_dir(root())
+        .env_remove("PYTHONUNBUFFERED")
         .arg("conform")
         .args(more)
         .arg("--")
@@ -88,12 +92,8 @@ fn conforms(what: &str, more: &[&str], command: &[&str]) {
         "{what}: {text}\n{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let is_ok = |line: &&str| line.starts_with("ok ");
-    assert_eq!(
-        text.lines().filter(is_ok).count(),
-        RULES.len(),
-        "{what}: {text}"
-    );
+    let passed = text.lines().filter(|line| line.starts_with("ok ")).count();
+    assert_eq!(passed, RULES.len(), "{what}: {text}");
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn a_robot_by_hand_gives_occasion_to_every_rule() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 46] = [
+const OTHERWISE: [&str; 49] = [
     "join.request:instance",
     "join.ready-last:first",
     "join.ready-last:queryables",
@@ -126,7 +126,7 @@ const OTHERWISE: [&str; 46] = [
     "join.refused:impatient",
     "tick.answer:generation",
     "tick.answer:unasked",
-    "tick.state-first:unheard",
+    "tick.state-first:unsubscribed",
     "command.sent:late",
     "command.sent:numbers",
     "command.sent:count",
@@ -150,6 +150,7 @@ const OTHERWISE: [&str; 46] = [
     "epoch.init:random",
     "epoch.init:variables",
     "epoch.init:count",
+    "epoch.init:numbers",
     "epoch.init:received",
     "epoch.init:token",
     "epoch.init:instance",
@@ -160,6 +161,8 @@ const OTHERWISE: [&str; 46] = [
     "return.generation:state",
     "return.rejoin:variables",
     "return.replaced:status",
+    "end.clock:finished",
+    "end.clock:stopped",
     "end.clock:aborted",
     "end.clock:news",
     "end.clock:answer",
@@ -167,20 +170,27 @@ const OTHERWISE: [&str; 46] = [
 ];
 
 /// Further ways that are about how a message is written or put.
-const OTHERWISE_ON_THE_WIRE: [&str; 5] = [
+const OTHERWISE_ON_THE_WIRE: [&str; 7] = [
     "end.gone:status",
     "robust.malformed:silent",
     "number.integers:command",
+    "number.integers:refused",
     "wire.qos:command",
+    "wire.qos:express",
     "wire.qos:state",
 ];
 
 /// Kits that run at the same time: their robots mostly wait.
 const KITS: usize = 10;
 
+/// The rule that a robot breaks, from the way in which it does.
+fn rule_of(how: &str) -> &str {
+    how.split(':').next().unwrap()
+}
+
 /// What is wrong with the verdict on a robot that breaks a rule in this way: it must fail by that rule alone.
 fn misjudged(how: &str, rules: &[Rule]) -> Option<String> {
-    let name = how.split(':').next().unwrap();
+    let name = rule_of(how);
     let report = match conform::check(&wrong(how), &setting(), rules) {
         Ok(report) => report,
         Err(error) => return Some(format!("{how}: {error}")),
@@ -198,20 +208,20 @@ fn misjudged(how: &str, rules: &[Rule]) -> Option<String> {
 /// Judges robots side by side.
 fn judge(robots: &[(&str, Vec<Rule>)]) {
     let next = AtomicUsize::new(0);
-    let misjudged_ones = Mutex::new(Vec::new());
+    let misjudgments = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
         for _ in 0..KITS {
             scope.spawn(|| {
                 while let Some((how, rules)) = robots.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let found = misjudged(how, rules);
-                    misjudged_ones.lock().unwrap().extend(found);
+                    misjudgments.lock().unwrap().extend(found);
                 }
             });
         }
     });
 
-    let misjudged_ones = misjudged_ones.into_inner().unwrap();
-    assert!(misjudged_ones.is_empty(), "{}", misjudged_ones.join("\n"));
+    let misjudgments = misjudgments.into_inner().unwrap();
+    assert!(misjudgments.is_empty(), "{}", misjudgments.join("\n"));
 }
 
 #[test]
@@ -222,22 +232,20 @@ fn a_wrong_robot_fails_by_the_rule_that_it_breaks_and_by_no_other() {
 
 #[test]
 fn rules_can_be_broken_in_more_than_one_way() {
-    let rule = |how: &str| Rule::named(how.split(':').next().unwrap()).unwrap();
     let mut robots = Vec::new();
     for how in OTHERWISE.iter().chain(&OTHERWISE_ON_THE_WIRE) {
-        robots.push((*how, vec![rule(how)]));
-    }
-    // A state is put where there is a subscriber, which another check has.
-    for (how, rules) in &mut robots {
+        let mut rules = vec![Rule::named(rule_of(how)).unwrap()];
+        // A state is put where there is a subscriber, which another check has.
         if *how == "wire.qos:state" {
-            rules.push(rule("query.tick"));
+            rules.push(Rule::named("query.tick").unwrap());
         }
+        robots.push((*how, rules));
     }
     judge(&robots);
 }
 
 #[test]
-fn what_cannot_be_checked_is_said() {
+fn what_cannot_be_checked_is_reported() {
     for (more, command, reason) in [
         (&[][..], &["/no/such/program"][..], "No such file"),
         (&[], &["true"], "a request to join: it never came"),
@@ -276,12 +284,14 @@ fn one_rule_can_be_checked_and_reported_as_json() {
         &["wrong-robot", "--wrong", "end.clock"],
     );
     assert_eq!(output.status.code(), Some(1));
+
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(
         (&report["robot"], &report["failed"]),
         (&"Walker".into(), &1.into()),
         "{report}"
     );
+
     let [rule] = &report["rules"].as_array().unwrap()[..] else {
         panic!("one rule was asked for: {report}")
     };
@@ -289,6 +299,7 @@ fn one_rule_can_be_checked_and_reported_as_json() {
         (&rule["rule"], &rule["verdict"]),
         (&"end.clock".into(), &"failed".into())
     );
+
     assert!(
         rule["expected"].as_str().unwrap().contains("exit status 0"),
         "{rule}"
@@ -300,26 +311,69 @@ fn one_rule_can_be_checked_and_reported_as_json() {
     assert_eq!(report["time.answer"]["ticks"], 25);
 }
 
+/// A program over standard input and output that answers each line and leaves its output to Python's buffer.
+const UNFLUSHED: &str = r#"#!/usr/bin/env python3
+import sys
+
+for line in sys.stdin:
+    if '"type":"end"' in line:
+        break
+    print('{"type":"done"}')
+"#;
+
+#[test]
+fn a_program_that_does_not_flush_is_told_so() {
+    let lab = Lab::new();
+    let flushed = UNFLUSHED.replace("\"}')", "\"}', flush=True)");
+    for (name, text) in [("silent.py", UNFLUSHED), ("right.py", &flushed)] {
+        let program = lab.write(name, text);
+        std::fs::set_permissions(&program, Permissions::from_mode(0o755)).unwrap();
+
+        let output = cars(
+            &["--rule", "tick.answer"],
+            &[
+                "cars",
+                "exec",
+                "--name",
+                "Mute",
+                "--",
+                program.to_str().unwrap(),
+            ],
+        );
+
+        let printed = String::from_utf8_lossy(&output.stdout);
+        let is_right = name == "right.py";
+        assert_eq!(output.status.success(), is_right, "{name}: {printed}");
+        for part in [
+            "a report for tick 0",
+            "its program has not flushed its standard output",
+            "in Python with print(…, flush=True)",
+        ] {
+            assert_eq!(printed.contains(part), !is_right, "{name}: {printed}");
+        }
+    }
+}
+
 /// Anchors of a page: its headings as links name them.
 fn anchors(page: &str) -> Vec<String> {
-    let headings = page.lines().filter(|line| line.starts_with('#'));
-    let anchor = |line: &str| {
-        let text = line
-            .trim_start_matches('#')
-            .trim()
-            .to_lowercase()
-            .replace(' ', "-");
-        text.chars()
+    let mut anchors = Vec::new();
+    for line in page.lines().filter(|line| line.starts_with('#')) {
+        let heading = line.trim_start_matches('#').trim().to_lowercase();
+        let anchor = heading
+            .replace(' ', "-")
+            .chars()
             .filter(|c| c.is_alphanumeric() || *c == '-' || *c == '_')
-            .collect()
-    };
-    headings.map(anchor).collect()
+            .collect();
+        anchors.push(anchor);
+    }
+    anchors
 }
 
 #[test]
-fn the_page_explains_every_rule_where_the_kit_says() {
+fn the_page_explains_every_rule_where_the_kit_refers_to_it() {
     let page = std::fs::read_to_string(root().join(Path::new(PAGE))).unwrap();
     let anchors = anchors(&page);
+
     for rule in RULES {
         assert!(
             anchors.iter().any(|anchor| anchor == rule.section),

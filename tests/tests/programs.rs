@@ -20,7 +20,7 @@ const C: &str = "sdk/stdio/c/leguin.c";
 const ANY_LANGUAGE: &str = "launch/any_language.toml";
 const MIXED: &str = "launch/mixed.toml";
 
-/// Whether a test cannot run for want of a tool. It says so on a user's machine, and fails where everything must be there.
+/// Whether a test cannot run because a tool is missing. It prints this on a user's machine, and fails in CI.
 fn lacks(tool: &str, is_there: bool, remedy: &str) -> bool {
     if is_there {
         return false;
@@ -83,7 +83,7 @@ fn said(output: &Output) -> String {
     format!("{}\n{out}\n{err}", output.status)
 }
 
-/// The commands that the head of a launch file tells to type before the first launch.
+/// The commands in the head of a launch file, to be typed before the first launch.
 fn commands_of(launch_file: &str) -> Vec<String> {
     let text = std::fs::read_to_string(root().join(launch_file)).unwrap();
     let commands = text
@@ -105,6 +105,11 @@ fn compiled(lab: &Lab, options: &str) -> PathBuf {
     program
 }
 
+/// An entry of a launch file, restarted when it fails.
+fn process_of(name: &str, command: &str) -> String {
+    format!("[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n")
+}
+
 /// A launch of a scenario in which `program`, or the SDK's own where there is none, is Leguin, and Vonda.
 struct Cast {
     lab: Lab,
@@ -120,15 +125,13 @@ impl Cast {
             "scenario = {:?}\n[console]\nenabled = false\n",
             scenario.display().to_string()
         );
-        let process = |name: &str, command: &str| {
-            format!(
-                "[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n"
-            )
-        };
-        let mut text = head + &process("Butler", r#"["cars-butler"]"#) + &process("Leguin", leguin);
+
+        let mut text =
+            head + &process_of("Butler", r#"["cars-butler"]"#) + &process_of("Leguin", leguin);
         if has_vonda {
-            text += &process("Vonda", leguin);
+            text += &process_of("Vonda", leguin);
         }
+
         let file = lab.write("launch.toml", &text).display().to_string();
         Self {
             lab,
@@ -158,7 +161,9 @@ impl Cast {
         let mut launch = vec!["launch", &self.file, "--run", "in-c", "--speed", "max"];
         launch.extend(more);
         self.lab.ok(&launch);
-        let (in_rust, in_c) = (self.lab.bytes("in-rust"), self.lab.bytes("in-c"));
+
+        let in_rust = self.lab.bytes("in-rust");
+        let in_c = self.lab.bytes("in-c");
         assert_same(
             (&format!("{scenario} {more:?} in Rust"), &in_rust),
             ("with C", &in_c),
@@ -166,7 +171,7 @@ impl Cast {
     }
 }
 
-/// As the page says.
+/// The options of the page.
 const PLAIN: &str = "-std=c11 -O2 -ffp-contract=off";
 
 #[test]
@@ -174,6 +179,7 @@ fn leguin_in_c_is_leguin_in_rust_byte_for_byte() {
     if lacks_compiler() {
         return;
     }
+
     for (scenario, has_vonda) in [
         ("configs/hors_doeuvres.toml", false),
         ("configs/partition.toml", false),
@@ -183,6 +189,7 @@ fn leguin_in_c_is_leguin_in_rust_byte_for_byte() {
         let cast = Cast::in_c(scenario, has_vonda, PLAIN);
         for seed in ["1", "2", "2002"] {
             cast.is_the_run_in_rust(&["--seed", seed]);
+
             // Nothing would be shown by runs in which she does nothing.
             let text = String::from_utf8(cast.lab.bytes("in-c")).unwrap();
             for part in [
@@ -201,6 +208,7 @@ fn her_parameters_and_vonda_mean_the_same_in_c() {
     if lacks_compiler() {
         return;
     }
+
     let cast = Cast::in_c("configs/three_robots.toml", true, PLAIN);
     let shorter = ["--duration", "200 s", "--seed", "5"];
     for changes in [
@@ -213,7 +221,7 @@ fn her_parameters_and_vonda_mean_the_same_in_c() {
             "robot.Leguin.params.affect=off",
             "robot.Vonda.params.schematic=off",
         ],
-        // Of somebody who is not there nothing is known: she searches.
+        // The waiter is not of the roster: she searches.
         &[
             "robot.Leguin.params.waiter=Nobody",
             "robot.Leguin.params.turn_mean_s=2.0",
@@ -240,9 +248,11 @@ fn no_compiler_fuses_her_arithmetic() {
     if lacks_compiler() {
         return;
     }
+
     // Where the machine can fuse, this asks for it.
     Cast::in_c("configs/hors_doeuvres.toml", false, "-O3 -march=native")
         .is_the_run_in_rust(&["--seed", "3"]);
+
     let mut sloppy = Command::new("cc");
     let output = sloppy
         .current_dir(root())
@@ -271,6 +281,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
         let cast = Cast::new(lab, "configs/hors_doeuvres.toml", false, command);
         let fault =
             "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"60 s\", for = \"0.1 s\" }]";
+
         let args = [
             "--set",
             fault,
@@ -284,6 +295,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
         ];
         let name = format!("over-{run}");
         let args: Vec<&str> = ["launch", &cast.file].into_iter().chain(args).collect();
+
         let mut launch = cast.lab.start(&name, &args);
         let ctl = |args: &[&str]| {
             let args: Vec<&str> = ["ctl"]
@@ -297,6 +309,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
                 .output()
                 .is_ok_and(|output| output.status.success())
         };
+
         // Into the first epoch, back to the beginning, and through the second one with its crash.
         eventually("the first ticks", || ctl(&["step", "50"]).then_some(()));
         eventually("the second epoch", || ctl(&["init"]).then_some(()));
@@ -305,6 +318,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
         cast.lab.bytes(&name)
     });
     assert_same(("in Rust", &in_rust), ("in C", &in_c));
+
     let text = String::from_utf8(in_c).unwrap();
     for part in [
         "is back, and takes over where the last one was lost",
@@ -314,8 +328,8 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
     }
 }
 
-/// What may be told to Leguin; every query of hers has an answer here.
-const TOLD: &[&str] = &[
+/// A session with Leguin; every query of hers has an answer here.
+const SESSION: &[&str] = &[
     r#"{"type":"init","protocol":2,"run":"r","name":"Leguin","generation":1,"epoch":1,"tick":0,"seed":42,"stream":"robot/Leguin","tick_s":0.5,"field_m":[15.24,15.24],"body_m":0.6096,"sensing_range_m":1.8288,"location":{"x":1.2192,"y":1.2192},"roster":["Butler","Leguin"],"parameters":{"waiter":"Butler","affect":"on","dynamics":{"label_cuts":[0.2,0.4,0.6,0.8]}}}"#,
     r#"{"type":"tick","tick":1,"location":{"x":1.2192,"y":1.2192},"commands":[{"from":"Butler","performative":"achieve","command":"refill"},{"from":"Bot","performative":"achieve","command":"\u00e9\ud83d\ude00 \"\\\u0007\u0000\n 0123456789012345678901234567890123456789012345678901234567890"}],"sensed":[{"name":"Vonda","location":{"x":1.0,"y":2e0}}]}"#,
     r#"{"type":"answer","value":{"epoch":1,"tick":0,"location":{"x":7.62,"y":7.62},"state_variables":{"need":true,"refiller":"Leguin"}}}"#,
@@ -326,6 +340,11 @@ const TOLD: &[&str] = &[
     r#"{"type":"answer","value":{"bodies":[{"kind":"guest","location":{"x":1.5,"y":1.5}}]}}"#,
     r#"{"type":"end","reason":"finished"}"#,
 ];
+
+/// A whole number below `count`, by chance.
+fn below(count: usize, chance: &mut Stream) -> usize {
+    (unit(chance) * count as f64) as usize
+}
 
 /// The session with a few bytes changed, doubled, cut out, or replaced by what parsers stumble over.
 fn damaged(chance: &mut Stream) -> Vec<u8> {
@@ -342,16 +361,17 @@ fn damaged(chance: &mut Stream) -> Vec<u8> {
         "[[[[[[[[[[[[",
         "99999999999999999999",
     ];
-    let mut session = TOLD.join("\n").into_bytes();
-    let mut below = |count: usize| (unit(chance) * count as f64) as usize;
-    for _ in 0..1 + below(4) {
-        let (at, len) = (below(session.len()), below(12));
+    let mut session = SESSION.join("\n").into_bytes();
+    for _ in 0..1 + below(4, chance) {
+        let at = below(session.len(), chance);
+        let len = below(12, chance);
         let end = (at + len).min(session.len());
-        match below(5) {
-            0 => session[at] = u8::try_from(below(256)).unwrap(),
+
+        match below(5, chance) {
+            0 => session[at] = u8::try_from(below(256, chance)).unwrap(),
             1 => drop(session.drain(at..end)),
             2 => drop(session.splice(at..at, session[at..end].to_vec())),
-            3 => drop(session.splice(at..at, STUMBLING[below(STUMBLING.len())].bytes())),
+            3 => drop(session.splice(at..at, STUMBLING[below(STUMBLING.len(), chance)].bytes())),
             _ => drop(session.splice(at..at, vec![b'['; 100 * len])),
         }
         session.push(b'\n');
@@ -359,8 +379,8 @@ fn damaged(chance: &mut Stream) -> Vec<u8> {
     session
 }
 
-/// What becomes of a program that is told all of this at once.
-fn told(program: &Path, session: &[u8]) -> Output {
+/// Runs a program with all of this on its standard input.
+fn run_with(program: &Path, session: &[u8]) -> Output {
     let mut command = Command::new(program);
     command
         .env("ASAN_OPTIONS", "exitcode=99")
@@ -369,18 +389,20 @@ fn told(program: &Path, session: &[u8]) -> Output {
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
+
     let mut child = command.spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     let session = session.to_vec();
     // It may end before it has read everything.
     let writer = std::thread::spawn(move || input.write_all(&session).is_ok());
+
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
     output
 }
 
 #[test]
-fn nothing_that_she_is_told_breaks_leguin_in_c() {
+fn no_input_breaks_leguin_in_c() {
     const STRICT: &str = "-std=c11 -O1 -g -Wall -Wextra -Wshadow -Wconversion -pedantic -Werror \
                           -fsanitize=address,undefined -fno-sanitize-recover=all";
     if lacks_compiler() {
@@ -405,7 +427,7 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
     cast.is_the_run_in_rust(&["--seed", "4", "--duration", "120 s"]);
 
     let program = cast.lab.out().join("leguin");
-    let whole = told(&program, TOLD.join("\n").as_bytes());
+    let whole = run_with(&program, SESSION.join("\n").as_bytes());
     assert!(whole.status.success(), "{}", said(&whole));
     assert_eq!(
         String::from_utf8_lossy(&whole.stdout)
@@ -419,11 +441,9 @@ fn nothing_that_she_is_told_breaks_leguin_in_c() {
     let mut refused = 0;
     for _ in 0..300 {
         let session = damaged(&mut chance);
-        let output = told(&program, &session);
-        let (status, text) = (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr),
-        );
+        let output = run_with(&program, &session);
+        let status = output.status.code();
+        let text = String::from_utf8_lossy(&output.stderr);
         let is_refusal =
             status == Some(1) && text.starts_with("leguin: ") && text.lines().count() == 1;
         assert!(
@@ -449,17 +469,20 @@ fn the_page_makes_a_robot_from_nothing() {
     ) {
         return;
     }
+
     let page = std::fs::read_to_string(root().join("sdk/stdio/README.md")).unwrap();
     let mut blocks = page.split("\n```").skip(1).step_by(2);
     let [program, scenario, launch] = ["python\n", "toml\n", "toml\n"].map(|language| {
         let block = blocks.next().and_then(|block| block.strip_prefix(language));
         block.unwrap_or_else(|| panic!("no block of {language}"))
     });
+
     let lab = Lab::new();
     let program = lab.write("walker.py", &format!("{program}\n"));
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
     lab.write("walk.toml", scenario);
     let launch = lab.write("walk-launch.toml", launch).display().to_string();
+
     lab.ok(&[
         "launch",
         &launch,
@@ -471,6 +494,7 @@ fn the_page_makes_a_robot_from_nothing() {
         "--run",
         "page",
     ]);
+
     // Half a meter a second, but where a guest is in the way.
     let way_m = way_m(&lab, "page", "Walker");
     assert!(
@@ -484,7 +508,7 @@ fn the_page_makes_a_robot_from_nothing() {
     );
 }
 
-/// Compiles the robot in TypeScript as the launch file says; `npx` would fetch the compiler that the console's check has.
+/// Compiles the robot in TypeScript as the launch file states; `npx` would fetch the compiler that the console's check has.
 fn companion_is_compiled() {
     static DONE: OnceLock<()> = OnceLock::new();
     DONE.get_or_init(|| {
@@ -492,6 +516,16 @@ fn companion_is_compiled() {
         let args = command.strip_prefix("npx -p typescript tsc ").unwrap();
         ok(Command::new(tsc()).args(args.split_whitespace()));
     });
+}
+
+/// What a robot changed to in a run: its emotions, or its behaviors.
+fn changes(events: &[serde_json::Value], kind: &str, robot: &str) -> Vec<String> {
+    events
+        .iter()
+        .filter(|event| event["event"] == kind && event["robot"] == robot)
+        .filter(|event| event["from"].is_string())
+        .map(|event| event["to"].as_str().unwrap().to_owned())
+        .collect()
 }
 
 #[test]
@@ -513,27 +547,19 @@ fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
 
     let events = lab.events("any-first");
     for (robot, felt) in [("Nora", "LONELY"), ("Tove", "WORRIED"), ("Bruno", "GRUMPY")] {
-        let changes = |kind: &str| {
-            let own = events
-                .iter()
-                .filter(|event| event["event"] == kind && event["robot"] == robot);
-            own.filter(|event| event["from"].is_string())
-                .map(|event| event["to"].as_str().unwrap())
-                .collect::<Vec<_>>()
-        };
+        let emotions = changes(&events, "emotion", robot);
         assert!(
-            changes("emotion").contains(&felt),
-            "{robot} never was {felt}: {:?}",
-            changes("emotion")
+            emotions.iter().any(|emotion| emotion == felt),
+            "{robot} never was {felt}: {emotions:?}"
         );
         assert!(
-            !changes("behavior").is_empty(),
+            !changes(&events, "behavior", robot).is_empty(),
             "{robot} did the same all the time"
         );
         let way_m = way_m(&lab, "any-first", robot);
         assert!(way_m > 20.0, "{robot} moved by {way_m} m in 300 s");
     }
-    // They speak with one another.
+    // They send each other commands.
     for part in [
         r#""command_sent","from":"Nora","to":"Tove""#,
         "nods to Nora",
@@ -547,9 +573,12 @@ fn robots_over_stdin_and_stdout_keep_the_rules_of_the_protocol() {
     if lacks_compiler() || lacks_node() || lacks_typescript() {
         return;
     }
+
     companion_is_compiled();
     let cast = Cast::in_c("configs/three_robots.toml", true, PLAIN);
-    let (in_c, any_language) = (PathBuf::from(&cast.file), root().join(ANY_LANGUAGE));
+    let in_c = PathBuf::from(&cast.file);
+    let any_language = root().join(ANY_LANGUAGE);
+
     std::thread::scope(|scope| {
         for robot in ["Leguin", "Vonda"] {
             scope.spawn(|| assert_conforms(&in_c, robot));
@@ -569,21 +598,19 @@ fn a_robot_in_perl_draws_and_keeps_the_rules() {
     }
     let wanderer = root().join("sdk/stdio/perl/wanderer.pl");
     ok(Command::new(&wanderer).args(["--check", "docs/vectors/streams.json"]));
+
     let lab = Lab::new();
     let scenario = "[[robot]]\nname = \"Wanda\"\nat = [\"25 ft\", \"25 ft\"]\n[[robot]]\nname = \"Wim\"\nat = [\"9 ft\", \"9 ft\"]\n";
     lab.write("stroll.toml", scenario);
-    let process = |name: &str| {
-        let program = wanderer.display();
-        format!(
-            "[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"{program}\"]\n"
-        )
-    };
-    let launch = format!(
-        "scenario = \"stroll.toml\"\n{}{}",
-        process("Wanda"),
-        process("Wim")
-    );
+    let mut launch = "scenario = \"stroll.toml\"\n".to_owned();
+    for name in ["Wanda", "Wim"] {
+        launch += &format!(
+            "[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", \"{}\"]\n",
+            wanderer.display()
+        );
+    }
     let launch = lab.write("stroll-launch.toml", &launch);
+
     for run in ["perl-first", "perl-second"] {
         lab.ok(&[
             "launch",
@@ -599,6 +626,7 @@ fn a_robot_in_perl_draws_and_keeps_the_rules() {
         ("the first launch", &lab.bytes("perl-first")),
         ("the second", &lab.bytes("perl-second")),
     );
+
     assert!(way_m(&lab, "perl-first", "Wanda") > 20.0);
     assert_conforms(&launch, "Wanda");
 }
@@ -620,6 +648,7 @@ fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
             ))
         })
         .collect();
+
     places
         .windows(2)
         .map(|pair| (pair[1].0 - pair[0].0).abs() + (pair[1].1 - pair[0].1).abs())
@@ -627,11 +656,12 @@ fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
 }
 
 #[test]
-fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
+fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
     if lacks_compiler() || lacks_node() || lacks_typescript() {
         return;
     }
     companion_is_compiled();
+
     let lab = Lab::new();
     let stdio = root().join("sdk/stdio");
     let programs = [
@@ -641,21 +671,23 @@ fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
         stdio.join("bash/stroller.sh"),
     ];
     for program in programs {
-        let end = told(&program, b"{\"type\":\"end\",\"reason\":\"finished\"}\n");
+        let end = run_with(&program, b"{\"type\":\"end\",\"reason\":\"finished\"}\n");
         assert!(
             end.status.success() && end.stdout.is_empty(),
             "{}: {}",
             program.display(),
             said(&end)
         );
-        let silence = told(&program, b"");
+
+        let silence = run_with(&program, b"");
         assert!(
             silence.status.success() && silence.stdout.is_empty(),
             "{}: {}",
             program.display(),
             said(&silence)
         );
-        let rubbish = told(&program, b"rubbish\n");
+
+        let rubbish = run_with(&program, b"rubbish\n");
         assert_eq!(
             rubbish.status.code(),
             Some(1),
@@ -665,7 +697,7 @@ fn every_program_ends_when_it_is_told_to_or_hears_no_more() {
         );
         assert!(
             !rubbish.stderr.is_empty(),
-            "{} says nothing about rubbish",
+            "{} does not report rubbish",
             program.display()
         );
     }
@@ -680,10 +712,12 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
     if lacks_compiler() || lacks("Python with zenoh", has_zenoh, "`pip install ./sdk/python`") {
         return;
     }
+
     let compile = commands_of(MIXED)
         .into_iter()
         .find(|command| command.starts_with("cc "));
     ok(Command::new("sh").args(["-c", &compile.unwrap()]));
+
     let lab = Lab::new();
     for (run, more) in [
         ("mixed", &[][..]),
@@ -699,6 +733,7 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
             .copied()
             .collect();
         lab.ok(&local);
+
         let launch = [
             "launch",
             MIXED,
@@ -714,6 +749,7 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
             .env("PYTHONPATH", root().join("sdk/python/src"))
             .env("PYTHONDONTWRITEBYTECODE", "1");
         ok(&mut launch);
+
         assert_same(
             ("all in Rust", &lab.bytes(&alone)),
             ("in three languages", &lab.bytes(run)),

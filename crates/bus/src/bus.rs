@@ -89,6 +89,17 @@ impl Bus {
         on!(Session, &self.session, session => session.put(key, message))
     }
 
+    /// The same with another quality of service than [`Qos::IN_ORDER`]. A network in memory has no other.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn put_with_qos(&self, key: &str, message: Vec<u8>, qos: Qos) -> Result<(), BusError> {
+        match &self.session {
+            Session::Middleware(session) => session.put_with_qos(key, message, qos),
+            Session::Memory(session) => session.put(key, message),
+        }
+    }
+
     /// Calls `handle(key, bytes)` for each message put on `keys`. It runs on the thread that reads the link: it must
     /// hand over and return.
     ///

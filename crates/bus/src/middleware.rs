@@ -181,6 +181,33 @@ impl Session {
         used("put on", key, put)
     }
 
+    pub(super) fn put_with_qos(
+        &self,
+        key: &str,
+        message: Vec<u8>,
+        qos: Qos,
+    ) -> Result<(), BusError> {
+        let congestion_control = if qos.is_blocking {
+            CongestionControl::Block
+        } else {
+            CongestionControl::Drop
+        };
+        let priority = if qos.has_default_priority {
+            Priority::default()
+        } else {
+            Priority::Background
+        };
+
+        let put = self
+            .session
+            .put(key, message)
+            .congestion_control(congestion_control)
+            .express(qos.is_express)
+            .priority(priority)
+            .wait();
+        used("put on", key, put)
+    }
+
     pub(super) fn subscribe(
         &self,
         keys: &str,

@@ -101,7 +101,7 @@ fn setting(args: &ConformArgs) -> miette::Result<Setting> {
 
     // Commands of the command line come before those of the scenario.
     for role in setting.cast.values_mut() {
-        role.hears.splice(0..0, args.says.iter().cloned());
+        role.understands.splice(0..0, args.says.iter().cloned());
     }
 
     setting.commands.splice(0..0, args.says.iter().cloned());
@@ -131,7 +131,7 @@ fn take_scenario(setting: &mut Setting, file: &Path) -> miette::Result<()> {
     let performances = lab::performances(scenario, setting.ticks)?;
     for (name, performance) in performances.into_iter().flatten() {
         if let Some(role) = setting.cast.get_mut(&name) {
-            role.hears = performance.commands;
+            role.understands = performance.commands;
             role.states = performance.states;
         }
     }

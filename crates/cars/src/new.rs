@@ -62,6 +62,8 @@ struct Skeleton {
     more: &'static [(&'static str, &'static str)],
     /// `command` of the launch file.
     command: &'static str,
+    /// The robot's own command, as typed where `cars new` was.
+    typed: &'static str,
     /// Command that builds the robot; empty if there is nothing to build.
     build: &'static str,
     /// Where to go on.
@@ -87,6 +89,7 @@ impl Skeleton {
             program: (file, text),
             more: &[],
             command: "",
+            typed: "",
             build: "",
             hint: OVER_PIPES,
         }
@@ -104,6 +107,7 @@ impl Language {
                     (".gitignore", "/target\n/runs\n"),
                 ],
                 command: r#"["./target/release/@PACKAGE@"]"#,
+                typed: "@FOLDER@/target/release/@PACKAGE@",
                 build: "cargo build --release --manifest-path @FOLDER@/Cargo.toml",
                 hint: "`docs/new-robot.md` of the CARS project makes a robot with an emotion of its own;\n\
                        `cargo doc --open -p robot` documents what a robot can do in a tick.",
@@ -113,21 +117,25 @@ impl Language {
                 program: ("robot.py", include_str!("new/python/robot.py")),
                 more: &[],
                 command: r#"["./robot.py"]"#,
+                typed: "@FOLDER@/robot.py",
                 build: "pip install @CARS@/sdk/python",
                 hint: "`sdk/python/README.md` of the CARS project documents what a robot can do in a tick.",
             },
             Self::C => Skeleton {
                 // A fused multiply-add rounds once instead of twice, so results would differ between machines.
+                typed: "cars exec --name @NAME@ -- @FOLDER@/robot",
                 build: "cc -std=c11 -O2 -ffp-contract=off -Wall -Wextra -o @FOLDER@/robot @FOLDER@/robot.c -lm",
                 command: r#"["cars", "exec", "--", "./robot"]"#,
                 ..Skeleton::over_pipes("C", "robot.c", include_str!("new/c/robot.c"))
             },
             Self::Bash => Skeleton {
                 command: r#"["cars", "exec", "--", "./robot.sh"]"#,
+                typed: "cars exec --name @NAME@ -- @FOLDER@/robot.sh",
                 ..Skeleton::over_pipes("Bash", "robot.sh", include_str!("new/bash/robot.sh"))
             },
             Self::Node => Skeleton {
                 command: r#"["cars", "exec", "--", "./robot.mjs"]"#,
+                typed: "cars exec --name @NAME@ -- @FOLDER@/robot.mjs",
                 ..Skeleton::over_pipes(
                     "JavaScript (Node.js)",
                     "robot.mjs",
@@ -227,7 +235,9 @@ impl Template<'_> {
     fn fill(&self, text: &str) -> String {
         let package = self.name.to_lowercase().replace('.', "-");
         let robot_crate = self.cars.join("crates/robot").display().to_string();
-        let mut text = text.replace("@COMMAND@", self.skeleton.command);
+        let mut text = text
+            .replace("@COMMAND@", self.skeleton.command)
+            .replace("@PROGRAM@", self.skeleton.typed);
         if text.contains("@STEPS@") {
             text = text.replace("@STEPS@", &format!("```sh\n{}\n```", self.steps()));
         }

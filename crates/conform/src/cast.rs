@@ -11,6 +11,9 @@ use serde_json::{Value, json};
 
 use crate::setting::Role;
 
+/// Below this, each whole number has a floating-point number of its own.
+const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
+
 /// A query that one of them received.
 #[derive(Debug, Clone)]
 pub(crate) struct Asked {
@@ -32,20 +35,27 @@ struct State {
 }
 
 /// The others, and the tick that they are in.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(crate) struct Cast {
     others: Arc<BTreeMap<RobotName, Role>>,
     state: Arc<Mutex<State>>,
     /// Whether everything that is put carries unknown fields.
     has_extras: bool,
+    /// Whether whole numbers are written without a fraction wherever a fraction is possible.
+    writes_integers: bool,
 }
 
 impl Cast {
-    pub(crate) fn new(others: BTreeMap<RobotName, Role>, has_extras: bool) -> Self {
+    pub(crate) fn new(
+        others: BTreeMap<RobotName, Role>,
+        has_extras: bool,
+        writes_integers: bool,
+    ) -> Self {
         Self {
             others: Arc::new(others),
             state: Arc::default(),
             has_extras,
+            writes_integers,
         }
     }
 
@@ -137,12 +147,17 @@ impl Cast {
     /// A message as it is put on the wire.
     pub(crate) fn dress<M: Message>(&self, message: &M) -> Vec<u8> {
         let bytes = encode(message);
-        if !self.has_extras {
+        if !self.has_extras && !self.writes_integers {
             return bytes;
         }
 
         let mut value = serde_json::from_slice(&bytes).unwrap_or(Value::Null);
-        add_extras(&mut value);
+        if self.has_extras {
+            add_extras(&mut value);
+        }
+        if self.writes_integers {
+            write_integers(&mut value);
+        }
         value.to_string().into_bytes()
     }
 
@@ -229,10 +244,29 @@ fn add_extras(value: &mut Value) {
                     _ => add_extras(field),
                 }
             }
+
             fields.insert(
                 "added_later".to_owned(),
                 json!({ "by": ["a later version", 1, null] }),
             );
+        }
+        _ => {}
+    }
+}
+
+/// Writes 7.0 as 7, wherever there is one.
+fn write_integers(value: &mut Value) {
+    match value {
+        Value::Array(values) => values.iter_mut().for_each(write_integers),
+        Value::Object(fields) => fields.values_mut().for_each(write_integers),
+        Value::Number(number) => {
+            let float = number.as_f64().unwrap_or_default();
+            let is_whole = float.fract() == 0.0 && float.abs() < MAX_WHOLE;
+            let is_minus_zero = float == 0.0 && float.is_sign_negative();
+
+            if number.is_f64() && is_whole && !is_minus_zero {
+                *number = (float as i64).into();
+            }
         }
         _ => {}
     }
@@ -251,6 +285,7 @@ mod tests {
             "parameters": { "speed": { "mean": 1 } },
         });
         add_extras(&mut news);
+
         for path in ["", "/correction/location", "/commands/0"] {
             assert!(
                 news.pointer(path).unwrap().get("added_later").is_some(),
@@ -263,5 +298,16 @@ mod tests {
                 "{path}"
             );
         }
+    }
+
+    #[test]
+    fn whole_numbers_lose_their_fraction_and_others_keep_it() {
+        let mut news =
+            json!({ "tick": 1, "at": [{ "x": 5.0, "y": -3.0, "z": 0.5, "none": -0.0 }] });
+        write_integers(&mut news);
+        assert_eq!(
+            news.to_string(),
+            r#"{"at":[{"none":-0.0,"x":5,"y":-3,"z":0.5}],"tick":1}"#
+        );
     }
 }

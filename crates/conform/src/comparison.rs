@@ -1,10 +1,11 @@
 //! Two plays of the same ticks: where they differ first.
 
+use protocol::Tick;
 use serde_json::Value;
 
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Entry, Transcript};
+use crate::transcript::{Entry, Transcript};
 
 /// What is shown of a value that differs, characters.
 const SHOWN: usize = 200;
@@ -20,11 +21,13 @@ pub(crate) struct Difference {
 fn outcome(entry: &Entry) -> Value {
     let mut value = serde_json::json!(entry.report);
     value["epoch"] = Value::Null;
-    let commands = entry.commands.iter().map(|sent| {
+
+    let mut commands = Vec::new();
+    for sent in &entry.commands {
         let text = sent.command.as_ref().map(|command| command.command.clone());
-        format!("{} to {}", text.unwrap_or_default(), sent.to)
-    });
-    value["commands put"] = commands.collect::<Vec<_>>().into();
+        commands.push(format!("{} to {}", text.unwrap_or_default(), sent.to));
+    }
+    value["commands put"] = commands.into();
 
     value
 }
@@ -32,29 +35,16 @@ fn outcome(entry: &Entry) -> Value {
 /// The first difference between the reports and commands of two plays. Their epochs may differ.
 pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<Difference> {
     for (one, two) in one.iter().zip(two) {
-        let tick = one.tick;
         let first = outcome(one);
         let second = outcome(two);
         if first == second {
             continue;
         }
 
-        let of = |value: &Value, field: &str| value.get(field).cloned().unwrap_or(Value::Null);
-        let field = first
-            .as_object()
-            .into_iter()
-            .chain(second.as_object())
-            .flat_map(|fields| fields.keys())
-            .find(|field| of(&first, field) != of(&second, field))
-            .cloned()
-            .unwrap_or_default();
-        let shown = |value: &Value| {
-            let text: String = of(value, &field).to_string().chars().take(SHOWN).collect();
-            format!("in tick {tick}, {field}: {text}")
-        };
+        let field = first_that_differs(&first, &second);
         return Some(Difference {
-            first: shown(&first),
-            second: shown(&second),
+            first: shown(&first, &field, one.tick),
+            second: shown(&second, &field, one.tick),
         });
     }
 
@@ -62,6 +52,24 @@ pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<Differenc
         first: format!("{} ticks", one.len()),
         second: format!("{} ticks", two.len()),
     })
+}
+
+/// The first field in which two objects differ.
+fn first_that_differs(one: &Value, two: &Value) -> String {
+    one.as_object()
+        .into_iter()
+        .chain(two.as_object())
+        .flat_map(|fields| fields.keys())
+        .find(|field| one.get(field) != two.get(field))
+        .cloned()
+        .unwrap_or_default()
+}
+
+/// A field of a tick in words.
+fn shown(value: &Value, field: &str, tick: Tick) -> String {
+    let found = value.get(field).unwrap_or(&Value::Null);
+    let text: String = found.to_string().chars().take(SHOWN).collect();
+    format!("in tick {tick}, {field}: {text}")
 }
 
 /// Whether two plays gave the same reports and commands.

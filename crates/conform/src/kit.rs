@@ -5,16 +5,15 @@ use std::net::TcpListener;
 use std::process::Command;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
-use bus::{Bus, BusError, Role as BusRole};
+use bus::{Bus, BusError, Declared, Role as BusRole};
 use protocol::messages::{JoinRequest, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
 
-use crate::report::{Outcome, Report, Verdict};
-use crate::rules::{RULES, Rule};
-use crate::script::Transcript;
+use crate::process;
 use crate::setting::{Role, Setting};
-use crate::{checks, process};
+use crate::transcript::Transcript;
 
 /// Why nothing could be checked.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +29,8 @@ pub enum CannotRun {
 /// A router session, a command, and what was learned.
 pub(crate) struct Kit {
     pub(crate) bus: Bus,
+    /// A queryable in a session of its own, which replies at once.
+    _control: Declared,
     pub(crate) endpoint: String,
     pub(crate) command: Command,
     pub(crate) setting: Setting,
@@ -41,7 +42,7 @@ pub(crate) struct Kit {
     pub(crate) is_deterministic: OnceLock<bool>,
 }
 
-/// What the first request to join told.
+/// What the first request to join contained.
 struct Learned {
     request: JoinRequest,
     cast: BTreeMap<RobotName, Role>,
@@ -49,56 +50,33 @@ struct Learned {
 
 /// Attempts to find a free port before giving up.
 const ATTEMPTS: usize = 8;
-/// Processes of the robot that run at the same time.
-const WORKERS: usize = 4;
-
-/// Checks the robot that `command` starts: all rules, or those in `rules`.
-///
-/// # Errors
-/// [`CannotRun`] if the command cannot be started, or the robot never asks to join.
-pub fn check(command: &Command, setting: &Setting, rules: &[Rule]) -> Result<Report, CannotRun> {
-    let kit = Kit::open(command, setting)?;
-    let (mut verdicts, times) = checks::all(&kit, rules, WORKERS)?;
-    let is_wanted = |rule: &Rule| rules.is_empty() || rules.contains(rule);
-    let unchecked = || Verdict::Skipped {
-        reason: "no check of it was run".to_owned(),
-    };
-    let outcomes = RULES.into_iter().filter(is_wanted).map(|rule| Outcome {
-        rule,
-        verdict: verdicts.remove(rule.name).unwrap_or_else(unchecked),
-    });
-    let outcomes = outcomes.collect();
-    let sdk = kit
-        .learned
-        .get()
-        .map(|learned| learned.request.sdk.clone())
-        .unwrap_or_default();
-    Ok(Report {
-        name: kit.subject(),
-        sdk,
-        outcomes,
-        answers: times,
-    })
-}
+/// How long the kit's second session tries to reach the first one.
+const OWN_PATIENCE: Duration = Duration::from_secs(20);
 
 impl Kit {
-    fn open(command: &Command, setting: &Setting) -> Result<Self, CannotRun> {
+    /// Opens the kit's sessions. Nothing is started yet.
+    pub(crate) fn open(command: &Command, setting: &Setting) -> Result<Self, CannotRun> {
         let (bus, endpoint) = open_router()?;
         let mut own = process::copy(command);
         // The robot connects to this kit only.
         own.env_remove("CARS_ZENOH_CONFIG");
-        let (runs, learned, usual) = (AtomicUsize::new(0), OnceLock::new(), OnceLock::new());
-        let (setting, is_deterministic) = (setting.clone(), OnceLock::new());
+
         Ok(Self {
+            _control: declare_control(&endpoint)?,
             bus,
             endpoint,
             command: own,
-            setting,
-            runs,
-            learned,
-            usual,
-            is_deterministic,
+            setting: setting.clone(),
+            runs: AtomicUsize::new(0),
+            learned: OnceLock::new(),
+            usual: OnceLock::new(),
+            is_deterministic: OnceLock::new(),
         })
+    }
+
+    /// The key of the kit's own queryable: a query there takes as long as this machine makes any query take.
+    pub(crate) fn control_key(&self) -> String {
+        control_key()
     }
 
     /// A name for a run that no other has.
@@ -108,7 +86,7 @@ impl Kit {
             .unwrap_or_else(|error| unreachable!("letters and digits are a name: {error}"))
     }
 
-    /// The first request to join tells who the robot is.
+    /// The first request to join names the robot.
     pub(crate) fn learn(&self, request: &JoinRequest) -> Result<(), CannotRun> {
         let cast = self
             .setting
@@ -140,16 +118,17 @@ impl Kit {
         self.learned().request.name.clone()
     }
 
+    /// What the robot is written with, as it states.
+    pub(crate) fn sdk(&self) -> String {
+        self.learned().request.sdk.clone()
+    }
+
     /// The robots that the kit plays.
     pub(crate) fn others(&self) -> BTreeMap<RobotName, Role> {
         let learned = self.learned();
-        let is_other = |(name, _): &(&RobotName, &Role)| **name != learned.request.name;
-        learned
-            .cast
-            .iter()
-            .filter(is_other)
-            .map(|(name, role)| (name.clone(), role.clone()))
-            .collect()
+        let mut others = learned.cast.clone();
+        others.remove(&learned.request.name);
+        others
     }
 
     /// The sender of the robot's commands: the first of the others, or the operator.
@@ -164,14 +143,12 @@ impl Kit {
     /// shows nothing of the one may show something of the other.
     pub(crate) fn pairs(&self) -> Vec<[String; 2]> {
         let role = self.learned().cast.get(&self.subject());
-        let hears = role.map(|role| role.hears.clone()).unwrap_or_default();
+        let own = role
+            .map(|role| role.understands.clone())
+            .unwrap_or_default();
         let unknown = ["hello".to_owned(), "goodbye".to_owned()];
-        let pair = |texts: &[String]| {
-            let one = texts.first()?;
-            let other = texts.iter().find(|text| *text != one).cloned();
-            Some([one.clone(), other.unwrap_or_else(|| format!("{one} again"))])
-        };
-        [&hears[..], &self.setting.commands, &unknown]
+
+        [&own[..], &self.setting.commands, &unknown]
             .into_iter()
             .filter_map(pair)
             .collect()
@@ -189,13 +166,13 @@ impl Kit {
 
     /// What the robot is welcomed with at tick 0.
     pub(crate) fn template(&self, run: &RunName) -> Welcome {
-        let setting = &self.setting;
         let learned = self.learned.get();
         let name = learned.map_or_else(RobotName::operator, |learned| learned.request.name.clone());
         let cast = learned
             .map(|learned| learned.cast.clone())
             .unwrap_or_default();
         let role = cast.get(&name).cloned().unwrap_or_default();
+        let setting = &self.setting;
 
         Welcome {
             protocol: PROTOCOL_VERSION,
@@ -220,7 +197,14 @@ impl Kit {
     }
 }
 
-/// A router on a free port of this machine. Somebody else may take the port first: then another one is tried.
+/// The first two different texts of a list; where there is one only, a second one is made of it.
+fn pair(texts: &[String]) -> Option<[String; 2]> {
+    let one = texts.first()?;
+    let other = texts.iter().find(|text| *text != one).cloned();
+    Some([one.clone(), other.unwrap_or_else(|| format!("{one} again"))])
+}
+
+/// A router on a free port of this machine. Another program may take the port first: then another one is tried.
 fn open_router() -> Result<(Bus, String), CannotRun> {
     let mut attempt = 0;
     loop {
@@ -229,16 +213,34 @@ fn open_router() -> Result<(Bus, String), CannotRun> {
             .map_err(|error| CannotRun::Robot(format!("no free port on this machine: {error}")))?
             .port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
-        match Bus::open(
-            &BusRole::Router {
-                listen: endpoint.clone(),
-                trusts_network: false,
-            },
-            None,
-        ) {
+        let role = BusRole::Router {
+            listen: endpoint.clone(),
+            trusts_network: false,
+        };
+
+        match Bus::open(&role, None) {
             Ok(bus) => return Ok((bus, endpoint)),
             Err(error) if attempt == ATTEMPTS => return Err(error.into()),
             Err(_) => attempt += 1,
         }
     }
+}
+
+fn control_key() -> String {
+    format!("conform/{}/control", std::process::id())
+}
+
+/// Declares a queryable that replies at once, in a session that is a client as the robot's.
+fn declare_control(endpoint: &str) -> Result<Declared, BusError> {
+    let role = BusRole::Client {
+        connect: endpoint.to_owned(),
+        patience: OWN_PATIENCE,
+    };
+    let bus = Bus::open(&role, None)?;
+
+    bus.clone().queryable(&control_key(), move |query| {
+        query.reply(query.key(), b"{}".to_vec());
+        // The session stays open as long as this declaration.
+        let _session = &bus;
+    })
 }

@@ -6,23 +6,37 @@
 //! [`lockstep::Barrier`], the same as in the simulator itself; the kit adds what the checks observe. No rule assumes that
 //! a robot moves, queries or commands. What it cannot show is skipped, and the report gives the reason.
 //!
+//! No verdict follows from the wall clock where a loaded machine can have the same effect: checks judge by the order of
+//! messages, or while they withhold what the robot waits for; a late answer counts only if it is late in each of several
+//! repetitions and the kit's own queryable replies in time (`patience.rs`, `checks/computing.rs`).
+//!
 //! Much of the contract is about what must *not* make a difference: a repeated clock, an unknown field, news that come
 //! late. Such a rule is checked by playing the same ticks twice, with the disturbance and without it: reports and commands
 //! must be the same, which the promise of the project (same seed, same run) makes fair.
 
+mod body;
 mod cast;
 mod checks;
 mod comparison;
+mod findings;
+mod flushing;
 mod kit;
+mod load;
+mod patience;
 mod process;
 mod reading;
 mod report;
 mod rules;
 mod script;
+mod seen;
 mod setting;
 mod stage;
+mod transcript;
+mod wire;
 
-pub use kit::{CannotRun, check};
+pub use checks::check;
+pub use flushing::unflushed;
+pub use kit::CannotRun;
 pub use report::{AnswerTimes, Failure, Outcome, Report, Verdict};
 pub use rules::{PAGE, RULES, Rule};
 pub use setting::{Role, Setting};

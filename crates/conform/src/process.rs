@@ -4,9 +4,12 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Duration;
 
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
+
+use crate::load::Group;
 
 /// What is shown of a program's output, bytes from its end.
 const TAIL_BYTES: u64 = 1500;
@@ -15,22 +18,25 @@ const TAIL_BYTES: u64 = 1500;
 pub(crate) fn copy(command: &Command) -> Command {
     let mut own = Command::new(command.get_program());
     own.args(command.get_args());
+
     if let Some(folder) = command.get_current_dir() {
         own.current_dir(folder);
     }
+
     for (name, value) in command.get_envs() {
         match value {
             Some(value) => own.env(name, value),
             None => own.env_remove(name),
         };
     }
+
     own
 }
 
 /// A robot's process, with all that it started.
 pub(crate) struct Process {
     child: Child,
-    group: Pid,
+    group: Group,
     output: File,
     errors: File,
     ended: Option<ExitStatus>,
@@ -42,17 +48,19 @@ impl Process {
         command: &Command,
         environment: &[(&str, String)],
     ) -> std::io::Result<Self> {
-        let (output, errors) = (tempfile::tempfile()?, tempfile::tempfile()?);
+        let output = tempfile::tempfile()?;
+        let errors = tempfile::tempfile()?;
         let mut own = copy(command);
         own.envs(environment.iter().map(|(name, value)| (name, value)));
         own.stdin(Stdio::null())
             .stdout(output.try_clone()?)
             .stderr(errors.try_clone()?);
+
         let child = own.process_group(0).spawn()?;
-        let group = Pid::from_raw(i32::try_from(child.id()).map_err(std::io::Error::other)?);
+        let id = i32::try_from(child.id()).map_err(std::io::Error::other)?;
         Ok(Self {
             child,
-            group,
+            group: Group(Pid::from_raw(id)),
             output,
             errors,
             ended: None,
@@ -70,8 +78,18 @@ impl Process {
 
     /// Sends a signal to the program and all that it started, as a launcher does.
     pub(crate) fn signal(&self, signal: Signal) {
-        // A group that is gone needs none.
-        let _gone = killpg(self.group, signal);
+        // A group that has ended needs none.
+        let _ended = killpg(self.group.0, signal);
+    }
+
+    /// Whether the program, and all that it started, rests.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.group.is_idle()
+    }
+
+    /// How long its threads have waited for a processor so far.
+    pub(crate) fn starved(&self) -> Duration {
+        self.group.starved()
     }
 
     /// How much it wrote to its standard error, bytes.
@@ -90,6 +108,7 @@ impl Process {
             None => "it runs".to_owned(),
             Some(status) => format!("its process has ended ({status})"),
         };
+
         let printed = [tail(&self.output), self.errors()]
             .join("\n")
             .trim()
@@ -101,18 +120,21 @@ impl Process {
     }
 }
 
-/// The end of a file that may still be written: read in place, since its cursor belongs to the writer.
+/// The end of a file that may still be written.
 fn tail(file: &File) -> String {
-    let read = || -> std::io::Result<Vec<u8>> {
-        let length = file.metadata()?.len();
-        let from = length.saturating_sub(TAIL_BYTES);
-        let mut bytes = vec![0; usize::try_from(length - from).map_err(std::io::Error::other)?];
-        file.read_exact_at(&mut bytes, from)?;
-        Ok(bytes)
-    };
-    String::from_utf8_lossy(&read().unwrap_or_default())
+    String::from_utf8_lossy(&last_bytes(file).unwrap_or_default())
         .trim()
         .to_owned()
+}
+
+/// Reads in place: the file's cursor belongs to the writer.
+fn last_bytes(file: &File) -> std::io::Result<Vec<u8>> {
+    let length = file.metadata()?.len();
+    let from = length.saturating_sub(TAIL_BYTES);
+    let mut bytes = vec![0; usize::try_from(length - from).map_err(std::io::Error::other)?];
+    file.read_exact_at(&mut bytes, from)?;
+
+    Ok(bytes)
 }
 
 impl Drop for Process {

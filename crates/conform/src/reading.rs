@@ -106,6 +106,10 @@ fn repair_integers(value: &mut Value) -> Vec<String> {
 mod tests {
     use super::*;
 
+    fn read(text: &str) -> Result<Reading, Malformed> {
+        super::read("key", "A", text.as_bytes())
+    }
+
     fn report(speed: &str, variable: &str) -> String {
         format!(
             "{{\"epoch\":1,\"tick\":3,\"generation\":1,\"proposal\":{{\"x\":1.0,\"y\":2.0}},\"speed_mps\":{speed},\
@@ -114,9 +118,9 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_none_are_named() {
-        let read = |text: &str| read("key", "A", text.as_bytes());
+    fn numbers_that_are_not_finite_are_named() {
         assert!(read(&report("0.5", "1")).unwrap().not_numbers.is_empty());
+
         for written in ["null", "NaN", " Infinity", "-Infinity"] {
             assert_eq!(
                 read(&report(written, "1")).unwrap().not_numbers,
@@ -124,6 +128,7 @@ mod tests {
                 "{written}"
             );
         }
+
         assert_eq!(
             read(&report("1", "NaN")).unwrap().not_numbers,
             ["state_variables.a"]
@@ -134,16 +139,16 @@ mod tests {
     #[test]
     fn integers_with_a_fraction_are_named() {
         let text = report("1", "1").replace("\"tick\":3", "\"tick\":3.0");
-        let reading = read("key", "A", text.as_bytes()).unwrap();
+        let reading = read(&text).unwrap();
         assert_eq!(reading.not_integers, ["tick"]);
         assert_eq!(reading.report.tick, 3);
+
         let text = text.replace("3.0", "3.5");
-        assert!(read("key", "A", text.as_bytes()).is_err());
+        assert!(read(&text).is_err());
     }
 
     #[test]
     fn what_is_not_a_report_is_malformed() {
-        let read = |text: &str| read("key", "A", text.as_bytes());
         assert!(read("{}").is_err());
     }
 }

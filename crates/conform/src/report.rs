@@ -29,7 +29,7 @@ impl Failure {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "verdict", rename_all = "snake_case")]
 pub enum Verdict {
-    /// Nothing speaks against it.
+    /// No check found it broken.
     Passed,
     /// It is broken.
     Failed(Failure),
@@ -49,8 +49,8 @@ pub struct Outcome {
     pub verdict: Verdict,
 }
 
-/// How long the robot took from a clock to its report, milliseconds of wall clock. No verdict: what is fast enough is
-/// for its user to say.
+/// How long the robot took from a clock to its report, milliseconds of wall clock. No rule demands
+/// any of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AnswerTimes {
     /// Number of ticks measured.
@@ -69,23 +69,21 @@ impl AnswerTimes {
     /// The distribution of these times, if there are any.
     pub(crate) fn of(mut times_ms: Vec<f64>) -> Option<Self> {
         times_ms.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            times_ms
-                .get(((times_ms.len() - 1) as f64 * share).round() as usize)
-                .copied()
-        };
-        let ticks = times_ms.len();
-        if ticks == 0 {
-            return None;
-        }
+
         Some(Self {
-            ticks,
-            min_ms: at(0.0)?,
-            median_ms: at(0.5)?,
-            p99_ms: at(0.99)?,
-            max_ms: at(1.0)?,
+            ticks: times_ms.len(),
+            min_ms: quantile(&times_ms, 0.0)?,
+            median_ms: quantile(&times_ms, 0.5)?,
+            p99_ms: quantile(&times_ms, 0.99)?,
+            max_ms: quantile(&times_ms, 1.0)?,
         })
     }
+}
+
+/// The value below which a share of sorted values lies.
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    sorted.get((last as f64 * share).round() as usize).copied()
 }
 
 /// What came of a check.
@@ -93,7 +91,7 @@ impl AnswerTimes {
 pub struct Report {
     /// The robot that was checked.
     pub name: RobotName,
-    /// What it says it is written with.
+    /// What it is written with, as it states.
     pub sdk: String,
     /// The rules that were asked for, in the order of the page.
     pub outcomes: Vec<Outcome>,
@@ -134,19 +132,21 @@ impl Report {
     /// The report as one JSON object.
     #[must_use]
     pub fn to_json(&self) -> serde_json::Value {
-        let rules = self.outcomes.iter().map(|Outcome { rule, verdict }| {
+        let mut rules = Vec::new();
+        for Outcome { rule, verdict } in &self.outcomes {
             let mut line = serde_json::json!(verdict);
             line["rule"] = rule.name.into();
             line["see"] = rule.reference().into();
-            line
-        });
+            rules.push(line);
+        }
+
         serde_json::json!({
             "robot": self.name,
             "sdk": self.sdk,
             "passed": self.count(|verdict| *verdict == Verdict::Passed),
             "failed": self.failed().count(),
             "skipped": self.count(|verdict| matches!(verdict, Verdict::Skipped { .. })),
-            "rules": rules.collect::<Vec<_>>(),
+            "rules": rules,
             "time.answer": self.answers,
         })
     }
@@ -180,22 +180,15 @@ impl fmt::Display for Report {
             }
         }
         if let Some(times) = self.answers {
-            let AnswerTimes {
-                ticks,
-                min_ms,
-                median_ms,
-                p99_ms,
-                max_ms,
-            } = times;
             writeln!(
                 f,
-                "# time.answer over {ticks} ticks: min {min_ms:.2} ms, median {median_ms:.2} ms, p99 {p99_ms:.2} ms, max {max_ms:.2} ms"
+                "# time.answer over {} ticks: min {:.2} ms, median {:.2} ms, p99 {:.2} ms, max {:.2} ms",
+                times.ticks, times.min_ms, times.median_ms, times.p99_ms, times.max_ms
             )?;
         }
-        let (passed, failed) = (
-            self.count(|verdict| *verdict == Verdict::Passed),
-            self.failed().count(),
-        );
+
+        let passed = self.count(|verdict| *verdict == Verdict::Passed);
+        let failed = self.failed().count();
         let skipped = self.outcomes.len() - passed - failed;
         writeln!(
             f,

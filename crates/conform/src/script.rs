@@ -1,24 +1,18 @@
 //! The ticks that a robot is taken through: what happens to it is a function of the tick and of what it proposed, so that
 //! the same robot meets the same again.
 
-use std::time::Duration;
+use protocol::messages::{Correction, Delivery, News, Performative};
+use protocol::{RobotName, Tick};
 
-use protocol::messages::{Correction, Delivery, News, Performative, Point, Report, Welcome};
-use protocol::{Epoch, RobotName, Tick};
-
+use crate::body::{Body, ROUND};
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::stage::{Sent, Stage};
+use crate::stage::{Options, Stage};
+use crate::transcript::{Entry, Transcript};
 
-/// Every so many ticks the same happens to it again.
-const ROUND: Tick = 16;
-/// In a round: it is placed elsewhere, its move is refused, it senses another robot, it cannot query any other.
-const PLACED: Tick = 5;
-const REFUSED: Tick = 9;
+/// In a round of ticks: the robot senses another one, and it cannot query any other.
 const SENSES: Tick = 12;
 const CUT_OFF: Tick = 14;
-/// How far it is placed from where it stood, meters.
-const SHIFT: (f64, f64) = (0.25, 0.125);
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
@@ -27,6 +21,17 @@ pub(crate) struct Arrival {
     pub(crate) text: String,
     /// The tick in whose news it is.
     pub(crate) tick: Tick,
+}
+
+impl Arrival {
+    /// The command `text` of `from`, in the news of a tick.
+    pub(crate) fn new(from: &RobotName, text: &str, tick: Tick) -> Self {
+        Self {
+            from: from.clone(),
+            text: text.to_owned(),
+            tick,
+        }
+    }
 }
 
 /// Ticks to play.
@@ -38,27 +43,8 @@ pub(crate) struct Script {
     pub(crate) arrivals: Vec<Arrival>,
 }
 
-/// A tick that was played.
-#[derive(Debug, Clone)]
-pub(crate) struct Entry {
-    pub(crate) epoch: Epoch,
-    pub(crate) tick: Tick,
-    pub(crate) news: News,
-    /// Where the robot stands in it.
-    pub(crate) location: Point,
-    pub(crate) report: Report,
-    /// Its commands, by number.
-    pub(crate) commands: Vec<Sent>,
-    /// The place of its report in [`crate::stage::Seen::answers`].
-    pub(crate) index: usize,
-    pub(crate) took: Duration,
-}
-
-/// What was played.
-pub(crate) type Transcript = Vec<Entry>;
-
 /// What a check does between the ticks. None of it may make a difference to the robot.
-pub(crate) trait Twist {
+pub(crate) trait Disturbance {
     /// Before a tick is granted.
     fn before(&mut self, _stage: &mut Stage<'_>, _tick: Tick) -> Result<(), Failure> {
         Ok(())
@@ -75,30 +61,25 @@ pub(crate) trait Twist {
     }
 }
 
-/// No twist at all.
+/// No disturbance at all.
 pub(crate) struct Straight;
 
-impl Twist for Straight {}
+impl Disturbance for Straight {}
 
 impl Script {
     /// The usual ticks: a few commands among them.
     pub(crate) fn usual(kit: &Kit) -> Self {
         let [one, two] = kit.texts();
         let from = kit.sender();
-        let arrival = |from: &RobotName, text: &String, tick: Tick| Arrival {
-            from: from.clone(),
-            text: text.clone(),
-            tick,
-        };
 
         Self {
             ticks: kit.setting.ticks,
             arrivals: vec![
-                arrival(&from, &one, 3),
-                arrival(&from, &two, 7),
-                arrival(&from, &one, 7),
-                arrival(&RobotName::operator(), &one, 10),
-                arrival(&from, &one, 20),
+                Arrival::new(&from, &one, 3),
+                Arrival::new(&from, &two, 7),
+                Arrival::new(&from, &one, 7),
+                Arrival::new(&RobotName::operator(), &one, 10),
+                Arrival::new(&from, &one, 20),
             ],
         }
     }
@@ -133,66 +114,35 @@ impl Script {
     }
 }
 
-/// Where the robot stands, and where it wants to be.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Body {
-    pub(crate) stands: Point,
-    pub(crate) proposal: Point,
+/// A robot that has joined a run of its own, ready for its first clock.
+pub(crate) fn seated(kit: &Kit, options: Options) -> Result<Stage<'_>, Failure> {
+    let mut stage = Stage::open_run(kit, options)?;
+    stage.join()?;
+    Ok(stage)
 }
 
-impl Body {
-    pub(crate) fn at(location: Point) -> Self {
-        Self {
-            stands: location,
-            proposal: location,
-        }
-    }
+/// A process of its own, taken straight through a script.
+pub(crate) fn played(kit: &Kit, script: &Script) -> Result<Transcript, Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    play(&mut stage, script, &mut Straight)
+}
 
-    /// Its move into a tick, and the correction if it does not stand where it proposed.
-    fn advance(&mut self, tick: Tick, welcome: &Welcome) -> Option<Correction> {
-        let half_m = welcome.body_m / 2.0;
-        let is_free = |at: Point| {
-            let within = |along: f64, size_m: f64| along >= half_m && along <= size_m - half_m;
-            within(at.x, welcome.field_m[0]) && within(at.y, welcome.field_m[1])
-        };
-        if tick % ROUND == PLACED {
-            let shifted = |sign: f64| {
-                Point::new(
-                    self.stands.x + sign * SHIFT.0,
-                    self.stands.y + sign * SHIFT.1,
-                )
-            };
-            self.stands = if is_free(shifted(1.0)) {
-                shifted(1.0)
-            } else {
-                shifted(-1.0)
-            };
-            return Some(Correction {
-                location: self.stands,
-                blocked: false,
-            });
-        }
-        if tick % ROUND == REFUSED || !is_free(self.proposal) {
-            return Some(Correction {
-                location: self.stands,
-                blocked: true,
-            });
-        }
-
-        self.stands = self.proposal;
-        None
-    }
+/// The usual ticks, as the robot went through them without any disturbance.
+pub(crate) fn usual(kit: &Kit) -> Result<&Transcript, Failure> {
+    kit.usual
+        .get()
+        .ok_or_else(|| Failure::new("the usual ticks are played first", "they were not"))
 }
 
 /// Plays a script to a robot that has joined, from the next tick of its stage on.
 pub(crate) fn play(
     stage: &mut Stage<'_>,
     script: &Script,
-    twist: &mut dyn Twist,
+    disturbance: &mut dyn Disturbance,
 ) -> Result<Transcript, Failure> {
     let mut transcript = Transcript::new();
     for _ in 0..=script.ticks {
-        transcript.push(step(stage, script, twist)?);
+        transcript.push(step(stage, script, disturbance)?);
     }
 
     Ok(transcript)
@@ -202,14 +152,14 @@ pub(crate) fn play(
 pub(crate) fn step(
     stage: &mut Stage<'_>,
     script: &Script,
-    twist: &mut dyn Twist,
+    disturbance: &mut dyn Disturbance,
 ) -> Result<Entry, Failure> {
     let epoch = stage.epoch();
     let tick = stage.next_tick();
     let news = news_of(stage, script, tick);
-    twist.before(stage, tick)?;
+    disturbance.before(stage, tick)?;
     stage.open(&news)?;
-    twist.during(stage, tick)?;
+    disturbance.during(stage, tick)?;
 
     let done = stage.complete()?;
     stage.body.proposal = done.report.proposal;
@@ -223,7 +173,7 @@ pub(crate) fn step(
         index: done.index,
         took: done.took,
     };
-    twist.after(stage, &entry)?;
+    disturbance.after(stage, &entry)?;
 
     Ok(entry)
 }
@@ -238,6 +188,7 @@ fn news_of(stage: &mut Stage<'_>, script: &Script, tick: Tick) -> News {
     if stage.kit.wants_bodies() {
         news.bodies = stage.cast.bodies(epoch, tick);
     }
+
     if stage.takes_over() {
         stage.body = Body::at(stage.template.location);
         news.correction = Some(Correction {

@@ -8,9 +8,9 @@ use protocol::{RobotName, Tick};
 /// What a conformance check plays.
 #[derive(Debug, Clone)]
 pub struct Setting {
-    /// The name that the robot must ask for; without it any name will do.
+    /// The name that the robot must ask for; without it any name is accepted.
     pub name: Option<RobotName>,
-    /// Where all chance comes from.
+    /// The seed of the run.
     pub seed: u64,
     /// Length of a tick, simulated seconds.
     pub tick_s: f64,
@@ -22,7 +22,7 @@ pub struct Setting {
     pub sensing_range_m: f64,
     /// The robots of the roster. Empty: the robot itself, without parameters, and one other.
     pub cast: BTreeMap<RobotName, Role>,
-    /// Texts of commands that the robot understands, if its [`Role::hears`] has none.
+    /// Texts of commands that the robot understands, if its [`Role::understands`] has none.
     pub commands: Vec<String>,
     /// Ticks of the longer checks.
     pub ticks: Tick,
@@ -33,15 +33,15 @@ pub struct Setting {
 pub struct Role {
     /// Where it starts, meters.
     pub location: Point,
-    /// What it is told about itself, if it is the one that is checked.
+    /// Its parameters, if it is the one that is checked.
     pub parameters: Parameters,
-    /// What others learn of it, by tick, if it is not; after the last one it stays as it is.
+    /// Its states by tick, if it is not; after the last one it stays as it is.
     pub states: Vec<PublicState>,
     /// Texts of the commands that it understands.
-    pub hears: Vec<String>,
+    pub understands: Vec<String>,
 }
 
-/// Ticks of the longer checks unless told otherwise.
+/// Ticks of the longer checks by default.
 const TICKS: Tick = 100;
 /// Where a robot without a scenario starts, and where the other one stands, meters.
 const CENTER: Point = Point { x: 5.0, y: 5.0 };
@@ -74,23 +74,11 @@ impl Setting {
                 "the robot asks to be {name}, and {wanted} is checked"
             ));
         }
+
         if self.cast.is_empty() {
-            let others = OTHERS.iter().filter_map(|other| RobotName::new(other).ok());
-            let other = others.into_iter().find(|other| other != name);
-            let beside = Role {
-                location: BESIDE,
-                ..Role::default()
-            };
-            let own = Role {
-                location: CENTER,
-                ..Role::default()
-            };
-            return Ok(other
-                .map(|other| (other, beside))
-                .into_iter()
-                .chain([(name.clone(), own)])
-                .collect());
+            return Ok(pair(name));
         }
+
         if !self.cast.contains_key(name) {
             let roster: Vec<&str> = self.cast.keys().map(RobotName::as_str).collect();
             return Err(format!(
@@ -98,6 +86,30 @@ impl Setting {
                 roster.join(", ")
             ));
         }
+
         Ok(self.cast.clone())
     }
+}
+
+/// The robot and one other.
+fn pair(name: &RobotName) -> BTreeMap<RobotName, Role> {
+    let mut cast = BTreeMap::new();
+    let other = OTHERS
+        .iter()
+        .filter_map(|other| RobotName::new(other).ok())
+        .find(|other| other != name);
+    if let Some(other) = other {
+        let role = Role {
+            location: BESIDE,
+            ..Role::default()
+        };
+        cast.insert(other, role);
+    }
+
+    let own = Role {
+        location: CENTER,
+        ..Role::default()
+    };
+    cast.insert(name.clone(), own);
+    cast
 }

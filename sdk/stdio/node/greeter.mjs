@@ -66,9 +66,10 @@ function begin(init) {
   };
 }
 
+/** It met a robot of the roster, or people greeted it from its panel. */
 function meet(name) {
   self.alone_s = 0;
-  self.met_s.set(name, 0);
+  if (self.met_s.has(name)) self.met_s.set(name, 0);
 }
 
 /** Progress: whom it met, and how long ago. */
@@ -77,7 +78,7 @@ function updateStateVariables(news) {
   self.alone_s += told.tick_s;
   for (const [name, met_s] of self.met_s) self.met_s.set(name, met_s + told.tick_s);
   for (const { from, command } of news.commands ?? []) {
-    if (command === "hello" && self.met_s.has(from)) meet(from);
+    if (command === "hello") meet(from);
   }
   const near = new Set((news.sensed ?? []).map(({ name }) => name));
   for (const name of near) {

@@ -6,26 +6,31 @@ use protocol::messages::Variable;
 use protocol::{RobotName, Tick};
 use serde_json::Value;
 
-use super::{Findings, played};
 use crate::comparison::is_same;
+use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Arrival, Script, Transcript};
+use crate::script::{Arrival, Script, played};
+use crate::transcript::Transcript;
 
-/// When the last commands of these checks arrive, and for how long the robot is watched.
+/// The tick in whose news the last commands of these checks arrive, and the last tick.
 const LAST: Tick = 6;
 const TICKS: Tick = 12;
 
-/// The command `text` from the sender of the kit's commands.
-fn arrival(kit: &Kit, text: &str, tick: Tick) -> Arrival {
-    Arrival {
-        from: kit.sender(),
-        text: text.to_owned(),
-        tick,
-    }
+/// Plays ticks in whose news these commands arrive, each from the sender of the kit's commands.
+fn commanded(kit: &Kit, commands: &[(&str, Tick)]) -> Result<Transcript, Failure> {
+    commanded_by(&kit.sender(), kit, commands)
 }
 
-fn told(kit: &Kit, arrivals: Vec<Arrival>) -> Result<Transcript, Failure> {
+fn commanded_by(
+    from: &RobotName,
+    kit: &Kit,
+    commands: &[(&str, Tick)],
+) -> Result<Transcript, Failure> {
+    let arrivals = commands
+        .iter()
+        .map(|(text, tick)| Arrival::new(from, text, *tick))
+        .collect();
     played(kit, &Script::with(TICKS, arrivals))
 }
 
@@ -48,22 +53,10 @@ impl Votes {
 /// Two commands in the same news have the effect of the same two in two ticks, in the same order.
 pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
     for [one, two] in kit.pairs() {
-        let apart = |first: &str, second: &str| {
-            told(
-                kit,
-                vec![arrival(kit, first, LAST - 1), arrival(kit, second, LAST)],
-            )
-        };
-        let together = |first: &str, second: &str| {
-            told(
-                kit,
-                vec![arrival(kit, first, LAST), arrival(kit, second, LAST)],
-            )
-        };
-        let straight = values(&apart(&one, &two)?);
-        let swapped = values(&apart(&two, &one)?);
-        let in_order = values(&together(&one, &two)?);
-        let reversed = values(&together(&two, &one)?);
+        let straight = values(&commanded(kit, &[(&one, LAST - 1), (&two, LAST)])?);
+        let swapped = values(&commanded(kit, &[(&two, LAST - 1), (&one, LAST)])?);
+        let in_order = values(&commanded(kit, &[(&one, LAST), (&two, LAST)])?);
+        let reversed = values(&commanded(kit, &[(&two, LAST), (&one, LAST)])?);
         // To this robot the order within a tick makes no difference: there is nothing to see.
         if in_order == reversed {
             continue;
@@ -156,12 +149,12 @@ pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
         return Ok(());
     }
 
-    let none = numbers(&told(kit, Vec::new())?);
+    let none = numbers(&commanded(kit, &[])?);
     for [text, _] in kit.pairs() {
-        let at = |tick| arrival(kit, &text, tick);
-        let once = numbers(&told(kit, vec![at(LAST)])?);
-        let apart = numbers(&told(kit, vec![at(LAST - 1), at(LAST)])?);
-        let doubled = numbers(&told(kit, vec![at(LAST), at(LAST)])?);
+        let once = numbers(&commanded(kit, &[(&text, LAST)])?);
+        let apart = numbers(&commanded(kit, &[(&text, LAST - 1), (&text, LAST)])?);
+        let doubled = numbers(&commanded(kit, &[(&text, LAST), (&text, LAST)])?);
+
         let mut votes = Votes::default();
         let mut counter = String::new();
         for (name, first) in &once {
@@ -170,7 +163,8 @@ pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
             else {
                 continue;
             };
-            // Only a variable that counts commands tells one execution from two.
+
+            // Only a variable that counts commands shows whether there were two executions.
             let is_counter = first != before && first - before == second - first;
             if is_counter && came == second {
                 votes.right += 1;
@@ -179,6 +173,7 @@ pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
                 counter.clone_from(name);
             }
         }
+
         if votes.is_broken() {
             return Err(Failure::new(
                 format!("a command that the news list twice is executed twice: {text:?}"),
@@ -216,17 +211,11 @@ fn numbers(transcript: &Transcript) -> BTreeMap<String, f64> {
 /// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.
 pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
     let operator = RobotName::operator();
-    let none = told(kit, Vec::new())?;
+    let none = commanded(kit, &[])?;
     let mut is_seen = false;
     for [text, _] in kit.pairs() {
-        let own = told(kit, vec![arrival(kit, &text, LAST)])?;
-        let from_operator = told(
-            kit,
-            vec![Arrival {
-                from: operator.clone(),
-                ..arrival(kit, &text, LAST)
-            }],
-        )?;
+        let own = commanded(kit, &[(&text, LAST)])?;
+        let from_operator = commanded_by(&operator, kit, &[(&text, LAST)])?;
         let answer = from_operator
             .iter()
             .flat_map(|entry| &entry.commands)
@@ -237,11 +226,13 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Fa
                 format!("one, after {text:?} from the operator"),
             ));
         }
+
         // An answer to the sender is an effect that the operator cannot have.
         let only_answers = values(&own) == values(&none);
         if kit.is_deterministic.get() == Some(&false) || only_answers || is_same(&own, &none) {
             continue;
         }
+
         is_seen = true;
         if is_same(&from_operator, &none) {
             let sender = kit.sender();

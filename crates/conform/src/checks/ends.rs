@@ -3,74 +3,42 @@
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
-use protocol::messages::{End, News};
+use protocol::messages::End;
 
-use super::{Findings, seated};
+use super::waiting;
+use crate::findings::Findings;
 use crate::kit::Kit;
+use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::Failure;
-use crate::script::{Script, Straight, play, step};
-use crate::stage::{Options, PATIENCE, Stage};
+use crate::script::{Script, Straight, play, seated, step};
+use crate::stage::{Options, Stage};
 
-/// A process that is told to end does so within this time. The page says 2 s; a busy machine may need more.
+/// A process ends within this time after SIGTERM. The page allows 2 s; signals and the kernel need some, too.
 const END_PATIENCE: Duration = Duration::from_secs(5);
-/// How long a wait lasts before the run ends during it.
-const WAITING: Duration = Duration::from_millis(150);
-/// Ticks within which a robot that queries others at all does so.
-const TICKS: u64 = 24;
-/// How long the robot is to wait for a simulator that is gone, seconds.
+/// How long the robot is to wait for a simulator that is gone where it comes back, or where the wait is to end, seconds.
 const GONE_S: u32 = 2;
-/// A robot that waits is still there after this time.
-const PATIENT: Duration = Duration::from_millis(1200);
+/// The same where the wait is not to end.
+const LONG_GONE_S: u32 = 60;
+/// A robot that ends at once when the simulator is gone has ended after this time.
+const HASTY: Duration = Duration::from_millis(1200);
 
 /// However a run ends, and whatever the robot waits for: it ends, as it should.
 pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
-    demand_end(&mut stage, End::Finished, "between two ticks")?;
+    for end in [End::Finished, End::Stopped, End::Aborted] {
+        let mut stage = seated(kit, Options::default())?;
+        play(&mut stage, &Script::quiet(3), &mut Straight)?;
+        demand_end(&mut stage, end, "between two ticks")?;
+    }
 
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
-    stage.withholds_news = true;
-    stage.open(&News {
-        sensed: stage.cast.sensed(1, 4).into_iter().collect(),
-        ..News::default()
-    })?;
-    stage.settle(WAITING);
+    let mut stage = waiting::for_news(kit)?;
     demand_end(&mut stage, End::Stopped, "while it waits for its news")?;
 
-    let mut stage = seated(
-        kit,
-        Options {
-            puts_states: false,
-            ..Options::default()
-        },
-    )?;
-    stage.cast.hold();
-    let is_asking = play_until_asking(&mut stage)?;
-    let when = if is_asking {
-        "while it waits for another robot's answer"
-    } else {
-        "between two ticks"
-    };
-    stage.settle(WAITING);
-    demand_end(&mut stage, End::Aborted, when)
-}
-
-/// Plays ticks until the robot waits for an answer that the others hold back. Returns whether it does.
-pub(super) fn play_until_asking(stage: &mut Stage<'_>) -> Result<bool, Failure> {
-    for tick in 0..TICKS {
-        stage.open(&News::default())?;
-        let came = stage.until("a report or a query", PATIENCE, |stage| {
-            (stage.cast.has_held() || !stage.is_open()).then_some(())
-        });
-        if stage.cast.has_held() {
-            return Ok(true);
-        }
-        came?;
-        let done = stage.complete()?;
-        debug_assert_eq!(done.report.tick, tick);
+    let (mut stage, is_asking) = waiting::for_another(kit)?;
+    if is_asking {
+        let when = "while it waits for another robot's answer";
+        demand_end(&mut stage, End::Aborted, when)?;
     }
-    Ok(false)
+    Ok(())
 }
 
 fn demand_end(stage: &mut Stage<'_>, end: End, when: &str) -> Result<(), Failure> {
@@ -86,10 +54,11 @@ fn demand_end(stage: &mut Stage<'_>, end: End, when: &str) -> Result<(), Failure
     stage.until_gone()
 }
 
-/// It is told to end by a signal, in the middle of a run.
+/// It is asked to end by a signal, in the middle of a run.
 pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
     play(&mut stage, &Script::quiet(3), &mut Straight)?;
+
     stage.process.signal(Signal::SIGTERM);
     stage.until_ended("its process ends within 2 s of SIGTERM", END_PATIENCE)?;
     stage.until_gone()
@@ -97,30 +66,55 @@ pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 
 /// The simulator's token goes: the robot waits for it, goes on if it comes back, and ends when its patience is over.
 pub(super) fn gone(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(
-        kit,
-        Options {
-            gone_patience_s: GONE_S,
-            ..Options::default()
-        },
-    )?;
-    let script = Script::quiet(3);
-    play(&mut stage, &script, &mut Straight)?;
+    gone_for_a_while(kit)?;
+    in_each_attempt(|scale| back_in_time(kit, GONE_S * scale))?;
+    gone_forever(kit)
+}
 
-    let waits = format!("it waits {GONE_S} s (CARS_GONE_PATIENCE_S) for a simulator that is gone");
+/// A robot that lost its simulator, and is to wait so long for it.
+fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Stage<'_>, Failure> {
+    let options = Options {
+        gone_patience_s,
+        ..Options::default()
+    };
+    let mut stage = seated(kit, options)?;
+    play(&mut stage, &Script::quiet(3), &mut Straight)?;
     stage.show_simulator(false)?;
-    stage.settle(PATIENT);
-    demand_running(&mut stage, &waits)?;
+    Ok(stage)
+}
+
+/// It does not end before its patience is over. There is so much of it that no machine uses it up meanwhile.
+fn gone_for_a_while(kit: &Kit) -> Result<(), Failure> {
+    let mut stage = without_simulator(kit, LONG_GONE_S)?;
+    stage.pass(HASTY);
+    let expected =
+        format!("it waits {LONG_GONE_S} s (CARS_GONE_PATIENCE_S) for a simulator that is gone");
+    demand_running(&mut stage, &expected)?;
+
     stage.show_simulator(true)?;
-    stage.settle(PATIENT);
-    demand_running(&mut stage, "it goes on when the simulator is back in time")?;
-    step(&mut stage, &script, &mut Straight)?;
+    step(&mut stage, &Script::quiet(1), &mut Straight).map(drop)
+}
 
-    stage.show_simulator(false)?;
-    stage.settle(PATIENT);
-    demand_running(&mut stage, &waits)?;
+/// The simulator is back before the robot's patience is over, and the time is over when its patience would have been.
+fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), Failure> {
+    let mut stage = without_simulator(kit, gone_patience_s)?;
+    let patience = Duration::from_secs(gone_patience_s.into());
+    stage.pass(patience / 4);
+    stage.show_simulator(true)?;
+    stage.pass(patience);
+    demand_running(
+        &mut stage,
+        "it goes on when the simulator is back in time, and waits no longer",
+    )?;
+    step(&mut stage, &Script::quiet(1), &mut Straight).map(drop)
+}
+
+/// The simulator does not come back.
+fn gone_forever(kit: &Kit) -> Result<(), Failure> {
+    let mut stage = without_simulator(kit, GONE_S)?;
     let expected = format!("its process ends when the simulator was gone for {GONE_S} s");
-    let status = stage.until_ended(&expected, PATIENCE)?;
+    let patience = PATIENCE + Duration::from_secs(GONE_S.into());
+    let status = stage.until_ended(&expected, patience)?;
     if status.success() {
         let expected = "an exit status other than 0 when the simulator is gone";
         return Err(Failure::new(expected, format!("{status}")));

@@ -5,12 +5,15 @@ use std::time::Duration;
 use protocol::messages::{Clock, Delivery, JoinRequest, News, Performative, Point};
 use protocol::{Epoch, Tick};
 
-use super::{Findings, seated, usual};
 use crate::comparison::{Difference, demand_same, difference};
+use crate::findings::Findings;
 use crate::kit::Kit;
+use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Entry, Script, Straight, Twist, play};
-use crate::stage::{Options, PATIENCE, Stage};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
+use crate::stage::{Options, Stage};
+use crate::transcript::Entry;
+use crate::wire::Joining;
 
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);
@@ -72,23 +75,29 @@ pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         by_seed.push(moves(&mut stage, seed + number, stream.clone())?);
     }
 
-    let is_one = |moves: &[Moves]| moves.iter().all(|other| Some(other) == moves.first());
-    // Only where no two are the same is it certain that chance would have shown in the others as well.
-    let is_rich = |moves: &[Moves]| (1..moves.len()).all(|at| !moves[..at].contains(&moves[at]));
     let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
-    if is_rich(&by_seed) && is_one(&by_stream) {
+    if are_all_different(&by_seed) && are_all_the_same(&by_stream) {
         return Err(Failure::new(
             expected,
             "the name of the stream makes no difference, the seed does",
         ));
     }
-    if is_rich(&by_stream) && is_one(&by_seed) {
+    if are_all_different(&by_stream) && are_all_the_same(&by_seed) {
         return Err(Failure::new(
             expected,
             "the seed makes no difference, the name of the stream does",
         ));
     }
     Ok(())
+}
+
+fn are_all_the_same(moves: &[Moves]) -> bool {
+    moves.iter().all(|other| Some(other) == moves.first())
+}
+
+/// Only where no two are the same is it certain that chance would have shown in the others as well.
+fn are_all_different(moves: &[Moves]) -> bool {
+    (1..moves.len()).all(|at| !moves[..at].contains(&moves[at]))
 }
 
 /// How the robot moves in a further epoch with this seed and stream.
@@ -103,21 +112,19 @@ fn moves(stage: &mut Stage<'_>, seed: u64, stream: String) -> Result<Moves, Fail
         return Ok(Moves::new());
     }
 
-    let shown = |entry: &Entry| {
-        (
-            entry.report.proposal,
-            entry.report.speed_mps,
-            entry.report.direction_rad,
-        )
-    };
-    Ok(played?.iter().map(shown).collect())
+    let mut moves = Moves::new();
+    for entry in played? {
+        let report = entry.report;
+        moves.push((report.proposal, report.speed_mps, report.direction_rad));
+    }
+    Ok(moves)
 }
 
 /// The clock of a higher epoch: it joins again, and goes through the same ticks as a fresh process.
 pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// At tick 0 the robot is welcomed to the epoch that is over before it is welcomed to the next one.
     struct WrongWelcome;
-    impl Twist for WrongWelcome {
+    impl Disturbance for WrongWelcome {
         fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             if tick > 0 {
                 return Ok(());
@@ -184,7 +191,8 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     stage.begin_epoch(2);
     stage.miss()?;
     stage.keeps_requests = true;
-    // A clock that does not name the robot: whatever the barrier puts for a robot that has not reported names it.
+
+    // A clock that does not name the robot: what the barrier puts for a robot that has not reported names it.
     stage.is_cut_off = true;
     stage.open(&News::default())?;
     stage.put_clock(&Clock {
@@ -193,6 +201,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         ..Clock::default()
     })?;
     stage.is_cut_off = false;
+
     let joining = join_again(&mut stage)?;
     stage.admit(&joining);
     stage.keeps_requests = false;
@@ -212,7 +221,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     Ok(())
 }
 
-fn join_again(stage: &mut Stage<'_>) -> Result<crate::stage::Joining, Failure> {
+fn join_again(stage: &mut Stage<'_>) -> Result<Joining, Failure> {
     let epoch = stage.epoch();
     stage.next_join(PATIENCE).map_err(|failure| {
         let expected = format!("another request to join for a clock of epoch {epoch}");
@@ -228,6 +237,7 @@ fn demand_silence(stage: &Stage<'_>, expected: &str) -> Result<(), Failure> {
         .answers
         .iter()
         .map(|answer| &answer.reading.report);
+
     match reports.find(|report| report.epoch == epoch) {
         None => Ok(()),
         Some(report) => Err(Failure::new(
@@ -240,14 +250,13 @@ fn demand_silence(stage: &Stage<'_>, expected: &str) -> Result<(), Failure> {
 /// It asked to join again as the process that it is.
 fn demand_same_process(stage: &Stage<'_>) -> Result<(), Failure> {
     let expected = "further requests to join with the same name and instance when an epoch begins";
-    let who =
-        |request: &JoinRequest| format!("{} with instance {:?}", request.name, request.instance);
     let mut first = None;
     for request in &stage.seen.requests {
         let request = match request {
-            Ok(request) => who(request),
+            Ok(JoinRequest { name, instance, .. }) => format!("{name} with instance {instance:?}"),
             Err(error) => return Err(Failure::new(expected, error)),
         };
+
         let first = first.get_or_insert_with(|| request.clone());
         if *first != request {
             return Err(Failure::new(

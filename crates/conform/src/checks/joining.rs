@@ -5,11 +5,12 @@ use std::time::Duration;
 use protocol::keys::{QUERIES, STATE};
 use protocol::messages::Refusal;
 
-use super::Findings;
+use crate::findings::Findings;
 use crate::kit::Kit;
+use crate::patience::{Limit, PATIENCE, START_PATIENCE};
 use crate::report::Failure;
 use crate::script::{Script, Straight, play};
-use crate::stage::{Options, PATIENCE, START_PATIENCE, Stage};
+use crate::stage::{Options, Stage};
 
 /// For how long a welcome is held back, to see whether the robot waits for it.
 const HELD_BACK: Duration = Duration::from_millis(200);
@@ -43,7 +44,7 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         }
     }
     for key in [stage.keys.clock(), stage.keys.news(&subject)] {
-        if !stage.is_heard(&key)? {
+        if !stage.has_subscriber(&key)? {
             let expected = format!("a subscriber of {key} is declared before the token");
             return Err(Failure::new(expected, "the token without it"));
         }
@@ -51,11 +52,11 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     play(&mut stage, &Script::quiet(2), &mut Straight).map(drop)
 }
 
-/// Refused for good, it ends and says why; refused because its place is taken, it tries again until its patience is over.
+/// Refused for good, it ends with the reason on its standard error; refused because its place is taken, it tries again until its patience is over.
 pub(super) fn refused(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     refused_for_good(kit)?;
     taken_for_a_while(kit)?;
-    taken_for_ever(kit)
+    taken_forever(kit)
 }
 
 fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
@@ -71,17 +72,17 @@ fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
             format!("{status}"),
         ));
     }
-    // Programs break long lines, and draw frames around them.
-    let bare = |text: &str| {
-        text.chars()
-            .filter(char::is_ascii_graphic)
-            .collect::<String>()
-    };
+
     if !bare(&stage.process.errors()).contains(&bare(&explanation)) {
         let expected = format!("the explanation on its standard error: {explanation}");
         return Err(Failure::new(expected, stage.process.fate()));
     }
     Ok(())
+}
+
+/// A text without spaces and frames: programs break long lines, and draw frames around them.
+fn bare(text: &str) -> String {
+    text.chars().filter(char::is_ascii_graphic).collect()
 }
 
 fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
@@ -95,6 +96,7 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
             "another process is this robot",
         );
     }
+
     let joining = stage.next_join(PATIENCE).map_err(|failure| {
         Failure::new(
             "another request to join after its place was taken (name_taken)",
@@ -107,7 +109,7 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
     play(&mut stage, &Script::quiet(2), &mut Straight).map(drop)
 }
 
-fn taken_for_ever(kit: &Kit) -> Result<(), Failure> {
+fn taken_forever(kit: &Kit) -> Result<(), Failure> {
     let options = Options {
         patience_s: 2,
         ..Options::default()
@@ -118,8 +120,9 @@ fn taken_for_ever(kit: &Kit) -> Result<(), Failure> {
     let expected = "its process ends when its place stays taken for longer than CARS_PATIENCE_S";
     let first = stage.next_join(START_PATIENCE)?;
     stage.refuse_join(&first, Refusal::NameTaken, explanation);
-    let begun = std::time::Instant::now();
-    while stage.process.ended().is_none() && begun.elapsed() < patience {
+
+    let mut limit = Limit::new(patience);
+    while stage.process.ended().is_none() && !limit.is_over(&stage.process) {
         if let Ok(joining) = stage.next_join(Duration::from_millis(100)) {
             stage.refuse_join(&joining, Refusal::NameTaken, explanation);
         }

@@ -5,11 +5,11 @@ use std::time::Duration;
 use protocol::Tick;
 use protocol::messages::{Clock, Correction, News, Point};
 
-use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
+use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Script, Straight, Twist, play};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
 use crate::stage::{Options, Stage};
 
 /// A report that must not come has come after this time.
@@ -21,7 +21,7 @@ const LATE_UP_TO: Tick = 14;
 pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// The news of the first ticks come after their clock, and after news of other ticks and epochs.
     struct LateNews;
-    impl Twist for LateNews {
+    impl Disturbance for LateNews {
         fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             stage.withholds_news = tick <= LATE_UP_TO;
             Ok(())
@@ -68,22 +68,25 @@ fn put_stale(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
         location: Point::new(1.0, 1.0),
         blocked: true,
     });
-    let stale = |epoch, tick| News {
-        epoch,
-        tick,
-        correction: elsewhere,
-        ..News::default()
-    };
-    if let Some(before) = tick.checked_sub(1) {
-        stage.put_news(&stale(stage.epoch(), before))?;
+
+    let of_other_epoch = (stage.epoch() - 1, tick);
+    let of_other_tick = tick.checked_sub(1).map(|before| (stage.epoch(), before));
+    for (epoch, tick) in of_other_tick.into_iter().chain([of_other_epoch]) {
+        stage.put_news(&News {
+            epoch,
+            tick,
+            correction: elsewhere,
+            ..News::default()
+        })?;
     }
-    stage.put_news(&stale(stage.epoch() - 1, tick))
+    Ok(())
 }
 
 /// Flags of other robots do not concern it.
 fn others_flags(kit: &Kit) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
     play(&mut stage, &Script::quiet(2), &mut Straight)?;
+
     // The barrier's own clock, which has no flag, does not reach the robot.
     stage.is_cut_off = true;
     stage.open(&News::default())?;
@@ -93,6 +96,7 @@ fn others_flags(kit: &Kit) -> Result<(), Failure> {
         news: !stage.flag(),
         end: None,
     })?;
+
     stage.complete().map(drop).map_err(|failure| {
         Failure::new(
             "a report for a clock that has the flags of other robots only, without any news",

@@ -1,36 +1,39 @@
-//! Queries: in every tick all robots learn of the tick before.
+//! Queries: in every tick all robots get the states of the tick before.
 
 use std::time::{Duration, Instant};
 
 use bus::Reply;
 use protocol::keys::{QUERIES, STATE};
-use protocol::messages::{Answer, Correction, News, Point, PublicState};
+use protocol::messages::{Answer, Point, PublicState};
 use protocol::{Epoch, Tick, decode};
 
-use super::ends::play_until_asking;
-use super::{Findings, seated, usual};
+use super::{computing, waiting, wire};
 use crate::comparison::demand_same;
+use crate::findings::Findings;
 use crate::kit::Kit;
+use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::Failure;
-use crate::script::{Entry, Script, Straight, Twist, play};
-use crate::stage::{Options, PATIENCE, Stage};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
+use crate::stage::{Options, Stage};
+use crate::transcript::Entry;
 
-/// A query that is answered at once has its reply within this time, also on a busy machine.
-const AT_ONCE: Duration = Duration::from_millis(1500);
-/// A robot whose tick takes so long could have answered during it.
-const COMPUTES: Duration = Duration::from_millis(80);
-/// After this time, a robot that received a clock is in its tick.
-const UNDER_WAY: Duration = Duration::from_millis(30);
 /// The kit's own limit where it waits until all replies are in.
-const ALL_REPLIES: Duration = Duration::from_secs(4);
+const ALL_REPLIES: Duration = Duration::from_secs(3);
 /// One tick in so many is asked about at length: that costs time.
 const ROUND: Tick = 10;
-/// A state that is shown after the report is there after this time.
-const LATE: Duration = Duration::from_millis(500);
+/// A state that is shown after the report is shown within this time.
+const LATE: Duration = Duration::from_secs(5);
 const ASK_AGAIN: Duration = Duration::from_millis(10);
+/// How often a robot that waits is queried, and how far apart.
+const TIMES: usize = 4;
+const APART: Duration = Duration::from_millis(20);
+/// A reply that takes so long, and comes after the report, was deferred until the tick was done.
+const DEFERRED: Duration = Duration::from_secs(1);
+/// How often a query of a robot that waits is repeated whose time was up.
+const ATTEMPTS: usize = 4;
 
-/// Asks after every tick, and follows as others do.
-struct Asker {
+/// Queries the state after each tick, and compares it with what was put for subscribers.
+struct StateQueries {
     findings: Findings,
     /// The state of the tick before.
     before: Option<PublicState>,
@@ -47,19 +50,20 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
             ..Options::default()
         },
     )?;
-    let mut asker = Asker {
+    let mut queries = StateQueries {
         findings: Findings::default(),
         before: None,
         location: stage.template.location,
     };
-    let played = play(&mut stage, &Script::usual(kit), &mut asker);
-    super::ticks::check_wire(&stage, findings);
-    findings.0.extend(asker.findings.0);
+
+    let played = play(&mut stage, &Script::usual(kit), &mut queries);
+    wire::check(&stage, findings);
+    findings.0.extend(queries.findings.0);
     if stage.seen.states.is_empty() {
         let came = "in none of the ticks, although there is a subscriber";
         findings.fail(
             "tick.state-first",
-            Failure::new("its state is put for those who follow it", came),
+            Failure::new("its state is put for its subscribers", came),
         );
     }
     played?;
@@ -74,17 +78,18 @@ fn state_of(
     tick: Tick,
     expected: &str,
 ) -> Result<Result<PublicState, Failure>, Failure> {
-    Ok(
-        state(stage.state_in(epoch, tick + 1)?, expected).and_then(|now| {
-            if (now.epoch, now.tick) == (epoch, tick) {
-                return Ok(now);
-            }
-            Err(Failure::new(
-                expected,
-                format!("the state of tick {} of epoch {}", now.tick, now.epoch),
-            ))
-        }),
-    )
+    let reply = stage.state_in(epoch, tick + 1)?;
+    let shown = state(reply, expected).and_then(|now| {
+        if (now.epoch, now.tick) == (epoch, tick) {
+            return Ok(now);
+        }
+        Err(Failure::new(
+            expected,
+            format!("the state of tick {} of epoch {}", now.tick, now.epoch),
+        ))
+    });
+
+    Ok(shown)
 }
 
 /// The same, for a robot that shows it after its report.
@@ -95,6 +100,7 @@ fn late_state_of(
     expected: &str,
 ) -> Result<Result<PublicState, Failure>, Failure> {
     let begun = Instant::now();
+
     loop {
         let came = state_of(stage, epoch, tick, expected)?;
         if came.is_ok() || begun.elapsed() > LATE {
@@ -119,7 +125,7 @@ pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState
     }
 }
 
-impl Twist for Asker {
+impl Disturbance for StateQueries {
     fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
         let epoch = entry.epoch;
         let tick = entry.tick;
@@ -127,18 +133,20 @@ impl Twist for Asker {
         // At once after the report: a robot that runs the next tick may query it.
         let mut came = state_of(stage, epoch, tick, &expected)?;
         if let Err(failure) = came {
-            // Too late, or never?
+            // It takes time to find out that a state never comes: once is enough.
+            if self.findings.has_failed("query.tick") {
+                return Ok(());
+            }
             came = late_state_of(stage, epoch, tick, &expected)?;
-            self.findings.fail(
-                if came.is_ok() {
-                    "tick.state-first"
-                } else {
-                    "query.tick"
-                },
-                failure,
-            );
+            let rule = if came.is_ok() {
+                "tick.state-first"
+            } else {
+                "query.tick"
+            };
+            self.findings.fail(rule, failure);
         }
         let Ok(now) = came else { return Ok(()) };
+
         self.findings
             .settle("tick.state-first", check_followed(stage, entry, &now));
         self.check_location(entry, &now);
@@ -147,12 +155,13 @@ impl Twist for Asker {
             .and_then(|()| check_newest(stage, tick, &now))
             .and_then(|()| check_six(stage, epoch, tick, &now));
         self.findings.settle("query.tick", matched);
+
         self.before = Some(now);
         Ok(())
     }
 }
 
-impl Asker {
+impl StateQueries {
     /// It stands where it was put, and else where it proposed.
     fn check_location(&mut self, entry: &Entry, now: &PublicState) {
         let tick = entry.tick;
@@ -161,12 +170,17 @@ impl Asker {
         if now.location == self.location {
             return;
         }
+
         if tick == 0 {
-            let expected = format!("it stands where its welcome says, at {:?}", self.location);
+            let expected = format!(
+                "it stands where its welcome places it, at {:?}",
+                self.location
+            );
             return self
                 .findings
                 .fail("tick.initial", Failure::new(expected, came));
         }
+
         let why = if entry.news.correction.is_some() {
             "as its news correct it"
         } else {
@@ -187,15 +201,15 @@ impl Asker {
             before.tick
         );
         let came = state(stage.state_in(epoch, tick)?, &expected)?;
-        if came == *before {
-            Ok(())
-        } else {
-            Err(Failure::new(expected, format!("{came:?}")))
+
+        if came != *before {
+            return Err(Failure::new(expected, format!("{came:?}")));
         }
+        Ok(())
     }
 }
 
-/// What subscribers are sent comes before the report, in every tick once the robot knows of a subscriber.
+/// What is put for subscribers comes before the report, in every tick once the robot knows of a subscriber.
 fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     let tick = entry.tick;
     let report = stage
@@ -203,6 +217,7 @@ fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result
         .answers
         .get(entry.index)
         .map_or(usize::MAX, |answer| answer.order);
+
     let mut before = stage
         .seen
         .states
@@ -211,6 +226,7 @@ fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result
     let Some((_, last)) = before.next_back() else {
         return Ok(());
     };
+
     let expected = format!("the state of tick {tick}, put before the report of tick {tick}");
     match last {
         Err(error) => Err(Failure::new(expected, error)),
@@ -235,9 +251,11 @@ fn check_state(entry: &Entry, now: &PublicState) -> Result<(), Failure> {
         emotion_state: report.emotion_state.clone(),
         behavior_state: report.behavior_state.clone(),
     };
+
     if shown == *now {
         return Ok(());
     }
+
     Err(Failure::new(
         format!("the state shows what is reported: {shown:?}"),
         format!("{now:?}"),
@@ -258,7 +276,7 @@ fn check_newest(stage: &Stage<'_>, tick: Tick, now: &PublicState) -> Result<(), 
     Ok(())
 }
 
-/// The six queries say the same, each its part.
+/// The six queries have the same answers, each its part.
 fn check_six(
     stage: &Stage<'_>,
     epoch: Epoch,
@@ -268,6 +286,7 @@ fn check_six(
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
+
     for what in QUERIES {
         let expected = format!(
             "the answer to {what} for tick {tick}: {:?}",
@@ -301,10 +320,10 @@ fn same_value(one: &serde_json::Value, two: &serde_json::Value) -> bool {
     match (one, two) {
         (Number(one), Number(two)) => one.as_f64() == two.as_f64(),
         (Object(one), Object(two)) => {
-            let is_in = |(name, value): (&String, &serde_json::Value)| {
-                two.get(name).is_some_and(|other| same_value(value, other))
-            };
-            one.len() == two.len() && one.iter().all(is_in)
+            one.len() == two.len()
+                && one.iter().all(|(name, value)| {
+                    two.get(name).is_some_and(|other| same_value(value, other))
+                })
         }
         _ => one == two,
     }
@@ -328,6 +347,7 @@ fn try_refused(stage: &Stage<'_>) -> Result<(), Failure> {
         (1, now + 1000),
         (0, now + 1),
     ];
+
     for (epoch, tick) in never {
         let expected = format!(
             "after tick {now} of epoch 1, an error reply in words to tick={tick};epoch={epoch}, at once"
@@ -352,137 +372,72 @@ fn try_refused(stage: &Stage<'_>) -> Result<(), Failure> {
 
 /// It answers at once, also while it computes, waits for its news, or waits for another robot's answer.
 pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    while_computing(kit)?;
-    while_waiting_for_news(kit)?;
-    let is_asking = while_waiting_for_another(kit)?;
+    computing::check(kit)?;
+
+    let mut stage = waiting::for_news(kit)?;
+    demand_replies(&mut stage, "while it waits for its news")?;
+
+    let (mut stage, is_asking) = waiting::for_another(kit)?;
     if !is_asking {
-        let reason = "nothing speaks against it, but the robot queried no other one, so that this was not seen while it \
+        let reason = "no fault was found, but the robot queried no other one, so that this was not checked while it \
                       waits for another robot's answer";
         findings.skip("query.at-once", reason);
+        return Ok(());
     }
-    Ok(())
-}
-
-fn while_computing(kit: &Kit) -> Result<(), Failure> {
-    /// Queries the robot in each tick that takes long: the number of the query of this tick.
-    struct Curious(Option<usize>);
-    impl Twist for Curious {
-        fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
-            self.0 = None;
-            let is_done = stage.until("the tick is complete", UNDER_WAY, |stage| {
-                (!stage.is_open()).then_some(())
-            });
-            if is_done.is_err() && tick > 0 {
-                self.0 = Some(stage.begin_query(stage.epoch(), tick)?);
-            }
-            Ok(())
-        }
-
-        fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-            let Some(number) = self.0 else {
-                return Ok(());
-            };
-            let tick = entry.tick;
-            let expected = format!("queried during tick {tick}, a reply at once");
-            stage.until(&expected, PATIENCE, |stage| {
-                stage.seen.replies.contains_key(&number).then_some(())
-            })?;
-            let report = stage
-                .seen
-                .answers
-                .get(entry.index)
-                .map_or(usize::MAX, |answer| answer.order);
-            let is_late = stage
-                .seen
-                .replies
-                .get(&number)
-                .is_some_and(|(order, _)| *order > report);
-            if is_late && entry.took > COMPUTES {
-                let came = format!(
-                    "one after its report, which took {} ms",
-                    entry.took.as_millis()
-                );
-                return Err(Failure::new(expected, came));
-            }
-            Ok(())
-        }
-    }
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::usual(kit), &mut Curious(None)).map(drop)
-}
-
-fn while_waiting_for_news(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
-    let tick = stage.next_tick();
-    stage.withholds_news = true;
-    stage.open(&News {
-        correction: Some(Correction {
-            location: stage.body.stands,
-            blocked: true,
-        }),
-        ..News::default()
-    })?;
-    stage.settle(UNDER_WAY);
-    demand_reply(&mut stage, tick, "while it waits for its news")
-}
-
-/// Returns whether there was an occasion to see it.
-fn while_waiting_for_another(kit: &Kit) -> Result<bool, Failure> {
-    let mut stage = seated(
-        kit,
-        Options {
-            puts_states: false,
-            ..Options::default()
-        },
-    )?;
-    stage.cast.hold();
-    if !play_until_asking(&mut stage)? {
-        return Ok(false);
-    }
-
-    let tick = stage.next_tick() - 1;
-    demand_reply(
-        &mut stage,
-        tick,
-        "while it waits for another robot's answer",
-    )?;
+    demand_replies(&mut stage, "while it waits for another robot's answer")?;
     stage.cast.release();
-    stage.complete()?;
-    Ok(true)
+    stage.complete().map(drop)
 }
 
-fn demand_reply(stage: &mut Stage<'_>, tick: Tick, when: &str) -> Result<(), Failure> {
-    let number = stage.begin_query(1, tick)?;
+/// The robot answers in the open tick. Its wait lasts until the kit ends it, so that no answer is late: it comes or not. A
+/// robot that does not wait gives no occasion to see it.
+fn demand_replies(stage: &mut Stage<'_>, when: &str) -> Result<(), Failure> {
+    let tick = stage.next_tick() - 1;
     let expected = format!(
         "queried in tick {tick} {when}, the state of tick {} at once",
         tick - 1
     );
-    let reply = stage
-        .until(&expected, AT_ONCE, |stage| {
-            stage.seen.replies.get(&number).cloned()
-        })
-        .map_err(|_| Failure::new(&expected, "no reply"))?;
-    let came = state(reply.1, &expected)?;
-    if came.tick + 1 == tick {
-        return Ok(());
-    }
 
-    Err(Failure::new(
-        expected,
-        format!("the state of tick {}", came.tick),
-    ))
+    for _ in 0..TIMES {
+        let begun = Instant::now();
+        let reply = reply_in(stage, tick, &expected)?;
+        if !stage.is_open() {
+            if begun.elapsed() < DEFERRED {
+                return Ok(());
+            }
+            return Err(Failure::new(expected, "a report before the reply"));
+        }
+
+        let came = state(reply, &expected)?;
+        if came.tick + 1 != tick {
+            return Err(Failure::new(
+                expected,
+                format!("the state of tick {}", came.tick),
+            ));
+        }
+        stage.pass(APART);
+    }
+    Ok(())
+}
+
+/// The robot's reply; `None` if the tick is over before there is one.
+fn reply_in(stage: &mut Stage<'_>, tick: Tick, expected: &str) -> Result<Option<Reply>, Failure> {
+    for _ in 0..ATTEMPTS {
+        let number = stage.begin_query(stage.epoch(), tick)?;
+        let reply = stage.until(expected, PATIENCE, |stage| {
+            let (_, reply) = stage.seen.replies.get(&number)?;
+            Some(reply.clone())
+        })?;
+        if reply.is_some() || !stage.is_open() {
+            return Ok(reply);
+        }
+    }
+    Ok(None)
 }
 
 /// What it asks others: with tick and epoch, not at tick 0, not those that it cannot reach.
 pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(
-        kit,
-        Options {
-            puts_states: false,
-            ..Options::default()
-        },
-    )?;
+    let mut stage = waiting::of_queries(kit)?;
     let played = play(&mut stage, &Script::usual(kit), &mut Straight)?;
     let asked = stage.cast.asked();
     if asked.is_empty() {
@@ -515,35 +470,20 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> 
     Ok(())
 }
 
-/// Each query has exactly one reply, the query object is let go of, and no key is served that is not its own.
+/// Each query has exactly one reply, the query object is released, and the robot has no queryable of another key.
 pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let mut stage = seated(kit, Options::default())?;
     play(&mut stage, &Script::quiet(3), &mut Straight)?;
-    let subject = kit.subject();
     for what in QUERIES.iter().chain([&STATE]) {
-        let begun = Instant::now();
-        let key = stage.keys.query(&subject, what);
-        let replies = kit.bus.get_all(&key, "tick=4;epoch=1", ALL_REPLIES)?;
-        if replies.len() != 1 {
-            let came = format!("{} replies", replies.len());
-            return Err(Failure::new(
-                format!("one reply to a query of {what}"),
-                came,
-            ));
-        }
-        if begun.elapsed() > ALL_REPLIES / 2 {
-            return Err(Failure::new(
-                format!("it lets go of a query of {what} when it has replied"),
-                "a query that ends only because time is up",
-            ));
-        }
+        in_each_attempt(|scale| demand_one_reply(&stage, what, ALL_REPLIES * scale))?;
     }
 
+    let subject = kit.subject();
     for what in ["percept", "news", "report", "panel", "waiting"] {
         let key = stage.keys.query(&subject, what);
         let replies = kit.bus.get_all(&key, "", ALL_REPLIES)?;
         if !replies.is_empty() {
-            let expected = format!("no queryable of {what}: a robot serves its seven keys");
+            let expected = format!("no queryable of {what}: a robot declares its seven keys");
             return Err(Failure::new(expected, "a reply"));
         }
     }
@@ -558,10 +498,32 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     Ok(())
 }
 
+/// One reply, and the end of the query with it: a query that is not released takes all the time that the kit has.
+fn demand_one_reply(stage: &Stage<'_>, what: &str, patience: Duration) -> Result<(), Failure> {
+    let key = stage.keys.query(&stage.kit.subject(), what);
+    let begun = Instant::now();
+    let replies = stage.kit.bus.get_all(&key, "tick=4;epoch=1", patience)?;
+    let took = begun.elapsed();
+
+    if replies.len() != 1 {
+        return Err(Failure::new(
+            format!("one reply to a query of {what}"),
+            format!("{} replies", replies.len()),
+        ));
+    }
+    if took >= patience {
+        return Err(Failure::new(
+            format!("it releases a query of {what} when it has replied"),
+            "a query that ends only because time is up",
+        ));
+    }
+    Ok(())
+}
+
 /// Queried for what does not exist, it gives no answer and goes on.
 pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Odd;
-    impl Twist for Odd {
+    impl Disturbance for Odd {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
             if !entry.tick.is_multiple_of(8) {
                 return Ok(());
@@ -584,6 +546,7 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             Ok(())
         }
     }
+
     let mut stage = seated(kit, Options::default())?;
     let asked = play(&mut stage, &Script::usual(kit), &mut Odd)?;
     demand_same(kit, "a query for what does not exist", usual(kit)?, &asked)

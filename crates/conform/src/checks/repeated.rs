@@ -1,53 +1,87 @@
 //! The same clock again, and clocks that come too late.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use protocol::messages::{Clock, Correction, News, Point};
 use protocol::{Epoch, Tick};
 
-use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
+use crate::findings::Findings;
 use crate::kit::Kit;
+use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Entry, Script, Twist, play};
-use crate::stage::{Answer, Options, PATIENCE, Sent, Stage};
+use crate::script::{Disturbance, Script, play, seated, usual};
+use crate::seen::{Answer, Sent};
+use crate::stage::{Options, Stage};
+use crate::transcript::Entry;
 
 /// One clock in so many comes again, and each whose tick had commands.
 const EVERY: Tick = 3;
 /// How long a robot may still send what belongs to the tick itself.
 const BEFORE_REPEATING: Duration = Duration::from_millis(50);
+/// How long the commands may take that should have come before the report that is there.
+const COMMANDS_PATIENCE: Duration = Duration::from_secs(2);
 
 /// A clock that comes again is answered as before, and a tick is done once.
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Again;
-    impl Twist for Again {
+    impl Disturbance for Again {
         fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
-            let tick = entry.tick;
-            if !tick.is_multiple_of(EVERY) && entry.commands.is_empty() {
-                return Ok(());
+            if entry.tick.is_multiple_of(EVERY) || !entry.commands.is_empty() {
+                repeat(stage, entry)?;
             }
-
-            // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
-            stage.settle(BEFORE_REPEATING);
-            let since = stage.seen.count;
-            stage.repeat();
-            let expected = format!("the report of tick {tick} again when its clock comes again");
-            let again = stage.until(&expected, PATIENCE, |stage| {
-                answers_of(stage, tick)
-                    .find(|answer| answer.order >= since)
-                    .map(|answer| (answer.order, answer.bytes.clone()))
-            })?;
-            let first = answers_of(stage, tick)
-                .next()
-                .map(|answer| answer.bytes.clone());
-            demand_bytes("report", &first.unwrap_or_default(), &again.1)?;
-            demand_commands(stage, entry, since, again.0)
+            Ok(())
         }
     }
     let mut stage = seated(kit, Options::default())?;
     let repeated = play(&mut stage, &Script::usual(kit), &mut Again)?;
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
+}
+
+/// Repeats the clock of a tick, and waits for its report and its commands.
+fn repeat(stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+    // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
+    stage.pass(BEFORE_REPEATING);
+    let since = stage.seen.count;
+    stage.repeat();
+
+    let tick = entry.tick;
+    let expected = format!("the report of tick {tick} again when its clock comes again");
+    stage.until(&expected, PATIENCE, |stage| {
+        answers_of(stage, tick)
+            .any(|answer| answer.order >= since)
+            .then_some(())
+    })?;
+    let mut answers = answers_of(stage, tick);
+    let first = answers.next().map(|answer| answer.bytes.clone());
+    for again in answers {
+        demand_bytes("report", first.as_deref().unwrap_or_default(), &again.bytes)?;
+    }
+
+    // A second report that the robot put by itself may have come before the one that follows the commands.
+    let came = stage.until("", COMMANDS_PATIENCE, |stage| {
+        let report = answers_of(stage, tick).last()?.order;
+        missing(stage, entry, since, report).is_none().then_some(())
+    });
+    if came.is_err() {
+        let report = answers_of(stage, tick).last();
+        let report = report.map_or(usize::MAX, |answer| answer.order);
+        let expected = format!(
+            "command {} of tick {tick} again, before the report, when the clock of tick {tick} comes again",
+            missing(stage, entry, since, report).unwrap_or_default()
+        );
+        return Err(Failure::new(expected, "the report without it"));
+    }
+
+    for first in &entry.commands {
+        for again in commands_since(stage, since) {
+            if again.number() == first.number() && again.tick() == Some(tick) {
+                demand_bytes("command", &first.bytes, &again.bytes)?;
+            }
+        }
+    }
+    Ok(())
 }
 
 fn answers_of<'s>(stage: &'s Stage<'_>, tick: Tick) -> impl Iterator<Item = &'s Answer> {
@@ -58,37 +92,28 @@ fn answers_of<'s>(stage: &'s Stage<'_>, tick: Tick) -> impl Iterator<Item = &'s 
         .filter(move |answer| answer.reading.report.tick == tick)
 }
 
-/// The commands of the tick came again between two places among all that came: all of them, and the same bytes.
-fn demand_commands(
-    stage: &Stage<'_>,
-    entry: &Entry,
-    since: usize,
-    report: usize,
-) -> Result<(), Failure> {
-    let tick = entry.tick;
-    let mut again: BTreeMap<u32, &Sent> = BTreeMap::new();
-    for sent in &stage.seen.commands {
-        let Ok(command) = &sent.command else { continue };
-        let is_between = sent.order >= since && sent.order < report;
-        if command.tick == tick && is_between {
-            again.insert(command.number, sent);
-        }
-    }
+/// Commands that came since a place among all that came.
+fn commands_since<'s>(stage: &'s Stage<'_>, since: usize) -> impl Iterator<Item = &'s Sent> {
+    stage
+        .seen
+        .commands
+        .iter()
+        .filter(move |sent| sent.order >= since)
+}
 
-    for first in &entry.commands {
-        let Ok(command) = &first.command else {
-            continue;
-        };
-        let Some(repeated) = again.get(&command.number) else {
-            let expected = format!(
-                "command {} of tick {tick} again, before the report, when the clock of tick {tick} comes again",
-                command.number
-            );
-            return Err(Failure::new(expected, "the report without it"));
-        };
-        demand_bytes("command", &first.bytes, &repeated.bytes)?;
-    }
-    Ok(())
+/// The number of a command of the tick that did not come again between two places among all that came.
+fn missing(stage: &Stage<'_>, entry: &Entry, since: usize, report: usize) -> Option<u32> {
+    let came: BTreeSet<Option<u32>> = commands_since(stage, since)
+        .filter(|sent| sent.order < report && sent.tick() == Some(entry.tick))
+        .map(Sent::number)
+        .collect();
+
+    entry
+        .commands
+        .iter()
+        .map(Sent::number)
+        .find(|number| !came.contains(number))
+        .flatten()
 }
 
 fn demand_bytes(what: &str, first: &[u8], again: &[u8]) -> Result<(), Failure> {
@@ -112,7 +137,7 @@ fn count_of(stage: &Stage<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
 pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// Reports that had come for the late clocks' epochs and ticks before they were put.
     struct Late(Vec<((Epoch, Tick), usize)>);
-    impl Twist for Late {
+    impl Disturbance for Late {
         fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             if tick < 6 || !tick.is_multiple_of(EVERY) {
                 return Ok(());

@@ -5,12 +5,14 @@ use std::time::Duration;
 use protocol::messages::{Clock, News, PublicState};
 use protocol::{Generation, Tick};
 
-use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
+use crate::findings::Findings;
 use crate::kit::Kit;
+use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Entry, Script, Straight, play, step};
-use crate::stage::{Options, PATIENCE, Stage};
+use crate::script::{Script, Straight, play, seated, step, usual};
+use crate::stage::{Options, Stage};
+use crate::transcript::Entry;
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;

@@ -7,11 +7,16 @@ use protocol::PROTOCOL_VERSION;
 use protocol::messages::Performative;
 use protocol::name::OPERATOR;
 
-use super::{Findings, seated};
+use super::wire;
+use crate::findings::Findings;
 use crate::kit::{CannotRun, Kit};
+use crate::patience::START_PATIENCE;
 use crate::report::{AnswerTimes, Failure};
-use crate::script::{Entry, Script, Straight, Transcript, play};
-use crate::stage::{Joining, Options, START_PATIENCE, Sent, Stage};
+use crate::script::{Script, Straight, play, seated};
+use crate::seen::Sent;
+use crate::stage::{Options, Stage};
+use crate::transcript::{Entry, Transcript};
+use crate::wire::Joining;
 
 /// The rules that the usual ticks show.
 pub(super) const USUAL: [&str; 7] = [
@@ -24,34 +29,34 @@ pub(super) const USUAL: [&str; 7] = [
     "wire.qos",
 ];
 
-/// Whatever a robot put beside its reports has arrived after this time.
+/// What a robot put beside its reports has arrived after this time.
 const ECHO: Duration = Duration::from_millis(200);
 /// How far an angle may be from a multiple of 1e-6 rad, in such multiples: what binary fractions leave.
 const ANGLE_TOLERANCE: f64 = 1e-3;
+/// What is expected of integer fields.
+const WHOLE: &str = "integers without a fraction";
 /// Half a turn, rounded as angles are, in units of 1e-6 rad.
 const HALF_TURN: f64 = 3_141_593.0;
 
-/// Plays the usual ticks, and keeps them for comparison. It is here that the robot is met for the first time. Returns the
-/// rule that keeps the robot from getting through them, if one does.
+/// Plays the usual ticks, and keeps them for comparison. Here the robot asks to join for the first time. Returns the rule
+/// that keeps the robot from getting through them, if one does.
 pub(super) fn usual(
     kit: &Kit,
     findings: &mut Findings,
 ) -> Result<(Option<&'static str>, Option<AnswerTimes>), CannotRun> {
-    let cannot =
-        |failure: Failure| CannotRun::Robot(format!("{}: {}", failure.expected, failure.came));
     let mut stage = Stage::open_run(kit, Options::default())
         .map_err(|failure| CannotRun::Robot(failure.came))?;
-    let joining = stage.next_join(START_PATIENCE).map_err(cannot)?;
+    let joining = stage.next_join(START_PATIENCE).map_err(cannot_run)?;
     let request = joining.request.clone().map_err(CannotRun::Robot)?;
     kit.learn(&request)?;
     findings.settle("join.request", check_request(&stage, &joining));
-    stage.prepare().map_err(cannot)?;
+    stage.prepare().map_err(cannot_run)?;
     stage.admit(&joining);
     stage.keeps_requests = false;
-    stage.until_ready().map_err(cannot)?;
+    stage.until_ready().map_err(cannot_run)?;
 
     let played = play(&mut stage, &Script::usual(kit), &mut Straight);
-    check_wire(&stage, findings);
+    wire::check(&stage, findings);
     let transcript = match played {
         Ok(transcript) => transcript,
         Err(failure) => {
@@ -80,25 +85,31 @@ pub(super) fn usual(
     Ok((None, AnswerTimes::of(times)))
 }
 
+fn cannot_run(failure: Failure) -> CannotRun {
+    let Failure { expected, came } = failure;
+    CannotRun::Robot(format!("{expected}: {came}"))
+}
+
+fn expect(holds: bool, expected: String, came: String) -> Result<(), Failure> {
+    if holds {
+        return Ok(());
+    }
+
+    Err(Failure::new(expected, came))
+}
+
 /// What a request to join must contain.
 fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
     let Ok(request) = &joining.request else {
         return Ok(());
     };
-    let expect = |holds: bool, expected: String, came: String| {
-        if holds {
-            Ok(())
-        } else {
-            Err(Failure::new(expected, came))
-        }
-    };
-
     let version = request.protocol;
     expect(
         version == PROTOCOL_VERSION,
         format!("protocol {PROTOCOL_VERSION}"),
         format!("protocol {version}"),
     )?;
+
     expect(
         request.run == stage.run,
         format!("run {}, the value of CARS_RUN", stage.run),
@@ -109,6 +120,7 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
         "an instance that no other process has".to_owned(),
         "an empty one".to_owned(),
     )?;
+
     let own = stage.keys.join_as(&request.name);
     expect(
         joining.key == own,
@@ -189,6 +201,7 @@ fn check_stamps(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failur
             Ok(command) => command,
             Err(error) => return Err(Failure::new("commands that can be read", error)),
         };
+
         let is_granted = transcript
             .iter()
             .any(|entry| (entry.epoch, entry.tick) == (command.epoch, command.tick));
@@ -201,6 +214,7 @@ fn check_stamps(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failur
                 .iter()
                 .any(|name| name.as_str() == sent.to);
         let is_right = command.generation == 1 && command.performative == Performative::Achieve;
+
         if !(is_granted && is_own && is_known && is_right) {
             let expected = format!(
                 "commands of generation 1 and of a tick that was granted, performative achieve, from {subject} to robots \
@@ -268,14 +282,6 @@ fn describe(sent: &Sent) -> String {
     }
 }
 
-/// How messages were put.
-pub(super) fn check_wire(stage: &Stage<'_>, findings: &mut Findings) {
-    if let Some(wrong) = stage.seen.wrong_qos.first() {
-        let expected = "put with congestion control block, not express, with the default priority";
-        findings.fail("wire.qos", Failure::new(expected, wrong));
-    }
-}
-
 /// Angles as they are published, and numbers that are finite and written as they should be.
 fn check_numbers(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Findings) {
     for answer in &stage.seen.answers {
@@ -286,24 +292,29 @@ fn check_numbers(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Find
         }
         if let Some(field) = answer.reading.not_integers.first() {
             let came = format!("{field} of the report of tick {tick}");
-            let expected = "integers without a fraction";
-            findings.fail("number.integers", Failure::new(expected, came));
+            findings.fail("number.integers", Failure::new(WHOLE, came));
         }
     }
     if let Some(field) = stage.seen.not_integers.first() {
         let came = format!("{field} of a command");
-        let expected = "integers without a fraction";
-        findings.fail("number.integers", Failure::new(expected, came));
+        findings.fail("number.integers", Failure::new(WHOLE, came));
     }
 
     for entry in transcript {
-        let micro = entry.report.direction_rad * 1e6;
-        let is_rounded = (micro - micro.round()).abs() <= ANGLE_TOLERANCE;
-        let is_minus_zero = micro == 0.0 && micro.is_sign_negative();
-        if !is_rounded || is_minus_zero || micro.round().abs() > HALF_TURN {
+        let direction_rad = entry.report.direction_rad;
+        if !is_published_angle(direction_rad) {
             let expected = "direction_rad from -pi to pi, rounded to 1e-6 rad, 0 instead of -0";
-            let came = format!("{} in tick {}", entry.report.direction_rad, entry.tick);
+            let came = format!("{direction_rad} in tick {}", entry.tick);
             findings.fail("number.angles", Failure::new(expected, came));
         }
     }
+}
+
+/// Whether an angle is rounded and within half a turn.
+fn is_published_angle(angle_rad: f64) -> bool {
+    let micro_rad = angle_rad * 1e6;
+    let is_rounded = (micro_rad - micro_rad.round()).abs() <= ANGLE_TOLERANCE;
+    let is_minus_zero = micro_rad == 0.0 && micro_rad.is_sign_negative();
+
+    is_rounded && !is_minus_zero && micro_rad.round().abs() <= HALF_TURN
 }

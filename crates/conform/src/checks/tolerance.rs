@@ -3,11 +3,11 @@
 use protocol::Tick;
 use protocol::messages::MAX_TEXT_BYTES;
 
-use super::{Findings, seated, usual};
 use crate::comparison::demand_same;
+use crate::findings::Findings;
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Script, Straight, Twist, play};
+use crate::script::{Disturbance, Script, Straight, play, seated, usual};
 use crate::stage::{Options, Stage};
 
 /// Later versions of the contract add fields: everything that the robot receives carries some.
@@ -23,10 +23,23 @@ pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), Failure>
     demand_same(kit, "an unknown field", usual(kit)?, &played)
 }
 
+/// JSON does not distinguish 7 from 7.0: everything that the robot receives has whole numbers without a fraction.
+pub(super) fn integers(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+    let mut stage = seated(
+        kit,
+        Options {
+            writes_integers: true,
+            ..Options::default()
+        },
+    )?;
+    let played = play(&mut stage, &Script::usual(kit), &mut Straight)?;
+    demand_same(kit, "that 7.0 is written as 7", usual(kit)?, &played)
+}
+
 /// Messages that cannot be understood change nothing, and are reported.
 pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Rubbish;
-    impl Twist for Rubbish {
+    impl Disturbance for Rubbish {
         fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
             if tick % 4 != 1 {
                 return Ok(());
@@ -40,6 +53,7 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             Ok(())
         }
     }
+
     let mut stage = seated(kit, Options::default())?;
     let before = stage.process.error_bytes();
     let played = play(&mut stage, &Script::usual(kit), &mut Rubbish)?;
@@ -72,6 +86,7 @@ fn common() -> Vec<Vec<u8>> {
         "{\"epoch\":1}",
         "\"clock\"",
     ];
+
     let mut rubbish: Vec<Vec<u8>> = texts.iter().map(|text| text.as_bytes().to_vec()).collect();
     rubbish.push(vec![0xff, 0xfe, 0x00, 0x80]);
     rubbish
@@ -79,6 +94,7 @@ fn common() -> Vec<Vec<u8>> {
 
 fn clocks(tick: Tick) -> Vec<Vec<u8>> {
     let mut rubbish = common();
+
     for text in [
         format!("{{\"epoch\":\"1\",\"tick\":{tick}}}"),
         format!("{{\"epoch\":1,\"tick\":\"{tick}\"}}"),
@@ -92,6 +108,7 @@ fn clocks(tick: Tick) -> Vec<Vec<u8>> {
     ] {
         rubbish.push(text.into_bytes());
     }
+
     rubbish
 }
 
@@ -113,5 +130,6 @@ fn news(tick: Tick) -> Vec<Vec<u8>> {
     ] {
         rubbish.push(text.into_bytes());
     }
+
     rubbish
 }

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
+# @NAME@ strolls back and forth. When it has been blocked for too long, it becomes frustrated and turns around.
 #
-# `cars exec` speaks the simulator's protocol for it: it is told and answers with one JSON object a
-# line, over standard input and output. What it writes to standard error is shown by the launcher,
+# `cars exec` speaks the simulator's protocol for it: one JSON object a line arrives on standard input,
+# and the answers go to standard output. What it writes to standard error is shown by the launcher,
 # and kept in the log of its process.
 #
 # No program but Bash is needed. Lines are searched with regular expressions: `type` is their first
@@ -29,15 +29,15 @@ decimal() {
     printf -v REPLY '%s%d.%06d' "$sign" $((value / 1000000)) $((value % 1000000))
 }
 
-# Where it really stands: if somebody was in the way, that is where it was.
+# Where it stands now: the place it proposed, or its old one if that was taken.
 stand() {
     millionths 'location":\{"x'; x=$REPLY
-    # As it is: it is only given back.
+    # Kept as text: it is only reported.
     [[ $line =~ \"location\":\{\"x\":[^,]*,\"y\":([^\}]*)\} ]] && y=${BASH_REMATCH[1]}
 }
 
-# Before tick 0, and whenever the run begins anew: start from nothing. Parameters are [robot.params] of
-# the scenario, in SI units.
+# Before tick 0, and whenever the run starts again: back to the initial state. Parameters are
+# [robot.params] of the scenario, in SI units.
 init() {
     stand
     millionths tick_s; tick_us=$REPLY
@@ -45,9 +45,9 @@ init() {
     millionths walk_m; from=$x to=$((x + REPLY))
     millionths speed_mps; speed=$REPLY
     millionths patience_s; patience_us=$REPLY
-    held_up_us=0 # Its measure of progress: for how long it has been held up.
+    held_up_us=0 # Its measure of progress: how long it has been blocked.
     turns=0 emotion=HAPPY behavior=STROLL
-    # What people see of it: two buttons that send it commands.
+    # Its panel in the console: two buttons that send it commands.
     say '{"type":"panel","widgets":['\
 '{"widget":"button","label":"Rest","command":"rest"},'\
 '{"widget":"button","label":"Stroll","command":"stroll"}]}'
@@ -75,7 +75,7 @@ obey() {
     done
 }
 
-# One tick: what it is told, what it feels, what it does about it.
+# One tick: from what it perceives to what it does.
 tick() {
     local was=$emotion
     stand
@@ -98,7 +98,7 @@ tick() {
     if ((x == to)); then turn; fi
 }
 
-# The end of every tick: where it wants to stand at the next one, and what others may learn.
+# The end of every tick: where it wants to stand at the next one, and what other robots can query.
 finish() {
     local goal=$x now=0 direction=0 step=$((speed * tick_us / 1000000))
     if [[ $behavior == STROLL ]]; then

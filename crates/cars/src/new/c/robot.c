@@ -1,7 +1,7 @@
-/* @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
+/* @NAME@ strolls back and forth. When it has been blocked for too long, it becomes frustrated and turns around.
  *
- * `cars exec` speaks the simulator's protocol for it: it is told and answers with one JSON object a
- * line, over standard input and output. What it writes to standard error is shown by the launcher,
+ * `cars exec` speaks the simulator's protocol for it: one JSON object a line arrives on standard input,
+ * and the answers go to standard output. What it writes to standard error is shown by the launcher,
  * and kept in the log of its process.
  *
  * No library but the standard one is needed. Lines are searched for what stands in front of a value:
@@ -15,13 +15,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* All that it remembers: init sets everything. Meters, seconds. */
+/* Its state: init sets everything. Meters, seconds. */
 static struct {
     double tick_s;
     double walk_m, speed_mps, patience_s; /* [robot.params] of the scenario, in SI units */
     double x, y;
     double from_x, to_x; /* the ends of its stroll; it is on its way to the second */
-    double held_up_s;    /* its measure of progress: for how long it has been held up */
+    double held_up_s;    /* its measure of progress: how long it has been blocked */
     int turns;
     bool is_frustrated, is_resting;
 } robot;
@@ -39,7 +39,7 @@ static int length(const char *text) {
     return at;
 }
 
-/* Where it really stands: if somebody was in the way, that is where it was. */
+/* Where it stands now: the place it proposed, or its old one if that was taken. */
 static void stand(const char *line) {
     const char *location = strstr(line, "\"location\":{");
     if (!location) return;
@@ -47,7 +47,7 @@ static void stand(const char *line) {
     robot.y = number(location, "\"y\":");
 }
 
-/* Before tick 0, and whenever the run begins anew: start from nothing. */
+/* Before tick 0, and whenever the run starts again: back to the initial state. */
 static void init(const char *line) {
     memset(&robot, 0, sizeof robot);
     stand(line);
@@ -57,7 +57,7 @@ static void init(const char *line) {
     robot.patience_s = number(line, "\"patience_s\":");
     robot.from_x = robot.x;
     robot.to_x = robot.x + robot.walk_m;
-    /* What people see of it: two buttons that send it commands. */
+    /* Its panel in the console: two buttons that send it commands. */
     puts("{\"type\":\"panel\",\"widgets\":["
          "{\"widget\":\"button\",\"label\":\"Rest\",\"command\":\"rest\"},"
          "{\"widget\":\"button\",\"label\":\"Stroll\",\"command\":\"stroll\"}]}");
@@ -93,7 +93,7 @@ static void obey(const char *line) {
     }
 }
 
-/* One tick: what it is told, what it feels, what it does about it. */
+/* One tick: from what it perceives to what it does. */
 static void tick(const char *line) {
     stand(line);
     obey(line);
@@ -113,8 +113,8 @@ static void tick(const char *line) {
     if (robot.x == robot.to_x) turn();
 }
 
-/* The end of every tick: where it wants to stand at the next one, and what others may learn. 17 digits
- * are the whole number, to the last bit. */
+/* The end of every tick: where it wants to stand at the next one, and what other robots can query. 17
+ * digits are the whole number, to the last bit. */
 static void done(void) {
     double speed_mps = robot.is_resting ? 0 : robot.speed_mps;
     double step = speed_mps * robot.tick_s, left = robot.to_x - robot.x;

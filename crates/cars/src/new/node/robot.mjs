@@ -1,8 +1,8 @@
 #!/usr/bin/env node
-// @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
+// @NAME@ strolls back and forth. When it has been blocked for too long, it becomes frustrated and turns around.
 //
-// `cars exec` speaks the simulator's protocol for it: it is told and answers with one JSON object a
-// line, over standard input and output. What it writes to standard error is shown by the launcher,
+// `cars exec` speaks the simulator's protocol for it: one JSON object a line arrives on standard input,
+// and the answers go to standard output. What it writes to standard error is shown by the launcher,
 // and kept in the log of its process.
 
 import { createInterface } from "node:readline";
@@ -20,12 +20,12 @@ function init({ location, parameters, tick_s }) {
     at: location,
     // The ends of its stroll, meters from the left edge; it is on its way to the second.
     endsX: [location.x, location.x + parameters.walk_m],
-    heldUpS: 0, // its measure of progress: for how long it has been held up, seconds
+    heldUpS: 0, // its measure of progress: how long it has been blocked, seconds
     turns: 0,
     isFrustrated: false,
     isResting: false,
   };
-  // What people see of it: two buttons that send it commands.
+  // Its panel in the console: two buttons that send it commands.
   say({
     type: "panel",
     widgets: [
@@ -51,7 +51,7 @@ function obey({ from, command }) {
 
 /** One tick: what it is told, what it feels, what it does about it. */
 function tick({ location, blocked = false, commands = [] }) {
-  robot.at = location; // Where it really stands: if somebody was in the way, that is where it was.
+  robot.at = location; // Where it stands now: the place it proposed, or its old one if that was taken.
   commands.forEach(obey);
 
   // Progress.

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""@NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
+"""@NAME@ strolls back and forth. When it has been blocked for too long, it becomes frustrated and turns around.
 
 In every tick the methods of the robot are called in this order: ``set_current_location``,
 ``set_command`` for each command, ``update_state_variables``, ``update_emotion_state``,
-``update_behavior_state``, ``project_location``; then the others learn what the getters return.
+``update_behavior_state``, ``project_location``; then other robots can query what the getters return.
 """
 
 import math
@@ -26,12 +26,12 @@ class Parameters:
 
 class Stroller(cars_robot.Robot):
     def init_robot(self, cars: Cars) -> None:
-        """Before tick 0, and whenever the run begins anew: start from nothing."""
+        """Before tick 0, and whenever the run starts again: back to the initial state."""
         self.parameters = cars.parameters(Parameters)
         self.at = cars.welcome.location
         # The ends of its stroll, meters from the left edge; it is on its way to the second.
         self.ends_x = [self.at.x, self.at.x + self.parameters.walk_m]
-        # Its measure of progress: for how long it has been held up, seconds.
+        # Its measure of progress: how long it has been blocked, seconds.
         self.held_up_s = 0.0
         self.turns = 0
         self.was_frustrated = False
@@ -43,7 +43,7 @@ class Stroller(cars_robot.Robot):
         self.turns += 1
 
     def set_current_location(self, cars: Cars, location: Point) -> None:
-        """Where it really stands: if somebody was in the way, that is where it was."""
+        """Where it stands now: the place it proposed, or its old one if that was taken."""
         self.at = location
 
     def set_command(self, cars: Cars, sender: str, command: str) -> None:
@@ -54,7 +54,7 @@ class Stroller(cars_robot.Robot):
         cars.log(f"obeys {sender}: {command}")
 
     def update_state_variables(self, cars: Cars) -> None:
-        """What it measures itself by. To look around: ``cars.percept()``; to ask others:
+        """Its progress. To look around: ``cars.percept()``; to query another robot:
         ``cars.get_robot_state("Butler")``."""
         if cars.was_blocked:
             self.held_up_s += cars.tick_s
@@ -103,7 +103,7 @@ class Stroller(cars_robot.Robot):
         return "REST" if self.is_resting else "STROLL"
 
     def panel(self) -> Panel:
-        """What people see of it: two buttons that send it commands."""
+        """Its panel in the console: two buttons that send it commands."""
         return Panel([Button("Rest", "rest"), Button("Stroll", "stroll")])
 
 

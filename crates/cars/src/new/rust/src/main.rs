@@ -1,4 +1,4 @@
-//! @NAME@ strolls to and fro. Being held up frustrates it, and frustrated it turns around.
+//! @NAME@ strolls back and forth. When it has been blocked for too long, it becomes frustrated and turns around.
 
 use robot::{Action, BadParameters, Cars, Panel, Point, ReceivedCommand, Robot, Widget};
 
@@ -11,13 +11,13 @@ struct Parameters {
     patience_s: f64,
 }
 
-/// What it remembers from tick to tick: `init` sets every field.
+/// Its state from tick to tick: `init` sets every field.
 #[derive(Default)]
 struct Stroller {
     parameters: Parameters,
     /// The ends of its stroll; it is on its way to the second.
     ends: [Point; 2],
-    /// Its measure of progress: for how long it has been held up, seconds.
+    /// Its measure of progress: how long it has been blocked, seconds.
     held_up_s: f64,
     turns: u32,
     is_frustrated: bool,
@@ -72,7 +72,7 @@ impl Robot for Stroller {
             .variable("turns", self.turns)
     }
 
-    // What people see of it: two buttons that send it commands.
+    // Its panel in the console: two buttons that send it commands.
     fn panel(&self) -> Panel {
         let button = |label: &str, command: &str| Widget::Button {
             label: label.into(),

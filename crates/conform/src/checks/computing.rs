@@ -1,0 +1,114 @@
+//! Queries of a robot that computes.
+//!
+//! The kit cannot know when a robot computes; it sees how long its ticks take. During each tick it queries the robot again
+//! and again. A robot that answers between its ticks only answers after its report, and it does so in the same tick
+//! whenever the same ticks are played. On a loaded machine an answer may be late as well; but not in the same tick in each
+//! of several plays, and not while the kit's own queryable replies in time.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use protocol::Tick;
+
+use crate::kit::Kit;
+use crate::patience::PATIENCE;
+use crate::report::Failure;
+use crate::script::{Disturbance, Script, play, seated};
+use crate::stage::{Options, Stage};
+use crate::transcript::Entry;
+
+/// How often the robot is queried during a tick.
+const EVERY: Duration = Duration::from_millis(20);
+/// A robot that had so much time between a query and its report could have answered.
+const ENOUGH: Duration = Duration::from_millis(60);
+/// How often the ticks are played before an answer counts as late.
+const PLAYS: usize = 4;
+/// Most queries in a tick.
+const MAX_PAIRS: usize = 500;
+
+/// A query of the robot during a tick, and one of the kit's own queryable at the same moment.
+struct Pair {
+    robot: usize,
+    control: usize,
+    at: Instant,
+}
+
+/// Queries the robot in each tick as long as it takes.
+#[derive(Default)]
+struct QueriesDuringTicks {
+    pairs: Vec<Pair>,
+    /// By tick, how long the robot had for an answer that came after its report.
+    late: BTreeMap<Tick, Duration>,
+}
+
+impl Disturbance for QueriesDuringTicks {
+    fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+        self.pairs.clear();
+        loop {
+            stage.pass_while(EVERY, Stage::is_open);
+            // At tick 0 there is nothing to answer. A robot that never reports is found by the wait for its report.
+            let is_long = self.pairs.len() >= MAX_PAIRS;
+            if !stage.is_open() || tick == 0 || is_long {
+                return Ok(());
+            }
+
+            self.pairs.push(Pair {
+                robot: stage.begin_query(stage.epoch(), tick)?,
+                control: stage.begin_control()?,
+                at: Instant::now(),
+            });
+        }
+    }
+
+    fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+        for pair in &self.pairs {
+            let expected = format!("queried during tick {}, a reply", entry.tick);
+            for number in [pair.robot, pair.control] {
+                stage.until(&expected, PATIENCE, |stage| {
+                    stage.seen.replies.contains_key(&number).then_some(())
+                })?;
+            }
+
+            let report = &stage.seen.answers[entry.index];
+            let had = report.at.saturating_duration_since(pair.at);
+            let is_late = stage.seen.replies[&pair.robot].0 > report.order;
+            let is_control_late = stage.seen.replies[&pair.control].0 > report.order;
+            if is_late && !is_control_late && had >= ENOUGH {
+                self.late.entry(entry.tick).or_insert(had);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The robot answers while it computes.
+pub(super) fn check(kit: &Kit) -> Result<(), Failure> {
+    let mut late = late_ticks(kit)?;
+    for _ in 1..PLAYS {
+        if late.is_empty() {
+            return Ok(());
+        }
+        let again: BTreeSet<Tick> = late_ticks(kit)?.into_keys().collect();
+        late.retain(|tick, _| again.contains(tick));
+    }
+
+    match late.first_key_value() {
+        None => Ok(()),
+        Some((tick, had)) => Err(Failure::new(
+            format!("queried during tick {tick}, a reply at once"),
+            format!(
+                "in each of {PLAYS} plays one after its report, which came {} ms after the query",
+                had.as_millis()
+            ),
+        )),
+    }
+}
+
+/// Plays the usual ticks. The ticks in which an answer came after the report although there was time for it before.
+fn late_ticks(kit: &Kit) -> Result<BTreeMap<Tick, Duration>, Failure> {
+    let mut stage = seated(kit, Options::default())?;
+    let mut queries = QueriesDuringTicks::default();
+    play(&mut stage, &Script::usual(kit), &mut queries)?;
+
+    Ok(queries.late)
+}

@@ -1,0 +1,99 @@
+//! What checks find, by rule.
+
+use std::collections::BTreeMap;
+
+use crate::report::{Failure, Verdict};
+
+/// What was found, by rule.
+pub(crate) type Verdicts = BTreeMap<&'static str, Verdict>;
+
+/// What one check finds.
+#[derive(Default)]
+pub(crate) struct Findings(pub(crate) Verdicts);
+
+impl Findings {
+    /// The rule is broken. The first failure of a rule is the one that is reported.
+    pub(crate) fn fail(&mut self, rule: &'static str, failure: Failure) {
+        if !self.has_failed(rule) {
+            self.0.insert(rule, Verdict::Failed(failure));
+        }
+    }
+
+    /// Whether the rule was found broken.
+    pub(crate) fn has_failed(&self, rule: &'static str) -> bool {
+        matches!(self.0.get(rule), Some(Verdict::Failed(_)))
+    }
+
+    /// The rule holds, unless it was found broken.
+    pub(crate) fn pass(&mut self, rule: &'static str) {
+        self.0.entry(rule).or_insert(Verdict::Passed);
+    }
+
+    /// The rule holds, or is broken.
+    pub(crate) fn settle(&mut self, rule: &'static str, result: Result<(), Failure>) {
+        match result {
+            Ok(()) => self.pass(rule),
+            Err(failure) => self.fail(rule, failure),
+        }
+    }
+
+    /// This robot gives no occasion to see it.
+    pub(crate) fn skip(&mut self, rule: &'static str, reason: &str) {
+        self.0.entry(rule).or_insert_with(|| Verdict::Skipped {
+            reason: reason.to_owned(),
+        });
+    }
+
+    /// Adds what another check found: the worse verdict counts.
+    pub(crate) fn merge(&mut self, other: Self) {
+        for (rule, verdict) in other.0 {
+            match verdict {
+                Verdict::Failed(failure) => self.fail(rule, failure),
+                Verdict::Skipped { reason } => self.skip(rule, &reason),
+                Verdict::Passed => {
+                    if !self.has_failed(rule) {
+                        self.0.insert(rule, verdict);
+                    }
+                }
+            }
+        }
+    }
+
+    /// A check of these rules came to its end, or broke off: then the first rule gets the reason, and nothing is known of
+    /// the others.
+    pub(crate) fn close(&mut self, rules: &[&'static str], end: Result<(), Failure>) {
+        let failure = match end {
+            Ok(()) => {
+                rules.iter().for_each(|rule| self.pass(rule));
+                return;
+            }
+            Err(failure) => failure,
+        };
+
+        let lead = rules.first().copied().unwrap_or_default();
+        self.fail(lead, failure);
+        let reason = format!("the check did not get so far, see {lead}");
+        rules.iter().for_each(|rule| self.skip(rule, &reason));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn broken() -> Verdict {
+        Verdict::Failed(Failure::new("a", "b"))
+    }
+
+    #[test]
+    fn the_worse_verdict_counts() {
+        let mut findings = Findings::default();
+        findings.skip("x", "nothing to see");
+        findings.merge(Findings([("x", Verdict::Passed)].into()));
+        assert_eq!(findings.0["x"], Verdict::Passed);
+
+        findings.merge(Findings([("x", broken())].into()));
+        findings.merge(Findings([("x", Verdict::Passed)].into()));
+        assert_eq!(findings.0["x"], broken());
+    }
+}

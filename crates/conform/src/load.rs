@@ -1,0 +1,100 @@
+//! What the system knows of the robot's processes: whether they rest, and how long they waited for a processor. It is how
+//! the kit tells a robot that does nothing from a robot that a loaded machine does not let run.
+
+use std::path::Path;
+use std::time::Duration;
+
+use nix::unistd::Pid;
+
+/// The processes of a group.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Group(pub(crate) Pid);
+
+impl Group {
+    /// Whether no thread of the group runs or waits for a processor. Where the system does not show it, the group is taken to rest.
+    pub(crate) fn is_idle(self) -> bool {
+        let mut is_idle = true;
+        self.each_thread(|thread| {
+            let stat = std::fs::read_to_string(thread.join("stat")).unwrap_or_default();
+            let state = after_name(&stat).split_whitespace().next();
+            is_idle &= state != Some("R");
+        });
+        is_idle
+    }
+
+    /// How long the group's threads have waited for a processor so far, together. Threads that have ended do not count.
+    pub(crate) fn starved(self) -> Duration {
+        let mut starved = Duration::ZERO;
+        self.each_thread(|thread| {
+            // proc(5): time on a processor, time waiting for one, number of time slices; nanoseconds.
+            let text = std::fs::read_to_string(thread.join("schedstat")).unwrap_or_default();
+            let waited = text.split_whitespace().nth(1);
+            let waited = waited.and_then(|waited| waited.parse().ok());
+            starved += Duration::from_nanos(waited.unwrap_or_default());
+        });
+        starved
+    }
+
+    fn each_thread(self, mut look: impl FnMut(&Path)) {
+        let Ok(processes) = std::fs::read_dir("/proc") else {
+            return;
+        };
+        for process in processes.flatten() {
+            if !self.has(&process.path()) {
+                continue;
+            }
+
+            let Ok(threads) = std::fs::read_dir(process.path().join("task")) else {
+                continue;
+            };
+            for thread in threads.flatten() {
+                look(&thread.path());
+            }
+        }
+    }
+
+    /// Whether a process of `/proc` is of this group.
+    fn has(self, process: &Path) -> bool {
+        let Ok(stat) = std::fs::read_to_string(process.join("stat")) else {
+            return false;
+        };
+
+        // proc(5): state, parent, group.
+        let group = after_name(&stat).split_whitespace().nth(2);
+        group == Some(self.0.to_string().as_str())
+    }
+}
+
+/// The fields of a `stat` file after the name, which may contain spaces and parentheses.
+fn after_name(stat: &str) -> &str {
+    stat.rsplit_once(')').map_or("", |(_, fields)| fields)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::process::CommandExt;
+    use std::process::Command;
+
+    use super::*;
+
+    #[test]
+    fn a_group_that_sleeps_is_idle_and_one_that_computes_is_not() {
+        for (script, is_idle) in [("sleep 60; :", true), ("while :; do :; done", false)] {
+            let mut shell = Command::new("sh");
+            let mut child = shell.args(["-c", script]).process_group(0).spawn().unwrap();
+            let group = Group(Pid::from_raw(i32::try_from(child.id()).unwrap()));
+
+            // A fresh process starts up first.
+            let mut looks = 0;
+            while group.is_idle() != is_idle && looks < 1000 {
+                looks += 1;
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            let found = group.is_idle();
+
+            nix::sys::signal::killpg(group.0, nix::sys::signal::Signal::SIGKILL).unwrap();
+            child.wait().unwrap();
+            assert_eq!(found, is_idle, "{script}");
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! All that came from the robot, in the order in which it came.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
+
+use bus::{Qos, Reply};
+use protocol::keys::{Keys, STATE};
+use protocol::messages::{Command, JoinRequest, PublicState};
+use protocol::{Tick, decode};
+
+use crate::reading::{self, Reading};
+
+/// A report that came.
+pub(crate) struct Answer {
+    pub(crate) reading: Reading,
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) at: Instant,
+    /// Its place among all that came.
+    pub(crate) order: usize,
+}
+
+/// A command of the robot that came.
+#[derive(Debug, Clone)]
+pub(crate) struct Sent {
+    pub(crate) to: String,
+    /// The sender that its key names.
+    pub(crate) from: String,
+    pub(crate) command: Result<Command, String>,
+    pub(crate) bytes: Vec<u8>,
+    /// Its place among all that came.
+    pub(crate) order: usize,
+}
+
+impl Sent {
+    /// Its number in its tick, if it can be read.
+    pub(crate) fn number(&self) -> Option<u32> {
+        self.command.as_ref().ok().map(|command| command.number)
+    }
+
+    /// The tick that it is of, if it can be read.
+    pub(crate) fn tick(&self) -> Option<Tick> {
+        self.command.as_ref().ok().map(|command| command.tick)
+    }
+}
+
+/// All that came from the robot so far.
+#[derive(Default)]
+pub(crate) struct Seen {
+    pub(crate) answers: Vec<Answer>,
+    /// Reports that cannot be read, and why.
+    pub(crate) unreadable: Vec<String>,
+    pub(crate) commands: Vec<Sent>,
+    /// Integers of commands that are written with a fraction.
+    pub(crate) not_integers: Vec<String>,
+    /// States that it put, with their place among all that came.
+    pub(crate) states: Vec<(usize, Result<PublicState, String>)>,
+    /// Requests to join.
+    pub(crate) requests: Vec<Result<JoinRequest, String>>,
+    /// How often a token was undeclared.
+    pub(crate) tokens_lost: usize,
+    /// Replies to the kit's queries, by their numbers, with their place among all that came.
+    pub(crate) replies: BTreeMap<usize, (usize, Option<Reply>)>,
+    /// Messages that were put in a way that may lose or reorder them.
+    pub(crate) wrong_qos: Vec<String>,
+    /// How many messages, tokens and replies came: the place of the next one.
+    pub(crate) count: usize,
+    /// Robots whose liveliness tokens are declared.
+    present: BTreeSet<String>,
+}
+
+impl Seen {
+    /// The place of what came just now.
+    pub(crate) fn next_order(&mut self) -> usize {
+        let order = self.count;
+        self.count += 1;
+        order
+    }
+
+    /// Whether a robot's token is declared.
+    pub(crate) fn is_present(&self, robot: &str) -> bool {
+        self.present.contains(robot)
+    }
+
+    /// Files that a token was declared or undeclared.
+    pub(crate) fn file_token(&mut self, robot: &str, is_present: bool) {
+        if is_present {
+            self.present.insert(robot.to_owned());
+        } else {
+            self.present.remove(robot);
+            self.tokens_lost += 1;
+        }
+    }
+
+    /// Files a report, and returns its place in [`Seen::answers`]; `None` if it cannot be read.
+    pub(crate) fn file_report(
+        &mut self,
+        key: &str,
+        bytes: Vec<u8>,
+        at: Instant,
+        order: usize,
+    ) -> Option<usize> {
+        let robot = Keys::robot_of(key).unwrap_or_default();
+        let reading = match reading::read(key, robot, &bytes) {
+            Ok(reading) => reading,
+            Err(error) => {
+                self.unreadable.push(error.to_string());
+                return None;
+            }
+        };
+
+        let index = self.answers.len();
+        self.answers.push(Answer {
+            reading,
+            bytes,
+            at,
+            order,
+        });
+        Some(index)
+    }
+
+    /// Files a command of the robot.
+    pub(crate) fn file_command(&mut self, key: &str, bytes: Vec<u8>, order: usize) -> Sent {
+        let from = Keys::last_chunk(key).to_owned();
+        let command = match reading::read_command(key, &from, &bytes) {
+            Ok((command, not_integers)) => {
+                self.not_integers.extend(not_integers);
+                Ok(command)
+            }
+            Err(error) => Err(error.to_string()),
+        };
+
+        let sent = Sent {
+            to: Keys::robot_of(key).unwrap_or_default().to_owned(),
+            from,
+            command,
+            bytes,
+            order,
+        };
+        self.commands.push(sent.clone());
+        sent
+    }
+
+    /// Files a state that the robot put.
+    pub(crate) fn file_state(&mut self, bytes: &[u8], order: usize) {
+        let state = decode(STATE, "the robot", bytes).map_err(|error| error.to_string());
+        self.states.push((order, state));
+    }
+
+    /// Notes a message that was put in another way than ticks need.
+    pub(crate) fn note_qos(&mut self, what: &str, qos: Qos) {
+        if qos == Qos::IN_ORDER {
+            return;
+        }
+
+        let congestion = if qos.is_blocking { "block" } else { "drop" };
+        let express = if qos.is_express { ", express" } else { "" };
+        let priority = if qos.has_default_priority {
+            ""
+        } else {
+            ", another priority"
+        };
+        self.wrong_qos.push(format!(
+            "{what} with congestion control {congestion}{express}{priority}"
+        ));
+    }
+}

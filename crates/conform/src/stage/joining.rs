@@ -1,0 +1,196 @@
+//! How robots come to take part: the one that is checked, and those that the kit plays.
+
+use std::time::Duration;
+
+use lockstep::{Admission, Refused, Stamp};
+use protocol::messages::{JoinAnswer, News, Refusal};
+use protocol::{Epoch, RobotName, Tick};
+
+use super::{Stage, barrier, patient};
+use crate::cast::Cast;
+use crate::patience::{PATIENCE, START_PATIENCE};
+use crate::report::Failure;
+use crate::wire::Joining;
+
+/// The instance of robots that the kit plays.
+const OWN_INSTANCE: &str = "conformance kit";
+
+impl Stage<'_> {
+    /// Sets the other robots up and begins the first epoch, so that the robot can be admitted.
+    pub(crate) fn prepare(&mut self) -> Result<(), Failure> {
+        let kit = self.kit;
+        let subject = kit.subject();
+        self.template = kit.template(&self.run);
+        self.cast = Cast::new(
+            kit.others(),
+            self.options.has_extras,
+            self.options.writes_integers,
+        );
+        self.wire.keep(self.cast.serve(&kit.bus, &self.keys)?);
+        if self.options.is_followed {
+            self.wire.follow(&subject)?;
+        }
+
+        let others: Vec<RobotName> = self.cast.names().cloned().collect();
+        let roster = others.iter().cloned().chain([subject.clone()]);
+        self.barrier = barrier(roster);
+        for name in &others {
+            self.play(name);
+        }
+        // A token that was declared before the welcome is a flaw of its own, and hides nothing else.
+        if self.is_present() {
+            self.drive(|barrier, out| barrier.token(&subject, true, out));
+        }
+
+        self.begin_epoch(1);
+        Ok(())
+    }
+
+    /// The kit plays this robot: it joins at once.
+    fn play(&mut self, name: &RobotName) {
+        self.drive(|barrier, out| {
+            let admission = barrier.join(name, OWN_INSTANCE, out);
+            assert!(
+                admission.is_ok(),
+                "the name of a robot that is played is free"
+            );
+            barrier.token(name, true, out);
+        });
+    }
+
+    /// `init`: begins an epoch.
+    pub(crate) fn begin_epoch(&mut self, epoch: Epoch) {
+        self.epoch = epoch;
+        self.next = 0;
+        self.is_gathered = false;
+        self.outcome = None;
+        self.drive(|barrier, out| barrier.gather(epoch, patient(), out));
+    }
+
+    /// The predecessor of the robot's process, played by the kit, takes part up to this tick and is gone.
+    pub(crate) fn play_predecessor(&mut self, last: Tick) -> Result<(), Failure> {
+        let subject = self.kit.subject();
+        self.play(&subject);
+        for tick in 0..=last {
+            self.open(&News::default())?;
+            let stamp = Stamp {
+                epoch: self.epoch,
+                tick,
+                generation: 1,
+            };
+            self.drive(|barrier, out| barrier.report(&subject, stamp, 0, usize::MAX, out));
+            self.outcome = None;
+        }
+
+        self.drive(|barrier, out| barrier.token(&subject, false, out));
+        Ok(())
+    }
+
+    /// Another process, played by the kit, takes the place of the robot's.
+    pub(crate) fn play_successor(&mut self) {
+        let subject = self.kit.subject();
+        self.drive(|barrier, out| barrier.token(&subject, false, out));
+        self.play(&subject);
+    }
+
+    /// The next request to join.
+    pub(crate) fn next_join(&mut self, patience: Duration) -> Result<Joining, Failure> {
+        self.until("a request to join", patience, |stage| {
+            stage.joins.pop_front()
+        })
+    }
+
+    /// Admits the robot, and waits until its token is declared. From now on its requests are answered as they come.
+    pub(crate) fn join(&mut self) -> Result<(), Failure> {
+        self.prepare()?;
+        self.admit_first()
+    }
+
+    /// The same where the other robots are set up.
+    pub(crate) fn admit_first(&mut self) -> Result<(), Failure> {
+        let joining = self.next_join(START_PATIENCE)?;
+        self.admit(&joining);
+        self.keeps_requests = false;
+        self.until_ready()
+    }
+
+    /// Answers a request to join as the barrier decides.
+    pub(crate) fn admit(&mut self, joining: &Joining) {
+        self.seen.requests.push(joining.request.clone());
+        let request = match &joining.request {
+            Ok(request) => request.clone(),
+            Err(error) => return self.refuse_join(joining, Refusal::Malformed, error),
+        };
+
+        let mut admitted = Err(Refused::Ended);
+        self.drive(|barrier, out| admitted = barrier.join(&request.name, &request.instance, out));
+        match admitted {
+            Ok(admission) => self.welcome(joining, admission),
+            Err(Refused::UnknownName) => self.refuse_join(
+                joining,
+                Refusal::UnknownName,
+                "no robot of this run has this name",
+            ),
+            Err(Refused::NameTaken) => {
+                self.refuse_join(joining, Refusal::NameTaken, "another process is this robot");
+            }
+            Err(Refused::Ended) => {
+                self.refuse_join(joining, Refusal::Ended, "the run is over");
+            }
+        }
+    }
+
+    fn welcome(&self, joining: &Joining, admission: Admission) {
+        let mut welcome = self.template.clone();
+        welcome.epoch = admission.epoch;
+        welcome.generation = admission.generation;
+        welcome.news_flag = admission.news_flag;
+        welcome.tick = self.next.saturating_sub(1);
+        self.answer_join(joining, &JoinAnswer::Welcome(Box::new(welcome)));
+    }
+
+    /// Welcomes the robot to an epoch that is over.
+    pub(crate) fn welcome_to(&mut self, joining: &Joining, epoch: Epoch) {
+        self.seen.requests.push(joining.request.clone());
+        let admission = Admission {
+            epoch,
+            generation: 1,
+            news_flag: self.flag(),
+        };
+        self.welcome(joining, admission);
+    }
+
+    /// Answers a request to join.
+    fn answer_join(&self, joining: &Joining, answer: &JoinAnswer) {
+        joining.query.reply(&joining.key, self.cast.dress(answer));
+    }
+
+    /// Refuses a request to join.
+    pub(crate) fn refuse_join(&self, joining: &Joining, reason: Refusal, explanation: &str) {
+        let refused = JoinAnswer::Refused {
+            reason,
+            explanation: explanation.to_owned(),
+        };
+        self.answer_join(joining, &refused);
+    }
+
+    /// Waits until the robot's token is declared.
+    pub(crate) fn until_ready(&mut self) -> Result<(), Failure> {
+        self.until(
+            "its liveliness token after the welcome",
+            PATIENCE,
+            |stage| stage.is_present().then_some(()),
+        )
+    }
+
+    /// Whether the robot takes part from the next tick on, in the middle of an epoch.
+    pub(crate) fn takes_over(&self) -> bool {
+        let (generation, _) = self.barrier.presence(&self.kit.subject());
+        let has_answered = self.seen.answers.iter().any(|answer| {
+            let report = &answer.reading.report;
+            (report.epoch, report.generation) == (self.epoch, generation)
+        });
+
+        self.next > 0 && !has_answered
+    }
+}

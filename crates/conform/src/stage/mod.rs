@@ -1,0 +1,466 @@
+//! One process of the robot and one run of its own: translates between the bus and [`Barrier`], which is the simulator's
+//! side of the lock-step, and keeps all that came from the robot for the checks.
+
+mod joining;
+mod queries;
+mod ticks;
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::process::ExitStatus;
+use std::time::{Duration, Instant};
+
+use lockstep::{Barrier, Lateness, Naming, Outcome, Output, Sent as Put, Stamp, Timer, Timing};
+use protocol::keys::Keys;
+use protocol::messages::{Clock, MAX_ENTRIES, News, OnLate, Report, Waiting, Welcome};
+use protocol::{Epoch, RobotName, RunName, Tick, decode};
+
+use crate::body::Body;
+use crate::cast::Cast;
+use crate::kit::Kit;
+use crate::patience::{Limit, PATIENCE};
+use crate::process::Process;
+use crate::report::Failure;
+use crate::seen::{Seen, Sent};
+use crate::wire::{Event, Joining, Wire};
+
+/// How often a wait looks whether the process still runs.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
+/// What a process put just before its end arrives within this time.
+const LAST_WORDS: Duration = Duration::from_millis(200);
+/// A robot that still does not rest after this time never does.
+const RESTLESS: Duration = Duration::from_secs(1);
+/// How long a robot that was admitted has to declare its token. The checks demand that it does.
+const TOKEN_PATIENCE: Duration = Duration::from_secs(120);
+
+/// A complete tick.
+pub(crate) struct Done {
+    pub(crate) report: Report,
+    pub(crate) commands: Vec<Sent>,
+    /// The place of its report in [`Seen::answers`].
+    pub(crate) index: usize,
+    /// From the clock to the report, wall clock.
+    pub(crate) took: Duration,
+}
+
+/// How a stage differs from the usual one.
+pub(crate) struct Options {
+    /// How long the robot is to try to join, seconds.
+    pub(crate) patience_s: u32,
+    /// How long the robot is to wait for a simulator that is gone, seconds.
+    pub(crate) gone_patience_s: u32,
+    /// Whether everything that is put carries unknown fields.
+    pub(crate) has_extras: bool,
+    /// Whether whole numbers are written without a fraction wherever a fraction is possible.
+    pub(crate) writes_integers: bool,
+    /// Whether the kit subscribes to the robot's state.
+    pub(crate) is_followed: bool,
+    /// Whether the other robots put their states, so that a robot that subscribes need not query.
+    pub(crate) puts_states: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            patience_s: 20,
+            gone_patience_s: 20,
+            has_extras: false,
+            writes_integers: false,
+            is_followed: false,
+            puts_states: true,
+        }
+    }
+}
+
+/// A robot's process on a run of its own.
+pub(crate) struct Stage<'k> {
+    pub(crate) kit: &'k Kit,
+    pub(crate) run: RunName,
+    pub(crate) keys: Keys,
+    pub(crate) cast: Cast,
+    pub(crate) seen: Seen,
+    pub(crate) process: Process,
+    pub(crate) body: Body,
+    /// Clocks that were put more than once.
+    pub(crate) repeated: BTreeSet<(Epoch, Tick)>,
+    /// What the robot is welcomed with; epoch, tick, generation and news flag are the barrier's.
+    pub(crate) template: Welcome,
+    /// Requests to join are queued for the check instead of being answered.
+    pub(crate) keeps_requests: bool,
+    /// Nothing reaches the robot: neither news nor clocks are put.
+    pub(crate) is_cut_off: bool,
+    /// News are not put.
+    pub(crate) withholds_news: bool,
+    wire: Wire,
+    barrier: Barrier<usize, Sent>,
+    timers: BTreeMap<Timer, Instant>,
+    epoch: Epoch,
+    next: Tick,
+    is_gathered: bool,
+    /// News of the open tick.
+    news: News,
+    granted: Option<(Epoch, Tick)>,
+    begun: Instant,
+    outcome: Option<Outcome<usize, Sent>>,
+    options: Options,
+    joins: VecDeque<Joining>,
+}
+
+/// The barrier for these robots: it waits, whatever happens.
+fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, Sent> {
+    let timing = Timing {
+        token: TOKEN_PATIENCE,
+        ..Timing::default()
+    };
+    Barrier::new(roster, patient(), timing, MAX_ENTRIES as u32)
+}
+
+fn patient() -> Lateness {
+    Lateness {
+        on_late: OnLate::Wait,
+        own: BTreeMap::new(),
+        deadline: Duration::from_millis(100),
+        lose_after: 1,
+    }
+}
+
+impl<'k> Stage<'k> {
+    /// Opens a run and starts the robot's program on it.
+    pub(crate) fn open_run(kit: &'k Kit, options: Options) -> Result<Self, Failure> {
+        let run = kit.next_run();
+        let keys = Keys::new(&run);
+        let wire = Wire::open(&kit.bus, &keys)?;
+        let environment = [
+            ("CARS_RUN", run.to_string()),
+            ("CARS_CONNECT", kit.endpoint.clone()),
+            ("CARS_PATIENCE_S", options.patience_s.to_string()),
+            ("CARS_GONE_PATIENCE_S", options.gone_patience_s.to_string()),
+        ];
+        let process = Process::start(&kit.command, &environment)
+            .map_err(|error| Failure::new("the command can be started", error.to_string()))?;
+
+        Ok(Self {
+            kit,
+            keys,
+            cast: Cast::default(),
+            seen: Seen::default(),
+            process,
+            body: Body::default(),
+            repeated: BTreeSet::new(),
+            template: kit.template(&run),
+            run,
+            keeps_requests: true,
+            is_cut_off: false,
+            withholds_news: false,
+            wire,
+            barrier: barrier([]),
+            timers: BTreeMap::new(),
+            epoch: 1,
+            next: 0,
+            is_gathered: false,
+            news: News::default(),
+            granted: None,
+            begun: Instant::now(),
+            outcome: None,
+            options,
+            joins: VecDeque::new(),
+        })
+    }
+
+    /// The epoch under way.
+    pub(crate) fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    /// The tick that is granted next.
+    pub(crate) fn next_tick(&self) -> Tick {
+        self.next
+    }
+
+    /// Whether the robot's token is declared.
+    pub(crate) fn is_present(&self) -> bool {
+        self.seen.is_present(self.kit.subject().as_str())
+    }
+
+    /// Waits for one event and files it, and lets timers fire that are due. Returns whether there was an event.
+    fn pump(&mut self, patience: Duration) -> bool {
+        self.fire_timers();
+        let Some(event) = self.wire.receive(patience) else {
+            return false;
+        };
+
+        let order = self.seen.next_order();
+        match event {
+            Event::Join(query) => self.on_join(Joining::new(query)),
+            Event::Report {
+                key,
+                bytes,
+                at,
+                qos,
+            } => {
+                self.seen.note_qos("a report", qos);
+                self.on_report(&key, bytes, at, order);
+            }
+            Event::State { bytes, qos } => {
+                self.seen.note_qos("a state", qos);
+                self.seen.file_state(&bytes, order);
+            }
+            Event::Command { key, bytes, qos } => {
+                self.seen.note_qos("a command", qos);
+                self.on_command(&key, bytes, order);
+            }
+            Event::Waiting { key, bytes, qos } => {
+                self.seen.note_qos("waiting", qos);
+                self.on_waiting(&key, &bytes);
+            }
+            Event::Token { robot, is_present } => self.on_token(&robot, is_present),
+            Event::Reply(number, reply) => {
+                self.seen.replies.insert(number, (order, reply));
+            }
+        }
+        true
+    }
+
+    fn on_join(&mut self, joining: Joining) {
+        if self.keeps_requests {
+            self.joins.push_back(joining);
+        } else {
+            self.admit(&joining);
+        }
+    }
+
+    fn on_report(&mut self, key: &str, bytes: Vec<u8>, at: Instant, order: usize) {
+        let Some(index) = self.seen.file_report(key, bytes, at, order) else {
+            return;
+        };
+        let Some(robot) = Keys::robot_of(key).and_then(|name| RobotName::new(name).ok()) else {
+            return;
+        };
+
+        let report = &self.seen.answers[index].reading.report;
+        let commands = report.commands;
+        let stamp = Stamp {
+            epoch: report.epoch,
+            tick: report.tick,
+            generation: report.generation,
+        };
+        self.drive(|barrier, out| barrier.report(&robot, stamp, commands, index, out));
+    }
+
+    fn on_command(&mut self, key: &str, bytes: Vec<u8>, order: usize) {
+        let sent = self.seen.file_command(key, bytes, order);
+        let Ok(command) = &sent.command else { return };
+        let Ok(to) = RobotName::new(&sent.to) else {
+            return;
+        };
+        let Ok(from) = RobotName::new(&sent.from) else {
+            return;
+        };
+
+        let number = command.number;
+        let stamp = Stamp {
+            epoch: command.epoch,
+            tick: command.tick,
+            generation: command.generation,
+        };
+        let put = Put { to, command: sent };
+        self.drive(|barrier, out| barrier.command(&from, stamp, number, put, out));
+    }
+
+    fn on_waiting(&mut self, key: &str, bytes: &[u8]) {
+        let Some(robot) = Keys::robot_of(key).and_then(|name| RobotName::new(name).ok()) else {
+            return;
+        };
+        let Ok(waiting) = decode::<Waiting>(key, "the robot", bytes) else {
+            return;
+        };
+
+        self.drive(|barrier, out| {
+            barrier.waiting(&robot, waiting.epoch, waiting.tick, waiting.on, out);
+        });
+    }
+
+    fn on_token(&mut self, robot: &str, is_present: bool) {
+        self.seen.file_token(robot, is_present);
+        if let Ok(name) = RobotName::new(robot)
+            && self.barrier.has(&name)
+        {
+            self.drive(|barrier, out| barrier.token(&name, is_present, out));
+        }
+    }
+
+    fn fire_timers(&mut self) {
+        let now = Instant::now();
+        let due: Vec<Timer> = self
+            .timers
+            .iter()
+            .filter(|(_, at)| **at <= now)
+            .map(|(timer, _)| timer.clone())
+            .collect();
+
+        for timer in due {
+            self.timers.remove(&timer);
+            self.drive(|barrier, out| barrier.timer(&timer, out));
+        }
+    }
+
+    /// Lets the barrier act, and carries out its outputs.
+    fn drive(
+        &mut self,
+        act: impl FnOnce(&mut Barrier<usize, Sent>, &mut Vec<Output<usize, Sent>>),
+    ) {
+        let mut out = Vec::new();
+        act(&mut self.barrier, &mut out);
+
+        for output in out {
+            match output {
+                Output::Gathered => self.is_gathered = true,
+                Output::Grant { news, clock } => self.grant(&news, &clock),
+                Output::Complete(outcome) => self.outcome = Some(outcome),
+                Output::SetTimer(timer, after) => {
+                    self.timers.insert(timer, Instant::now() + after);
+                }
+                // Checks look at what came, not at what the barrier makes of it.
+                Output::Held | Output::Released | Output::Aborted | Output::Ignored(..) => {}
+            }
+        }
+    }
+
+    /// Puts news and clock, and reports for the robots that the kit plays.
+    fn grant(&mut self, news: &[(RobotName, Naming)], clock: &Clock) {
+        let at = (clock.epoch, clock.tick);
+        if self.granted == Some(at) {
+            self.repeated.insert(at);
+        }
+        self.granted = Some(at);
+
+        self.cast.begin(clock.epoch, clock.tick);
+        if !self.is_cut_off {
+            // Where nothing can be put any more, the wait for the report ends by itself.
+            let _ = self.put_tick(news, clock);
+        }
+
+        let others: Vec<RobotName> = self.cast.names().cloned().collect();
+        for name in others {
+            let (generation, _) = self.barrier.presence(&name);
+            let stamp = Stamp {
+                epoch: clock.epoch,
+                tick: clock.tick,
+                generation,
+            };
+            self.drive(|barrier, out| barrier.report(&name, stamp, 0, usize::MAX, out));
+        }
+    }
+
+    fn put_tick(&self, news: &[(RobotName, Naming)], clock: &Clock) -> Result<(), Failure> {
+        if self.options.puts_states {
+            self.cast.put_states(&self.kit.bus, &self.keys)?;
+        }
+
+        let subject = self.kit.subject();
+        let own = news.iter().find(|(name, _)| *name == subject);
+        if let Some((_, naming)) = own
+            && !self.withholds_news
+        {
+            self.put_news(&News {
+                epoch: clock.epoch,
+                tick: clock.tick,
+                joined: naming.joined,
+                rejoin: naming.rejoin,
+                ..self.news.clone()
+            })?;
+        }
+
+        self.put_clock(clock)
+    }
+
+    /// Files what comes until `found` finds something.
+    pub(crate) fn until<T>(
+        &mut self,
+        expected: &str,
+        patience: Duration,
+        mut found: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<T, Failure> {
+        let mut limit = Limit::new(patience);
+        let mut last_words = None;
+        loop {
+            if let Some(found) = found(self) {
+                return Ok(found);
+            }
+            if self.pump(LOOK_AGAIN) {
+                continue;
+            }
+
+            if self.process.ended().is_some() {
+                last_words.get_or_insert_with(Instant::now);
+            }
+            let has_ended = last_words.is_some_and(|since| since.elapsed() > LAST_WORDS);
+            if has_ended || limit.is_over(&self.process) {
+                return Err(Failure::new(
+                    expected,
+                    format!("it never came; {}", self.process.fate()),
+                ));
+            }
+        }
+    }
+
+    /// Files what comes within a time.
+    pub(crate) fn pass(&mut self, time: Duration) {
+        self.pass_while(time, |_| true);
+    }
+
+    /// Files what comes within a time, as long as a condition holds.
+    pub(crate) fn pass_while(&mut self, time: Duration, mut holds: impl FnMut(&Self) -> bool) {
+        let deadline = Instant::now() + time;
+        while holds(self) {
+            let rest = deadline.saturating_duration_since(Instant::now());
+            if rest.is_zero() {
+                return;
+            }
+            self.pump(rest.min(LOOK_AGAIN));
+        }
+    }
+
+    /// Files what comes within a time, and until the robot rests: after that, it has put what it had to put, and it is in
+    /// the wait that it was led to.
+    pub(crate) fn settle(&mut self, time: Duration) {
+        self.pass(time);
+        let deadline = Instant::now() + RESTLESS;
+        while !self.process.is_idle() && Instant::now() < deadline {
+            self.pass(LOOK_AGAIN);
+        }
+    }
+
+    /// Waits for the end of the process.
+    pub(crate) fn until_ended(
+        &mut self,
+        expected: &str,
+        patience: Duration,
+    ) -> Result<ExitStatus, Failure> {
+        let mut limit = Limit::new(patience);
+        loop {
+            if let Some(status) = self.process.ended() {
+                return Ok(status);
+            }
+
+            if limit.is_over(&self.process) {
+                return Err(Failure::new(expected, self.process.fate()));
+            }
+            self.pump(LOOK_AGAIN);
+        }
+    }
+
+    /// Waits until the robot's token is undeclared.
+    pub(crate) fn until_gone(&mut self) -> Result<(), Failure> {
+        let mut limit = Limit::new(PATIENCE);
+        while self.is_present() {
+            if limit.is_over(&self.process) {
+                return Err(Failure::new(
+                    "its liveliness token is undeclared",
+                    "it is still declared",
+                ));
+            }
+            self.pump(LOOK_AGAIN);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,216 @@
+//! Ticks: granted, waited for, repeated, missed.
+
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+use lockstep::Lateness;
+use protocol::Tick;
+use protocol::messages::{Clock, End, News, OnLate, Report};
+
+use super::{Done, Stage, patient};
+use crate::flushing;
+use crate::patience::PATIENCE;
+use crate::report::Failure;
+use crate::seen::Sent;
+
+/// A robot that has put its report so often without all commands that it states does not put them at all.
+const INCOMPLETE: usize = 3;
+
+impl Stage<'_> {
+    /// Whether the tick that was granted last is open.
+    pub(crate) fn is_open(&self) -> bool {
+        self.barrier.is_open()
+    }
+
+    /// The robot's flag in clocks.
+    pub(crate) fn flag(&self) -> u32 {
+        let subject = self.kit.subject();
+        let index = self.barrier.roster().position(|name| *name == subject);
+
+        1 << (index.unwrap_or_default() % protocol::messages::NEWS_FLAGS)
+    }
+
+    /// Puts a clock.
+    pub(crate) fn put_clock(&self, clock: &Clock) -> Result<(), Failure> {
+        self.put_as_clock(&self.cast.dress(clock))
+    }
+
+    /// Puts something else on the key of clocks.
+    pub(crate) fn put_as_clock(&self, bytes: &[u8]) -> Result<(), Failure> {
+        self.wire.put_clock(bytes.to_vec())
+    }
+
+    /// Puts news for the robot.
+    pub(crate) fn put_news(&self, news: &News) -> Result<(), Failure> {
+        self.put_as_news(&self.cast.dress(news))
+    }
+
+    /// Puts something else on the key of its news.
+    pub(crate) fn put_as_news(&self, bytes: &[u8]) -> Result<(), Failure> {
+        self.wire.put_news(&self.kit.subject(), bytes.to_vec())
+    }
+
+    /// Puts the last clock and its news again.
+    pub(crate) fn repeat(&mut self) {
+        self.drive(lockstep::Barrier::repeat);
+    }
+
+    /// The news of the open tick, as they are put.
+    pub(crate) fn open_news(&self) -> News {
+        News {
+            epoch: self.epoch,
+            tick: self.next.saturating_sub(1),
+            ..self.news.clone()
+        }
+    }
+
+    /// Grants the next tick with these news.
+    pub(crate) fn open(&mut self, news: &News) -> Result<(), Failure> {
+        self.until("all robots are connected", PATIENCE, |stage| {
+            stage.is_gathered.then_some(())
+        })?;
+
+        let tick = self.next;
+        let mut named = BTreeSet::new();
+        if !news.is_empty() {
+            named.insert(self.kit.subject());
+        }
+
+        self.news = news.clone();
+        self.next += 1;
+        self.outcome = None;
+        self.begun = Instant::now();
+        self.drive(|barrier, out| barrier.open(tick, named, out));
+        Ok(())
+    }
+
+    /// Waits until the open tick is complete.
+    pub(crate) fn complete(&mut self) -> Result<Done, Failure> {
+        let tick = self.next.saturating_sub(1);
+        let expected = format!("a report for tick {tick} of epoch {}", self.epoch);
+        let came = self.until(&expected, PATIENCE, |stage| {
+            if let Some(outcome) = stage.outcome.take() {
+                return Some(Ok(outcome));
+            }
+            stage.hopeless(tick).map(Err)
+        });
+        let mut outcome = match came {
+            Ok(came) => came?,
+            Err(mut failure) => {
+                let reason = self.seen.unreadable.last().cloned();
+                if let Some(reason) = reason.or_else(|| self.unflushed()) {
+                    failure.came = format!("{}; {reason}", failure.came);
+                }
+                return Err(failure);
+            }
+        };
+
+        let subject = self.kit.subject();
+        let own = outcome.reports.remove(&subject);
+        let came = own.and_then(|(index, commands)| {
+            let answer = self.seen.answers.get(index)?;
+            Some((index, commands, answer))
+        });
+        let Some((index, commands, answer)) = came else {
+            return Err(Failure::new(expected, "the clock went on without one"));
+        };
+
+        Ok(Done {
+            report: answer.reading.report.clone(),
+            commands: commands.into_iter().map(|put| put.command).collect(),
+            index,
+            took: answer.at.saturating_duration_since(self.begun),
+        })
+    }
+
+    /// Why a program behind `cars exec` does not answer, if it rests: it does not compute, and waits for what never comes.
+    fn unflushed(&mut self) -> Option<String> {
+        let program = flushing::program_of(&self.kit.command)?;
+        let is_waiting = self.process.ended().is_none() && self.process.is_idle();
+        is_waiting.then(|| flushing::unflushed(&program))
+    }
+
+    /// Why the open tick will never be complete, if that is known.
+    fn hopeless(&self, tick: Tick) -> Option<Failure> {
+        let (generation, _) = self.barrier.presence(&self.kit.subject());
+        let reports = self
+            .seen
+            .answers
+            .iter()
+            .map(|answer| &answer.reading.report);
+        let wrong = reports
+            .filter(|report| report.tick == tick)
+            .find(|report| report.generation != generation && report.epoch == self.epoch);
+        if let Some(report) = wrong {
+            return Some(Failure::new(
+                format!("a report of generation {generation} for tick {tick}"),
+                format!("one of generation {}", report.generation),
+            ));
+        }
+
+        let stated = self.incomplete()?;
+        Some(Failure::new(
+            format!("{stated} commands, put before the report of tick {tick} that states so many"),
+            self.commands_of(tick),
+        ))
+    }
+
+    /// How many commands the robot states for the open tick again and again, and does not put.
+    pub(crate) fn incomplete(&self) -> Option<u32> {
+        if !self.barrier.is_open() {
+            return None;
+        }
+
+        let at = (self.epoch, self.next.saturating_sub(1));
+        let of_tick: Vec<&Report> = self
+            .seen
+            .answers
+            .iter()
+            .map(|answer| &answer.reading.report)
+            .filter(|report| (report.epoch, report.tick) == at && report.commands > 0)
+            .collect();
+        let stated = of_tick.first()?.commands;
+        (of_tick.len() >= INCOMPLETE).then_some(stated)
+    }
+
+    /// The commands of a tick as they came, in words.
+    fn commands_of(&self, tick: Tick) -> String {
+        let numbers: BTreeSet<u32> = self
+            .seen
+            .commands
+            .iter()
+            .filter(|sent| sent.tick() == Some(tick))
+            .filter_map(Sent::number)
+            .collect();
+
+        format!("commands with the numbers {numbers:?}")
+    }
+
+    /// Grants the next tick while the robot is cut off, and goes on without it: it is lost.
+    pub(crate) fn miss(&mut self) -> Result<(), Failure> {
+        let impatient = Lateness {
+            on_late: OnLate::Continue,
+            ..patient()
+        };
+        self.is_cut_off = true;
+        self.drive(|barrier, out| barrier.set_lateness(impatient, out));
+        self.open(&News::default())?;
+        self.until("the clock goes on", PATIENCE, |stage| stage.outcome.take())?;
+
+        self.drive(|barrier, out| barrier.set_lateness(patient(), out));
+        self.is_cut_off = false;
+        Ok(())
+    }
+
+    /// Puts the clock that ends the run.
+    pub(crate) fn put_end(&mut self, end: End) -> Result<(), Failure> {
+        let clock = self.barrier.end(end);
+        self.put_clock(&clock)
+    }
+
+    /// Undeclares the simulator's liveliness token, or declares it again. Returns when that is done.
+    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<Instant, Failure> {
+        self.wire.show_simulator(is_present)?;
+        Ok(Instant::now())
+    }
+}

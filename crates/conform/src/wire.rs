@@ -1,0 +1,218 @@
+//! The kit's end of the wire in one run: what it declares there, and what arrives.
+
+use std::sync::mpsc::{Receiver, SyncSender};
+use std::time::{Duration, Instant};
+
+use bus::{Bus, BusError, Declared, Publisher, QUERY_TIMEOUT, Qos, Query, Reply};
+use protocol::keys::{Keys, STATE};
+use protocol::messages::JoinRequest;
+use protocol::{RobotName, decode};
+
+use crate::report::Failure;
+
+/// Messages that may queue up before the robot's link is slowed down.
+const QUEUE: usize = 65_536;
+/// How often a query is repeated whose time was up.
+const ATTEMPTS: usize = 4;
+
+/// All that a robot can put or ask.
+pub(crate) enum Event {
+    Join(Query),
+    Report {
+        key: String,
+        bytes: Vec<u8>,
+        at: Instant,
+        qos: Qos,
+    },
+    State {
+        bytes: Vec<u8>,
+        qos: Qos,
+    },
+    Command {
+        key: String,
+        bytes: Vec<u8>,
+        qos: Qos,
+    },
+    Waiting {
+        key: String,
+        bytes: Vec<u8>,
+        qos: Qos,
+    },
+    Token {
+        robot: String,
+        is_present: bool,
+    },
+    /// A query of the kit, by its number, has its reply.
+    Reply(usize, Option<Reply>),
+}
+
+/// A robot asks to take part.
+pub(crate) struct Joining {
+    pub(crate) query: Query,
+    pub(crate) key: String,
+    pub(crate) request: Result<JoinRequest, String>,
+}
+
+impl Joining {
+    pub(crate) fn new(query: Query) -> Self {
+        let key = query.key().to_owned();
+        let request = decode(&key, "a robot", &query.body()).map_err(|error| error.to_string());
+        Self {
+            query,
+            key,
+            request,
+        }
+    }
+}
+
+impl From<BusError> for Failure {
+    fn from(error: BusError) -> Self {
+        Self::new("the kit's own bus works", error.to_string())
+    }
+}
+
+/// The declarations of one run, and the queue of what arrives.
+pub(crate) struct Wire {
+    bus: Bus,
+    keys: Keys,
+    queue: SyncSender<Event>,
+    events: Receiver<Event>,
+    clock: Publisher,
+    declared: Vec<Declared>,
+    simulator: Option<Declared>,
+    queries: usize,
+}
+
+impl Wire {
+    /// Declares all that a simulator declares, its token last.
+    pub(crate) fn open(bus: &Bus, keys: &Keys) -> Result<Self, BusError> {
+        let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
+        let declared = listen(bus, keys, &queue)?;
+        let clock = bus.publisher(&keys.clock())?;
+        let simulator = bus.token(&keys.alive_sim())?;
+
+        Ok(Self {
+            bus: bus.clone(),
+            keys: keys.clone(),
+            queue,
+            events,
+            clock,
+            declared,
+            simulator: Some(simulator),
+            queries: 0,
+        })
+    }
+
+    /// Keeps further declarations until the run is over.
+    pub(crate) fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
+        self.declared.extend(declared);
+    }
+
+    /// The next that arrives.
+    pub(crate) fn receive(&self, patience: Duration) -> Option<Event> {
+        self.events.recv_timeout(patience).ok()
+    }
+
+    /// Subscribes to the state that a robot puts.
+    pub(crate) fn follow(&mut self, robot: &RobotName) -> Result<(), BusError> {
+        let sender = self.queue.clone();
+        let key = self.keys.query(robot, STATE);
+        let states = self.bus.subscribe_with_qos(&key, move |_, bytes, qos| {
+            let _over = sender.send(Event::State {
+                bytes: bytes.into(),
+                qos,
+            });
+        })?;
+        self.declared.push(states);
+        Ok(())
+    }
+
+    /// Puts a clock, or something else on the key of clocks.
+    pub(crate) fn put_clock(&self, bytes: Vec<u8>) -> Result<(), Failure> {
+        Ok(self.clock.put(bytes)?)
+    }
+
+    /// Puts news for a robot, or something else on the key of its news.
+    pub(crate) fn put_news(&self, robot: &RobotName, bytes: Vec<u8>) -> Result<(), Failure> {
+        Ok(self.bus.put(&self.keys.news(robot), bytes)?)
+    }
+
+    /// Undeclares the simulator's liveliness token, or declares it again.
+    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<(), Failure> {
+        self.simulator = None;
+        if is_present {
+            self.simulator = Some(self.bus.token(&self.keys.alive_sim())?);
+        }
+        Ok(())
+    }
+
+    /// Queries a robot; `None` if no queryable replies. A query whose time is up is sent again: a robot that has the key
+    /// and a loaded machine may be late, and a key without a queryable is known at once.
+    pub(crate) fn ask(&self, key: &str, parameters: &str) -> Result<Option<Reply>, Failure> {
+        for _ in 0..ATTEMPTS {
+            let begun = Instant::now();
+            let reply = self.bus.get(key, parameters, None)?;
+            if reply.is_some() || begun.elapsed() < QUERY_TIMEOUT {
+                return Ok(reply);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Queries a key without waiting. The reply arrives as an event with the number that this returns.
+    pub(crate) fn begin_query(&mut self, key: &str, parameters: &str) -> Result<usize, Failure> {
+        let number = self.queries;
+        self.queries += 1;
+        let sender = self.queue.clone();
+        self.bus.get_then(key, parameters, move |reply| {
+            let _over = sender.send(Event::Reply(number, reply));
+        })?;
+        Ok(number)
+    }
+}
+
+/// Subscribes to all that the robots of a run put, and receives their requests. A send fails only when the stage is over.
+fn listen(bus: &Bus, keys: &Keys, queue: &SyncSender<Event>) -> Result<Vec<Declared>, BusError> {
+    let sender = queue.clone();
+    let reports = bus.subscribe_with_qos(&keys.reports(), move |key, bytes, qos| {
+        let _over = sender.send(Event::Report {
+            key: key.into(),
+            bytes: bytes.into(),
+            at: Instant::now(),
+            qos,
+        });
+    })?;
+
+    let sender = queue.clone();
+    let commands = bus.subscribe_with_qos(&keys.commands(), move |key, bytes, qos| {
+        let _over = sender.send(Event::Command {
+            key: key.into(),
+            bytes: bytes.into(),
+            qos,
+        });
+    })?;
+
+    let sender = queue.clone();
+    let waiting = bus.subscribe_with_qos(&keys.all_waiting(), move |key, bytes, qos| {
+        let _over = sender.send(Event::Waiting {
+            key: key.into(),
+            bytes: bytes.into(),
+            qos,
+        });
+    })?;
+
+    let sender = queue.clone();
+    let joins = bus.queryable(&keys.joins(), move |query| {
+        let _over = sender.send(Event::Join(query));
+    })?;
+
+    let sender = queue.clone();
+    let tokens = bus.liveliness(&keys.alive_robots(), move |key, is_present| {
+        let _over = sender.send(Event::Token {
+            robot: Keys::last_chunk(key).to_owned(),
+            is_present,
+        });
+    })?;
+
+    Ok(vec![reports, commands, waiting, joins, tokens])
+}

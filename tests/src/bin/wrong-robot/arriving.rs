@@ -1,0 +1,221 @@
+//! What arrives: clocks, news, answers to its requests to join.
+
+use std::time::Duration;
+
+use lockstep::{Admission, Leave, Naming};
+use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, News, Refusal, Welcome};
+use protocol::{PROTOCOL_VERSION, encode};
+
+use crate::answering::Phase;
+use crate::host::{Failure, Host};
+use crate::walker::Walker;
+
+/// How much later what is declared too late is declared.
+const LATE: Duration = Duration::from_millis(1500);
+
+impl Host {
+    pub(crate) fn on_clock(&mut self, mut clock: Clock) -> Result<(), Failure> {
+        let own = self.welcome.as_ref().map_or(0, |welcome| welcome.epoch);
+        let generation = self
+            .welcome
+            .as_ref()
+            .map_or(0, |welcome| welcome.generation);
+        let flag = self.welcome.as_ref().map_or(0, |welcome| welcome.news_flag);
+        let is_later = clock.epoch > own && own > 0;
+        if self.ignores(clock.end) {
+            return Ok(());
+        }
+        if self.is_unserved {
+            self.is_unserved = false;
+            self.serve()?;
+        }
+
+        if self.wrong.is("epoch.init") && is_later && clock.tick == 0
+            || self.wrong.is("epoch.late") && is_later && clock.tick > 0
+        {
+            return Ok(());
+        }
+        if let Some((epoch, tick)) = self.last {
+            let is_late_tick = clock.epoch == epoch && clock.tick < tick;
+            if self.wrong.is("clock.late") && is_late_tick
+                || self.wrong.is("clock.late:epoch") && clock.epoch < epoch
+            {
+                let (_, _, report) = self.act(clock.epoch, clock.tick, &News::default())?;
+                let key = self.keys.report(&self.name);
+                self.bus.put(&key, encode(&report))?;
+                return Ok(());
+            }
+        }
+        if self.wrong.is("news.wait") {
+            clock.news = 0;
+        }
+        if self.wrong.is("news.wait:always") && clock.news != 0 {
+            clock.news |= flag;
+        }
+        let is_early = clock.tick > 0
+            && clock.epoch == own
+            && self.last.is_none_or(|(epoch, _)| epoch < clock.epoch)
+            && self.wrong.is("return.generation")
+            && own == 1;
+        if is_early {
+            self.drive(|machine, out| {
+                let naming = Naming {
+                    joined: Some(generation),
+                    rejoin: None,
+                };
+                machine.news(clock.epoch, clock.tick, naming, News::default(), out);
+            })?;
+        }
+
+        let is_new = (clock.epoch, clock.tick) > (self.last_clock.epoch, self.last_clock.tick);
+        if is_new {
+            self.last_clock = clock;
+        }
+        if is_new && clock.news & flag != 0 && self.shared.is_in(Phase::Idle) {
+            self.shared.enter(Phase::AwaitingNews);
+        }
+        self.drive(|machine, out| machine.clock(clock, out))
+    }
+
+    /// Whether it is deaf to an end.
+    fn ignores(&self, end: Option<End>) -> bool {
+        match end {
+            None => false,
+            Some(End::Finished) if self.wrong.is("end.clock:finished") => true,
+            Some(End::Stopped) if self.wrong.is("end.clock:stopped") => true,
+            Some(End::Aborted) if self.wrong.is("end.clock:aborted") => true,
+            Some(_) => {
+                self.wrong.is("end.clock:news") && self.shared.is_in(Phase::AwaitingNews)
+                    || self.wrong.is("end.clock:answer") && self.shared.is_in(Phase::Asking)
+            }
+        }
+    }
+
+    pub(crate) fn on_news(&mut self, mut news: News) -> Result<(), Failure> {
+        let generation = self
+            .welcome
+            .as_ref()
+            .map_or(0, |welcome| welcome.generation);
+        if self.wrong.is("return.replaced") && news.joined.is_some_and(|joined| joined > generation)
+        {
+            news.joined = None;
+        }
+        if self.wrong.is("return.rejoin") {
+            news.rejoin = None;
+        }
+
+        let mut epoch = news.epoch;
+        let mut tick = news.tick;
+        if self.wrong.is("news.wait:any") && self.shared.is_in(Phase::AwaitingNews) {
+            epoch = self.last_clock.epoch;
+            tick = self.last_clock.tick;
+        }
+
+        if self.wrong.is("epoch.init:received") {
+            self.strays.push(news.clone());
+        }
+        let naming = Naming::from(&news);
+        self.drive(|machine, out| machine.news(epoch, tick, naming, news, out))
+    }
+
+    pub(crate) fn ask_to_join(&mut self) -> Result<(), Failure> {
+        let is_again = self.welcome.is_some();
+        let mut instance = self.bus.id();
+        if self.wrong.is("join.request:instance") {
+            instance = "me".to_owned();
+        }
+        if is_again && self.wrong.is("epoch.init:instance") {
+            instance.push_str(" again");
+        }
+        let request = JoinRequest {
+            protocol: if self.wrong.is("join.request") {
+                99
+            } else {
+                PROTOCOL_VERSION
+            },
+            run: self.run.clone(),
+            name: self.name.clone(),
+            instance,
+            bodies: false,
+            sdk: "wrong robot".to_owned(),
+        };
+        if is_again && self.wrong.is("epoch.init:token") {
+            self.token = None;
+            self.declare_token()?;
+        }
+
+        let key = self.keys.join_as(&self.name);
+        let reply = self.bus.get(&key, "", Some(encode(&request)))?;
+        let bytes = reply.and_then(|reply| reply.result.ok());
+        match bytes.and_then(|bytes| self.wrong.read(&key, &bytes)) {
+            None => self.drive(lockstep::Participant::unanswered),
+            Some(JoinAnswer::Refused {
+                reason,
+                explanation,
+            }) => {
+                self.explanation = explanation;
+                if reason == Refusal::NameTaken && self.wrong.is("join.refused:impatient") {
+                    self.leave = Some(Leave::Refused(reason));
+                }
+                self.drive(|machine, out| machine.refused(reason, out))
+            }
+            Some(JoinAnswer::Welcome(welcome)) => self.on_welcome(*welcome),
+        }
+    }
+
+    pub(crate) fn on_welcome(&mut self, mut welcome: Welcome) -> Result<(), Failure> {
+        if self.wrong.is("epoch.init:welcome") && self.last_clock.epoch > welcome.epoch {
+            welcome.epoch = self.last_clock.epoch;
+        }
+        let admission = Admission {
+            epoch: welcome.epoch,
+            generation: welcome.generation,
+            news_flag: welcome.news_flag,
+        };
+
+        let mut states = Vec::new();
+        if !self.wrong.is("return.generation:state") {
+            for state in [&welcome.state_before, &welcome.last_state] {
+                states.extend(state.clone().map(|state| (state.tick, state)));
+            }
+        }
+
+        let is_early = self.wrong.is("epoch.late:early") && welcome.epoch > 1 && welcome.tick > 0;
+        self.welcome = Some(welcome);
+        self.drive(|machine, out| machine.admitted(admission, states, out))?;
+        if is_early {
+            let clock = self.last_clock;
+            let naming = Naming {
+                joined: Some(admission.generation),
+                rejoin: None,
+            };
+            self.drive(|machine, out| {
+                machine.news(clock.epoch, clock.tick, naming, News::default(), out);
+                machine.clock(clock, out);
+            })?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn on_declare_token(&mut self) -> Result<(), Failure> {
+        self.declare_token()?;
+
+        if self.wrong.is("join.ready-last") {
+            std::thread::sleep(LATE);
+            self.listen_to_clocks()?;
+        }
+        if self.wrong.is("join.ready-last:news") {
+            std::thread::sleep(LATE);
+            self.listen_to_news()?;
+        }
+
+        if self.wrong.is("tick.answer:unasked") {
+            let welcome = self.welcome.clone().ok_or("no welcome")?;
+            self.walker = Some(Walker::new(&welcome, &self.wrong));
+            let (_, _, report) = self.act(welcome.epoch, 0, &News::default())?;
+            self.bus
+                .put(&self.keys.report(&self.name), encode(&report))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,324 @@
+//! The robot's process: its session, its loop, its end.
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+use std::sync::atomic::AtomicU8;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use bus::{Bus, BusError, Declared, Publisher, Reply, Role};
+use lockstep::{Action, Leave, Patience, RobotTimer};
+use protocol::keys::{Keys, QUERIES, STATE};
+use protocol::messages::{Clock, CommandText, News, PublicState, Report, Waiting, Welcome};
+use protocol::{Epoch, RobotName, RunName, Tick, encode};
+
+use crate::answering::{Machine, Phase, Shared, lock};
+use crate::walker::Walker;
+use crate::wrong::Wrong;
+
+pub(crate) type Actions = Vec<Action<News, PublicState, CommandText, Report>>;
+pub(crate) type Failure = Box<dyn std::error::Error>;
+
+/// Messages that may queue up.
+const QUEUE: usize = 4096;
+
+/// What arrives. Malformed messages do not.
+pub(crate) enum Event {
+    Clock(Clock),
+    News(News),
+    Simulator(bool),
+    Reply(RobotName, Option<Reply>),
+}
+
+/// The robot's process.
+pub(crate) struct Host {
+    pub(crate) shared: Shared,
+    pub(crate) wrong: Wrong,
+    pub(crate) name: RobotName,
+    pub(crate) run: RunName,
+    pub(crate) bus: Bus,
+    pub(crate) keys: Keys,
+    pub(crate) queue: SyncSender<Event>,
+    pub(crate) events: Receiver<Event>,
+    pub(crate) timers: BTreeMap<RobotTimer, Instant>,
+    pub(crate) welcome: Option<Welcome>,
+    pub(crate) walker: Option<Walker>,
+    pub(crate) states: Publisher,
+    pub(crate) token: Option<Declared>,
+    pub(crate) declared: Vec<Declared>,
+    pub(crate) leave: Option<Leave>,
+    pub(crate) explanation: String,
+    /// What was put last.
+    pub(crate) last: Option<(Epoch, Tick)>,
+    pub(crate) last_clock: Clock,
+    /// All news that came, where it forgets none.
+    pub(crate) strays: Vec<News>,
+    /// The number of the last command of the first epoch.
+    pub(crate) numbered: u32,
+    /// Whether the queryables are still to be declared.
+    pub(crate) is_unserved: bool,
+}
+
+fn variable(name: &str, default: &str) -> String {
+    std::env::var(name).unwrap_or_else(|_| default.to_owned())
+}
+
+fn seconds(name: &str, default: &str) -> Result<Duration, Failure> {
+    Ok(Duration::from_secs_f64(variable(name, default).parse()?))
+}
+
+impl Host {
+    pub(crate) fn connect(name: &str, wrong: Wrong) -> Result<Self, Failure> {
+        let name = RobotName::new(name)?;
+        let run = RunName::new(&variable("CARS_RUN", "default"))?;
+        let patience = Patience {
+            join: seconds("CARS_PATIENCE_S", "20")?,
+            gone: seconds("CARS_GONE_PATIENCE_S", "600")?,
+        };
+        let role = Role::Client {
+            connect: variable("CARS_CONNECT", bus::DEFAULT_ENDPOINT),
+            patience: patience.join,
+        };
+        let bus = Bus::open(&role, None)?;
+
+        let keys = Keys::new(&run);
+        let (queue, events) = sync_channel(QUEUE);
+        let mut actions = Vec::new();
+        let machine = Machine::new(patience, &mut actions);
+        let shared = Shared {
+            machine: Arc::new(Mutex::new(machine)),
+            phase: Arc::new(AtomicU8::new(Phase::Idle as u8)),
+            deferred: Arc::default(),
+            has_reported: Arc::default(),
+            wrong: wrong.clone(),
+        };
+        let states = bus.publisher(&keys.query(&name, STATE))?;
+
+        let mut host = Self {
+            shared,
+            wrong,
+            name,
+            run,
+            bus,
+            keys,
+            queue,
+            events,
+            timers: BTreeMap::new(),
+            welcome: None,
+            walker: None,
+            states,
+            token: None,
+            declared: Vec::new(),
+            leave: None,
+            explanation: String::new(),
+            last: None,
+            last_clock: Clock::default(),
+            strays: Vec::new(),
+            numbered: 0,
+            is_unserved: false,
+        };
+        host.declare()?;
+        host.perform(actions)?;
+        Ok(host)
+    }
+
+    fn declare(&mut self) -> Result<(), BusError> {
+        let wrong = self.wrong.clone();
+        if wrong.is("join.ready-last:queryables") {
+            self.is_unserved = true;
+        } else {
+            self.serve()?;
+        }
+        if !wrong.is("join.ready-last") {
+            self.listen_to_clocks()?;
+        }
+        if !wrong.is("join.ready-last:news") {
+            self.listen_to_news()?;
+        }
+
+        let queue = self.queue.clone();
+        self.declared.push(
+            self.bus
+                .liveliness(&self.keys.alive_sim(), move |_, is_present| {
+                    let _ = queue.send(Event::Simulator(is_present));
+                })?,
+        );
+
+        if wrong.is("join.ready-last:first") {
+            self.declare_token()?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn serve(&mut self) -> Result<(), BusError> {
+        for what in QUERIES.iter().chain([&STATE]) {
+            let shared = self.shared.clone();
+            let key = self.keys.query(&self.name, what);
+            self.declared.push(
+                self.bus
+                    .queryable(&key, move |query| shared.receive(query))?,
+            );
+        }
+
+        if self.wrong.is("query.once:percept") {
+            let key = self.keys.query(&self.name, "percept");
+            self.declared.push(
+                self.bus
+                    .queryable(&key, |query| query.reply(query.key(), b"{}".to_vec()))?,
+            );
+        }
+
+        if self.wrong.is("query.once:others") {
+            let own = self.keys.query(&self.name, STATE);
+            let all = own.replace(self.name.as_str(), "*");
+            let shared = self.shared.clone();
+            self.declared.push(self.bus.queryable(&all, move |query| {
+                if query.key() != own && !shared.is_in(Phase::Asking) {
+                    query.reply_err("this is another robot");
+                }
+            })?);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn listen_to_clocks(&mut self) -> Result<(), BusError> {
+        let queue = self.queue.clone();
+        let wrong = self.wrong.clone();
+        let clocks = self.bus.subscribe(&self.keys.clock(), move |key, bytes| {
+            if let Some(clock) = wrong.read(key, bytes) {
+                let _ = queue.send(Event::Clock(clock));
+            }
+        })?;
+        self.declared.push(clocks);
+        Ok(())
+    }
+
+    pub(crate) fn listen_to_news(&mut self) -> Result<(), BusError> {
+        let queue = self.queue.clone();
+        let wrong = self.wrong.clone();
+        let key = self.keys.news(&self.name);
+        let news = self.bus.subscribe(&key, move |key, bytes| {
+            if let Some(news) = wrong.read(key, bytes) {
+                let _ = queue.send(Event::News(news));
+            }
+        })?;
+        self.declared.push(news);
+        Ok(())
+    }
+
+    pub(crate) fn declare_token(&mut self) -> Result<(), BusError> {
+        self.token = Some(self.bus.token(&self.keys.alive_robot(&self.name))?);
+        Ok(())
+    }
+
+    pub(crate) fn run(mut self) -> Result<ExitCode, Failure> {
+        while self.leave.is_none() {
+            self.pump()?;
+        }
+
+        self.token = None;
+        self.declared.clear();
+        self.bus.close();
+        let leave = self.leave.take().unwrap_or(Leave::Stopped);
+        let code = match &leave {
+            Leave::End(_) if self.wrong.is("end.clock") => ExitCode::from(3),
+            Leave::End(_) => ExitCode::SUCCESS,
+            Leave::Refused(_) if self.wrong.is("join.refused") => ExitCode::SUCCESS,
+            Leave::Replaced if self.wrong.is("return.replaced:status") => ExitCode::SUCCESS,
+            Leave::SimulatorGone if self.wrong.is("end.gone:status") => ExitCode::SUCCESS,
+            _ => ExitCode::FAILURE,
+        };
+        if !matches!(leave, Leave::End(_)) && !self.wrong.is("join.refused:mute") {
+            eprintln!("error: {leave:?} {}", self.explanation);
+        }
+        Ok(code)
+    }
+
+    /// Lets the machine act, and carries out what it wants done.
+    pub(crate) fn drive(
+        &mut self,
+        act: impl FnOnce(&mut Machine, &mut Actions),
+    ) -> Result<(), Failure> {
+        let mut actions = Vec::new();
+        act(&mut lock(&self.shared.machine), &mut actions);
+        self.perform(actions)
+    }
+
+    pub(crate) fn perform(&mut self, actions: Actions) -> Result<(), Failure> {
+        for action in actions {
+            match action {
+                Action::Join => self.ask_to_join()?,
+                Action::DeclareToken => self.on_declare_token()?,
+                Action::Run(turn) => self.run_tick(turn)?,
+                Action::Put(answer) => self.put(&answer)?,
+                Action::Query { of, tick, epoch } => self.query(of, tick, epoch)?,
+                Action::PutWaiting { tick, epoch, on } => {
+                    let key = self.keys.waiting(&self.name);
+                    self.bus.put(&key, encode(&Waiting { epoch, tick, on }))?;
+                }
+                Action::SetTimer(timer, after) => {
+                    self.timers.insert(timer, Instant::now() + after);
+                }
+                Action::Unfollow(_) => {}
+                Action::Leave(leave) => {
+                    self.leave.get_or_insert(leave);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for one event, or for a timer, and handles it.
+    pub(crate) fn pump(&mut self) -> Result<(), Failure> {
+        let next = self.timers.values().min().copied();
+        let rest = next.map_or(Duration::from_secs(1), |at| {
+            at.saturating_duration_since(Instant::now())
+        });
+        match self.events.recv_timeout(rest) {
+            Ok(event) => self.handle(event),
+            Err(RecvTimeoutError::Timeout) => self.fire_timers(),
+            Err(RecvTimeoutError::Disconnected) => Err("the queue is closed".into()),
+        }
+    }
+
+    fn fire_timers(&mut self) -> Result<(), Failure> {
+        let now = Instant::now();
+        let due: Vec<RobotTimer> = self
+            .timers
+            .iter()
+            .filter(|(_, at)| **at <= now)
+            .map(|(timer, _)| *timer)
+            .collect();
+
+        for timer in due {
+            self.timers.remove(&timer);
+            if timer == RobotTimer::Gone && self.wrong.is("end.gone") {
+                continue;
+            }
+            self.drive(|machine, out| machine.timer(timer, out))?;
+        }
+        Ok(())
+    }
+
+    fn handle(&mut self, event: Event) -> Result<(), Failure> {
+        match event {
+            Event::Clock(clock) => self.on_clock(clock),
+            Event::News(news) => self.on_news(news),
+            Event::Simulator(is_present) => {
+                if !is_present && self.wrong.is("end.gone:hasty") {
+                    self.leave.get_or_insert(Leave::SimulatorGone);
+                }
+                self.drive(|machine, out| machine.simulator(is_present, out))
+            }
+            Event::Reply(of, reply) => {
+                let bytes = reply.and_then(|reply| reply.result.ok());
+                let state = bytes.and_then(|bytes| self.wrong.read::<PublicState>(STATE, &bytes));
+                if let Some(state) = state {
+                    lock(&self.shared.machine).heard(of, state.epoch, state.tick, state);
+                }
+                Ok(())
+            }
+        }
+    }
+}

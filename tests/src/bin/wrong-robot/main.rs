@@ -1,0 +1,36 @@
+//! A small robot to check the conformance kit: the robot's side of the lock-step as it runs everywhere, in a host of its
+//! own. Without arguments it is correct; with `--wrong RULE` or `--wrong RULE:HOW` one input or output is altered, which
+//! that rule of `docs/protocol.md` forbids.
+
+mod answering;
+mod arriving;
+mod host;
+mod putting;
+mod ticking;
+mod walker;
+mod wrong;
+
+use std::process::ExitCode;
+
+use host::Host;
+use wrong::Wrong;
+
+fn main() -> ExitCode {
+    let wrong = Wrong(argument("--wrong").unwrap_or_default());
+    let name = argument("--name").unwrap_or_else(|| "Walker".to_owned());
+
+    match Host::connect(&name, wrong).and_then(Host::run) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// What follows a flag.
+fn argument(flag: &str) -> Option<String> {
+    let mut arguments = std::env::args().skip_while(|argument| argument != flag);
+    arguments.next();
+    arguments.next()
+}

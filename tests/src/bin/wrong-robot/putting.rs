@@ -1,0 +1,132 @@
+//! What the robot puts: commands, states, reports.
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use bus::Qos;
+use lockstep::Answer;
+use protocol::encode;
+use protocol::keys::STATE;
+use protocol::messages::{Command, CommandText, News, PublicState, Report};
+
+use crate::host::{Failure, Host};
+
+impl Host {
+    /// Puts what came of a tick: the commands, the state, the report.
+    pub(crate) fn put(
+        &mut self,
+        answer: &Answer<PublicState, CommandText, Report>,
+    ) -> Result<(), Failure> {
+        let at = (answer.epoch, answer.tick);
+        let is_again = self.last == Some(at);
+        self.last = Some(at);
+        self.shared.has_reported.store(true, Ordering::SeqCst);
+
+        let mut report = answer.report.clone();
+        if is_again && self.wrong.is("clock.duplicate") {
+            (_, _, report) = self.act(answer.epoch, answer.tick, &News::default())?;
+            report.commands = answer.report.commands;
+        }
+        if is_again && self.wrong.is("clock.duplicate:bytes") {
+            report.log.push("again".to_owned());
+        }
+
+        let is_late = self.wrong.is("command.sent:late")
+            || is_again && self.wrong.is("clock.duplicate:order");
+        let forgets_commands = is_again && self.wrong.is("clock.duplicate:commands");
+        if !is_late && !forgets_commands {
+            self.put_commands(answer)?;
+        }
+
+        let is_state_late = self.wrong.is("tick.state-first");
+        if !is_state_late {
+            self.put_state(&answer.state)?;
+        }
+        self.put_report(&report)?;
+        if self.wrong.is("tick.answer") {
+            self.put_report(&report)?;
+        }
+
+        if is_late {
+            std::thread::sleep(Duration::from_millis(20));
+            self.put_commands(answer)?;
+        }
+        if is_state_late {
+            std::thread::sleep(Duration::from_millis(30));
+            self.put_state(&answer.state)?;
+        }
+        Ok(())
+    }
+
+    fn put_commands(
+        &mut self,
+        answer: &Answer<PublicState, CommandText, Report>,
+    ) -> Result<(), Failure> {
+        let mut first = 1;
+        if self.wrong.is("command.sent:numbers") {
+            first = 2;
+        }
+        if self.wrong.is("epoch.init:numbers") && answer.epoch > 1 {
+            first = self.numbered + 1;
+        }
+
+        for (number, sent) in (first..).zip(&answer.commands) {
+            let command = Command {
+                epoch: answer.epoch,
+                tick: answer.tick,
+                generation: answer.report.generation,
+                number,
+                performative: sent.command.performative,
+                command: sent.command.command.clone(),
+            };
+            let mut bytes = encode(&command);
+            if self.wrong.is("number.integers:command") {
+                bytes = with_fraction(&bytes, "number");
+            }
+            let key = self.keys.command(&sent.to, &self.name);
+            self.put_on(&key, bytes, self.wrong.is("wire.qos:command"))?;
+
+            if answer.epoch == 1 {
+                self.numbered = number;
+            }
+        }
+        Ok(())
+    }
+
+    fn put_state(&self, state: &PublicState) -> Result<(), Failure> {
+        if self.states.has_subscribers() && !self.wrong.is("tick.state-first:unsubscribed") {
+            let key = self.keys.query(&self.name, STATE);
+            self.put_on(&key, encode(state), self.wrong.is("wire.qos:state"))?;
+        }
+        Ok(())
+    }
+
+    fn put_report(&self, report: &Report) -> Result<(), Failure> {
+        let mut bytes = encode(report);
+        if self.wrong.is("number.integers") {
+            bytes = with_fraction(&bytes, "tick");
+        }
+        let key = self.keys.report(&self.name);
+        self.put_on(&key, bytes, self.wrong.is("wire.qos"))
+    }
+
+    /// Puts as ticks need it, or with congestion control drop, or express.
+    fn put_on(&self, key: &str, bytes: Vec<u8>, drops: bool) -> Result<(), Failure> {
+        let qos = Qos {
+            is_blocking: !drops,
+            is_express: self.wrong.is("wire.qos:express"),
+            ..Qos::IN_ORDER
+        };
+        self.bus.put_with_qos(key, bytes, qos)?;
+        Ok(())
+    }
+}
+
+/// The same message with a fraction in an integer.
+fn with_fraction(bytes: &[u8], field: &str) -> Vec<u8> {
+    let Ok(mut value) = serde_json::from_slice::<serde_json::Value>(bytes) else {
+        return bytes.to_vec();
+    };
+    value[field] = value[field].as_f64().into();
+    value.to_string().into_bytes()
+}

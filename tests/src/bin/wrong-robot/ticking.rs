@@ -1,0 +1,265 @@
+//! The robot's ticks.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use lockstep::{Begin, Sent, Turn};
+use protocol::keys::STATE;
+use protocol::messages::{
+    CommandText, News, Performative, Point, PublicState, Report, Variable, Welcome,
+};
+use protocol::random::unit;
+use protocol::{Epoch, RobotName, Tick};
+
+use crate::answering::{Phase, lock};
+use crate::host::{Event, Failure, Host};
+use crate::walker::Walker;
+
+/// How long it computes in its slow tick.
+const COMPUTES: Duration = Duration::from_millis(150);
+const SLOW_TICK: Tick = 11;
+
+/// What came of a tick.
+pub(crate) type Outcome = (Vec<Sent<CommandText>>, PublicState, Report);
+
+impl Host {
+    pub(crate) fn run_tick(&mut self, turn: Turn<News>) -> Result<(), Failure> {
+        self.shared.enter(Phase::Computing);
+        if turn.begin != Begin::GoOn {
+            self.begin();
+        }
+
+        let stray = self
+            .strays
+            .iter()
+            .find(|stray| stray.epoch < turn.epoch && stray.tick == turn.tick);
+        let news = turn.news.or(stray.cloned()).unwrap_or_default();
+
+        let (commands, state, report) = self.act(turn.epoch, turn.tick, &news)?;
+        self.drive(|machine, out| machine.done(commands, state, report, out))?;
+        self.shared.enter(Phase::Idle);
+        Ok(())
+    }
+
+    /// Back to the beginning of what it was welcomed to.
+    fn begin(&mut self) {
+        let Some(welcome) = &self.welcome else { return };
+
+        let mut walker = Walker::new(welcome, &self.wrong);
+        if let Some(before) = self.walker.take() {
+            if self.wrong.is("epoch.init:random") {
+                walker.random = before.random;
+            }
+            if self.wrong.is("epoch.init:variables") {
+                walker.received = before.received;
+            }
+            if self.wrong.is("epoch.init:count") {
+                walker.sent = before.sent;
+            }
+            if self.wrong.is("return.rejoin:variables") && welcome.generation > 1 {
+                walker.received = before.received;
+            }
+        }
+
+        self.walker = Some(walker);
+    }
+
+    /// The robot's tick.
+    pub(crate) fn act(
+        &mut self,
+        epoch: Epoch,
+        tick: Tick,
+        news: &News,
+    ) -> Result<Outcome, Failure> {
+        let wrong = self.wrong.clone();
+        let welcome = self.welcome.clone().ok_or("no welcome")?;
+        let mut walker = self.walker.take().ok_or("no walker")?;
+        walker.at = match news.correction {
+            Some(correction) if !wrong.is("tick.correction") => correction.location,
+            _ => walker.proposal,
+        };
+
+        let mut deliveries = news.commands.clone();
+        if wrong.is("command.order") {
+            deliveries.reverse();
+        }
+        if wrong.is("command.twice") {
+            deliveries.dedup();
+        }
+        if wrong.is("operator.commands") {
+            deliveries.retain(|delivery| delivery.from != RobotName::operator());
+        }
+
+        let mut commands = Vec::new();
+        let mut log = Vec::new();
+        for delivery in deliveries {
+            walker.received += 1;
+            walker.last.clone_from(&delivery.command);
+            log.push(format!(
+                "received {:?} from {}",
+                delivery.command, delivery.from
+            ));
+            let answers_operator = wrong.is("operator.commands:answers");
+            if welcome.roster.contains(&delivery.from) || answers_operator {
+                walker.sent += 1;
+                commands.push(Sent {
+                    to: delivery.from,
+                    command: CommandText {
+                        performative: Performative::Achieve,
+                        command: format!("{} received: {}", walker.sent, delivery.command),
+                    },
+                });
+            }
+        }
+
+        let seen = self.ask_another(tick, epoch, news, &welcome)?;
+        if tick == SLOW_TICK {
+            std::thread::sleep(COMPUTES);
+        }
+        let step_x_m = (unit(&mut walker.random) - 0.5) * 0.2;
+        let step_y_m = (unit(&mut walker.random) - 0.5) * 0.2;
+        walker.proposal = Point::new(walker.at.x + step_x_m, walker.at.y + step_y_m);
+        let angle = unit(&mut walker.random) * 3.0;
+        let turn = if wrong.is("number.angles") { 7.0 } else { 0.0 };
+
+        let mut state_variables: BTreeMap<String, Variable> = [
+            ("received".to_owned(), Variable::from(walker.received)),
+            ("last".to_owned(), Variable::from(walker.last.clone())),
+        ]
+        .into();
+        if let Some(seen) = seen {
+            state_variables.insert("seen_x_m".to_owned(), Variable::from(seen.x));
+        }
+
+        let state = PublicState {
+            epoch,
+            tick,
+            location: if wrong.is("tick.initial") && tick == 0 {
+                Point::default()
+            } else {
+                walker.at
+            },
+            speed_mps: 0.1,
+            direction_rad: ((angle + turn) * 1e6).round() / 1e6,
+            state_variables,
+            emotion_state: "CALM".to_owned(),
+            behavior_state: "WALK".to_owned(),
+        };
+
+        let report = self.report(&welcome, &walker, &state, &commands, log);
+        self.walker = Some(walker);
+        Ok((commands, state, report))
+    }
+
+    fn report(
+        &self,
+        welcome: &Welcome,
+        walker: &Walker,
+        state: &PublicState,
+        commands: &[Sent<CommandText>],
+        log: Vec<String>,
+    ) -> Report {
+        let wrong = &self.wrong;
+        let generation = if wrong.is("tick.answer:generation") {
+            7
+        } else if wrong.is("return.generation:number") {
+            1
+        } else {
+            welcome.generation
+        };
+        let mut stated = u32::try_from(commands.len()).unwrap_or(u32::MAX);
+        if wrong.is("command.sent") {
+            stated = 0;
+        }
+        if wrong.is("command.sent:count") && stated > 0 {
+            stated += 1;
+        }
+        let mut state_variables = state.state_variables.clone();
+        if wrong.is("number.finite") {
+            state_variables.insert("ratio".to_owned(), Variable::Number(f64::NAN));
+        }
+
+        Report {
+            epoch: state.epoch,
+            tick: state.tick,
+            generation,
+            proposal: walker.proposal,
+            speed_mps: state.speed_mps,
+            direction_rad: state.direction_rad,
+            emotion_state: state.emotion_state.clone(),
+            behavior_state: state.behavior_state.clone(),
+            state_variables,
+            commands: stated,
+            log,
+        }
+    }
+
+    /// Now and then it wants to know where another robot stands.
+    fn ask_another(
+        &mut self,
+        tick: Tick,
+        epoch: Epoch,
+        news: &News,
+        welcome: &Welcome,
+    ) -> Result<Option<Point>, Failure> {
+        let other = welcome.roster.iter().find(|name| **name != self.name);
+        let Some(other) = other.cloned() else {
+            return Ok(None);
+        };
+        if tick == 0 && self.wrong.is("query.asking:zero") {
+            self.query(other, tick, epoch)?;
+            return Ok(None);
+        }
+        let is_unreachable = news.unreachable.contains(&other);
+        // A tick that is done a second time is not one of the machine's.
+        let is_running = self.shared.is_in(Phase::Computing);
+        if tick == 0 || !tick.is_multiple_of(2) || !is_running {
+            return Ok(None);
+        }
+        if is_unreachable {
+            if self.wrong.is("query.asking:unreachable") {
+                self.query(other, tick, epoch)?;
+            }
+            return Ok(None);
+        }
+
+        self.shared.enter(Phase::Asking);
+        let found = self.await_state(&other);
+        self.shared.enter(Phase::Computing);
+        Ok(found?.map(|state| state.location))
+    }
+
+    fn await_state(&mut self, of: &RobotName) -> Result<Option<PublicState>, Failure> {
+        loop {
+            let mut actions = Vec::new();
+            let found = lock(&self.shared.machine).ask(of, &mut actions);
+            self.perform(actions)?;
+            if found.is_some() {
+                return Ok(found);
+            }
+
+            let is_interrupted = lock(&self.shared.machine).is_interrupted();
+            if is_interrupted || self.leave.is_some() {
+                return Ok(None);
+            }
+            self.pump()?;
+        }
+    }
+
+    pub(crate) fn query(&self, of: RobotName, tick: Tick, epoch: Epoch) -> Result<(), Failure> {
+        let parameters = if self.wrong.is("query.asking") {
+            String::new()
+        } else if self.wrong.is("query.asking:epoch") {
+            format!("tick={tick}")
+        } else {
+            format!("tick={tick};epoch={epoch}")
+        };
+
+        let queue = self.queue.clone();
+        let key = self.keys.query(&of, STATE);
+        self.bus.get_then(&key, &parameters, move |reply| {
+            let _ = queue.send(Event::Reply(of, reply));
+        })?;
+        Ok(())
+    }
+}

@@ -1,0 +1,40 @@
+//! The robot itself.
+
+use protocol::messages::{Point, Welcome};
+use protocol::random::{Stream, stream};
+
+use crate::wrong::Wrong;
+
+/// The robot itself: walks at random, counts commands and replies to them, queries another robot now and then.
+pub(crate) struct Walker {
+    pub(crate) random: Stream,
+    pub(crate) at: Point,
+    pub(crate) proposal: Point,
+    pub(crate) received: u32,
+    pub(crate) sent: u32,
+    pub(crate) last: String,
+}
+
+impl Walker {
+    pub(crate) fn new(welcome: &Welcome, wrong: &Wrong) -> Self {
+        let seed = if wrong.is("determinism.seed") {
+            std::process::id().into()
+        } else {
+            welcome.seed
+        };
+        let name = if wrong.is("determinism.seed:stream") {
+            welcome.name.as_str()
+        } else {
+            &welcome.stream
+        };
+
+        Self {
+            random: stream(seed, name),
+            at: welcome.location,
+            proposal: welcome.location,
+            received: 0,
+            sent: 0,
+            last: String::new(),
+        }
+    }
+}
