@@ -105,7 +105,7 @@ fn talker(name: &str, texts: (usize, usize), asks: &[String]) -> Talker {
 /// largest state that a report has room for, besides.
 #[test]
 fn a_state_as_large_as_a_message_allows_is_asked_for_in_every_tick() {
-    for (label, texts) in [("large-92kb", (92, 1_000)), ("large-850kb", (14, 60_000))] {
+    for (label, texts) in [("large-92kb", (92, 1_000)), ("large-800kb", (200, 4_000))] {
         let talkers = [
             talker("A", texts, &[]),
             talker("B", (0, 0), &["A".to_owned()]),

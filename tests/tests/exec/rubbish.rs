@@ -8,7 +8,7 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
         "words",
         "say 'hello there'",
         &[
-            "its line `hello there` is not understood: it is no JSON",
+            "its line `hello there` is not understood: it is not valid JSON",
             "expected is one JSON object",
         ],
     ),
@@ -43,7 +43,7 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
     (
         "infinite",
         r#"say '{"type":"done","proposal":{"x":1,"y":1e999}}'"#,
-        &["it is no JSON (number out of range"],
+        &["it is not valid JSON (number out of range"],
     ),
     (
         "variable",
