@@ -646,7 +646,7 @@ fn a_launch_that_cannot_be_secured_says_why() {
     let (_, text) = lab.fails(&["launch", &together]);
     assert!(
         flat(&text).contains("several robots in one process")
-            && flat(&text).contains("process of its own"),
+            && flat(&text).contains("give each one a process"),
         "{text}"
     );
 

@@ -15,5 +15,4 @@ mod pace;
 mod process;
 mod timers;
 
-pub use inbox::Inbox;
 pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError};

@@ -107,8 +107,8 @@ fn run(args: &Args) -> miette::Result<Summary> {
         repeat_after: REPEAT_AFTER,
     };
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;
-    let inbox = server.inbox();
-    ctrlc::set_handler(move || inbox.send(Event::Terminate)).into_diagnostic()?;
+    let send = server.sender();
+    ctrlc::set_handler(move || send(Event::Terminate)).into_diagnostic()?;
 
     if let Some(file) = &args.operator_config {
         write_line(

@@ -1,44 +1,41 @@
-//! What arrives at a server, and the thread that works on it: the one on which a message arrives, so that nothing is handed
-//! from thread to thread, or else the server's own. The own thread always is the one that a timer wakes.
+//! A queue, and the thread that works on it: the one on which an event arrives, so that nothing is handed from thread to
+//! thread, or else the worker's own. The own thread always is the one that a timer wakes.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::recorder::Recorder;
-use crate::simulation::Simulation;
-
-use super::process::{Event, Interrupt, Server};
-
-/// Events that may queue up before links are slowed down.
+/// Events that may queue up before those that send them are slowed down.
 const QUEUE: usize = 65_536;
 
+/// What is done about events.
+pub(super) trait Work: Send {
+    /// What can happen.
+    type Event: Send;
+    /// Why the work is over.
+    type Interrupt: Send;
+
+    /// Handles all events that are queued, and does all that can be done now. Returns how long to wait at most before looking
+    /// again.
+    fn work(&mut self) -> Result<Option<Duration>, Self::Interrupt>;
+}
+
 /// Where events are sent to.
-#[derive(Clone)]
-pub struct Inbox {
-    queue: SyncSender<Event>,
-    desk: Arc<Desk>,
+pub(super) struct Inbox<W: Work> {
+    queue: SyncSender<W::Event>,
+    desk: Arc<Desk<W>>,
 }
 
-/// Where a server takes its events from.
-pub(super) struct Events {
-    queue: Receiver<Event>,
-    desk: Arc<Desk>,
+/// Where the worker takes its events from.
+pub(super) struct Events<W: Work> {
+    queue: Receiver<W::Event>,
+    desk: Arc<Desk<W>>,
 }
 
-/// An epoch that a server runs.
-pub(super) struct Running {
-    pub(super) server: Server,
-    pub(super) simulation: Simulation,
-    pub(super) recorder: Recorder,
-    /// Why the epoch is over, when it is.
-    interrupt: Option<Interrupt>,
-}
-
-/// What those that send events share with the server's thread.
-struct Desk {
-    running: Mutex<Option<Running>>,
+/// What those that send events share with the worker's own thread.
+struct Desk<W: Work> {
+    working: Mutex<Option<Working<W>>>,
     /// Events that are sent and not handled.
     queued: AtomicUsize,
     sleep: Mutex<Sleep>,
@@ -46,7 +43,13 @@ struct Desk {
     works_on_arrival: bool,
 }
 
-/// The sleep of the server's own thread.
+/// A worker, and why it cannot go on.
+struct Working<W: Work> {
+    worker: W,
+    interrupt: Option<W::Interrupt>,
+}
+
+/// The sleep of the worker's own thread.
 #[derive(Debug, Default)]
 struct Sleep {
     /// When it ends by itself.
@@ -54,12 +57,12 @@ struct Sleep {
     is_woken: bool,
 }
 
-/// The two ends of a server's queue. Whether its work is done where events arrive is decided here: only where the process
-/// stays connected while it works there.
-pub(super) fn inbox() -> (Inbox, Events) {
+/// The two ends of a queue. Whether the work is done where events arrive is decided here: only where the process stays
+/// connected while it works there.
+pub(super) fn inbox<W: Work>() -> (Inbox<W>, Events<W>) {
     let (sender, receiver) = std::sync::mpsc::sync_channel(QUEUE);
     let desk = Arc::new(Desk {
-        running: Mutex::new(None),
+        working: Mutex::new(None),
         queued: AtomicUsize::new(0),
         sleep: Mutex::default(),
         woken: Condvar::new(),
@@ -76,9 +79,18 @@ pub(super) fn inbox() -> (Inbox, Events) {
     (inbox, events)
 }
 
-impl Inbox {
+impl<W: Work> Clone for Inbox<W> {
+    fn clone(&self) -> Self {
+        Self {
+            queue: self.queue.clone(),
+            desk: self.desk.clone(),
+        }
+    }
+}
+
+impl<W: Work> Inbox<W> {
     /// Sends an event, and works on it if no other thread is working.
-    pub fn send(&self, event: Event) {
+    pub(super) fn send(&self, event: W::Event) {
         self.desk.queued.fetch_add(1, Ordering::SeqCst);
         // It fails only when the process ends, and then no event matters any more.
         if self.queue.send(event).is_err() {
@@ -92,20 +104,24 @@ impl Inbox {
         }
     }
 
-    /// Runs an epoch on this thread and on those on which events arrive, until it is over.
-    pub(super) fn run(&self, running: Running) -> (Running, Interrupt) {
+    /// Works on this thread and on those on which events arrive, until the work is over. Returns the worker and the reason.
+    pub(super) fn run(&self, worker: W) -> (W, W::Interrupt) {
         let desk = &self.desk;
-        *lock(&desk.running) = Some(running);
+        *lock(&desk.working) = Some(Working {
+            worker,
+            interrupt: None,
+        });
         loop {
-            let mut slot = lock(&desk.running);
-            let Some(running) = slot.as_mut() else {
-                unreachable!("it is taken out below only");
-            };
-            running.work();
-            if let Some(interrupt) = running.interrupt.take()
-                && let Some(running) = slot.take()
+            let mut slot = lock(&desk.working);
+            if let Some(working) = slot.as_mut() {
+                desk.work(working);
+            }
+            if let Some(Working {
+                worker,
+                interrupt: Some(interrupt),
+            }) = slot.take_if(|working| working.interrupt.is_some())
             {
-                return (running, interrupt);
+                return (worker, interrupt);
             }
             drop(slot);
 
@@ -114,73 +130,58 @@ impl Inbox {
     }
 }
 
-impl Events {
+impl<W: Work> Events<W> {
     /// The next event, if one is queued.
-    pub(super) fn try_next(&self) -> Option<Event> {
+    pub(super) fn try_next(&self) -> Option<W::Event> {
         let event = self.queue.try_recv().ok()?;
 
         self.desk.queued.fetch_sub(1, Ordering::SeqCst);
         Some(event)
     }
 
-    /// The next event, or `None` after `patience`: for a server that no epoch runs.
-    pub(super) fn wait(&self, patience: Duration) -> Option<Event> {
-        match self.queue.recv_timeout(patience) {
-            Ok(event) => {
-                self.desk.queued.fetch_sub(1, Ordering::SeqCst);
-                Some(event)
-            }
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
-        }
+    /// The next event, or `None` after `patience`: for a worker that does not run.
+    pub(super) fn wait(&self, patience: Duration) -> Option<W::Event> {
+        let event = self.queue.recv_timeout(patience).ok()?;
+
+        self.desk.queued.fetch_sub(1, Ordering::SeqCst);
+        Some(event)
     }
 }
 
-impl Running {
-    pub(super) fn new(server: Server, simulation: Simulation, recorder: Recorder) -> Self {
-        Self {
-            server,
-            simulation,
-            recorder,
-            interrupt: None,
-        }
-    }
-
+impl<W: Work> Desk<W> {
     /// Does all that can be done now.
-    fn work(&mut self) {
-        if self.interrupt.is_some() {
+    fn work(&self, working: &mut Working<W>) {
+        if working.interrupt.is_some() {
             return;
         }
 
-        let desk = self.server.events.desk.clone();
-        match self.server.work(&mut self.simulation, &mut self.recorder) {
+        match working.worker.work() {
             Ok(patience) => {
                 let until = patience.and_then(|patience| Instant::now().checked_add(patience));
                 if let Some(until) = until {
-                    desk.sleep_until(until);
+                    self.sleep_until(until);
                 }
             }
             Err(interrupt) => {
-                self.interrupt = Some(interrupt);
-                desk.wake();
+                working.interrupt = Some(interrupt);
+                self.wake();
             }
         }
     }
-}
 
-impl Desk {
     /// Works until no event is left, unless another thread does.
     fn work_here(&self) {
         loop {
             let alarm = Alarm(self);
             // Another thread that works looks for further events when it is done.
-            let Ok(mut slot) = self.running.try_lock() else {
+            let Ok(mut slot) = self.working.try_lock() else {
                 return;
             };
-            let Some(running) = slot.as_mut() else { return };
-            running.work();
-            drop(alarm);
-            let is_over = running.interrupt.is_some();
+            let Some(working) = slot.as_mut() else { return };
+            self.work(working);
+            let is_over = working.interrupt.is_some();
             drop(slot);
+            drop(alarm);
 
             if is_over || self.queued.load(Ordering::SeqCst) == 0 {
                 return;
@@ -188,13 +189,13 @@ impl Desk {
         }
     }
 
-    /// Wakes the server's own thread.
+    /// Wakes the worker's own thread.
     fn wake(&self) {
         lock(&self.sleep).is_woken = true;
         self.woken.notify_one();
     }
 
-    /// The server's own thread has something to do at this time at the latest.
+    /// The worker's own thread has something to do at this time at the latest.
     fn sleep_until(&self, until: Instant) {
         let mut sleep = lock(&self.sleep);
         // A plan that is too early stands: to wake once in vain is cheaper than to plan anew in each tick.
@@ -228,10 +229,10 @@ impl Desk {
     }
 }
 
-/// Wakes the server's own thread when the one that works panics: it finds out, and the process ends.
-struct Alarm<'a>(&'a Desk);
+/// Wakes the worker's own thread when the one that works panics: it finds out, and the process ends.
+struct Alarm<'a, W: Work>(&'a Desk<W>);
 
-impl Drop for Alarm<'_> {
+impl<W: Work> Drop for Alarm<'_, W> {
     fn drop(&mut self) {
         if std::thread::panicking() {
             self.0.wake();
@@ -242,6 +243,6 @@ impl Drop for Alarm<'_> {
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     match mutex.lock() {
         Ok(guard) => guard,
-        Err(_) => panic!("another thread of the server panicked"),
+        Err(_) => panic!("another thread panicked while it worked"),
     }
 }

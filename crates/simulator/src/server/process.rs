@@ -18,7 +18,7 @@ use crate::scenario::Scenario;
 use crate::simulation::Simulation;
 use crate::summary::{Summary, Wall};
 
-use super::inbox::{Events, Inbox, Running, inbox};
+use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
 use super::orders::{Orders, Underway};
 use super::pace::Pace;
@@ -136,8 +136,8 @@ pub struct Server {
     pub(super) options: Options,
     bus: Bus,
     keys: Keys,
-    inbox: Inbox,
-    pub(super) events: Events,
+    inbox: Inbox<Running>,
+    events: Events<Running>,
     declared: Vec<Declared>,
     clock: Publisher,
     news: BTreeMap<RobotName, Publisher>,
@@ -208,15 +208,16 @@ impl Server {
         Ok(server)
     }
 
-    /// Where signals and tests send events to.
+    /// What sends an event to this server, from any thread: a signal, for example.
     #[must_use]
-    pub fn inbox(&self) -> Inbox {
-        self.inbox.clone()
+    pub fn sender(&self) -> impl Fn(Event) + Clone + Send + Sync + 'static {
+        let inbox = self.inbox.clone();
+        move |event| inbox.send(event)
     }
 
     /// Declares what the simulator subscribes to and answers, its token last.
     fn declare(&mut self) -> Result<(), BusError> {
-        let inbox = self.inbox();
+        let inbox = self.inbox.clone();
         let reports = self
             .bus
             .subscribe(&self.keys.reports(), move |key, bytes| {
@@ -225,7 +226,7 @@ impl Server {
                 inbox.send(Event::Report { robot, report });
             })?;
 
-        let inbox = self.inbox();
+        let inbox = self.inbox.clone();
         let commands = self
             .bus
             .subscribe(&self.keys.commands(), move |key, bytes| {
@@ -235,7 +236,7 @@ impl Server {
                 inbox.send(Event::Command { from, to, command });
             })?;
 
-        let inbox = self.inbox();
+        let inbox = self.inbox.clone();
         let waiting = self
             .bus
             .subscribe(&self.keys.all_waiting(), move |key, bytes| {
@@ -244,7 +245,7 @@ impl Server {
                 inbox.send(Event::Waiting { robot, waiting });
             })?;
 
-        let inbox = self.inbox();
+        let inbox = self.inbox.clone();
         let tokens = self
             .bus
             .liveliness(&self.keys.alive_robots(), move |key, is_present| {
@@ -258,7 +259,7 @@ impl Server {
             (self.keys.joins(), Event::Join),
             (self.keys.control(), Event::Control),
         ] {
-            let inbox = self.inbox();
+            let inbox = self.inbox.clone();
             self.declared.push(self.bus.queryable(&key, move |query| {
                 inbox.send(event(query));
             })?);
@@ -282,13 +283,17 @@ impl Server {
             let recorder = Recorder::begin(folder, &self.options.run, &simulation)?;
             self.begin_epoch(&mut simulation);
 
-            let inbox = self.inbox();
-            let (running, interrupt) = inbox.run(Running::new(self, simulation, recorder));
+            let inbox = self.inbox.clone();
+            let running = Running {
+                server: self,
+                simulation,
+                recorder,
+            };
+            let (running, interrupt) = inbox.run(running);
             let Running {
                 server,
                 mut simulation,
                 recorder,
-                ..
             } = running;
             self = server;
             match interrupt {
@@ -321,7 +326,7 @@ impl Server {
     }
 
     /// Does all that can be done now. Returns how long to wait at most before looking again.
-    pub(super) fn work(
+    fn work(
         &mut self,
         simulation: &mut Simulation,
         recorder: &mut Recorder,
@@ -673,6 +678,22 @@ impl Server {
     /// Whether a robot's process is connected, for people.
     pub(super) fn presence(&self, name: &RobotName) -> (Generation, Presence) {
         self.barrier.presence(name)
+    }
+}
+
+/// An epoch that a server runs.
+struct Running {
+    server: Server,
+    simulation: Simulation,
+    recorder: Recorder,
+}
+
+impl Work for Running {
+    type Event = Event;
+    type Interrupt = Interrupt;
+
+    fn work(&mut self) -> Result<Option<Duration>, Interrupt> {
+        self.server.work(&mut self.simulation, &mut self.recorder)
     }
 }
 
