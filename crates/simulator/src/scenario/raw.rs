@@ -3,6 +3,7 @@
 mod fault;
 mod network;
 mod range;
+mod unplaced;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,7 @@ use world::Triangular;
 use fault::FaultTable;
 use network::NetworkTable;
 use range::Range;
+use unplaced::unplaced;
 
 use super::checked::{self, DEFAULT_SEED, Lateness, Record, RobotSpec};
 use super::placing;
@@ -479,11 +481,6 @@ impl Robot {
 
 fn lengths(at: Point) -> [Length; 2] {
     [Length(at.x), Length(at.y)]
-}
-
-/// A value that has no place in a file, because the table is written from a scenario.
-fn unplaced<T>(value: T) -> Spanned<T> {
-    Spanned::new(0..0, value)
 }
 
 /// The inverse of [`to_json`]; parameters come from TOML, which has no `null`.

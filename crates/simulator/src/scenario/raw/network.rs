@@ -12,7 +12,7 @@ use world::Triangular;
 use super::super::checked::RobotSpec;
 use super::super::network::{Burst, Channel, LinkRule, Network, Partition, ticks};
 use super::range::Range;
-use super::unplaced;
+use super::unplaced::unplaced;
 
 /// Longest delay of a command, ticks.
 const MAX_DELAY_TICKS: u64 = 1000;
