@@ -209,7 +209,6 @@ impl Server {
     }
 
     /// What sends an event to this server, from any thread: a signal, for example.
-    #[must_use]
     pub fn sender(&self) -> impl Fn(Event) + Clone + Send + Sync + 'static {
         let inbox = self.inbox.clone();
         move |event| inbox.send(event)
