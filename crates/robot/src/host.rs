@@ -28,8 +28,6 @@ use crate::network::{Network, Undelivered};
 use crate::seat::{Done, Seat};
 use shared::{HostAction, HostAnswer, Shared, Thread, Waited};
 
-/// More commands than this are put while another thread takes over the middleware's duties: they may fill its queue.
-const MANY_COMMANDS: usize = 16;
 /// A panel is for eyes: it is put no more often than this.
 const PANEL_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -315,9 +313,9 @@ impl Host {
     }
 
     /// Carries out all that is for this thread.
-    fn work(&mut self, thread: Thread) {
+    fn work(&mut self, mut thread: Thread) {
         while self.outcome.is_none()
-            && let Some((name, action)) = self.shared.next(thread)
+            && let Some((name, action)) = self.shared.next(&mut thread)
         {
             self.outcome = self.carry_out(&name, action).transpose();
         }
@@ -356,9 +354,6 @@ impl Host {
                 if let Some(member) = self.members.get_mut(name) {
                     member.token = Some(token);
                 }
-            }
-            Action::Put(answer) if answer.commands.len() > MANY_COMMANDS => {
-                bus::runtime::block(|| self.put(name, &answer))?;
             }
             Action::Put(answer) => self.put(name, &answer)?,
             Action::Query { of, tick, epoch } => {
@@ -557,26 +552,22 @@ impl Host {
     }
 }
 
-/// Runs what may run on the middleware's thread, unless another thread is at it, which then looks for more itself.
+/// Runs what may run on the middleware's thread, unless another thread is at it.
 fn work_here(host: &Mutex<Host>) {
-    loop {
-        let Ok(mut working) = host.try_lock() else {
-            return;
-        };
-        let shared = working.shared.clone();
-        let alarm = Alarm(&shared);
-        working.work(Thread::Middleware);
-        let is_over = working.outcome.is_some();
-        drop(working);
-        drop(alarm);
+    let Ok(mut working) = host.try_lock() else {
+        return; // The host's own thread finds what is left when it is done, and another one leaves it to that.
+    };
+    let shared = working.shared.clone();
+    let alarm = Alarm(&shared);
+    working.work(Thread::middleware());
+    let is_over = working.outcome.is_some();
+    drop(working);
+    drop(alarm);
 
-        if is_over {
-            shared.end();
-            return;
-        }
-        if !shared.has_next(Thread::Middleware) {
-            return;
-        }
+    if is_over {
+        shared.end();
+    } else {
+        shared.leave_rest();
     }
 }
 

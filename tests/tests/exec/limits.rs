@@ -124,3 +124,29 @@ fn many_states_go_to_one_asker_in_every_tick() {
     }
     play("large-many", &talkers, 40);
 }
+
+/// Robots that are run on the middleware's thread and share a link: what they put in one tick is more than its queue holds.
+#[test]
+fn two_hundred_robots_of_one_process_get_through_their_ticks() {
+    let lab = Lab::new();
+    let names: Vec<String> = (0..200).map(|index| format!("B{index}")).collect();
+    let mut scenario =
+        "tick = \"0.5 s\"\nduration = \"10 s\"\n[field]\nsize = [\"60 m\", \"60 m\"]\n".to_owned();
+    for (index, name) in names.iter().enumerate() {
+        scenario += &format!(
+            "[[robot]]\nname = \"{name}\"\nclass = \"Butler\"\nat = [\"{} m\", \"{} m\"]\n",
+            4 * (index % 14) + 2,
+            4 * (index / 14) + 2
+        );
+    }
+    lab.write("many.toml", &scenario);
+    let launch = format!(
+        "scenario = \"many.toml\"\n[[process]]\nname = \"all\"\ncommand = [\"cars-butler\"]\nrobots = {names:?}\n"
+    );
+    let launch = lab.write("launch.toml", &launch).display().to_string();
+
+    let args = ["launch", &launch, "--no-console", "--speed", "max"];
+    lab.start("many", &args).finish();
+
+    assert_eq!(lab.summary("many")["ticks"], 20);
+}

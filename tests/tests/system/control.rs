@@ -270,3 +270,46 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
         assert!(lab.file("ctl-load", kept).exists(), "{kept}");
     }
 }
+
+/// Ticks that wait for no robot follow one another at once, and the simulator receives what people want meanwhile.
+#[test]
+fn a_clock_that_waits_for_nobody_can_be_paused() {
+    let lab = Lab::new();
+    let faults = "fault=[{ robot = \"Butler\", do = \"hang\", at = \"5 s\" }, \
+                  { robot = \"Leguin\", do = \"hang\", at = \"5 s\" }]";
+    let args = [
+        "--duration",
+        "1000000 s",
+        "--set",
+        faults,
+        "--set",
+        "on_late=continue",
+    ];
+    let mut launch = paused(&lab, "ctl-nobody", &args);
+    ctl(&lab, "ctl-nobody", &["start"]);
+    eventually("ticks without robots", || {
+        let tick = status(&lab, "ctl-nobody")["tick"].as_u64().unwrap();
+        (tick > 1_000).then_some(())
+    });
+
+    assert_eq!(ctl(&lab, "ctl-nobody", &["pause"])["phase"], "paused");
+    ctl(&lab, "ctl-nobody", &["stop"]);
+    launch.wait();
+}
+
+#[test]
+fn a_step_is_answered_although_others_ask_meanwhile() {
+    let lab = Lab::new();
+    let mut launch = paused(&lab, "ctl-asked", &["--duration", "10000 s"]);
+    std::thread::scope(|scope| {
+        let stepped = scope.spawn(|| ctl(&lab, "ctl-asked", &["step", "4000"]));
+        eventually("the steps to be under way", || {
+            let tick = status(&lab, "ctl-asked")["tick"].as_u64().unwrap();
+            (tick > 0).then_some(())
+        });
+        assert_eq!(stepped.join().unwrap()["tick"], 4_000);
+    });
+
+    ctl(&lab, "ctl-asked", &["stop"]);
+    launch.wait();
+}

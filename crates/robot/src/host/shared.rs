@@ -49,8 +49,50 @@ struct Inner {
 pub(super) enum Thread {
     /// The host's own.
     Own,
-    /// The middleware's: it must neither wait for an answer nor declare anything.
-    Middleware,
+    /// The middleware's: it must neither wait for an answer nor declare anything; and what it puts must fit into the queue of
+    /// the link, because to empty that is its own duty.
+    Middleware {
+        /// Bytes that it may still put.
+        budget: usize,
+    },
+}
+
+/// Bytes that the middleware's thread may put in one go: a quarter of the queue of a link, two batches of 64 KiB.
+const BUDGET: usize = 32 * 1024;
+/// Bytes of a message beside its content, generously.
+const OVERHEAD: usize = 512;
+
+impl Thread {
+    /// The middleware's thread, when it begins.
+    pub(super) fn middleware() -> Self {
+        Self::Middleware { budget: BUDGET }
+    }
+
+    /// Whether it may carry this out. What it puts is deducted from its budget.
+    fn takes(&mut self, action: &HostAction) -> bool {
+        let Self::Middleware { budget } = self else {
+            return true;
+        };
+        match action {
+            Action::Run(_) => true,
+            Action::Put(answer) => {
+                let left = budget.checked_sub(size_of(answer));
+                *budget = left.unwrap_or(*budget);
+                left.is_some()
+            }
+            _ => false,
+        }
+    }
+}
+
+/// Bytes that are put for an answer, at most. The state has the same content as the report.
+fn size_of(answer: &HostAnswer) -> usize {
+    let mut bytes = 2 * (answer.report.len() + OVERHEAD);
+    for sent in &answer.commands {
+        bytes += sent.command.command.len() + OVERHEAD;
+    }
+
+    bytes
 }
 
 /// The answer to a robot that waits for another robot's state.
@@ -130,7 +172,8 @@ impl Shared {
     /// Wakes the thread that is to carry out what was filed: the one of a robot that waits, the middleware's, or the host's own.
     fn wake(&self, inner: MutexGuard<'_, Inner>) {
         let is_robot_waiting = inner.is_robot_waiting;
-        let is_for_middleware = inner.is_next_for(Thread::Middleware);
+        let next = inner.actions.front();
+        let is_for_middleware = next.is_some_and(|(_, action)| Thread::middleware().takes(action));
         let has_actions = !inner.actions.is_empty();
         let has_earlier_timer = inner.has_earlier_timer();
         drop(inner);
@@ -174,25 +217,28 @@ impl Shared {
         self.lock().participants.contains_key(name)
     }
 
-    /// Takes the next thing to be done that is for this thread.
-    pub(super) fn next(&self, thread: Thread) -> Option<(RobotName, HostAction)> {
+    /// Takes the next thing to be done that is for this thread. What is for the host's own thread wakes that.
+    pub(super) fn next(&self, thread: &mut Thread) -> Option<(RobotName, HostAction)> {
         let mut inner = self.lock();
-        if thread == Thread::Own {
+        if *thread == Thread::Own {
             inner.fire();
         }
-        if inner.is_next_for(thread) {
+        let Some((_, action)) = inner.actions.front() else {
+            return None;
+        };
+        if thread.takes(action) {
             return inner.actions.pop_front();
         }
-        if !inner.actions.is_empty() {
-            self.has_work.notify_one();
-        }
 
+        self.has_work.notify_one();
         None
     }
 
-    /// Whether there is something to do for this thread.
-    pub(super) fn has_next(&self, thread: Thread) -> bool {
-        self.lock().is_next_for(thread)
+    /// Leaves to the host's own thread what came while the middleware's was at work.
+    pub(super) fn leave_rest(&self) {
+        if !self.lock().actions.is_empty() {
+            self.has_work.notify_one();
+        }
     }
 
     /// The host's own thread sleeps until there is something to do.
@@ -278,15 +324,6 @@ impl Inner {
                 Some(due) => self.timers.insert(key, due),
                 None => self.timers.remove(&key),
             };
-        }
-    }
-
-    /// Whether this thread may carry out what is to be done next.
-    fn is_next_for(&self, thread: Thread) -> bool {
-        match self.actions.front() {
-            None => false,
-            Some((_, Action::Run(_) | Action::Put(_))) => true,
-            Some(_) => thread == Thread::Own,
         }
     }
 

@@ -53,7 +53,8 @@ impl Server {
             }
             other => match self.act(&other) {
                 Ok(()) => {
-                    if let (Control::Pause, Some(stepping)) = (&other, self.pace.give_up_stepping())
+                    if matches!(other, Control::Pause)
+                        && let Some(stepping) = self.pace.give_up_stepping()
                     {
                         self.answer_status(&stepping, simulation);
                     }

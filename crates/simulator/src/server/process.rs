@@ -10,7 +10,7 @@ use protocol::keys::Keys;
 use protocol::messages::{
     Clock, Command, CommandText, End, MAX_ENTRIES, Presence, Reason, Report, Waiting,
 };
-use protocol::{Epoch, Generation, Malformed, RobotName, RunName, decode, encode};
+use protocol::{Epoch, Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 
 use crate::diagnostic::FileError;
 use crate::recorder::{Recorder, RunFolder};
@@ -28,6 +28,8 @@ use super::timers::Timers;
 pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
 /// How long the simulator waits at the end of a run for the robots to leave.
 const GOODBYE: Duration = Duration::from_secs(1);
+/// Most ticks that wait for no robot and are granted in one go: the thread that does it may be the one that receives.
+const MAX_TICKS_AT_ONCE: Tick = 16;
 /// Most commands of the operator that wait for the next tick.
 const MAX_OPERATOR_COMMANDS: usize = 1024;
 
@@ -324,12 +326,13 @@ impl Server {
             .gather(simulation.epoch(), lateness, &mut self.outputs);
     }
 
-    /// Does all that can be done now. Returns how long to wait at most before looking again.
+    /// Does all that can be done now, within bounds. Returns how long to wait at most before looking again.
     fn work(
         &mut self,
         simulation: &mut Simulation,
         recorder: &mut Recorder,
     ) -> Result<Option<Duration>, Interrupt> {
+        let last = simulation.tick() + MAX_TICKS_AT_ONCE;
         loop {
             while let Some(event) = self.events.try_next() {
                 self.handle(event, simulation)?;
@@ -340,6 +343,10 @@ impl Server {
             self.carry_out(simulation, recorder)?;
             if simulation.tick() >= simulation.scenario().ticks && !self.is_waiting_for_robots() {
                 return Err(Interrupt::End(End::Finished));
+            }
+
+            if simulation.tick() >= last {
+                return Ok(Some(Duration::ZERO));
             }
 
             match self.advance(simulation)? {
