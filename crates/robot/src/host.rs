@@ -411,7 +411,7 @@ impl Host {
         if let Some(member) = self.members.get_mut(name) {
             member.seat = Some(seat);
         }
-        self.shared.with(name, |participant, actions| {
+        self.shared.file(name, |participant, actions| {
             participant.done(commands, state, bytes.into(), actions);
         });
         Ok(())

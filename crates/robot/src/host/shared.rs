@@ -159,6 +159,15 @@ impl Shared {
         self.wake(inner);
     }
 
+    /// The same, on a thread that carries out what comes of it itself.
+    pub(super) fn file(
+        &self,
+        name: &RobotName,
+        feed: impl FnOnce(&mut HostParticipant, &mut Vec<HostAction>),
+    ) {
+        self.lock().feed(name, feed);
+    }
+
     /// Feeds something to every participant, in the order of their names.
     pub(super) fn each(&self, feed: impl Fn(&mut HostParticipant, &mut Vec<HostAction>)) {
         let mut inner = self.lock();
