@@ -89,11 +89,17 @@ impl<W: Work> Clone for Inbox<W> {
 }
 
 impl<W: Work> Inbox<W> {
-    /// Sends an event, and works on it if no other thread is working.
+    /// Sends an event to the worker's own thread. For callers that may hold locks which the work needs: the middleware calls
+    /// back about tokens and matching in the middle of its own work.
     pub(super) fn send(&self, event: W::Event) {
-        self.desk.queued.fetch_add(1, Ordering::SeqCst);
-        // It fails only when the process ends, and then no event matters any more.
-        if self.queue.send(event).is_err() {
+        if self.enqueue(event) {
+            self.desk.wake();
+        }
+    }
+
+    /// Sends an event, and works on it if no other thread is working: for messages, of which there are many in each tick.
+    pub(super) fn send_and_work(&self, event: W::Event) {
+        if !self.enqueue(event) {
             return;
         }
 
@@ -102,6 +108,12 @@ impl<W: Work> Inbox<W> {
         } else {
             self.desk.wake();
         }
+    }
+
+    /// Returns whether anybody takes events: otherwise the process ends, and no event matters any more.
+    fn enqueue(&self, event: W::Event) -> bool {
+        self.desk.queued.fetch_add(1, Ordering::SeqCst);
+        self.queue.send(event).is_ok()
     }
 
     /// Works on this thread and on those on which events arrive, until the work is over. Returns the worker and the reason.

@@ -224,7 +224,7 @@ impl Server {
             .subscribe(&self.keys.reports(), move |key, bytes| {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
                 let report = decode(key, &robot, bytes);
-                inbox.send(Event::Report { robot, report });
+                inbox.send_and_work(Event::Report { robot, report });
             })?;
 
         let inbox = self.inbox.clone();
@@ -234,7 +234,7 @@ impl Server {
                 let to = Keys::robot_of(key).unwrap_or_default().to_owned();
                 let from = Keys::last_chunk(key).to_owned();
                 let command = decode(key, &from, bytes);
-                inbox.send(Event::Command { from, to, command });
+                inbox.send_and_work(Event::Command { from, to, command });
             })?;
 
         let inbox = self.inbox.clone();
