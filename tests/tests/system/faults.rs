@@ -27,7 +27,9 @@ fn launch_file(lab: &Lab, leguin: &str) -> String {
 /// one up, and so the clock, whatever its `on_late`: later ones find the states that it has put.
 fn let_robots_follow_each_other(lab: &Lab, run: &str) {
     eventually("the first ticks", || {
-        let status = lab.cars(&["ctl", "status", "--json", "--run", run]).output();
+        let status = lab
+            .cars(&["ctl", "status", "--json", "--run", run])
+            .output();
         let status: serde_json::Value = serde_json::from_slice(&status.unwrap().stdout).ok()?;
         (status["tick"].as_u64()? > 10).then_some(())
     });
