@@ -232,9 +232,7 @@ impl Shared {
         if *thread == Thread::Own {
             inner.fire();
         }
-        let Some((_, action)) = inner.actions.front() else {
-            return None;
-        };
+        let (_, action) = inner.actions.front()?;
         if thread.takes(action) {
             return inner.actions.pop_front();
         }
