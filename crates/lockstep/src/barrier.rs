@@ -301,8 +301,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if is_present && takes_in_now && is_awaited {
             // The open tick waits for it: it takes the place of a predecessor, or it is back and may have missed the clock.
             if let Some(generation) = member.take_in() {
-                self.membership
-                    .push(Membership::Joined(name.clone(), generation));
+                self.note_joined(name, generation);
             }
             self.repeat(out);
         }
@@ -557,6 +556,15 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
 
         awaited
+    }
+
+    /// An incarnation takes part from the open tick on. One that was taken in before it and has not reported leaves no trace.
+    fn note_joined(&mut self, name: &RobotName, generation: Generation) {
+        let is_of_other =
+            |change: &Membership| !matches!(change, Membership::Joined(robot, _) if robot == name);
+        self.membership.retain(is_of_other);
+        self.membership
+            .push(Membership::Joined(name.clone(), generation));
     }
 
     fn look_whether_gathered(&mut self, out: &mut Vec<Output<R, C>>) {

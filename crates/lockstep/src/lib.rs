@@ -9,6 +9,7 @@
 //! The content of messages is a type parameter: the rules depend on epochs, ticks, generations and counts only.
 
 mod barrier;
+mod contract;
 mod exchange;
 mod member;
 #[cfg(test)]

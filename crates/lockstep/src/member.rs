@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use protocol::messages::{FaultKind, News, OnLate};
+use protocol::messages::{FaultKind, OnLate};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::Sent;
@@ -49,15 +49,6 @@ pub struct Naming {
     pub joined: Option<Generation>,
     /// The incarnation that takes part no more, and whose process is to join again.
     pub rejoin: Option<Generation>,
-}
-
-impl From<&News> for Naming {
-    fn from(news: &News) -> Self {
-        Self {
-            joined: news.joined,
-            rejoin: news.rejoin,
-        }
-    }
 }
 
 /// A robot of the roster.

@@ -18,7 +18,7 @@ use lockstep::{Action, Admission, Begin, Leave, Naming, Patience, StateQuery, Tu
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
-    Clock, Command, End, JoinAnswer, JoinRequest, News, PublicState, Refusal, Waiting, Welcome,
+    Clock, End, JoinAnswer, JoinRequest, News, PublicState, Refusal, Waiting, Welcome,
 };
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
@@ -439,15 +439,8 @@ impl Host {
         let bytes = answer.result.unwrap_or_else(String::into_bytes);
         match decode(&key, "simulator", &bytes)? {
             JoinAnswer::Welcome(welcome) => {
-                let admission = Admission {
-                    epoch: welcome.epoch,
-                    generation: welcome.generation,
-                    news_flag: welcome.news_flag,
-                };
-                let mut states = Vec::new();
-                for state in welcome.state_before.iter().chain(&welcome.last_state) {
-                    states.push((state.tick, Arc::new(state.clone())));
-                }
+                let admission = Admission::from(welcome.as_ref());
+                let states = welcome.states_before();
                 member.welcome = Some(*welcome);
                 self.shared.with(name, |participant, actions| {
                     participant.admitted(admission, states, actions);
@@ -472,17 +465,9 @@ impl Host {
         let Some(member) = self.members.get_mut(name) else {
             return Ok(());
         };
-        for (number, sent) in (1..).zip(&answer.commands) {
-            let command = Command {
-                epoch: answer.epoch,
-                tick: answer.tick,
-                generation: answer.generation,
-                number,
-                performative: sent.command.performative,
-                command: sent.command.command.clone(),
-            };
+        for (to, command) in answer.commands_from(1) {
             self.bus
-                .put(&self.keys.command(&sent.to, name), encode(&command))?;
+                .put(&self.keys.command(to, name), encode(&command))?;
         }
         if member.state.has_subscribers() {
             member.state.put(encode(answer.state.as_ref()))?;
@@ -558,7 +543,12 @@ fn work_here(host: &Mutex<Host>) {
         return; // The host's own thread finds what is left when it is done, and another one leaves it to that.
     };
     let shared = working.shared.clone();
-    let alarm = Alarm(&shared);
+    let alarm = scopeguard::guard(&shared, |shared| {
+        // The host's own thread finds out that a robot panicked here, and the process ends.
+        if std::thread::panicking() {
+            shared.end();
+        }
+    });
     working.work(Thread::middleware());
     let is_over = working.outcome.is_some();
     drop(working);
@@ -568,17 +558,6 @@ fn work_here(host: &Mutex<Host>) {
         shared.end();
     } else {
         shared.leave_rest();
-    }
-}
-
-/// Wakes the host's own thread when a robot panics on the middleware's: it finds out, and the process ends.
-struct Alarm<'a>(&'a Shared);
-
-impl Drop for Alarm<'_> {
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.0.end();
-        }
     }
 }
 

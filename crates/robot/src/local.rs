@@ -157,11 +157,7 @@ impl LocalHost {
             let Action::Put(answer) = action else {
                 continue;
             };
-            let stamp = Stamp {
-                epoch: answer.epoch,
-                tick: answer.tick,
-                generation: answer.generation,
-            };
+            let stamp = Stamp::from(answer.as_ref());
             let count = answer.commands.len() as u32;
             for (number, command) in (1..).zip(answer.commands) {
                 self.barrier

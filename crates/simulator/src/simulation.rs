@@ -387,7 +387,7 @@ impl Simulation {
     }
 
     fn note_joined(&mut self, robot: RobotName, generation: Generation) {
-        let incarnation = self.incarnation(&robot, generation);
+        let incarnation = self.incarnation(&robot, generation, None);
         self.incarnations
             .insert(robot.clone(), (generation, incarnation));
         // At tick 0 every incarnation publishes the same state.
@@ -402,13 +402,15 @@ impl Simulation {
         });
     }
 
-    /// The incarnation in this epoch that a generation has if it takes part next.
-    fn incarnation(&self, robot: &RobotName, generation: Generation) -> u32 {
-        match self.incarnations.get(robot) {
-            Some((last, incarnation)) if *last == generation => *incarnation,
-            Some((_, incarnation)) => incarnation + 1,
-            None => 1,
+    /// The incarnation in this epoch that a generation has if it takes part next. `open` is what the robot has reported for the
+    /// open tick, perhaps by an incarnation that takes part from that tick on.
+    fn incarnation(&self, robot: &RobotName, generation: Generation, open: Option<&Report>) -> u32 {
+        let mut last = self.incarnations.get(robot).copied();
+        if let Some(report) = open {
+            last = Some(follow(last, report.generation));
         }
+
+        follow(last, generation).1
     }
 
     /// Records the commands that arrived in the tick. Those to a robot that did not take part are lost.
@@ -571,7 +573,7 @@ impl Simulation {
             epoch: self.epoch,
             tick: self.tick,
             seed: self.scenario.seed,
-            stream: self.stream_of(name, generation, open.is_some()),
+            stream: self.stream_of(name, generation, open),
             tick_s: self.scenario.tick_s,
             field_m: self.scenario.field_m,
             body_m: self.scenario.body_m,
@@ -594,15 +596,11 @@ impl Simulation {
 
     /// The name of a robot's random stream. The first incarnation in an epoch draws from the stream of its name; a later one
     /// must not draw the same numbers again.
-    fn stream_of(&self, name: &RobotName, generation: Generation, has_open_report: bool) -> String {
-        let has_last_report = self.reports.contains_key(name);
-        let incarnation = match (has_last_report, has_open_report) {
-            (false, false) => return format!("robot/{name}"),
-            // The first incarnation has reported for tick 0, which is not complete.
-            (false, true) => 2,
-            (true, _) => self.incarnation(name, generation),
-        };
-        format!("robot/{name}#{incarnation}")
+    fn stream_of(&self, name: &RobotName, generation: Generation, open: Option<&Report>) -> String {
+        match self.incarnation(name, generation, open) {
+            1 => format!("robot/{name}"),
+            incarnation => format!("robot/{name}#{incarnation}"),
+        }
     }
 
     /// All bodies within a robot's sensing range, if its news contain them.
@@ -727,6 +725,17 @@ impl Simulation {
     pub fn digest(&self) -> String {
         self.digest.to_string()
     }
+}
+
+/// The incarnation that `generation` has after the last one.
+fn follow(last: Option<(Generation, u32)>, generation: Generation) -> (Generation, u32) {
+    let incarnation = match last {
+        Some((same, incarnation)) if same == generation => incarnation,
+        Some((_, incarnation)) => incarnation + 1,
+        None => 1,
+    };
+
+    (generation, incarnation)
 }
 
 /// The state that a report and a location publish to the other robots.

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use lockstep::{Exchange, Outcome, Sent};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{CommandText, Delivery, News, Performative, Point, Report, SensedKind};
-use protocol::{RobotName, Tick};
+use protocol::{RobotName, RunName, Tick};
 use simulator::diagnostic::Source;
 use simulator::{Event, Scenario, Simulation, TickRecord};
 
@@ -461,6 +461,29 @@ fn who_does_not_report_stays_and_is_out_of_reach_at_the_next_tick() {
     simulation.step(&mut puppets).unwrap();
     assert_eq!(puppets.news[1][&name("A")].unreachable, [name("B")]);
     assert!(!puppets.news[1][&name("B")].correction.unwrap().blocked);
+}
+
+#[test]
+fn each_successor_in_one_tick_draws_from_a_stream_of_its_own() {
+    let mut simulation = simulation(TWO);
+    let mut reported = vec![];
+    let mut puppets = Puppets::new(&simulation, |_, report, _| reported.push(report.clone()));
+    simulation.init(&mut puppets).unwrap();
+    let stream = |generation, open: Option<&Report>| {
+        let run = RunName::new("test").unwrap();
+        let welcome = simulation.welcome(&run, &name("A"), generation, open);
+        welcome.unwrap().stream
+    };
+
+    let mut open = reported[0].clone();
+    open.tick = 1;
+    assert_eq!(stream(1, None), "robot/A");
+    assert_eq!(stream(2, None), "robot/A#2");
+    assert_eq!(stream(2, Some(&open)), "robot/A#2");
+    // The second incarnation took part from the open tick on, and has reported for it.
+    open.generation = 2;
+    assert_eq!(stream(2, Some(&open)), "robot/A#2");
+    assert_eq!(stream(3, Some(&open)), "robot/A#3");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use lockstep::{
     Action, Admission, Answer, Begin, Leave, Naming, Participant, Patience, RobotTimer, Turn,
 };
 use protocol::messages::{
-    Command, CommandText, JoinAnswer, JoinRequest, News, PublicState, Waiting, Welcome,
+    CommandText, JoinAnswer, JoinRequest, News, PublicState, Waiting, Welcome,
 };
 use protocol::{Epoch, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
 use robot::{Done, Network, Robot, Seat, Undelivered};
@@ -406,16 +406,8 @@ impl World {
 
     /// Puts what came of a tick: commands, state, report.
     fn put(&mut self, process: usize, answer: &Answer<Arc<PublicState>, CommandText, Bytes>) {
-        for (number, sent) in (1..).zip(&answer.commands) {
-            let command = Command {
-                epoch: answer.epoch,
-                tick: answer.tick,
-                generation: answer.generation,
-                number,
-                performative: sent.command.performative,
-                command: sent.command.command.clone(),
-            };
-            let to = sent.to.clone();
+        for (to, command) in answer.commands_from(1) {
+            let to = to.clone();
             let bytes = encode(&command).into();
             self.send(process, Way::Up, Message::Command { to, bytes });
         }
@@ -517,15 +509,8 @@ impl World {
 
         match self.read(bytes) {
             JoinAnswer::Welcome(welcome) => {
-                let admission = Admission {
-                    epoch: welcome.epoch,
-                    generation: welcome.generation,
-                    news_flag: welcome.news_flag,
-                };
-                let mut states = Vec::new();
-                for state in welcome.state_before.iter().chain(&welcome.last_state) {
-                    states.push((state.tick, Arc::new(state.clone())));
-                }
+                let admission = Admission::from(welcome.as_ref());
+                let states = welcome.states_before();
                 self.processes[process].welcome = Some(*welcome);
                 self.feed(process, |participant, out| {
                     participant.admitted(admission, states, out);

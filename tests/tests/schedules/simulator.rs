@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use lockstep::{Barrier, Lateness, Membership, Output, Refused, Sent, Stamp, Timer, Timing};
+use lockstep::{Barrier, Lateness, Membership, Output, Sent, Stamp, Timer, Timing};
 use protocol::messages::{
     Clock, Command, CommandText, End, FaultKind, JoinAnswer, JoinRequest, MAX_ENTRIES, PublicState,
-    Refusal, Report, Waiting,
+    Report, Waiting,
 };
 use protocol::{Epoch, Generation, RobotName, RunName, Tick, encode};
 use simulator::{Event as Recorded, Simulation, TickRecord};
@@ -470,11 +470,7 @@ impl World {
 
     pub(crate) fn on_report(&mut self, robot: &RobotName, bytes: &[u8]) {
         let report: Report = self.read(bytes);
-        let stamp = Stamp {
-            epoch: report.epoch,
-            tick: report.tick,
-            generation: report.generation,
-        };
+        let stamp = Stamp::from(&report);
         let commands = report.commands;
         let simulator = &mut self.simulator;
         simulator.barrier.report(
@@ -485,14 +481,7 @@ impl World {
             &mut simulator.outputs,
         );
 
-        let is_complete = simulator
-            .outputs
-            .iter()
-            .any(|output| matches!(output, Output::Complete(_)));
-        let has_counted = simulator.barrier.is_open() && !self.is_awaited(robot);
-        if is_complete || has_counted {
-            self.die_counted(robot, stamp);
-        }
+        self.die_counted(robot, stamp);
     }
 
     fn is_awaited(&self, robot: &RobotName) -> bool {
@@ -503,7 +492,17 @@ impl World {
             .any(|(name, _)| name == robot)
     }
 
+    /// The robot whose report counts now dies, if that is planned.
     fn die_counted(&mut self, robot: &RobotName, stamp: Stamp) {
+        let outputs = &self.simulator.outputs;
+        let is_complete = outputs
+            .iter()
+            .any(|output| matches!(output, Output::Complete(_)));
+        let has_counted = self.simulator.barrier.is_open() && !self.is_awaited(robot);
+        if !is_complete && !has_counted {
+            return;
+        }
+
         let processes = 0..self.processes.len();
         let alive: Vec<usize> = processes
             .filter(|process| self.is_alive(*process, robot))
@@ -515,23 +514,16 @@ impl World {
 
     pub(crate) fn on_command(&mut self, from: &RobotName, to: RobotName, bytes: &[u8]) {
         let command: Command = self.read(bytes);
-        let stamp = Stamp {
-            epoch: command.epoch,
-            tick: command.tick,
-            generation: command.generation,
-        };
-        let sent = Sent {
-            to,
-            command: CommandText {
-                performative: command.performative,
-                command: command.command,
-            },
-        };
+        let stamp = Stamp::from(&command);
+        let number = command.number;
+        let sent = Sent::new(to, command);
 
         let simulator = &mut self.simulator;
         simulator
             .barrier
-            .command(from, stamp, command.number, sent, &mut simulator.outputs);
+            .command(from, stamp, number, sent, &mut simulator.outputs);
+        // A report counts with the last of its commands, which may have been lost before it.
+        self.die_counted(from, stamp);
     }
 
     pub(crate) fn on_waiting(&mut self, robot: &RobotName, bytes: &[u8]) {
@@ -570,11 +562,7 @@ impl World {
                 JoinAnswer::Welcome(Box::new(welcome))
             }
             Err(refused) => JoinAnswer::Refused {
-                reason: match refused {
-                    Refused::UnknownName => Refusal::UnknownName,
-                    Refused::NameTaken => Refusal::NameTaken,
-                    Refused::Ended => Refusal::Ended,
-                },
+                reason: refused.into(),
                 explanation: String::new(),
             },
         };

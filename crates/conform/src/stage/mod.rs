@@ -238,11 +238,7 @@ impl<'k> Stage<'k> {
 
         let report = &self.seen.answers[index].reading.report;
         let commands = report.commands;
-        let stamp = Stamp {
-            epoch: report.epoch,
-            tick: report.tick,
-            generation: report.generation,
-        };
+        let stamp = Stamp::from(report);
         self.drive(|barrier, out| barrier.report(&robot, stamp, commands, index, out));
     }
 
@@ -257,11 +253,7 @@ impl<'k> Stage<'k> {
         };
 
         let number = command.number;
-        let stamp = Stamp {
-            epoch: command.epoch,
-            tick: command.tick,
-            generation: command.generation,
-        };
+        let stamp = Stamp::from(command);
         let put = Put { to, command: sent };
         self.drive(|barrier, out| barrier.command(&from, stamp, number, put, out));
     }

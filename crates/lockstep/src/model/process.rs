@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use protocol::messages::{Clock, Refusal};
+use protocol::messages::Clock;
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use super::simulation::{self, News, Order, Report, Simulation, Violation};
@@ -129,14 +129,7 @@ impl Process {
 
         self.feed(around, |robot, out| match message {
             Down::Answer(Ok(admission)) => robot.admitted(admission, [], out),
-            Down::Answer(Err(refused)) => {
-                let refusal = match refused {
-                    Refused::UnknownName => Refusal::UnknownName,
-                    Refused::NameTaken => Refusal::NameTaken,
-                    Refused::Ended => Refusal::Ended,
-                };
-                robot.refused(refusal, out);
-            }
+            Down::Answer(Err(refused)) => robot.refused(refused.into(), out),
             Down::News(epoch, tick, naming, news) => robot.news(epoch, tick, naming, news, out),
             Down::Clock(clock) => robot.clock(clock, out),
         })
@@ -222,11 +215,7 @@ impl Process {
                 }
                 Action::Run(turn) => self.run(turn, around),
                 Action::Put(answer) => {
-                    let stamp = Stamp {
-                        epoch: answer.epoch,
-                        tick: answer.tick,
-                        generation: answer.generation,
-                    };
+                    let stamp = Stamp::from(answer.as_ref());
                     // How many were sent; a broken rule may repeat fewer.
                     let count = simulation::commands(&self.name, 0, answer.tick, 0).len();
                     for (number, command) in (1..).zip(answer.commands) {

@@ -123,6 +123,17 @@ pub struct Welcome {
     pub state_before: Option<PublicState>,
 }
 
+impl Welcome {
+    /// What its previous incarnation reported, with the ticks: at most two states, the older first.
+    #[must_use]
+    pub fn states_before<S: From<PublicState>>(&self) -> Vec<(Tick, S)> {
+        let states = self.state_before.iter().chain(&self.last_state);
+        states
+            .map(|state| (state.tick, S::from(state.clone())))
+            .collect()
+    }
+}
+
 /// The flags of [`Clock::news`]: robot number i of the roster, from 0, has flag `1 << (i % NEWS_FLAGS)`.
 pub const NEWS_FLAGS: usize = 32;
 

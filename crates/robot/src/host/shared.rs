@@ -243,16 +243,19 @@ impl Shared {
 
     /// Leaves to the host's own thread what came while the middleware's was at work.
     pub(super) fn leave_rest(&self) {
-        if !self.lock().actions.is_empty() {
+        let inner = self.lock();
+        if !inner.actions.is_empty() || inner.has_earlier_timer() {
             self.has_work.notify_one();
         }
     }
 
     /// The host's own thread sleeps until there is something to do.
     pub(super) fn sleep(&self) {
-        let inner = self.lock();
+        let mut inner = self.lock();
         if inner.actions.is_empty() && !inner.is_over {
-            let _woken = wait(&self.has_work, inner);
+            inner.sleeps_until = inner.next_timer();
+            inner = wait(&self.has_work, inner);
+            inner.sleeps_until = None;
         }
     }
 
@@ -288,22 +291,16 @@ impl Shared {
 }
 
 /// Sleeps until something arrives or a timer fires.
-fn wait<'a>(condition: &Condvar, mut inner: MutexGuard<'a, Inner>) -> MutexGuard<'a, Inner> {
-    let due = inner.timers.values().min().copied();
-    inner.sleeps_until = due;
-    let mut inner = match due {
-        None => condition
+fn wait<'a>(condition: &Condvar, inner: MutexGuard<'a, Inner>) -> MutexGuard<'a, Inner> {
+    let Some(due) = inner.next_timer() else {
+        return condition
             .wait(inner)
-            .unwrap_or_else(PoisonError::into_inner),
-        Some(due) => {
-            let patience: Duration = due.saturating_duration_since(Instant::now());
-            let waited = condition.wait_timeout(inner, patience);
-            waited.unwrap_or_else(PoisonError::into_inner).0
-        }
+            .unwrap_or_else(PoisonError::into_inner);
     };
 
-    inner.sleeps_until = None;
-    inner
+    let patience: Duration = due.saturating_duration_since(Instant::now());
+    let waited = condition.wait_timeout(inner, patience);
+    waited.unwrap_or_else(PoisonError::into_inner).0
 }
 
 impl Inner {
@@ -334,11 +331,15 @@ impl Inner {
         }
     }
 
+    /// When a timer fires next.
+    fn next_timer(&self) -> Option<Instant> {
+        self.timers.values().min().copied()
+    }
+
     /// Whether a timer fires before the host's own thread wakes by itself.
     fn has_earlier_timer(&self) -> bool {
-        let due = self.timers.values().min();
-        match (due, self.sleeps_until) {
-            (Some(due), Some(planned)) => *due < planned,
+        match (self.next_timer(), self.sleeps_until) {
+            (Some(due), Some(planned)) => due < planned,
             (Some(_), None) => true,
             (None, _) => false,
         }

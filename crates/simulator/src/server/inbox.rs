@@ -184,7 +184,12 @@ impl<W: Work> Desk<W> {
     /// Works until no event is left, unless another thread does.
     fn work_here(&self) {
         loop {
-            let alarm = Alarm(self);
+            let alarm = scopeguard::guard(self, |desk| {
+                // The worker's own thread finds out that this one panicked, and the process ends.
+                if std::thread::panicking() {
+                    desk.wake();
+                }
+            });
             // Another thread that works looks for further events when it is done.
             let Ok(mut slot) = self.working.try_lock() else {
                 return;
@@ -238,17 +243,6 @@ impl<W: Work> Desk<W> {
         }
 
         *sleep = Sleep::default();
-    }
-}
-
-/// Wakes the worker's own thread when the one that works panics: it finds out, and the process ends.
-struct Alarm<'a, W: Work>(&'a Desk<W>);
-
-impl<W: Work> Drop for Alarm<'_, W> {
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.0.wake();
-        }
     }
 }
 

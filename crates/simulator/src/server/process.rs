@@ -611,12 +611,7 @@ impl Server {
         let Some(name) = self.known(robot) else {
             return;
         };
-        let stamp = Stamp {
-            epoch: report.epoch,
-            tick: report.tick,
-            generation: report.generation,
-        };
-
+        let stamp = Stamp::from(&report);
         let commands = report.commands;
         self.barrier
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
@@ -631,21 +626,11 @@ impl Server {
             return self.on_operator(to, command.command);
         }
         let Some(from) = self.known(from) else { return };
-        let stamp = Stamp {
-            epoch: command.epoch,
-            tick: command.tick,
-            generation: command.generation,
-        };
-
-        let sent = Sent {
-            to,
-            command: CommandText {
-                performative: command.performative,
-                command: command.command,
-            },
-        };
+        let stamp = Stamp::from(&command);
+        let number = command.number;
+        let sent = Sent::new(to, command);
         self.barrier
-            .command(&from, stamp, command.number, sent, &mut self.outputs);
+            .command(&from, stamp, number, sent, &mut self.outputs);
     }
 
     fn on_operator(&mut self, to: RobotName, command: String) {

@@ -167,17 +167,11 @@ impl Host {
         if self.wrong.is("epoch.init:welcome") && self.last_clock.epoch > welcome.epoch {
             welcome.epoch = self.last_clock.epoch;
         }
-        let admission = Admission {
-            epoch: welcome.epoch,
-            generation: welcome.generation,
-            news_flag: welcome.news_flag,
-        };
+        let admission = Admission::from(&welcome);
 
-        let mut states = Vec::new();
-        if !self.wrong.is("return.generation:state") {
-            for state in [&welcome.state_before, &welcome.last_state] {
-                states.extend(state.clone().map(|state| (state.tick, state)));
-            }
+        let mut states = welcome.states_before();
+        if self.wrong.is("return.generation:state") {
+            states.clear();
         }
 
         let is_early = self.wrong.is("epoch.late:early") && welcome.epoch > 1 && welcome.tick > 0;

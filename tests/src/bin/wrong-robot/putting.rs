@@ -7,7 +7,7 @@ use bus::Qos;
 use lockstep::Answer;
 use protocol::encode;
 use protocol::keys::STATE;
-use protocol::messages::{Command, CommandText, News, PublicState, Report};
+use protocol::messages::{CommandText, News, PublicState, Report};
 
 use crate::host::{Failure, Host};
 
@@ -70,24 +70,18 @@ impl Host {
             first = self.numbered + 1;
         }
 
-        for (number, sent) in (first..).zip(&answer.commands) {
-            let command = Command {
-                epoch: answer.epoch,
-                tick: answer.tick,
-                generation: answer.report.generation,
-                number,
-                performative: sent.command.performative,
-                command: sent.command.command.clone(),
-            };
+        for (to, mut command) in answer.commands_from(first) {
+            // A report may be of a wrong generation; its commands are, too.
+            command.generation = answer.report.generation;
             let mut bytes = encode(&command);
             if self.wrong.is("number.integers:command") {
                 bytes = with_fraction(&bytes, "number");
             }
-            let key = self.keys.command(&sent.to, &self.name);
+            let key = self.keys.command(to, &self.name);
             self.put_on(&key, bytes, self.wrong.is("wire.qos:command"))?;
 
             if answer.epoch == 1 {
-                self.numbered = number;
+                self.numbered = command.number;
             }
         }
         Ok(())

@@ -1,0 +1,100 @@
+//! Messages of the contract as what the state machines take and give.
+
+use protocol::RobotName;
+use protocol::messages::{Command, CommandText, News, Refusal, Report, Welcome};
+
+use crate::barrier::{Refused, Stamp};
+use crate::exchange::Sent;
+use crate::member::{Admission, Naming};
+use crate::participant::Answer;
+
+impl From<&Report> for Stamp {
+    fn from(report: &Report) -> Self {
+        Self {
+            epoch: report.epoch,
+            tick: report.tick,
+            generation: report.generation,
+        }
+    }
+}
+
+impl From<&Command> for Stamp {
+    fn from(command: &Command) -> Self {
+        Self {
+            epoch: command.epoch,
+            tick: command.tick,
+            generation: command.generation,
+        }
+    }
+}
+
+impl<S, C, R> From<&Answer<S, C, R>> for Stamp {
+    fn from(answer: &Answer<S, C, R>) -> Self {
+        Self {
+            epoch: answer.epoch,
+            tick: answer.tick,
+            generation: answer.generation,
+        }
+    }
+}
+
+impl From<&Welcome> for Admission {
+    fn from(welcome: &Welcome) -> Self {
+        Self {
+            epoch: welcome.epoch,
+            generation: welcome.generation,
+            news_flag: welcome.news_flag,
+        }
+    }
+}
+
+impl From<&News> for Naming {
+    fn from(news: &News) -> Self {
+        Self {
+            joined: news.joined,
+            rejoin: news.rejoin,
+        }
+    }
+}
+
+impl From<Refused> for Refusal {
+    fn from(refused: Refused) -> Self {
+        match refused {
+            Refused::UnknownName => Self::UnknownName,
+            Refused::NameTaken => Self::NameTaken,
+            Refused::Ended => Self::Ended,
+        }
+    }
+}
+
+impl Sent<CommandText> {
+    /// The content of a command that was put for `to`.
+    #[must_use]
+    pub fn new(to: RobotName, command: Command) -> Self {
+        Self {
+            to,
+            command: CommandText {
+                performative: command.performative,
+                command: command.command,
+            },
+        }
+    }
+}
+
+impl<S, R> Answer<S, CommandText, R> {
+    /// The commands as they are put, in their order, each with its target. The first has the number `first`: 1, if no rule is
+    /// to be broken.
+    pub fn commands_from(&self, first: u32) -> impl Iterator<Item = (&RobotName, Command)> {
+        (first..).zip(&self.commands).map(|(number, sent)| {
+            let command = Command {
+                epoch: self.epoch,
+                tick: self.tick,
+                generation: self.generation,
+                number,
+                performative: sent.command.performative,
+                command: sent.command.command.clone(),
+            };
+            (&sent.to, command)
+        })
+    }
+}
