@@ -59,6 +59,8 @@ pub enum Output<R, C> {
     },
     /// The tick is complete.
     Complete(Outcome<R, C>),
+    /// The clock goes on without this robot, and others may wait for its state as of the tick before: put that on its behalf.
+    StandIn(RobotName),
     /// The clock is held: tell people for whom, or tell them again because that has changed.
     Held,
     /// A clock that was held goes on.
@@ -308,6 +310,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if !is_present && is_awaited && policy == OnLate::Continue {
             // It will not report in time.
             self.give_up(name);
+            self.stand_in(name, out);
             self.settle(out);
         }
         if self.phase == Phase::Gathering {
@@ -401,7 +404,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             return;
         };
 
-        member.turn.waits_for = Some(on);
+        member.turn.waits_for = Some(on.clone());
+        self.stand_in(&on, out);
         if self.is_announced {
             out.push(Output::Held);
         }
@@ -418,6 +422,10 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             Timer::Repeat if self.phase == Phase::Open => {
                 if self.rules.hold(Rule::RepeatsClock) {
                     self.repeat(out);
+                }
+                let roster: Vec<RobotName> = self.members.keys().cloned().collect();
+                for name in roster {
+                    self.stand_in(&name, out);
                 }
                 out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
             }
@@ -577,6 +585,14 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
     }
 
+    /// Has the state of a robot put that cannot answer, because the clock goes on without it in the open tick.
+    fn stand_in(&self, robot: &RobotName, out: &mut Vec<Output<R, C>>) {
+        let member = self.members.get(robot);
+        if self.phase == Phase::Open && member.is_some_and(|member| member.turn.is_given_up) {
+            out.push(Output::StandIn(robot.clone()));
+        }
+    }
+
     fn news_flag(&self, robot: &RobotName) -> u32 {
         let index = self.members.keys().position(|name| name == robot);
 
@@ -700,6 +716,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         for (name, policy) in late {
             if policy == OnLate::Continue {
                 self.give_up(&name);
+                self.stand_in(&name, out);
             }
         }
         self.settle(out);

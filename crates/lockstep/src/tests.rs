@@ -161,6 +161,31 @@ fn a_deadline_does_what_the_scenario_wants() {
 }
 
 #[test]
+fn the_state_of_a_robot_that_is_given_up_is_put_on_its_behalf() {
+    let own = [(name("B"), OnLate::Continue)].into();
+    let mut barrier = gathered(Lateness {
+        own,
+        ..lateness(OnLate::Wait, 3)
+    });
+    open(&mut barrier, 0);
+    let stands_in = |out: &Outputs| out.contains(&Output::StandIn(name("B")));
+
+    let mut early = Vec::new();
+    barrier.waiting(&name("A"), 1, 0, name("B"), &mut early);
+    let mut given_up = Vec::new();
+    barrier.timer(&Timer::Deadline, &mut given_up);
+    let mut late = Vec::new();
+    barrier.waiting(&name("A"), 1, 0, name("B"), &mut late);
+    let mut again = Vec::new();
+    barrier.timer(&Timer::Repeat, &mut again);
+
+    assert!(!stands_in(&early), "it may still answer");
+    assert!(stands_in(&given_up));
+    assert!(stands_in(&late));
+    assert!(stands_in(&again));
+}
+
+#[test]
 fn a_robot_whose_token_goes_is_lost_at_once_where_the_clock_goes_on() {
     let mut barrier = gathered(lateness(OnLate::Continue, 3));
     open(&mut barrier, 0);

@@ -563,7 +563,7 @@ impl Simulation {
         let index = self.index(name)?;
         let location = self.location(name)?;
         let open_state = open.map(|report| public_state(report, location));
-        let last_state = self.last_state(name, index);
+        let last_state = self.last_state(name);
 
         Some(Welcome {
             protocol: PROTOCOL_VERSION,
@@ -588,9 +588,10 @@ impl Simulation {
     }
 
     /// The state of a robot as of the last complete tick, if it has reported.
-    fn last_state(&self, name: &RobotName, index: usize) -> Option<PublicState> {
+    #[must_use]
+    pub fn last_state(&self, name: &RobotName) -> Option<PublicState> {
         let report = self.reports.get(name)?;
-        let location = self.stood_at.get(index)?;
+        let location = self.stood_at.get(self.index(name)?)?;
         Some(public_state(report, *location))
     }
 

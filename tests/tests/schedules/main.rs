@@ -185,6 +185,11 @@ fn a_robot_that_is_cut_off_at_init_and_never_returns_is_found() {
 }
 
 #[test]
+fn a_robot_that_waits_for_one_that_is_stopped_is_found() {
+    assert_found(Flaw::NobodyStandsIn, 1_000);
+}
+
+#[test]
 fn a_queue_without_room_for_a_large_state_is_found() {
     assert_found(Flaw::QueueWithoutRoom, 200);
 }

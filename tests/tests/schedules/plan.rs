@@ -126,6 +126,8 @@ pub(crate) enum Flaw {
     InitAtTickZeroOnly,
     /// A message that is larger than a queue never fits, also if the queue is empty.
     QueueWithoutRoom,
+    /// The state of a robot that cannot answer is not put on its behalf.
+    NobodyStandsIn,
 }
 
 #[derive(Debug, Clone)]
@@ -181,6 +183,10 @@ impl Plan {
         let roster = halls.scenario(hall, 1).roster();
         if is_late {
             plan.lateness = draw_lateness(&mut chance, &roster);
+        }
+        if is_late && chance.happens(0.2) {
+            plan.draw_silence(&mut chance, &roster);
+            return plan;
         }
         if family == Family::Stopped {
             plan.draw_stop(&mut chance, &roster);
@@ -277,6 +283,20 @@ impl Plan {
             };
             self.blow(at, chance.magnitude(1, 10 * MS), what);
         }
+    }
+
+    /// A robot is stopped for long while others make their first queries. The clock waits for those, and not for it.
+    fn draw_silence(&mut self, chance: &mut Chance, roster: &[RobotName]) {
+        let robot = chance.one_of(roster);
+        self.lateness.on_late = OnLate::Wait;
+        self.lateness.own = [(robot.clone(), OnLate::Continue)].into();
+        let what = What::Hang {
+            robot,
+            lasts: 60 * S,
+            has_successor: false,
+        };
+        let at = (1, chance.below(4));
+        self.blow(Some(at), chance.magnitude(1, 10 * MS), what);
     }
 
     fn draw_crashes(&mut self, chance: &mut Chance, roster: &[RobotName]) {

@@ -13,7 +13,7 @@ use protocol::messages::{
 use protocol::{Epoch, Generation, RobotName, RunName, Tick, encode};
 use simulator::{Event as Recorded, Simulation, TickRecord};
 
-use crate::plan::{Family, MS, Micros, Plan, Point, S};
+use crate::plan::{Family, Flaw, MS, Micros, Plan, Point, S};
 use crate::reference::{Reference, Reports};
 use crate::star::{Bytes, Message};
 use crate::world::{BOUND, Event, World};
@@ -38,7 +38,7 @@ pub(crate) struct Simulator {
     timers: BTreeMap<Timer, Micros>,
     stage: Stage,
     /// Whether robots join and tick 0 is not complete: the operator's `init` is refused.
-    is_gathering: bool,
+    pub(crate) is_gathering: bool,
     /// The tick before which the last order of the scenario was carried out.
     ordered: Option<Tick>,
     with_bodies: BTreeSet<RobotName>,
@@ -210,10 +210,19 @@ impl World {
                 }
                 self.put_down(None, &Message::Clock(encode(&clock).into()));
             }
+            Output::StandIn(robot) => self.stand_in(&robot),
             Output::Complete(outcome) => self.complete(&outcome),
             Output::Aborted => self.end(End::Aborted),
             Output::SetTimer(timer, after) => self.set_timer(timer, after),
             Output::Held | Output::Released | Output::Ignored(..) => {}
+        }
+    }
+
+    /// Puts the state of a robot that cannot answer, to those that follow it.
+    fn stand_in(&mut self, robot: &RobotName) {
+        let state = self.simulator.simulation.last_state(robot);
+        if let Some(state) = state.filter(|_| self.plan.flaw != Flaw::NobodyStandsIn) {
+            self.put_state(robot, encode(&state).into());
         }
     }
 

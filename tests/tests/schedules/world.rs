@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lockstep::{Leave, Sent, Timer};
-use protocol::messages::{CommandText, End, PublicState, Refusal, Report};
+use protocol::messages::{CommandText, End, OnLate, PublicState, Refusal, Report};
 use protocol::{Epoch, RobotName, Tick};
 
 use crate::chance::Chance;
@@ -131,6 +131,8 @@ pub(crate) struct World {
     pub(crate) counts: Counts,
     /// When the last fault is over.
     pub(crate) disturbed_until: Micros,
+    /// Until when faults may hold the clock.
+    held_until: Micros,
     pub(crate) progress_at: Micros,
     has_died: bool,
     trace: u64,
@@ -154,6 +156,7 @@ impl World {
             made: BTreeMap::new(),
             counts: Counts::default(),
             disturbed_until: 0,
+            held_until: 0,
             progress_at: 0,
             has_died: false,
             trace: 0xcbf2_9ce4_8422_2325,
@@ -214,6 +217,7 @@ impl World {
     /// A fault lasts for so long from now on.
     pub(crate) fn disturb(&mut self, lasts: Micros) {
         self.disturbed_until = self.disturbed_until.max(self.now + lasts);
+        self.held_until = self.held_until.max(self.now + lasts);
     }
 
     /// Whether single messages are lost, and so on.
@@ -336,9 +340,30 @@ impl World {
 
     fn hang(&mut self, process: usize, lasts: Micros) {
         self.counts.hangs += 1;
-        self.disturb(lasts);
+        let name = self.processes[process].name.clone();
+        let holds_for = if self.goes_on_without(&name) {
+            lasts.min(self.simulator.barrier.lateness().deadline.as_micros() as Micros)
+        } else {
+            lasts
+        };
+        self.held_until = self.held_until.max(self.now + holds_for);
+        self.disturbed_until = self.disturbed_until.max(self.now + lasts);
         self.stop(process);
         self.schedule(lasts, Event::Resume { process });
+    }
+
+    /// Whether ticks follow also while this robot is stopped.
+    fn goes_on_without(&self, robot: &RobotName) -> bool {
+        let has_change = self
+            .plan
+            .blows
+            .iter()
+            .any(|blow| matches!(blow.what, What::Init | What::Late(_)));
+        let is_under_way = !self.simulator.is_gathering;
+
+        is_under_way
+            && !has_change
+            && self.simulator.barrier.lateness().of(robot) == OnLate::Continue
     }
 
     fn stop(&mut self, process: usize) {
@@ -393,7 +418,7 @@ impl World {
         }
         let quiet = self
             .now
-            .saturating_sub(self.disturbed_until.max(self.progress_at));
+            .saturating_sub(self.held_until.max(self.progress_at));
         if self.simulator.ended.is_none() && quiet > BOUND {
             let awaited = self.simulator.barrier.awaited();
             let tick = self.simulator.simulation.tick();

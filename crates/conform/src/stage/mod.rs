@@ -312,7 +312,11 @@ impl<'k> Stage<'k> {
                     self.timers.insert(timer, Instant::now() + after);
                 }
                 // Checks look at what came, not at what the barrier makes of it.
-                Output::Held | Output::Released | Output::Aborted | Output::Ignored(..) => {}
+                Output::StandIn(_)
+                | Output::Held
+                | Output::Released
+                | Output::Aborted
+                | Output::Ignored(..) => {}
             }
         }
     }

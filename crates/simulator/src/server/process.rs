@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
 use lockstep::{Barrier, Naming, Outcome, Output, Sent, Stamp, Timing};
-use protocol::keys::Keys;
+use protocol::keys::{Keys, STATE};
 use protocol::messages::{
     Clock, Command, CommandText, End, MAX_ENTRIES, Presence, Reason, Report, Waiting,
 };
@@ -403,6 +403,7 @@ impl Server {
                     Output::Gathered => self.begin(simulation),
                     Output::Grant { news, clock } => self.put(simulation, &news, clock)?,
                     Output::Complete(outcome) => self.complete(outcome, simulation, recorder)?,
+                    Output::StandIn(robot) => self.stand_in(&robot, simulation)?,
                     Output::Held => self.tell_held(simulation),
                     Output::Released => {
                         let status = self.status(simulation);
@@ -416,6 +417,14 @@ impl Server {
         }
 
         Ok(())
+    }
+
+    /// Puts what a robot would have answered: those that follow its state wait for it no longer.
+    fn stand_in(&self, robot: &RobotName, simulation: &Simulation) -> Result<(), BusError> {
+        let Some(state) = simulation.last_state(robot) else {
+            return Ok(());
+        };
+        self.bus.put(&self.keys.query(robot, STATE), encode(&state))
     }
 
     /// Every robot of the roster is connected: tick 0.
