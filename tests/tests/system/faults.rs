@@ -195,7 +195,7 @@ fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
         "--set",
         "robot.Leguin.on_late=continue",
         "--set",
-        "deadline=1 s",
+        "deadline=0.5 s",
         "--set",
         "lose_after=3",
     ];
