@@ -42,12 +42,14 @@ fn check(file: &str, text: &str) {
     if std::env::var_os("CARS_UPDATE").is_some() {
         std::fs::write(&path, text).unwrap();
     }
+
     let on_file = std::fs::read_to_string(&path).unwrap_or_default();
     let differs = on_file
         .lines()
         .zip(text.lines())
         .position(|(old, new)| old != new);
     let at = differs.unwrap_or_else(|| on_file.lines().count().min(text.lines().count()));
+
     assert!(
         on_file == text,
         "{} is out of date from line {} on: run the test with CARS_UPDATE=1\n  on file: {}\n  now:     {}",
@@ -127,15 +129,17 @@ fn streams() {
         (2002, "robot/Leguin#2"),
         (MAX_SEED, "robot/Echo"),
     ];
-    let vectors: Vec<_> = streams
-        .into_iter()
-        .map(|(seed, name)| {
-            let (mut whole, mut units) = (stream(seed, name), stream(seed, name));
-            let draws: Vec<String> = (0..4).map(|_| whole.next_u64().to_string()).collect();
-            let units: Vec<f64> = (0..4).map(|_| unit(&mut units)).collect();
-            serde_json::json!({ "seed": seed, "stream": name, "draws": draws, "units": units })
-        })
-        .collect();
+    let mut vectors = Vec::new();
+    for (seed, name) in streams {
+        let mut whole = stream(seed, name);
+        let draws: Vec<String> = (0..4).map(|_| whole.next_u64().to_string()).collect();
+        let mut fractions = stream(seed, name);
+        let units: Vec<f64> = (0..4).map(|_| unit(&mut fractions)).collect();
+        vectors.push(
+            serde_json::json!({ "seed": seed, "stream": name, "draws": draws, "units": units }),
+        );
+    }
+
     check(
         "streams.json",
         &(serde_json::to_string_pretty(&vectors).unwrap() + "\n"),
