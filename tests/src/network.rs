@@ -77,10 +77,11 @@ impl Row {
     /// Makes them.
     #[must_use]
     pub fn new(test: &str, hosts: usize) -> Self {
-        let name = |i| format!("carstest{}-{test}-{i}", std::process::id());
-        let row = Self {
-            names: (0..hosts).map(name).collect(),
-        };
+        let mut names = Vec::new();
+        for host in 0..hosts {
+            names.push(format!("carstest{}-{test}-{host}", std::process::id()));
+        }
+        let row = Self { names };
         for (i, host) in row.names.iter().enumerate() {
             ip(&["netns", "add", host]).expect("a namespace");
             ip(&["-n", host, "link", "set", "lo", "up"]).expect("loopback");

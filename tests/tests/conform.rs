@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use conform::{PAGE, RULES, Rule, Setting, Verdict};
 use system_tests::{Lab, programs, root};
 
-/// Robots that pass: what to call it, more arguments of `cars conform`, the command from the project's root.
+/// Robots that pass: a name for the report, more arguments of `cars conform`, the command from the project's root.
 const ROBOTS: [(&str, &[&str], &[&str]); 7] = [
     ("a robot by hand", &[], &["wrong-robot"]),
     ("Vonda", &[], &["cars-vonda"]),
@@ -63,11 +63,11 @@ fn cars(more: &[&str], command: &[&str]) -> std::process::Output {
     cars.output().unwrap()
 }
 
-/// The robot by hand, with what it does wrong.
+/// The command of `wrong-robot`, with what it does wrong.
 fn wrong(rule: &str) -> Command {
     let robot = program("wrong-robot");
     if rule == DEAF {
-        // A signal that the shell ignores is ignored by the program that takes its place, too.
+        // A signal that the shell ignores is also ignored by the program that replaces it.
         let mut command = Command::new("sh");
         command.args(["-c", "trap '' TERM; exec \"$0\"", &robot]);
         return command;
@@ -180,7 +180,7 @@ const OTHERWISE_ON_THE_WIRE: [&str; 7] = [
     "wire.qos:state",
 ];
 
-/// Kits that run at the same time: their robots mostly wait.
+/// How many kits run at the same time: their robots mostly wait.
 const KITS: usize = 10;
 
 /// The rule that a robot breaks, from the way in which it does.
@@ -272,6 +272,7 @@ fn what_cannot_be_checked_is_reported() {
     ] {
         let output = cars(more, command);
         let error = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
+
         assert_eq!(output.status.code(), Some(2), "{command:?}: {error}");
         assert!(error.contains(reason), "{command:?}: {error}");
     }

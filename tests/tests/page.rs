@@ -34,16 +34,16 @@ fn table(page: &str, header: &str) -> Vec<Vec<String>> {
         .lines()
         .skip_while(|line| !line.starts_with(&begin))
         .take_while(|line| line.starts_with('|'));
-    let cells = |row: &str| {
-        row.trim_matches('|')
-            .split(" | ")
-            .map(|cell| cell.trim().to_owned())
-            .collect()
-    };
     let rows: Vec<Vec<String>> = rows.skip(2).map(cells).collect();
     assert!(!rows.is_empty(), "there is no table with {header:?}");
 
     rows
+}
+
+fn cells(row: &str) -> Vec<String> {
+    let cells = row.trim_matches('|').split(" | ");
+
+    cells.map(|cell| cell.trim().to_owned()).collect()
 }
 
 /// The text of all source files in a folder.
@@ -61,7 +61,7 @@ fn sources(folder: &Path) -> String {
     text
 }
 
-/// What stands between single backticks.
+/// The text between the first two backticks.
 fn code(text: &str) -> &str {
     text.split('`')
         .nth(1)
@@ -153,25 +153,30 @@ fn the_rules_are_there_once_each() {
         "number.integers",
     ];
 
-    let page: &'static str = page().leak();
-    let found: Vec<&str> = page
+    let page = page();
+    let mut found: Vec<&str> = page
         .split("**`")
         .skip(1)
         .filter_map(|rest| rest.split_once("`**").map(|(rule, _)| rule))
         .collect();
-    let sorted = |mut rules: Vec<&'static str>| {
-        rules.sort_unstable();
-        rules
-    };
-    assert_eq!(sorted(found), sorted(RULES.to_vec()));
+    found.sort_unstable();
+    let mut rules = RULES.to_vec();
+    rules.sort_unstable();
+    assert_eq!(found, rules);
+}
+
+/// A key with the names that the page has for its parts.
+fn as_on_page(key: &str) -> String {
+    key.replace("RUN", "{run}")
+        .replace("NAME", "{name}")
+        .replace("FROM", "{from}")
 }
 
 #[test]
 fn the_table_of_keys_is_that_of_the_code() {
-    let (run, name) = (RunName::new("RUN").unwrap(), |name| {
-        RobotName::new(name).unwrap()
-    });
-    let (keys, robot, from) = (Keys::new(&run), name("NAME"), name("FROM"));
+    let keys = Keys::new(&RunName::new("RUN").unwrap());
+    let robot = RobotName::new("NAME").unwrap();
+    let from = RobotName::new("FROM").unwrap();
     let mut expected = vec![
         keys.clock(),
         keys.join_as(&robot),
@@ -189,18 +194,13 @@ fn the_table_of_keys_is_that_of_the_code() {
         keys.faults(),
     ];
     expected.extend(QUERIES.map(|what| keys.query(&robot, what)));
-    let open = |key: String| {
-        key.replace("RUN", "{run}")
-            .replace("NAME", "{name}")
-            .replace("FROM", "{from}")
-    };
-    let expected: BTreeSet<String> = expected.into_iter().map(open).collect();
+    let expected: BTreeSet<String> = expected.iter().map(|key| as_on_page(key)).collect();
 
     let page = page();
     let rows = table(&page, "Key");
     let found: BTreeSet<String> = rows.iter().map(|row| code(&row[0]).to_owned()).collect();
     assert_eq!(found, expected);
-    assert_eq!(found.len(), rows.len(), "a key stands there twice");
+    assert_eq!(found.len(), rows.len(), "a key is in the table twice");
 
     // The same keys are in the AsyncAPI document, and all messages that travel are named.
     let document = protocol::asyncapi::document();
@@ -209,6 +209,7 @@ fn the_table_of_keys_is_that_of_the_code() {
         .map(|c| c["address"].as_str().unwrap().to_owned())
         .collect();
     assert_eq!(addresses, found);
+
     let named: BTreeSet<&str> = rows
         .iter()
         .flat_map(|row| schemas(row.last().unwrap()))
@@ -359,7 +360,7 @@ fn check_as(schema: &str, text: &str) -> Result<(), Malformed> {
     }
 }
 
-/// Whether a recorded message or answer is this.
+/// Whether a transcript has this message or answer.
 fn is_recorded(file: &str, example: &Value) -> bool {
     let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
     let mut lines = text
@@ -371,7 +372,8 @@ fn is_recorded(file: &str, example: &Value) -> bool {
 #[test]
 fn the_examples_are_messages_and_those_of_runs_were_recorded() {
     let page = page();
-    let (mut shown, mut recorded) = (BTreeSet::new(), 0);
+    let mut shown = BTreeSet::new();
+    let mut recorded = 0;
     let mut blocks = page.split("\n```json\n");
     let mut before = blocks.next().unwrap();
     for block in blocks {
@@ -380,6 +382,7 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
         let [schema] = schemas(caption)[..] else {
             panic!("which message is this? {caption}")
         };
+
         check_as(schema, example).unwrap_or_else(|error| panic!("{error}\n{example}"));
         if let Some((_, link)) = caption.split_once("(vectors/") {
             let file = link.split(')').next().unwrap();
@@ -390,6 +393,7 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
             );
             recorded += 1;
         }
+
         shown.insert(schema);
         before = rest;
     }
@@ -411,41 +415,46 @@ fn the_examples_are_messages_and_those_of_runs_were_recorded() {
     }
 }
 
+/// Decodes the messages of a line with this key. Tokens have none.
+fn check_line(key: &str, line: &Value) -> Result<(), Malformed> {
+    let message = line["message"].to_string();
+    let answer = line["answer"].to_string();
+    if key.contains("/alive/") {
+        return Ok(());
+    }
+    if key.contains("/command/") {
+        return check::<Command>(&message);
+    }
+    if key.contains("/join") {
+        return check::<JoinRequest>(&message).and(check::<JoinAnswer>(&answer));
+    }
+
+    match Keys::last_chunk(key) {
+        "clock" => check::<Clock>(&message),
+        "report" => check::<Report>(&message),
+        "news" => check::<News>(&message),
+        _ if line["refused"].is_string() => Ok(()),
+        STATE if line["way"] == "from" => check::<PublicState>(&message),
+        STATE => check::<PublicState>(&answer),
+        what => {
+            assert!(QUERIES.contains(&what), "{key}");
+            check::<Answer>(&answer)
+        }
+    }
+}
+
 /// Every line of the transcripts is a message of its key.
 #[test]
 fn the_transcripts_are_messages() {
     let mut count = 0;
     for file in ["leguin.jsonl", "echo.jsonl", "return.jsonl"] {
         let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
-        for line in text
-            .lines()
-            .map(|line| serde_json::from_str::<Value>(line).unwrap())
-        {
+        for line in text.lines() {
+            let line: Value = serde_json::from_str(line).unwrap();
             let Some(key) = line["key"].as_str() else {
                 continue;
             };
-            let (message, answer) = (line["message"].to_string(), line["answer"].to_string());
-            let chunk = match Keys::last_chunk(key) {
-                _ if key.contains("/command/") => "command",
-                _ if key.contains("/join") => "join",
-                _ if key.contains("/alive/") => continue,
-                chunk => chunk,
-            };
-            let read = match chunk {
-                "join" => check::<JoinRequest>(&message).and(check::<JoinAnswer>(&answer)),
-                "command" => check::<Command>(&message),
-                "clock" => check::<Clock>(&message),
-                "report" => check::<Report>(&message),
-                "news" => check::<News>(&message),
-                _ if line["refused"].is_string() => Ok(()),
-                STATE if line["way"] == "from" => check::<PublicState>(&message),
-                STATE => check::<PublicState>(&answer),
-                what => {
-                    assert!(QUERIES.contains(&what), "{key}");
-                    check::<Answer>(&answer)
-                }
-            };
-            read.unwrap_or_else(|error| panic!("{file}: {error}\n{line}"));
+            check_line(key, &line).unwrap_or_else(|error| panic!("{file}: {error}\n{line}"));
             count += 1;
         }
     }
@@ -462,7 +471,9 @@ fn the_random_streams_are_those_of_the_code() {
     assert_eq!(rows.len(), vectors.len());
 
     for row in rows {
-        let (seed, name) = (row[0].parse().unwrap(), code(&row[1]));
+        let seed = row[0].parse().unwrap();
+        let name = code(&row[1]);
+
         assert_eq!(row[2], stream(seed, name).next_u64().to_string(), "{name}");
         assert_eq!(
             row[3].parse::<f64>().unwrap().to_bits(),

@@ -28,7 +28,7 @@ fn lacks(tool: &str, is_there: bool, remedy: &str) -> bool {
     let text =
         format!("a test of robots in other languages is skipped: there is no {tool}; {remedy}");
     assert!(std::env::var_os("CI").is_none(), "{text}");
-    // Past the test harness, which keeps what a passing test prints to itself.
+    // Directly on the standard error, because the test harness hides the output of passing tests.
     let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
     true
 }
@@ -67,19 +67,20 @@ fn tsc() -> PathBuf {
     root().join("crates/console/check/node_modules/.bin/tsc")
 }
 
-/// Runs a command from the project's root; it must succeed.
+/// Runs a command from the project's root, which must succeed.
 fn ok(command: &mut Command) -> Output {
     let output = command
         .current_dir(root())
         .stdin(Stdio::null())
         .output()
         .unwrap();
-    assert!(output.status.success(), "{command:?}: {}", said(&output));
+    assert!(output.status.success(), "{command:?}: {}", printed(&output));
     output
 }
 
-fn said(output: &Output) -> String {
-    let [out, err] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+fn printed(output: &Output) -> String {
+    let out = String::from_utf8_lossy(&output.stdout);
+    let err = String::from_utf8_lossy(&output.stderr);
     format!("{}\n{out}\n{err}", output.status)
 }
 
@@ -110,11 +111,12 @@ fn process_of(name: &str, command: &str) -> String {
     format!("[[process]]\nname = \"{name}\"\nrestart = \"on-failure\"\ncommand = {command}\n")
 }
 
-/// A launch of a scenario in which `program`, or the SDK's own where there is none, is Leguin, and Vonda.
+/// A launch of a scenario in which one program is Leguin and, if wanted, Vonda.
 struct Cast {
     lab: Lab,
-    scenario: PathBuf,
     /// The scenario of the launch, and of the run to compare it with.
+    scenario: PathBuf,
+    /// The launch file.
     file: String,
 }
 
@@ -152,8 +154,8 @@ impl Cast {
         )
     }
 
-    /// The launch is, byte for byte, the run in one process with the robots in Rust.
-    fn is_the_run_in_rust(&self, more: &[&str]) {
+    /// Asserts that the launch gives the same run, byte for byte, as one process with the robots in Rust.
+    fn assert_same_as_in_rust(&self, more: &[&str]) {
         let scenario = self.scenario.display().to_string();
         let mut local = vec!["run", &scenario, "--run", "in-rust"];
         local.extend(more);
@@ -188,9 +190,9 @@ fn leguin_in_c_is_leguin_in_rust_byte_for_byte() {
     ] {
         let cast = Cast::in_c(scenario, has_vonda, PLAIN);
         for seed in ["1", "2", "2002"] {
-            cast.is_the_run_in_rust(&["--seed", seed]);
+            cast.assert_same_as_in_rust(&["--seed", seed]);
 
-            // Nothing would be shown by runs in which she does nothing.
+            // A run in which Leguin does nothing would show nothing.
             let text = String::from_utf8(cast.lab.bytes("in-c")).unwrap();
             for part in [
                 r#""robot":"Leguin","from":"REFILL","to":"EXCHANGE""#,
@@ -221,7 +223,7 @@ fn her_parameters_and_vonda_mean_the_same_in_c() {
             "robot.Leguin.params.affect=off",
             "robot.Vonda.params.schematic=off",
         ],
-        // The waiter is not of the roster: she searches.
+        // The waiter is not in the roster, so Leguin searches.
         &[
             "robot.Leguin.params.waiter=Nobody",
             "robot.Leguin.params.turn_mean_s=2.0",
@@ -239,7 +241,7 @@ fn her_parameters_and_vonda_mean_the_same_in_c() {
     ] {
         let sets = changes.iter().flat_map(|change| ["--set", change]);
         let more: Vec<&str> = shorter.into_iter().chain(sets).collect();
-        cast.is_the_run_in_rust(&more);
+        cast.assert_same_as_in_rust(&more);
     }
 }
 
@@ -249,9 +251,9 @@ fn no_compiler_fuses_her_arithmetic() {
         return;
     }
 
-    // Where the machine can fuse, this asks for it.
+    // Permits fused operations on machines that have them.
     Cast::in_c("configs/hors_doeuvres.toml", false, "-O3 -march=native")
-        .is_the_run_in_rust(&["--seed", "3"]);
+        .assert_same_as_in_rust(&["--seed", "3"]);
 
     let mut sloppy = Command::new("cc");
     let output = sloppy
@@ -260,9 +262,9 @@ fn no_compiler_fuses_her_arithmetic() {
         .output()
         .unwrap();
     assert!(
-        said(&output).contains("doubles must be computed as doubles"),
+        printed(&output).contains("doubles must be computed as doubles"),
         "{}",
-        said(&output)
+        printed(&output)
     );
 }
 
@@ -310,7 +312,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
                 .is_ok_and(|output| output.status.success())
         };
 
-        // Into the first epoch, back to the beginning, and through the second one with its crash.
+        // Part of the first epoch, then all of the second one with its crash.
         eventually("the first ticks", || ctl(&["step", "50"]).then_some(()));
         eventually("the second epoch", || ctl(&["init"]).then_some(()));
         eventually("its start", || ctl(&["start"]).then_some(()));
@@ -328,7 +330,7 @@ fn she_starts_over_and_takes_over_in_c_as_in_rust() {
     }
 }
 
-/// A session with Leguin; every query of hers has an answer here.
+/// A session with Leguin in which every query of hers has an answer.
 const SESSION: &[&str] = &[
     r#"{"type":"init","protocol":2,"run":"r","name":"Leguin","generation":1,"epoch":1,"tick":0,"seed":42,"stream":"robot/Leguin","tick_s":0.5,"field_m":[15.24,15.24],"body_m":0.6096,"sensing_range_m":1.8288,"location":{"x":1.2192,"y":1.2192},"roster":["Butler","Leguin"],"parameters":{"waiter":"Butler","affect":"on","dynamics":{"label_cuts":[0.2,0.4,0.6,0.8]}}}"#,
     r#"{"type":"tick","tick":1,"location":{"x":1.2192,"y":1.2192},"commands":[{"from":"Butler","performative":"achieve","command":"refill"},{"from":"Bot","performative":"achieve","command":"\u00e9\ud83d\ude00 \"\\\u0007\u0000\n 0123456789012345678901234567890123456789012345678901234567890"}],"sensed":[{"name":"Vonda","location":{"x":1.0,"y":2e0}}]}"#,
@@ -341,12 +343,12 @@ const SESSION: &[&str] = &[
     r#"{"type":"end","reason":"finished"}"#,
 ];
 
-/// A whole number below `count`, by chance.
+/// A random whole number below `count`.
 fn below(count: usize, chance: &mut Stream) -> usize {
     (unit(chance) * count as f64) as usize
 }
 
-/// The session with a few bytes changed, doubled, cut out, or replaced by what parsers stumble over.
+/// The session with a few bytes changed, repeated, removed, or replaced by texts that are hard to parse.
 fn damaged(chance: &mut Stream) -> Vec<u8> {
     const STUMBLING: &[&str] = &[
         "null",
@@ -379,7 +381,7 @@ fn damaged(chance: &mut Stream) -> Vec<u8> {
     session
 }
 
-/// Runs a program with all of this on its standard input.
+/// Runs a program with this text on its standard input.
 fn run_with(program: &Path, session: &[u8]) -> Output {
     let mut command = Command::new(program);
     command
@@ -424,18 +426,18 @@ fn no_input_breaks_leguin_in_c() {
         return;
     }
     let cast = Cast::in_c("configs/three_robots.toml", true, STRICT);
-    cast.is_the_run_in_rust(&["--seed", "4", "--duration", "120 s"]);
+    cast.assert_same_as_in_rust(&["--seed", "4", "--duration", "120 s"]);
 
     let program = cast.lab.out().join("leguin");
     let whole = run_with(&program, SESSION.join("\n").as_bytes());
-    assert!(whole.status.success(), "{}", said(&whole));
+    assert!(whole.status.success(), "{}", printed(&whole));
     assert_eq!(
         String::from_utf8_lossy(&whole.stdout)
             .matches("\"done\"")
             .count(),
         4,
         "{}",
-        said(&whole)
+        printed(&whole)
     );
     let mut chance = stream(1, "damage");
     let mut refused = 0;
@@ -449,7 +451,7 @@ fn no_input_breaks_leguin_in_c() {
         assert!(
             status == Some(0) || is_refusal,
             "{}\nafter\n{}",
-            said(&output),
+            printed(&output),
             String::from_utf8_lossy(&session)
         );
         refused += usize::from(is_refusal);
@@ -589,7 +591,7 @@ fn robots_over_stdin_and_stdout_keep_the_rules_of_the_protocol() {
     });
 }
 
-/// The robot that was written from `docs/protocol.md` alone.
+/// The robot that was written with nothing but `docs/protocol.md`.
 #[test]
 fn a_robot_in_perl_draws_and_keeps_the_rules() {
     let is_there = succeeds(Command::new("perl").args(["-MJSON::PP", "-e1"]));
@@ -631,7 +633,7 @@ fn a_robot_in_perl_draws_and_keeps_the_rules() {
     assert_conforms(&launch, "Wanda");
 }
 
-/// How far a robot has gone in a run.
+/// The length of the way of a robot in a run, meters.
 fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
     let text = std::fs::read_to_string(lab.file(run, "recording.jsonl")).unwrap();
     let places: Vec<(f64, f64)> = text
@@ -676,7 +678,7 @@ fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
             end.status.success() && end.stdout.is_empty(),
             "{}: {}",
             program.display(),
-            said(&end)
+            printed(&end)
         );
 
         let silence = run_with(&program, b"");
@@ -684,7 +686,7 @@ fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
             silence.status.success() && silence.stdout.is_empty(),
             "{}: {}",
             program.display(),
-            said(&silence)
+            printed(&silence)
         );
 
         let rubbish = run_with(&program, b"rubbish\n");
@@ -693,7 +695,7 @@ fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
             Some(1),
             "{}: {}",
             program.display(),
-            said(&rubbish)
+            printed(&rubbish)
         );
         assert!(
             !rubbish.stderr.is_empty(),

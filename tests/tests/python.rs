@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, killpg};
@@ -25,6 +25,7 @@ fn python() -> Command {
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARS_")) {
         python.env_remove(name);
     }
+
     python.stdin(Stdio::null());
     python
 }
@@ -33,8 +34,8 @@ fn package() -> PathBuf {
     root().join("sdk/python/src")
 }
 
-/// Whether there is a Python with all that is needed. If not, says so past the test harness, which keeps what a passing
-/// test prints to itself; and fails where everything must be tested.
+/// Whether there is a Python with all that is needed. If not, the test is reported as skipped, directly on the standard error,
+/// because the test harness hides the output of passing tests. With the environment variable `CI` that is a failure.
 fn is_equipped() -> bool {
     let missing = match python().args(["-c", "import zenoh, pytest, mypy"]).output() {
         Ok(output) if output.status.success() => return true,
@@ -42,9 +43,10 @@ fn is_equipped() -> bool {
             .to_owned(),
         Err(error) => format!("python3 does not run ({error}); install Python 3.10 or later"),
     };
+
     let text = format!("the tests of the SDK in Python are skipped: {missing}");
     assert!(std::env::var_os("CI").is_none(), "{text}");
-    let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
+    let _unseen = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
     false
 }
 
@@ -53,46 +55,44 @@ fn the_package_passes_its_tests() {
     if !is_equipped() {
         return;
     }
+
     let lab = Lab::new();
     let printed = lab.out().join("pytest.txt");
     let file = std::fs::File::create(&printed).unwrap();
-    let mut pytest = python();
-    pytest
+    let mut command = python();
+    command
         .current_dir(root().join("sdk/python"))
-        .env("CARS_BIN_DIR", programs());
-    pytest.args([
-        "-m",
-        "pytest",
-        "-v",
-        "-ra",
-        "--tb=short",
-        "-p",
-        "no:cacheprovider",
-    ]);
-    pytest.arg("--basetemp").arg(lab.out().join("pytest"));
-    // A group of its own, so that nothing that its tests have started outlives it.
-    let mut pytest = pytest
-        .process_group(0)
+        .env("CARS_BIN_DIR", programs())
+        .args(["-m", "pytest", "-v", "-ra", "--tb=short"])
+        .args(["-p", "no:cacheprovider"])
+        .arg("--basetemp")
+        .arg(lab.out().join("pytest"))
         .stdout(file.try_clone().unwrap())
-        .stderr(file)
-        .spawn()
-        .unwrap();
-    let group = Pid::from_raw(i32::try_from(pytest.id()).unwrap());
-    let begun = Instant::now();
-    let status = loop {
-        if let Some(status) = pytest.try_wait().unwrap() {
-            break Some(status);
-        }
-        if begun.elapsed() > PATIENCE {
-            killpg(group, Signal::SIGKILL).unwrap();
-            pytest.wait().unwrap();
-            break None;
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    };
+        .stderr(file);
+    let status = status_of_group(command);
+
     println!("{}", std::fs::read_to_string(&printed).unwrap_or_default());
     let status = status.unwrap_or_else(|| panic!("not done after {PATIENCE:?}"));
     assert!(status.success(), "pytest: {status}");
+}
+
+/// Runs a command in a process group of its own, so that nothing that it starts outlives it. `None` if it is not done after
+/// [`PATIENCE`].
+fn status_of_group(mut command: Command) -> Option<ExitStatus> {
+    let mut child = command.process_group(0).spawn().unwrap();
+    let group = Pid::from_raw(i32::try_from(child.id()).unwrap());
+    let begun = Instant::now();
+
+    while begun.elapsed() <= PATIENCE {
+        if let Some(status) = child.try_wait().unwrap() {
+            return Some(status);
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+
+    killpg(group, Signal::SIGKILL).unwrap();
+    child.wait().unwrap();
+    None
 }
 
 /// Draws of many streams, as a program in Python prints them.
@@ -110,12 +110,14 @@ fn streams_draw_the_same_numbers() {
     if !is_equipped() {
         return;
     }
+
     let names = ["guests", "robot/Butler", "robot/Leguin#2", "", "caf\u{e9}"];
     let seeds = [0, 1, 42, 2002, MAX_SEED, u64::MAX];
     let streams: Vec<(u64, &str)> = seeds
         .into_iter()
         .flat_map(|seed| names.map(|name| (seed, name)))
         .collect();
+
     let arguments = streams.iter().map(|(seed, name)| format!("{seed} {name}"));
     let output = python()
         .args(["-c", DRAWS])
@@ -127,6 +129,7 @@ fn streams_draw_the_same_numbers() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
+
     let printed = String::from_utf8(output.stdout).unwrap();
     assert_eq!(printed.lines().count(), streams.len());
     for ((seed, name), line) in streams.into_iter().zip(printed.lines()) {

@@ -1,4 +1,4 @@
-//! A secured run and its intruders: what is refused, what is harmless, and that the record stays what it is.
+//! A secured run and intruders: what is refused, what is harmless, and that the record does not change.
 
 #![expect(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
 
@@ -17,6 +17,8 @@ use serde_json::json;
 use system_tests::processes::Running;
 use system_tests::{Lab, PATIENCE, assert_same, eventually, programs};
 
+/// A message that is not valid JSON.
+const RUBBISH: &[u8] = b"rubbish";
 const HALL: &str = "launch/hors_doeuvres.toml";
 
 fn name(name: &str) -> RobotName {
@@ -43,7 +45,7 @@ fn config(folder: &Path, participant: &str) -> PathBuf {
     folder.join(participant).join("zenoh.json5")
 }
 
-/// A printed message without its line breaks and its frame.
+/// A printed error without its line breaks and its frame.
 fn flat(text: &str) -> String {
     text.split_whitespace()
         .filter(|word| *word != "│")
@@ -166,15 +168,15 @@ impl Castle {
     }
 }
 
-/// What a subscription has heard: keys, in order.
+/// The keys of the messages that subscribers receive, in order.
 #[derive(Clone, Default)]
-struct Heard(Arc<Mutex<Vec<String>>>);
+struct Received(Arc<Mutex<Vec<String>>>);
 
-impl Heard {
+impl Received {
     fn on(&self, bus: &Bus, keys: &str) -> Declared {
-        let heard = self.0.clone();
+        let received = self.0.clone();
         bus.subscribe(keys, move |key, _| {
-            heard.lock().expect("no panic").push(key.to_owned());
+            received.lock().expect("no panic").push(key.to_owned());
         })
         .unwrap()
     }
@@ -189,7 +191,7 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
     let castle = Castle::new("secure-same");
     let lab = &castle.lab;
 
-    // Whoever launched it needs to say nothing more: the run's folder tells where and how.
+    // Its owner names the run only: the address and the certificate are in the run's folder.
     lab.ok(&["ctl", "step", "30", "--run", "secure-same"]);
     assert!(
         lab.ok(&["ctl", "status", "--run", "secure-same"])
@@ -210,10 +212,9 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
         "--connect",
         &castle.endpoint,
     ]);
-
     assert!(flat(&text).contains("wants a certificate"), "{text}");
 
-    // A robot is no operator.
+    // A robot's certificate does not permit control.
     let leguin = config(&castle.folder, "Leguin").display().to_string();
     lab.fails(&[
         "ctl",
@@ -224,19 +225,19 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
         &leguin,
     ]);
 
-    let (folder, run) = (castle.launch.folder.clone(), castle.run.clone());
+    let folder = castle.launch.folder.clone();
     castle.finish_unharmed();
 
     for file in ["endpoint", "operator_config"] {
         assert!(
             !folder.join(file).exists(),
-            "{file} of {run} is still there"
+            "{file} of the run is still there"
         );
     }
 }
 
 #[test]
-fn nobody_enters_without_a_certificate_of_this_authority() {
+fn no_session_opens_without_a_certificate_of_this_authority() {
     let castle = Castle::new("secure-door");
     let others = certificates(&castle.lab, "others");
     let plain = castle.endpoint.replace("tls/", "tcp/");
@@ -246,7 +247,7 @@ fn nobody_enters_without_a_certificate_of_this_authority() {
     );
     let anonymous = castle.lab.write(
         "anonymous.json5",
-        // It believes the simulator, and shows nothing itself.
+        // It accepts the simulator's certificate, and has none itself.
         &std::fs::read_to_string(config(&castle.folder, "Butler"))
             .unwrap()
             .replace("enable_mtls: true", "enable_mtls: false"),
@@ -288,45 +289,41 @@ fn no_robot_passes_for_the_simulator() {
         listen: endpoint.clone(),
         trusts_network: false,
     };
-    let _listening = Bus::open(&role, Some(&forged)).unwrap();
-    let error = open(&endpoint, Some(&config(&folder, "Butler"))).map(|bus| bus.id());
+    let _router = Bus::open(&role, Some(&forged)).unwrap();
+
+    let opened = open(&endpoint, Some(&config(&folder, "Butler"))).map(|bus| bus.id());
     assert!(
-        error.is_err(),
-        "Butler believed Leguin to be the simulator: {error:?}"
+        opened.is_err(),
+        "Butler accepts Leguin as the simulator: {opened:?}"
     );
 }
 
 #[test]
-fn a_participant_says_nothing_in_anothers_name() {
+fn a_participant_puts_nothing_in_anothers_name() {
     let castle = Castle::new("secure-pose");
     let keys = &castle.keys;
-    let (butler, leguin, vonda) = (name("Butler"), name("Leguin"), name("Vonda"));
+    let butler = name("Butler");
+    let leguin = name("Leguin");
+    let vonda = name("Vonda");
     let thief = castle.enter("Leguin");
-
     let operator = castle.enter("operator");
 
-    // Witnesses, each with what its certificate lets it hear.
-    let heard = Heard::default();
+    // Witnesses, each with subscribers that its certificate permits.
+    let received = Received::default();
     let witness = castle.enter("Butler");
-    let _at_butler = heard.on(&witness, &keys.news(&butler));
+    let _at_butler = received.on(&witness, &keys.news(&butler));
     let at_operator = [
         keys.clock(),
         keys.query(&butler, "panel"),
         keys.query(&leguin, "panel"),
         keys.query(&butler, STATE),
     ]
-    .map(|key| heard.on(&castle.operator, &key));
-
-    // An answer on the same link comes after what was declared there: from here on they hear.
-    assert!(
-        witness
-            .get(&keys.query(&leguin, STATE), "", None)
-            .unwrap()
-            .is_some()
-    );
+    .map(|key| received.on(&castle.operator, &key));
+    // A reply on the same link follows what was declared before: from here on the subscribers are in effect.
+    let reply = witness.get(&keys.query(&leguin, STATE), "", None).unwrap();
+    assert!(reply.is_some());
     castle.status();
 
-    let rubbish = || b"rubbish".to_vec();
     let clock = Clock {
         epoch: 1,
         tick: 99_999,
@@ -334,104 +331,113 @@ fn a_participant_says_nothing_in_anothers_name() {
     };
     for (key, message) in [
         (keys.clock(), encode(&clock)),
-        (keys.report(&butler), rubbish()),
-        (keys.waiting(&butler), rubbish()),
-        (keys.report(&vonda), rubbish()),
-        ("cars/secure-pose/robot/*/report".to_owned(), rubbish()),
-        ("cars/secure-pose/**".to_owned(), rubbish()),
-        (keys.query(&butler, STATE), rubbish()),
-        (keys.panel(&butler), rubbish()),
-        (keys.news(&butler), rubbish()),
-        (keys.news(&leguin), rubbish()),
-        (keys.world(), rubbish()),
-        (keys.log(), rubbish()),
-        (keys.command(&butler, &vonda), rubbish()),
-        (keys.command(&leguin, &butler), rubbish()),
+        (keys.report(&butler), RUBBISH.to_vec()),
+        (keys.waiting(&butler), RUBBISH.to_vec()),
+        (keys.report(&vonda), RUBBISH.to_vec()),
+        (
+            "cars/secure-pose/robot/*/report".to_owned(),
+            RUBBISH.to_vec(),
+        ),
+        ("cars/secure-pose/**".to_owned(), RUBBISH.to_vec()),
+        (keys.query(&butler, STATE), RUBBISH.to_vec()),
+        (keys.panel(&butler), RUBBISH.to_vec()),
+        (keys.news(&butler), RUBBISH.to_vec()),
+        (keys.news(&leguin), RUBBISH.to_vec()),
+        (keys.world(), RUBBISH.to_vec()),
+        (keys.log(), RUBBISH.to_vec()),
+        (keys.command(&butler, &vonda), RUBBISH.to_vec()),
+        (keys.command(&leguin, &butler), RUBBISH.to_vec()),
     ] {
         for intruder in [&thief, &operator] {
             intruder.put(&key, message.clone()).unwrap();
         }
     }
-    for message in [rubbish(), br#"{"command":"refill"}"#.to_vec()] {
+    for message in [RUBBISH.to_vec(), br#"{"command":"refill"}"#.to_vec()] {
         let as_operator = keys.command(&leguin, &RobotName::operator());
         thief.put(&as_operator, message).unwrap();
     }
     operator
-        .put(&keys.command(&butler, &leguin), rubbish())
+        .put(&keys.command(&butler, &leguin), RUBBISH.to_vec())
         .unwrap();
     let forged_tokens =
         [&butler, &vonda].map(|robot| thief.token(&keys.alive_robot(robot)).unwrap());
     drop(forged_tokens);
 
-    // What it may say arrives, after all that it may not.
-    thief.put(&keys.report(&leguin), rubbish()).unwrap();
-    thief.put(&keys.panel(&leguin), rubbish()).unwrap();
+    // What they may put arrives, after all that they may not.
+    thief.put(&keys.report(&leguin), RUBBISH.to_vec()).unwrap();
+    thief.put(&keys.panel(&leguin), RUBBISH.to_vec()).unwrap();
     thief
-        .put(&keys.command(&butler, &leguin), rubbish())
+        .put(&keys.command(&butler, &leguin), RUBBISH.to_vec())
         .unwrap();
     operator
-        .put(&keys.command(&leguin, &RobotName::operator()), rubbish())
+        .put(
+            &keys.command(&leguin, &RobotName::operator()),
+            RUBBISH.to_vec(),
+        )
         .unwrap();
+
     let status = castle.ignored("malformed", 3);
     assert_eq!(status.ignored.len(), 1, "{:?}", status.ignored);
     let expected = keys.query(&leguin, "panel");
     eventually("what is allowed", || {
-        heard.keys().contains(&expected).then_some(())
+        received.keys().contains(&expected).then_some(())
     });
-    let unexpected: Vec<String> = heard
+    let unexpected: Vec<String> = received
         .keys()
         .into_iter()
         .filter(|key| *key != expected)
         .collect();
     assert!(unexpected.is_empty(), "forged: {unexpected:?}");
+
     drop(at_operator);
     castle.finish_unharmed();
 }
 
+/// A request to join as this robot.
+fn request_to_join(run: &str, robot: &str) -> Vec<u8> {
+    let request = json!({
+        "protocol": PROTOCOL_VERSION,
+        "run": run,
+        "name": robot,
+        "instance": "intruder",
+    });
+
+    request.to_string().into_bytes()
+}
+
 #[test]
-fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
+fn a_robot_neither_queries_nor_receives_nor_replies_what_is_not_its_own() {
     let castle = Castle::new("secure-ask");
     let keys = &castle.keys;
-    let (butler, leguin) = (name("Butler"), name("Leguin"));
+    let butler = name("Butler");
+    let leguin = name("Leguin");
     let thief = castle.enter("Leguin");
 
-    let stop = encode(&Control::Stop);
-    let join = |robot: &str| {
-        json!({ "protocol": PROTOCOL_VERSION, "run": castle.run, "name": robot, "instance": "intruder" })
-            .to_string()
-            .into_bytes()
-    };
+    let as_butler = request_to_join(castle.run.as_str(), "Butler");
     for (key, body) in [
-        (keys.control(), stop),
-        (keys.join(), join("Butler")),
-        (keys.join_as(&butler), join("Butler")),
+        (keys.control(), encode(&Control::Stop)),
+        (keys.join(), as_butler.clone()),
+        (keys.join_as(&butler), as_butler.clone()),
         (keys.all(), Vec::new()),
     ] {
-        let answer = thief
+        let reply = thief
             .get_within(&key, "", Some(body), Duration::from_millis(300))
             .unwrap();
-        assert!(answer.is_none(), "{key}: {answer:?}");
+        assert!(reply.is_none(), "{key}: {reply:?}");
     }
-    // In its own name for another one: it is let through, and seen through.
-    let answer = thief
-        .get(&keys.join_as(&leguin), "", Some(join("Butler")))
-        .unwrap()
-        .unwrap()
-        .result
-        .unwrap();
+
+    // Under its own key, in another robot's name: access control lets it pass, and the simulator refuses it.
+    let reply = thief.get(&keys.join_as(&leguin), "", Some(as_butler));
+    let answer = reply.unwrap().unwrap().result.unwrap();
     assert!(
         String::from_utf8_lossy(&answer).contains("Leguin cannot join as Butler"),
         "{answer:?}"
     );
-    assert!(
-        thief
-            .get(&keys.query(&butler, STATE), "", None)
-            .unwrap()
-            .is_some()
-    );
+    let state = thief.get(&keys.query(&butler, STATE), "", None).unwrap();
+    assert!(state.is_some());
 
-    // It listens at doors.
-    let (secrets, clocks) = (Heard::default(), Heard::default());
+    // It subscribes to what is not its own.
+    let secrets = Received::default();
     let listening = [
         keys.all(),
         keys.reports(),
@@ -445,14 +451,16 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
         keys.log(),
     ]
     .map(|key| secrets.on(&thief, &key));
-    // What a session may hear, all its subscriptions hear that match: this is another one.
+    // What a session receives, all its subscribers receive that match: so this is another session.
     let listener = castle.enter("Leguin");
-    let own_news = Heard::default();
+    let clocks = Received::default();
+    let own_news = Received::default();
     let _clock = clocks.on(&listener, &keys.clock());
     let _news = own_news.on(&listener, &keys.news(&leguin));
-    // It answers for others.
+
+    // It declares queryables of others.
     let queries = Arc::new(AtomicUsize::new(0));
-    let answering = [keys.query(&butler, STATE), keys.control(), keys.joins()].map(|key| {
+    let queryables = [keys.query(&butler, STATE), keys.control(), keys.joins()].map(|key| {
         let queries = queries.clone();
         thief
             .queryable(&key, move |_| {
@@ -460,28 +468,20 @@ fn a_robot_neither_asks_nor_hears_nor_answers_what_is_not_its_own() {
             })
             .unwrap()
     });
-    assert!(
-        listener
-            .get(&keys.query(&butler, STATE), "", None)
-            .unwrap()
-            .is_some()
-    );
+    let state = listener.get(&keys.query(&butler, STATE), "", None).unwrap();
+    assert!(state.is_some());
+
     castle.control(&Control::Step { n: 80 });
     eventually("clocks", || (clocks.keys().len() >= 80).then_some(()));
     assert!(!own_news.keys().is_empty(), "it gets its own news");
-    let state = castle
-        .operator
-        .get(&keys.query(&butler, STATE), "", None)
-        .unwrap()
-        .unwrap()
-        .result
-        .unwrap();
+    let reply = castle.operator.get(&keys.query(&butler, STATE), "", None);
+    let state = reply.unwrap().unwrap().result.unwrap();
     assert!(String::from_utf8_lossy(&state).contains("\"tick\":80"));
-    assert_eq!(
-        (secrets.keys(), queries.load(Ordering::Relaxed)),
-        (Vec::<String>::new(), 0)
-    );
-    drop((listening, answering));
+    assert_eq!(secrets.keys(), Vec::<String>::new());
+    assert_eq!(queries.load(Ordering::Relaxed), 0);
+
+    drop(listening);
+    drop(queryables);
     castle.finish_unharmed();
 }
 
@@ -503,7 +503,7 @@ fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
 
     flooding.join().unwrap();
 
-    // Where the simulator does not keep up, it is the flooder that loses its connection, and some of its messages.
+    // If the simulator does not keep up, the flooding session loses its connection and some of its messages.
     let counted = eventually("the count", || {
         let ignored = castle.status().ignored;
         assert!(

@@ -1,16 +1,14 @@
-//! The bus: a middleware behind seven verbs.
+//! The bus: sessions of the middleware, with the settings that a lock-step system needs.
 //!
 //! A simulator embeds the router and everything else is a client of it: one path between any two, which is what keeps
 //! messages in order. No multicast, no gossip, loopback unless an address says otherwise.
 //!
-//! There are two of them. `middleware.rs` is the real one and the only file that names it. [`MemoryNetwork`] is a star
-//! of the same shape inside one process whose deliveries are chosen by a seed, for tests of everything above it.
+//! `middleware.rs` is the only file that names the middleware.
 
-mod bus;
 mod declared;
 pub mod endpoint;
 mod error;
-mod memory;
+pub mod logging;
 mod middleware;
 mod qos;
 mod reply;
@@ -21,11 +19,9 @@ mod settings;
 
 pub use protocol::DEFAULT_ENDPOINT;
 
-pub use bus::{Bus, Publisher, Query};
 pub use declared::Declared;
 pub use error::BusError;
-pub use memory::{Faults, MemoryNetwork, Overheard, Traffic};
-pub use middleware::check_exposure;
+pub use middleware::{Bus, Publisher, Query, check_exposure};
 pub use qos::Qos;
 pub use reply::{QUERY_TIMEOUT, Reply};
 pub use role::Role;

@@ -1,4 +1,4 @@
-//! The middleware: the only file of the project that names it, with the settings that a lock-step system needs.
+//! Sessions, publishers and queries, and the configuration of the middleware: the only file of the project that names it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,9 +25,9 @@ use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
 /// What else may be the matter with an encrypted endpoint.
 const TLS_HINT: &str = " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
 
-/// A session of the middleware. Clones share it; the last one closes it.
+/// A session. Clones share it; the last one closes it.
 #[derive(Debug, Clone)]
-pub(super) struct Session {
+pub struct Bus {
     session: zenoh::Session,
     sending: Sending,
 }
@@ -80,8 +80,14 @@ fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T
     })
 }
 
-impl Session {
-    pub(super) fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
+impl Bus {
+    /// Opens a session. `overrides` is a configuration file of the middleware that replaces the built-in settings,
+    /// for set-ups across machines; `configs/zenoh/` has files with the built-in settings. The role determines the mode
+    /// and where to listen or connect in either case.
+    ///
+    /// # Errors
+    /// [`BusError::Open`] names the address that was tried and what went wrong.
+    pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
         let (doing, endpoint) = match role {
             Role::Router {
                 listen,
@@ -112,6 +118,7 @@ impl Session {
                 ("listen at", listen.join(", "))
             }
         };
+
         let failed = |reason: String| BusError::Open {
             doing,
             endpoint: endpoint.clone(),
@@ -123,22 +130,34 @@ impl Session {
         let session = zenoh::open(config)
             .wait()
             .map_err(|error| failed(format!("{error}{hint}")))?;
+
         Ok(Self {
             session,
             sending: Sending::of(role, overrides),
         })
     }
 
-    pub(super) fn id(&self) -> String {
+    /// The id of the session, unique among all.
+    #[must_use]
+    pub fn id(&self) -> String {
         self.session.zid().to_string()
     }
 
-    pub(super) fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
+    /// Declares a publisher on `key`. Its messages are never dropped.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn publisher(&self, key: &str) -> Result<Publisher, BusError> {
         // The middleware's default would drop under pressure, and a lock-step system cannot afford a lost message.
         self.declare_publisher(key, CongestionControl::Block)
     }
 
-    pub(super) fn observer_publisher(&self, key: &str) -> Result<Publisher, BusError> {
+    /// Declares a publisher of what only observers subscribe to. Its messages are dropped where an observer does not keep
+    /// up: an observer must not hold the clock.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn observer_publisher(&self, key: &str) -> Result<Publisher, BusError> {
         self.declare_publisher(key, CongestionControl::Drop)
     }
 
@@ -153,6 +172,7 @@ impl Session {
             .congestion_control(congestion)
             .wait();
         let inner = used("publish on", key, declared)?;
+
         let watched = Arc::new(AtomicBool::new(false));
         let seen = watched.clone();
         let listener = inner
@@ -164,6 +184,7 @@ impl Session {
         let matching =
             used("watch subscribers of", key, inner.matching_status().wait())?.matching();
         watched.fetch_or(matching, Ordering::Relaxed);
+
         Ok(Publisher {
             inner,
             sending: self.sending,
@@ -171,7 +192,11 @@ impl Session {
         })
     }
 
-    pub(super) fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
+    /// Puts one message.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
         let put = self.sending.send(message, |message| {
             self.session
                 .put(key, message)
@@ -181,12 +206,11 @@ impl Session {
         used("put on", key, put)
     }
 
-    pub(super) fn put_with_qos(
-        &self,
-        key: &str,
-        message: Vec<u8>,
-        qos: Qos,
-    ) -> Result<(), BusError> {
+    /// Puts one message with another quality of service than [`Qos::IN_ORDER`].
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn put_with_qos(&self, key: &str, message: Vec<u8>, qos: Qos) -> Result<(), BusError> {
         let congestion_control = if qos.is_blocking {
             CongestionControl::Block
         } else {
@@ -208,7 +232,12 @@ impl Session {
         used("put on", key, put)
     }
 
-    pub(super) fn subscribe(
+    /// Declares a subscriber: calls `handle(key, bytes)` for each message put on `keys`, on the thread that reads the link.
+    /// `handle` must not block.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn subscribe(
         &self,
         keys: &str,
         handle: impl Fn(&str, &[u8]) + Send + Sync + 'static,
@@ -224,7 +253,11 @@ impl Session {
         Ok(Declared::new(declared))
     }
 
-    pub(super) fn subscribe_with_qos(
+    /// Like [`Self::subscribe`], with the quality of service of each message.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn subscribe_with_qos(
         &self,
         keys: &str,
         handle: impl Fn(&str, &[u8], Qos) + Send + Sync + 'static,
@@ -250,7 +283,12 @@ impl Session {
         Ok(Declared::new(declared))
     }
 
-    pub(super) fn queryable(
+    /// Declares a queryable: calls `handle` for each query on `keys`, on the thread that reads the link. `handle` must not
+    /// block.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn queryable(
         &self,
         keys: &str,
         handle: impl Fn(Query) + Send + Sync + 'static,
@@ -265,7 +303,24 @@ impl Session {
         Ok(Declared::new(declared))
     }
 
-    pub(super) fn get_within(
+    /// Sends a query and waits for the one reply: `None` if none arrives within [`QUERY_TIMEOUT`].
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn get(
+        &self,
+        key: &str,
+        parameters: &str,
+        body: Option<Vec<u8>>,
+    ) -> Result<Option<Reply>, BusError> {
+        self.get_within(key, parameters, body, QUERY_TIMEOUT)
+    }
+
+    /// Like [`Self::get`], with another timeout.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn get_within(
         &self,
         key: &str,
         parameters: &str,
@@ -275,7 +330,7 @@ impl Session {
         let replies: FifoChannelHandler<zenoh::query::Reply> = used(
             "ask",
             key,
-            self.get(key, parameters, body, timeout)?
+            self.query(key, parameters, body, timeout)?
                 .with(zenoh::handlers::FifoChannel::new(8))
                 .wait(),
         )?;
@@ -287,7 +342,12 @@ impl Session {
         Ok(None)
     }
 
-    pub(super) fn get_all(
+    /// Sends a query and returns the replies of all queryables, when the last of them has dropped the query, or after
+    /// `timeout`.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn get_all(
         &self,
         key: &str,
         parameters: &str,
@@ -296,7 +356,7 @@ impl Session {
         let replies: FifoChannelHandler<zenoh::query::Reply> = used(
             "ask",
             key,
-            self.get(key, parameters, None, timeout)?
+            self.query(key, parameters, None, timeout)?
                 .with(zenoh::handlers::FifoChannel::new(64))
                 .wait(),
         )?;
@@ -308,7 +368,12 @@ impl Session {
         Ok(all)
     }
 
-    pub(super) fn get_then(
+    /// Sends a query and calls `then` with the one reply, or with `None` if none arrives within [`QUERY_TIMEOUT`]. `then`
+    /// runs on the thread that reads the link and must not block.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn get_then(
         &self,
         key: &str,
         parameters: &str,
@@ -316,7 +381,7 @@ impl Session {
     ) -> Result<(), BusError> {
         let pending = std::sync::Mutex::new(Pending::new(then));
         let asked = self
-            .get(key, parameters, None, QUERY_TIMEOUT)?
+            .query(key, parameters, None, QUERY_TIMEOUT)?
             .callback(move |reply: zenoh::query::Reply| {
                 if let (Some(answer), Ok(mut pending)) = (Reply::read(reply), pending.lock()) {
                     pending.settle(Some(answer));
@@ -326,7 +391,8 @@ impl Session {
         used("ask", key, asked)
     }
 
-    fn get(
+    /// A query to all queryables, without what happens to the replies.
+    fn query(
         &self,
         key: &str,
         parameters: &str,
@@ -350,7 +416,12 @@ impl Session {
             .timeout(timeout))
     }
 
-    pub(super) fn token(&self, key: &str) -> Result<Declared, BusError> {
+    /// Declares a liveliness token, until it is dropped or this process or its link ends. Declare it last: when other
+    /// sessions see it, everything declared before is in effect.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn token(&self, key: &str) -> Result<Declared, BusError> {
         let declared = self
             .session
             .liveliness()
@@ -360,7 +431,12 @@ impl Session {
         Ok(Declared::new(declared))
     }
 
-    pub(super) fn liveliness(
+    /// Declares a liveliness subscriber: calls `handle(key, is_declared)` for each token on `keys` that exists, is declared
+    /// or is undeclared.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn liveliness(
         &self,
         keys: &str,
         handle: impl Fn(&str, bool) + Send + Sync + 'static,
@@ -378,29 +454,37 @@ impl Session {
         Ok(Declared::new(declared))
     }
 
-    pub(super) fn close(&self) {
+    /// Closes the session after everything that was put has been sent. A process that exits without it loses messages.
+    pub fn close(&self) {
         if let Err(error) = self.session.close().wait() {
             tracing::debug!(%error, "closing the session");
         }
     }
 }
 
+/// A declared publisher of one key.
 #[derive(Debug)]
-pub(super) struct Publisher {
+pub struct Publisher {
     inner: zenoh::pubsub::Publisher<'static>,
     sending: Sending,
     watched: Arc<AtomicBool>,
 }
 
 impl Publisher {
-    pub(super) fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
+    /// Puts a message.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed.
+    pub fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
         let put = self
             .sending
             .send(message, |message| self.inner.put(message).wait());
         used("put on", self.inner.key_expr().as_str(), put)
     }
 
-    pub(super) fn has_subscribers(&self) -> bool {
+    /// Whether there are subscribers.
+    #[must_use]
+    pub fn has_subscribers(&self) -> bool {
         self.watched.load(Ordering::Relaxed)
     }
 }
@@ -424,29 +508,37 @@ impl Reply {
     }
 }
 
+/// A query that waits for a reply. One that is dropped without a reply ends at once at the session that sent it.
 #[derive(Debug)]
-pub(super) struct Query {
+pub struct Query {
     query: zenoh::query::Query,
     sending: Sending,
 }
 
 impl Query {
-    pub(super) fn key(&self) -> &str {
+    /// The key of the query.
+    #[must_use]
+    pub fn key(&self) -> &str {
         self.query.key_expr().as_str()
     }
 
-    pub(super) fn parameter(&self, name: &str) -> Option<&str> {
+    /// The parameter called `name`, as in `?tick=12;epoch=1`.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<&str> {
         self.query.parameters().get(name)
     }
 
-    pub(super) fn body(&self) -> Vec<u8> {
+    /// The payload; empty if there is none.
+    #[must_use]
+    pub fn body(&self) -> Vec<u8> {
         self.query
             .payload()
             .map(|payload| payload.to_bytes().into_owned())
             .unwrap_or_default()
     }
 
-    pub(super) fn reply(&self, key: &str, message: Vec<u8>) {
+    /// Replies on `key`.
+    pub fn reply(&self, key: &str, message: Vec<u8>) {
         let replied = self.sending.send(message, |message| {
             self.query.reply(key.to_owned(), message).wait()
         });
@@ -455,7 +547,8 @@ impl Query {
         }
     }
 
-    pub(super) fn reply_err(&self, reason: &str) {
+    /// Replies with an error, in words.
+    pub fn reply_err(&self, reason: &str) {
         if let Err(error) = self.query.reply_err(reason.to_owned()).wait() {
             tracing::debug!(%error, "a refusal could not be sent");
         }

@@ -84,19 +84,8 @@ enum Subcommands {
 
 fn main() -> miette::Result<ExitCode> {
     let cli = Cli::parse();
-    init_tracing();
+    bus::logging::init(bus::logging::WARNINGS, true);
     dispatch(cli.subcommand)
-}
-
-fn init_tracing() {
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
-
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .init();
 }
 
 /// Calls the subcommand; the hidden ones follow the public ones.

@@ -69,7 +69,7 @@ struct Args {
 fn main() -> ExitCode {
     bus::runtime::use_one_thread();
     let args = Args::parse();
-    init_tracing();
+    bus::logging::init(bus::logging::WARNINGS, false);
 
     match run(args) {
         Ok(()) => ExitCode::SUCCESS,
@@ -78,18 +78,6 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-fn init_tracing() {
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
-
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .with_target(false)
-        .init();
 }
 
 fn run(args: Args) -> Result<(), String> {

@@ -1,5 +1,7 @@
 //! Messages of the contract as what the state machines take and give.
 
+use std::str::FromStr;
+
 use protocol::RobotName;
 use protocol::messages::{Command, CommandText, News, Refusal, Report, Welcome};
 
@@ -7,6 +9,7 @@ use crate::barrier::{Refused, Stamp};
 use crate::exchange::Sent;
 use crate::member::{Admission, Naming};
 use crate::participant::Answer;
+use crate::states::StateQuery;
 
 impl From<&Report> for Stamp {
     fn from(report: &Report) -> Self {
@@ -54,6 +57,30 @@ impl From<&News> for Naming {
             joined: news.joined,
             rejoin: news.rejoin,
         }
+    }
+}
+
+impl StateQuery {
+    /// Reads the parameters `tick` and `epoch` of a query.
+    ///
+    /// # Errors
+    /// The text of the error reply.
+    pub fn read<'a>(parameter: impl Fn(&str) -> Option<&'a str>) -> Result<Self, String> {
+        Ok(Self {
+            tick: number(parameter("tick"), "tick")?,
+            epoch: number(parameter("epoch"), "epoch")?,
+        })
+    }
+}
+
+fn number<T: FromStr>(text: Option<&str>, name: &str) -> Result<Option<T>, String> {
+    let Some(text) = text else {
+        return Ok(None);
+    };
+
+    match text.parse() {
+        Ok(number) => Ok(Some(number)),
+        Err(_) => Err(format!("parameter {name}: not a whole number")),
     }
 }
 

@@ -76,14 +76,7 @@ pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> 
         args.names.extend(RobotName::new(default_name));
     }
 
-    let filter =
-        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .with_target(false)
-        .init();
+    bus::logging::init("warn", false);
 
     match take_part(&args, make) {
         Ok(()) => ExitCode::SUCCESS,

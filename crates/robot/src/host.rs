@@ -228,7 +228,7 @@ impl Host {
                 .bus
                 .queryable(
                     &self.keys.query(name, what),
-                    move |query| match read_query(&query)
+                    move |query| match StateQuery::read(|name| query.parameter(name))
                         .and_then(|asked| shared.state(&own, asked))
                     {
                         Ok(state) => reply(&query, &state),
@@ -631,24 +631,6 @@ fn hear(shared: &Shared, own: &RobotName, other: &RobotName, key: &str, bytes: &
         }),
         Err(error) => tracing::warn!("{error}"),
     }
-}
-
-/// As of when a query asks.
-fn read_query(query: &bus::Query) -> Result<StateQuery, String> {
-    fn number<T: std::str::FromStr>(query: &bus::Query, name: &str) -> Result<Option<T>, String> {
-        let Some(text) = query.parameter(name) else {
-            return Ok(None);
-        };
-        match text.parse() {
-            Ok(number) => Ok(Some(number)),
-            Err(_) => Err(format!("parameter {name}: not a whole number")),
-        }
-    }
-
-    Ok(StateQuery {
-        tick: number(query, "tick")?,
-        epoch: number(query, "epoch")?,
-    })
 }
 
 /// Answers a query with a state, or with the one field of it that the key names.

@@ -1,7 +1,7 @@
 //! The test vectors in `docs/vectors`: what a robot receives and puts, for authors who want to test without a simulator.
 //!
-//! Set `CARS_UPDATE=1` to write the files anew. They are transcripts of the real simulator and the real robots' loop over
-//! a network in this process, and a run writes the same bytes whatever its schedule.
+//! Set `CARS_UPDATE=1` to write the files again. They are transcripts of the real state machines of simulator and robots, joined
+//! by function calls; a run over zenoh puts the same bytes.
 
 #![expect(
     clippy::unwrap_used,
@@ -11,6 +11,7 @@
 
 mod caller;
 mod echo;
+mod process;
 mod stage;
 mod transcript;
 
@@ -18,9 +19,10 @@ use bus::{Bus, Role};
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer};
 use protocol::random::{MAX_SEED, stream, unit};
-use protocol::{RunName, decode, encode};
+use protocol::{RobotName, RunName, decode, encode};
 use rand_xoshiro::rand_core::Rng;
-use stage::{Stage, name};
+use robot::Robot;
+use stage::Stage;
 use system_tests::{Lab, PATIENCE, eventually, root};
 
 const ECHO: &str = "docs/vectors/echo.toml";
@@ -34,18 +36,20 @@ const EARLY: [&str; 4] = [
     "robot.Butler.params.resend_s=2 s",
 ];
 
-/// Demands that the file says this, or makes it so.
+/// Asserts that a file has this content; writes it first with `CARS_UPDATE`.
 fn check(file: &str, text: &str) {
     let path = root().join("docs/vectors").join(file);
     if std::env::var_os("CARS_UPDATE").is_some() {
         std::fs::write(&path, text).unwrap();
     }
+
     let on_file = std::fs::read_to_string(&path).unwrap_or_default();
     let differs = on_file
         .lines()
         .zip(text.lines())
         .position(|(old, new)| old != new);
     let at = differs.unwrap_or_else(|| on_file.lines().count().min(text.lines().count()));
+
     assert!(
         on_file == text,
         "{} is out of date from line {} on: run the test with CARS_UPDATE=1\n  on file: {}\n  now:     {}",
@@ -56,36 +60,29 @@ fn check(file: &str, text: &str) {
     );
 }
 
-/// The last clock of a story, as it was on the wire.
-fn last_clock(story: &str) -> String {
-    let is_clock = |line: &&str| line.contains(r#""key":"cars/vectors/clock""#);
-    let line = story
-        .lines()
-        .rev()
-        .find(is_clock)
-        .expect("a clock has come");
-    let (_, message) = line
-        .split_once(r#""message":"#)
-        .expect("a line with a message");
-    message.strip_suffix('}').expect("a whole line").to_owned()
+fn echo() -> Box<dyn Robot> {
+    Box::<echo::Echo>::default()
+}
+
+fn caller() -> Box<dyn Robot> {
+    Box::new(caller::Caller)
 }
 
 #[test]
 fn leguin_in_the_hall() {
     let mut stage = Stage::new("configs/hors_doeuvres.toml", &EARLY, "Leguin");
-    stage.seat("Butler", || robots::make("Butler").unwrap());
-    stage.seat("Leguin", || robots::make("Leguin").unwrap());
-    stage.begin(1);
+    stage.start("Butler", "memory-2", || robots::make("Butler").unwrap());
+    stage.start("Leguin", "memory-3", || robots::make("Leguin").unwrap());
     stage.step_to(LEGUIN_TICKS);
+
     check("leguin.jsonl", &stage.end());
 }
 
 #[test]
 fn echo_through_everything_that_a_network_does() {
     let mut stage = Stage::new(ECHO, &[], "Echo");
-    stage.seat("Caller", || Box::new(caller::Caller));
-    stage.seat("Echo", || Box::<echo::Echo>::default());
-    stage.begin(1);
+    stage.start("Caller", "memory-2", caller);
+    stage.start("Echo", "memory-3", echo);
     stage.step_to(28);
     for parameters in [
         "",
@@ -100,30 +97,27 @@ fn echo_through_everything_that_a_network_does() {
     for what in protocol::keys::QUERIES {
         stage.ask(what, "tick=29;epoch=1");
     }
-    let clock = last_clock(&stage.transcript.text());
-    stage.repeat_clock(clock.as_bytes());
-    stage.command_as_operator(r#"{"command":"hello"}"#);
+    stage.repeat_clock();
+    stage.command_as_operator("hello");
     stage.step_to(30);
-    stage.order(&Control::Init {
-        seed: Some(8),
-        setup: None,
-    });
-    stage.begin(2);
+
+    stage.init(8);
     stage.step_to(4);
+
     check("echo.jsonl", &stage.end());
 }
 
 #[test]
 fn echo_returns() {
     let mut stage = Stage::new(ECHO, &[], "Echo");
-    stage.seat("Caller", || Box::new(caller::Caller));
-    stage.seat("Echo", || Box::<echo::Echo>::default());
-    stage.begin(1);
+    stage.start("Caller", "memory-2", caller);
+    stage.start("Echo", "memory-3", echo);
     stage.step_to(3);
+
     stage.kill();
-    stage.seat("Echo", || Box::<echo::Echo>::default());
-    stage.wait_for(2);
+    stage.start("Echo", "memory-4", echo);
     stage.step_to(10);
+
     check("return.jsonl", &stage.end());
 }
 
@@ -135,25 +129,60 @@ fn streams() {
         (2002, "robot/Leguin#2"),
         (MAX_SEED, "robot/Echo"),
     ];
-    let vectors: Vec<_> = streams
-        .into_iter()
-        .map(|(seed, name)| {
-            let (mut whole, mut units) = (stream(seed, name), stream(seed, name));
-            let draws: Vec<String> = (0..4).map(|_| whole.next_u64().to_string()).collect();
-            let units: Vec<f64> = (0..4).map(|_| unit(&mut units)).collect();
-            serde_json::json!({ "seed": seed, "stream": name, "draws": draws, "units": units })
-        })
-        .collect();
+    let mut vectors = Vec::new();
+    for (seed, name) in streams {
+        let mut whole = stream(seed, name);
+        let draws: Vec<String> = (0..4).map(|_| whole.next_u64().to_string()).collect();
+        let mut fractions = stream(seed, name);
+        let units: Vec<f64> = (0..4).map(|_| unit(&mut fractions)).collect();
+        vectors.push(
+            serde_json::json!({ "seed": seed, "stream": name, "draws": draws, "units": units }),
+        );
+    }
+
     check(
         "streams.json",
         &(serde_json::to_string_pretty(&vectors).unwrap() + "\n"),
     );
 }
 
-/// What the transcript of the hall says is what goes over zenoh between processes, byte for byte.
+/// The messages of a transcript that are put once in every tick from tick 1 on, or less often: each line from its key on.
+fn puts(file: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
+    let mut puts = Vec::new();
+    let from_tick_1 = text
+        .lines()
+        .skip_while(|line| !line.contains(r#""message":{"epoch":1,"tick":1"#));
+    for line in from_tick_1 {
+        // Joining is over, queries and states depend on who asks when, and the end comes with the test's own order.
+        let is_put = line.contains(r#""message":"#);
+        if is_put && !line.contains("/state\"") && !line.contains(r#""end""#) {
+            let (_, rest) = line.split_once(',').unwrap();
+            puts.push(rest.to_owned());
+        }
+    }
+
+    puts
+}
+
+/// Steps a run that waits for `start`, once its robots have joined.
+fn step(bus: &Bus, keys: &Keys, ticks: u64) {
+    let step = encode(&Control::Step { n: ticks });
+    eventually("tick 0", || {
+        let reply = bus
+            .get_within(&keys.control(), "", Some(step.clone()), PATIENCE)
+            .unwrap()?;
+        let answer = reply.result.unwrap();
+        let answer: ControlAnswer = decode("control", "simulator", &answer).unwrap();
+        matches!(answer, ControlAnswer::Done(_)).then_some(())
+    });
+}
+
+/// What simulator and Leguin put over zenoh between processes is in the transcript of the hall, byte for byte.
 #[test]
 fn leguin_in_the_hall_as_processes() {
-    let (lab, run) = (Lab::new(), "vectors");
+    let lab = Lab::new();
+    let run = "vectors";
     let mut args = vec![
         "launch",
         "launch/hors_doeuvres.toml",
@@ -161,65 +190,50 @@ fn leguin_in_the_hall_as_processes() {
         "--speed",
         "max",
     ];
-    args.extend(EARLY.iter().flat_map(|change| ["--set", *change]));
+    for change in EARLY {
+        args.extend(["--set", change]);
+    }
     let mut launch = lab.start(run, &args);
     let endpoint = eventually("the endpoint", || {
         std::fs::read_to_string(lab.file(run, "endpoint")).ok()
     });
+
     let role = Role::Client {
         connect: endpoint.trim().to_owned(),
         patience: PATIENCE,
     };
-    let (bus, keys) = (
-        Bus::open(&role, None).unwrap(),
-        Keys::new(&RunName::new(run).unwrap()),
-    );
-    let leguin = name("Leguin");
-    let (sender, heard) = std::sync::mpsc::channel();
-    let listen = |key: &str| {
+    let bus = Bus::open(&role, None).unwrap();
+    let keys = Keys::new(&RunName::new(run).unwrap());
+    let leguin = RobotName::new("Leguin").unwrap();
+    let butler = RobotName::new("Butler").unwrap();
+    let (sender, received) = std::sync::mpsc::channel();
+    let mut subscribers = Vec::new();
+    for key in [
+        keys.clock(),
+        keys.news(&leguin),
+        keys.report(&leguin),
+        keys.command(&butler, &leguin),
+    ] {
         let sender = sender.clone();
-        let hear = move |key: &str, bytes: &[u8]| {
+        let subscriber = bus.subscribe(&key, move |key, bytes| {
             let message = String::from_utf8(bytes.to_vec()).unwrap();
-            let _ = sender.send(format!(r#""key":"{key}","message":{message}}}"#));
-        };
-        bus.subscribe(key, hear).unwrap()
-    };
-    let _listening = [
-        listen(&keys.clock()),
-        listen(&keys.news(&leguin)),
-        listen(&keys.report(&leguin)),
-        listen(&keys.command(&name("Butler"), &leguin)),
-    ];
-    // An answer shows that what was declared before the query is in effect.
-    let step = encode(&Control::Step { n: LEGUIN_TICKS });
-    eventually("tick 0", || {
-        let answer = bus
-            .get_within(&keys.control(), "", Some(step.clone()), PATIENCE)
-            .unwrap()?
-            .result
-            .unwrap();
-        let answer: ControlAnswer = decode("control", "simulator", &answer).unwrap();
-        matches!(answer, ControlAnswer::Done(_)).then_some(())
-    });
-    let text = std::fs::read_to_string(root().join("docs/vectors/leguin.jsonl")).unwrap();
-    let is_put = |line: &&str| {
-        line.contains(r#""message":"#) && !line.contains("/join") && !line.contains("/state\"")
-    };
-    let from_tick_1 = text
-        .lines()
-        .skip_while(|line| !line.contains(r#""message":{"epoch":1,"tick":1"#));
-    let wanted = from_tick_1
-        .filter(is_put)
-        .filter(|line| !line.contains(r#""end""#));
-    let mut wanted: Vec<&str> = wanted.map(|line| line.split_once(',').unwrap().1).collect();
+            let _is_over = sender.send(format!(r#""key":"{key}","message":{message}}}"#));
+        });
+        subscribers.push(subscriber.unwrap());
+    }
+    // The reply shows that what was declared before the query is in effect.
+    step(&bus, &keys, LEGUIN_TICKS);
+
+    let mut wanted = puts("leguin.jsonl");
     assert!(wanted.len() > 2 * LEGUIN_TICKS as usize, "{}", wanted.len());
     while !wanted.is_empty() {
-        let line = heard
+        let line = received
             .recv_timeout(PATIENCE)
-            .unwrap_or_else(|_| panic!("never came: {wanted:#?}"));
-        // A clock that is repeated on a slow machine is there no more.
+            .unwrap_or_else(|_| panic!("not received: {wanted:#?}"));
+        // On a slow machine a clock is repeated.
         wanted.retain(|wanted| *wanted != line);
     }
+
     lab.ok(&["ctl", "stop", "--run", run]);
     launch.finish();
 }

@@ -1,247 +1,392 @@
-//! A run of the real simulator and the real robots' loop over a network in this process, stepped by hand, so that all
-//! that is said in a tick can be told apart from the next.
+//! A run of the real state machines: the simulator's [`Barrier`] and [`Simulation`], and a [`Process`] for each robot. Every
+//! message goes from one to the other by a function call, in its encoded form, and the transcript gets what one robot
+//! receives and puts.
 
+use std::collections::BTreeMap;
 use std::path::Path;
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
 
-use bus::{Bus, Declared, Faults, MemoryNetwork, Overheard, Reply};
+use lockstep::{
+    Action, Admission, Answer, Barrier, Ignored, Leave, Naming, Output, Sent, Stamp, StateQuery,
+    Timing, Turn,
+};
 use protocol::keys::{Keys, STATE};
-use protocol::messages::{Control, ControlAnswer, Phase, Presence, Status};
-use protocol::{RobotName, RunName, Tick, decode, encode};
-use robot::{Host, HostError, HostOptions, Robot};
+use protocol::messages::{
+    Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, News, PublicState,
+    Report,
+};
+use protocol::{Epoch, Message, RobotName, RunName, Tick, decode, encode};
+use robot::Robot;
 use simulator::scenario::Changes;
-use simulator::server::{Options, Server};
-use simulator::{RunFolder, Scenario};
-use system_tests::{PATIENCE, eventually, root};
+use simulator::{Scenario, Simulation};
+use system_tests::root;
 
-use crate::transcript::Transcript;
+use crate::process::{Machine, MachineAction, Others, Process};
+use crate::transcript::{Query, Transcript};
 
-/// Longer than any step: the clock is repeated only where a test does it.
-const NEVER: Duration = Duration::from_secs(600);
-
-pub(super) fn name(name: &str) -> RobotName {
+fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap()
 }
 
+fn read<M: Message>(bytes: &[u8]) -> M {
+    decode("a key", "a sender", bytes).unwrap_or_else(|error| panic!("{error}"))
+}
+
 pub(super) struct Stage {
-    network: MemoryNetwork,
-    /// Sees everything and asks.
-    observer: Bus,
-    pub(super) keys: Keys,
     run: RunName,
+    keys: Keys,
+    barrier: Barrier<Arc<Report>, CommandText>,
+    outputs: Vec<Output<Arc<Report>, CommandText>>,
+    simulation: Simulation,
+    clock: Clock,
+    processes: BTreeMap<RobotName, Process>,
+    /// The robot whose transcript is written.
     robot: RobotName,
-    process: Option<Bus>,
-    threads: Vec<JoinHandle<()>>,
-    pub(super) transcript: Transcript,
-    _watching: Vec<Declared>,
-    _folder: tempfile::TempDir,
+    transcript: Transcript,
 }
 
 impl Stage {
-    /// A run of a scenario of the project, before anybody has joined. `robot` is the one whose story is told.
+    /// A run of a scenario of the project that no robot has joined. `robot` is the one whose transcript is written.
     pub(super) fn new(scenario: &str, set: &[&str], robot: &str) -> Self {
-        let (run, robot) = (RunName::new("vectors").unwrap(), name(robot));
-        let keys = Keys::new(&run);
-        let set = set
-            .iter()
-            .map(|change| change.parse().expect("a legal change"))
-            .collect();
-        let changes = Changes {
-            set,
-            ..Changes::default()
-        };
+        let run = RunName::new("vectors").unwrap();
+        let mut changes = Changes::default();
+        for change in set {
+            changes.set.push(change.parse().expect("a legal change"));
+        }
         let loaded = Scenario::load(&root().join(Path::new(scenario)), &changes)
             .unwrap_or_else(|error| panic!("{error}"));
-        let network = MemoryNetwork::new(0, Faults::default());
-        let (folder, router) = (tempfile::tempdir().unwrap(), network.router());
-        let options = Options {
-            run: run.clone(),
-            speed: None,
-            is_paused: true,
-            repeat_after: NEVER,
-        };
-        let server = Server::open(router, &loaded, options).unwrap();
-        let run_folder = RunFolder::new(folder.path(), &run);
-        let lock = run_folder.create(&loaded).unwrap();
-        let simulator = std::thread::spawn(move || {
-            let _lock = lock;
-            server.run(loaded, &run_folder).unwrap();
-        });
-        let observer = network.client();
-        // With a subscriber from the beginning, robots put all of their states: whatever a robot can query is overheard.
-        let watch = |key: String| observer.subscribe(&key, |_, _| {}).unwrap();
-        let watching = vec![watch(
-            keys.query(&robot, STATE).replace(robot.as_str(), "*"),
-        )];
-        let transcript = Transcript::new(keys.clone(), robot.clone(), scenario);
-        // Who is answered knows that the simulator is there, and that what it declared before it asked is in effect.
-        let status = encode(&Control::Status);
-        eventually("the simulator", || {
-            observer
-                .get(&keys.control(), "", Some(status.clone()))
-                .unwrap()
-        });
-        let _ = network.overhear(); // The story begins here.
-        Self {
-            network,
-            observer,
-            keys,
+        let barrier = Barrier::new(
+            loaded.robots.keys().cloned(),
+            loaded.lateness.to_lockstep(),
+            Timing::default(),
+            MAX_ENTRIES as u32,
+        );
+
+        let mut stage = Self {
+            keys: Keys::new(&run),
             run,
-            robot,
-            process: None,
-            threads: vec![simulator],
-            transcript,
-            _watching: watching,
-            _folder: folder,
-        }
-    }
-
-    /// A robot of the SDK takes part as a process of its own, as it would over a network.
-    pub(super) fn seat(&mut self, who: &str, make: fn() -> Box<dyn Robot>) {
-        let (bus, who) = (self.network.client(), name(who));
-        if who == self.robot {
-            self.process = Some(bus.clone());
-        }
-        let options = HostOptions {
-            run: self.run.clone(),
-            connect: "this process".to_owned(),
-            patience: Duration::from_secs(20),
-            gone_patience: Duration::from_secs(1),
-            zenoh_config: None,
+            barrier,
+            outputs: Vec::new(),
+            simulation: Simulation::new(loaded, 1).unwrap(),
+            clock: Clock::default(),
+            processes: BTreeMap::new(),
+            robot: name(robot),
+            transcript: Transcript::new(robot, scenario),
         };
-        self.threads.push(std::thread::spawn(move || {
-            match Host::join_over(bus, vec![(who, make())], options).and_then(Host::run) {
-                // One that is killed here finds its link broken.
-                Ok(_) | Err(HostError::SimulatorGone(_) | HostError::Bus(_)) => {}
-                Err(error) => panic!("{error}"),
-            }
-        }));
+        stage.gather();
+        stage
     }
 
-    /// Kills the process of the robot whose story is told, between two ticks.
+    /// Starts a robot's process. When all robots of the roster are connected, tick 0 follows.
+    pub(super) fn start(&mut self, robot: &str, instance: &str, make: fn() -> Box<dyn Robot>) {
+        let name = name(robot);
+        let mut actions = Vec::new();
+        let process = Process::new(&self.run, &name, instance, make(), &mut actions);
+        self.processes.insert(name.clone(), process);
+
+        self.carry_out_all(&name, actions);
+        self.settle();
+    }
+
+    /// Kills the process of the robot whose transcript is written.
     pub(super) fn kill(&mut self) {
-        let process = self.process.take().expect("it has been seated");
-        self.network.kill(&process);
-        self.wait_until("it is gone", |status| {
-            self.presence(status) == Presence::Gone
-        });
-        self.write();
-    }
-
-    /// Waits until the process of the robot is there, and as this incarnation.
-    pub(super) fn wait_for(&self, generation: u32) {
-        self.wait_until("it is there", |status| {
-            let robot = status
-                .robots
-                .iter()
-                .find(|robot| robot.name == self.robot)
-                .expect("it is of the roster");
-            (robot.generation, robot.presence) == (generation, Presence::Here)
-        });
-    }
-
-    fn presence(&self, status: &Status) -> Presence {
-        status
-            .robots
-            .iter()
-            .find(|robot| robot.name == self.robot)
-            .expect("it is of the roster")
-            .presence
-    }
-
-    fn control(&self, control: &Control) -> Status {
-        let answer = self
-            .observer
-            .get(&self.keys.control(), "", Some(encode(control)))
-            .unwrap();
-        let bytes = answer.expect("the simulator answers").result.unwrap();
-        match decode("control", "simulator", &bytes).unwrap() {
-            ControlAnswer::Done(status) => *status,
-            other => panic!("{control:?}: {other:?}"),
-        }
-    }
-
-    fn wait_until(&self, what: &str, is_so: impl Fn(&Status) -> bool) {
-        eventually(what, || {
-            is_so(&self.control(&Control::Status)).then_some(())
-        });
-    }
-
-    /// Files what has been said since the last time.
-    fn write(&mut self) {
-        self.transcript.add(&self.network.overhear());
-    }
-
-    /// Waits for tick 0 of an epoch.
-    pub(super) fn begin(&mut self, epoch: u32) {
-        self.wait_until("tick 0", |status| {
-            (status.epoch, status.phase) == (epoch, Phase::Ready)
-        });
-        self.write();
+        self.processes.remove(&self.robot);
+        self.barrier.token(&self.robot, false, &mut self.outputs);
+        self.settle();
     }
 
     /// Steps to this tick.
     pub(super) fn step_to(&mut self, last: Tick) {
-        loop {
-            let tick = self.control(&Control::Status).tick;
-            if tick >= last {
-                return;
-            }
-            self.control(&Control::Step { n: 1 });
-            self.wait_until("the step", |status| {
-                status.tick == tick + 1 && status.pending_steps == 0
-            });
-            self.write();
+        while self.simulation.tick() < last {
+            let tick = self.simulation.begin_tick();
+            self.open(tick);
+            self.settle();
+            assert!(!self.barrier.is_open(), "every robot has reported {tick}");
         }
     }
 
-    /// Does something at the simulator that is not part of the robot's story.
-    pub(super) fn order(&self, control: &Control) {
-        self.control(control);
+    /// Begins the next epoch with another seed.
+    pub(super) fn init(&mut self, seed: u64) {
+        let epoch: Epoch = self.simulation.epoch() + 1;
+        let scenario = Scenario {
+            seed,
+            ..self.simulation.scenario().clone()
+        };
+        self.simulation = Simulation::new(scenario, epoch).unwrap();
+        for (name, process) in &self.processes {
+            self.simulation.list_bodies(name, process.request.bodies);
+        }
+
+        self.gather();
+        self.settle();
     }
 
-    /// Puts a command to the robot as an operator does, with any tool.
-    pub(super) fn command_as_operator(&self, payload: &str) {
-        let key = self.keys.command(&self.robot, &RobotName::operator());
-        self.observer
-            .put(&key, payload.as_bytes().to_vec())
-            .unwrap();
+    /// Sends a command to the robot as an operator does.
+    pub(super) fn command_as_operator(&mut self, command: &str) {
+        self.simulation.command(&self.robot, command);
     }
 
-    /// Puts the last clock again, and waits for the robot's answer.
-    pub(super) fn repeat_clock(&mut self, clock: &[u8]) {
-        self.observer
-            .put(&self.keys.clock(), clock.to_vec())
-            .unwrap();
-        let report = self.keys.report(&self.robot);
-        let mut heard = Vec::new();
-        eventually("the report again", || {
-            heard.extend(self.network.overhear());
-            let is_report =
-                |one: &Overheard| matches!(one, Overheard::Put { key, .. } if *key == report);
-            heard.iter().any(is_report).then_some(())
-        });
-        self.transcript.add(&heard);
+    /// Puts the last clock again.
+    pub(super) fn repeat_clock(&mut self) {
+        self.put_clock(self.clock);
+        self.settle();
     }
 
-    /// Asks the robot, and files what it says.
+    /// Queries the robot.
     pub(super) fn ask(&mut self, what: &str, parameters: &str) {
-        let key = self.keys.query(&self.robot, what);
-        if let Some(Reply { result, .. }) = self.observer.get(&key, parameters, None).unwrap() {
-            self.transcript.asked(&key, parameters, &result);
+        let participant = &self.processes[&self.robot].participant;
+        let query = StateQuery::read(|name| parameter(parameters, name));
+        let state =
+            query.and_then(|query| participant.query(query).map_err(|none| none.to_string()));
+        let reply = state.map(|state| match what {
+            STATE => encode(state.as_ref()),
+            _ => encode(&state.answer(what).expect("one of the six queries")),
+        });
+
+        self.transcript.asked(&Query {
+            key: &self.keys.query(&self.robot, what),
+            parameters,
+            message: None,
+            reply: &reply,
+        });
+    }
+
+    /// Stops the run, and returns the transcript.
+    pub(super) fn end(mut self) -> String {
+        let clock = self.barrier.end(End::Stopped);
+        self.put_clock(clock);
+
+        self.transcript.text()
+    }
+}
+
+/// A parameter of a query such as `tick=29;epoch=1`.
+fn parameter<'a>(parameters: &'a str, name: &str) -> Option<&'a str> {
+    let mut pairs = parameters
+        .split(';')
+        .filter_map(|pair| pair.split_once('='));
+    let found = pairs.find(|(key, _)| *key == name)?;
+
+    Some(found.1)
+}
+
+/// The simulator.
+impl Stage {
+    fn gather(&mut self) {
+        let lateness = self.simulation.scenario().lateness.to_lockstep();
+        self.barrier
+            .gather(self.simulation.epoch(), lateness, &mut self.outputs);
+    }
+
+    fn open(&mut self, tick: Tick) {
+        let news = self.simulation.robots_with_news();
+        self.barrier.open(tick, news, &mut self.outputs);
+    }
+
+    /// Carries out what the barrier wants done.
+    fn settle(&mut self) {
+        while !self.outputs.is_empty() {
+            for output in std::mem::take(&mut self.outputs) {
+                self.carry_out_output(output);
+            }
         }
     }
 
-    /// Ends the run, and waits for everybody.
-    pub(super) fn end(mut self) -> String {
-        self.control(&Control::Stop);
-        let begun = Instant::now();
-        for thread in std::mem::take(&mut self.threads) {
-            assert!(begun.elapsed() < PATIENCE, "it does not end");
-            thread.join().unwrap();
+    fn carry_out_output(&mut self, output: Output<Arc<Report>, CommandText>) {
+        match output {
+            Output::Gathered => {
+                self.simulation.begin_init();
+                self.open(0);
+            }
+            Output::Grant { news, clock } => {
+                for (name, naming) in news {
+                    self.put_news(&name, naming);
+                }
+                self.put_clock(clock);
+            }
+            Output::Complete(outcome) => {
+                self.simulation.end_tick(outcome);
+            }
+            // The robot repeats its report after a repeated clock.
+            Output::Ignored(Ignored::Stale, _) => {}
+            // Every robot reports at once, so no timer fires.
+            Output::SetTimer(..) => {}
+            other => unreachable!("{other:?}"),
         }
-        self.write();
-        self.transcript.text()
+    }
+
+    fn put_news(&mut self, name: &RobotName, naming: Naming) {
+        let bytes = encode(&self.simulation.news(name, naming));
+        if *name == self.robot {
+            self.transcript.received(&self.keys.news(name), &bytes);
+        }
+
+        let news: News = read(&bytes);
+        self.feed(name, |participant, actions| {
+            participant.news(news.epoch, news.tick, Naming::from(&news), news, actions);
+        });
+    }
+
+    fn put_clock(&mut self, clock: Clock) {
+        self.clock = clock;
+        self.transcript
+            .received(&self.keys.clock(), &encode(&clock));
+
+        let names: Vec<RobotName> = self.processes.keys().cloned().collect();
+        for name in names {
+            self.feed(&name, |participant, actions| {
+                participant.clock(clock, actions);
+            });
+        }
+    }
+
+    /// Answers a request to join.
+    fn admit(&mut self, request: &JoinRequest) -> JoinAnswer {
+        let name = &request.name;
+        let admission = self
+            .barrier
+            .join(name, &request.instance, &mut self.outputs)
+            .expect("the place is free");
+        self.simulation.list_bodies(name, request.bodies);
+
+        let welcome = self
+            .simulation
+            .welcome(&self.run, name, admission.generation, None)
+            .expect("it is in the roster");
+        JoinAnswer::Welcome(Box::new(welcome))
+    }
+}
+
+/// The robots.
+impl Stage {
+    fn feed(&mut self, name: &RobotName, feed: impl FnOnce(&mut Machine, &mut Vec<MachineAction>)) {
+        let process = self.processes.get_mut(name).expect("it has been started");
+        let mut actions = Vec::new();
+        feed(&mut process.participant, &mut actions);
+
+        self.carry_out_all(name, actions);
+    }
+
+    fn carry_out_all(&mut self, name: &RobotName, actions: Vec<MachineAction>) {
+        for action in actions {
+            self.carry_out(name, action);
+        }
+    }
+
+    fn carry_out(&mut self, name: &RobotName, action: MachineAction) {
+        match action {
+            Action::Join => self.join(name),
+            Action::DeclareToken => {
+                if *name == self.robot {
+                    self.transcript.token(&self.keys.alive_robot(name));
+                }
+                self.barrier.token(name, true, &mut self.outputs);
+            }
+            Action::Run(turn) => self.run_tick(name, &turn),
+            Action::Put(answer) => self.put(name, &answer),
+            Action::SetTimer(..) => {}
+            Action::Leave(leave) => assert_eq!(leave, Leave::End(End::Stopped)),
+            Action::Query { .. } | Action::Unfollow(_) | Action::PutWaiting { .. } => {
+                unreachable!("a robot is called with the other robots' states")
+            }
+        }
+    }
+
+    fn join(&mut self, name: &RobotName) {
+        let request = encode(&self.processes[name].request);
+        let answer = encode(&self.admit(&read(&request)));
+        if *name == self.robot {
+            self.transcript.asks(&Query {
+                key: &self.keys.join_as(name),
+                parameters: "",
+                message: Some(&request),
+                reply: &Ok(answer.clone()),
+            });
+        }
+
+        let JoinAnswer::Welcome(welcome) = read(&answer) else {
+            unreachable!("it has been admitted");
+        };
+        let admission = Admission::from(welcome.as_ref());
+        let states = welcome.states_before();
+        let process = self.processes.get_mut(name).expect("it has been started");
+        process.welcome = Some(*welcome);
+        self.feed(name, |participant, actions| {
+            participant.admitted(admission, states, actions);
+        });
+    }
+
+    fn run_tick(&mut self, name: &RobotName, turn: &Turn<News>) {
+        if *name == self.robot && turn.tick > 0 {
+            self.write_queries(turn);
+        }
+
+        let mut process = self.processes.remove(name).expect("it has been started");
+        let mut others = Others {
+            processes: &self.processes,
+            query: query_in(turn),
+        };
+        let done = process.run(turn, &mut others);
+        self.processes.insert(name.clone(), process);
+        let report = encode(done.report.as_ref());
+        self.feed(name, |participant, actions| {
+            participant.done(done.commands, done.state, report, actions);
+        });
+    }
+
+    /// Writes all queries that the robot can make in a tick, and the replies.
+    fn write_queries(&mut self, turn: &Turn<News>) {
+        let unreachable = turn.news.iter().flat_map(|news| &news.unreachable);
+        let unreachable: Vec<&RobotName> = unreachable.collect();
+        for (name, other) in &self.processes {
+            if *name == self.robot || unreachable.contains(&name) {
+                continue;
+            }
+            let state = other.participant.query(query_in(turn));
+            let state = state.expect("it has reported the tick before");
+            self.transcript.asks(&Query {
+                key: &self.keys.query(name, STATE),
+                parameters: &format!("tick={};epoch={}", turn.tick, turn.epoch),
+                message: None,
+                reply: &Ok(encode(state.as_ref())),
+            });
+        }
+    }
+
+    /// Puts what came of a tick: the commands, the state, the report.
+    fn put(&mut self, name: &RobotName, answer: &Answer<Arc<PublicState>, CommandText, Vec<u8>>) {
+        for (to, command) in answer.commands_from(1) {
+            let bytes = encode(&command);
+            self.write_put(name, &self.keys.command(to, name), &bytes);
+            let command: Command = read(&bytes);
+            let stamp = Stamp::from(&command);
+            let number = command.number;
+            let sent = Sent::new(to.clone(), command);
+            self.barrier
+                .command(name, stamp, number, sent, &mut self.outputs);
+        }
+
+        let state = encode(answer.state.as_ref());
+        self.write_put(name, &self.keys.query(name, STATE), &state);
+
+        self.write_put(name, &self.keys.report(name), &answer.report);
+        let report: Report = read(&answer.report);
+        let stamp = Stamp::from(&report);
+        let commands = report.commands;
+        self.barrier
+            .report(name, stamp, commands, Arc::new(report), &mut self.outputs);
+    }
+
+    fn write_put(&mut self, name: &RobotName, key: &str, message: &[u8]) {
+        if *name == self.robot {
+            self.transcript.put(key, message);
+        }
+    }
+}
+
+fn query_in(turn: &Turn<News>) -> StateQuery {
+    StateQuery {
+        tick: Some(turn.tick),
+        epoch: Some(turn.epoch),
     }
 }

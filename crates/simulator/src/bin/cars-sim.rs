@@ -61,15 +61,7 @@ struct Args {
 fn main() -> miette::Result<ExitCode> {
     let args = Args::parse();
     bus::runtime::use_router_threads([args.listen.as_str()], args.zenoh_config.as_deref());
-
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .with_target(false)
-        .init();
+    bus::logging::init(bus::logging::WARNINGS, false);
 
     let summary = run(&args)?;
 

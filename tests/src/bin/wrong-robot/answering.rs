@@ -13,7 +13,7 @@ use crate::wrong::Wrong;
 
 pub(crate) type Machine = Participant<News, PublicState, CommandText, Report>;
 
-/// What it is doing, for those who query it.
+/// What the robot is doing when a query arrives.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Phase {
     Idle,

@@ -10,7 +10,7 @@ use crate::answering::Phase;
 use crate::host::{Failure, Host};
 use crate::walker::Walker;
 
-/// How much later what is declared too late is declared.
+/// Delay of a declaration that is made too late.
 const LATE: Duration = Duration::from_millis(1500);
 
 impl Host {
@@ -77,7 +77,7 @@ impl Host {
         self.drive(|machine, out| machine.clock(clock, out))
     }
 
-    /// Whether it is deaf to an end.
+    /// Whether it ignores the end of the run.
     fn ignores(&self, end: Option<End>) -> bool {
         match end {
             None => false,

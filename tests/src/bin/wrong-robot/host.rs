@@ -20,10 +20,10 @@ use crate::wrong::Wrong;
 pub(crate) type Actions = Vec<Action<News, PublicState, CommandText, Report>>;
 pub(crate) type Failure = Box<dyn std::error::Error>;
 
-/// Messages that may queue up.
+/// Most events in the queue.
 const QUEUE: usize = 4096;
 
-/// What arrives. Malformed messages do not.
+/// What arrives from the bus. Malformed messages are dropped before.
 pub(crate) enum Event {
     Clock(Clock),
     News(News),
@@ -49,10 +49,10 @@ pub(crate) struct Host {
     pub(crate) declared: Vec<Declared>,
     pub(crate) leave: Option<Leave>,
     pub(crate) explanation: String,
-    /// What was put last.
+    /// Epoch and tick of the results that were put last.
     pub(crate) last: Option<(Epoch, Tick)>,
     pub(crate) last_clock: Clock,
-    /// All news that came, where it forgets none.
+    /// All news that arrived, if the robot is to keep them.
     pub(crate) strays: Vec<News>,
     /// The number of the last command of the first epoch.
     pub(crate) numbered: u32,

@@ -1,6 +1,6 @@
-//! A small robot to check the conformance kit: the robot's side of the lock-step as it runs everywhere, in a host of its
-//! own. Without arguments it is correct; with `--wrong RULE` or `--wrong RULE:HOW` one input or output is altered, which
-//! that rule of `docs/protocol.md` forbids.
+//! A small robot to check the conformance kit: [`lockstep::Participant`] in a host of its own. Without arguments it is
+//! correct; with `--wrong RULE` or `--wrong RULE:HOW` it alters one input or output and so breaks that rule of
+//! `docs/protocol.md`.
 
 mod answering;
 mod arriving;
@@ -28,7 +28,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What follows a flag.
+/// The argument after a flag.
 fn argument(flag: &str) -> Option<String> {
     let mut arguments = std::env::args().skip_while(|argument| argument != flag);
     arguments.next();

@@ -12,7 +12,7 @@ use protocol::messages::{CommandText, News, PublicState, Report};
 use crate::host::{Failure, Host};
 
 impl Host {
-    /// Puts what came of a tick: the commands, the state, the report.
+    /// Puts the results of a tick: the commands, the state, the report.
     pub(crate) fn put(
         &mut self,
         answer: &Answer<PublicState, CommandText, Report>,
@@ -71,7 +71,7 @@ impl Host {
         }
 
         for (to, mut command) in answer.commands_from(first) {
-            // A report may be of a wrong generation; its commands are, too.
+            // If the report has a wrong generation, so do its commands.
             command.generation = answer.report.generation;
             let mut bytes = encode(&command);
             if self.wrong.is("number.integers:command") {
@@ -104,7 +104,7 @@ impl Host {
         self.put_on(&key, bytes, self.wrong.is("wire.qos"))
     }
 
-    /// Puts as ticks need it, or with congestion control drop, or express.
+    /// Puts a message with the quality of service that the rules require, or with a wrong one.
     fn put_on(&self, key: &str, bytes: Vec<u8>, drops: bool) -> Result<(), Failure> {
         let qos = Qos {
             is_blocking: !drops,

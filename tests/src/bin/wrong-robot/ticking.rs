@@ -15,11 +15,11 @@ use crate::answering::{Phase, lock};
 use crate::host::{Event, Failure, Host};
 use crate::walker::Walker;
 
-/// How long it computes in its slow tick.
+/// How long the robot computes in its slow tick.
 const COMPUTES: Duration = Duration::from_millis(150);
 const SLOW_TICK: Tick = 11;
 
-/// What came of a tick.
+/// The results of a tick.
 pub(crate) type Outcome = (Vec<Sent<CommandText>>, PublicState, Report);
 
 impl Host {
@@ -41,7 +41,7 @@ impl Host {
         Ok(())
     }
 
-    /// Back to the beginning of what it was welcomed to.
+    /// Returns the robot to the state of its last welcome.
     fn begin(&mut self) {
         let Some(welcome) = &self.welcome else { return };
 
@@ -194,7 +194,7 @@ impl Host {
         }
     }
 
-    /// Now and then it wants to know where another robot stands.
+    /// Queries the location of another robot in some ticks.
     fn ask_another(
         &mut self,
         tick: Tick,
@@ -211,7 +211,7 @@ impl Host {
             return Ok(None);
         }
         let is_unreachable = news.unreachable.contains(&other);
-        // A tick that is done a second time is not one of the machine's.
+        // The participant does not know of a tick that is run a second time.
         let is_running = self.shared.is_in(Phase::Computing);
         if tick == 0 || !tick.is_multiple_of(2) || !is_running {
             return Ok(None);

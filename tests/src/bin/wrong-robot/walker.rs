@@ -5,7 +5,7 @@ use protocol::random::{Stream, stream};
 
 use crate::wrong::Wrong;
 
-/// The robot itself: walks at random, counts commands and replies to them, queries another robot now and then.
+/// Walks at random, counts commands and replies to them, and queries another robot in some ticks.
 pub(crate) struct Walker {
     pub(crate) random: Stream,
     pub(crate) at: Point,

@@ -1,0 +1,96 @@
+//! One robot's process: its side of the lock-step, and the robot that it runs.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use lockstep::{Action, Begin, Participant, Patience, StateQuery, Turn};
+use protocol::messages::{CommandText, JoinRequest, News, PublicState, Welcome};
+use protocol::{PROTOCOL_VERSION, RobotName, RunName};
+use robot::{Done, Network, Robot, Seat, Undelivered};
+
+pub(super) type Machine = Participant<News, Arc<PublicState>, CommandText, Vec<u8>>;
+pub(super) type MachineAction = Action<News, Arc<PublicState>, CommandText, Vec<u8>>;
+
+/// No timer ever fires.
+const PATIENCE: Patience = Patience {
+    join: std::time::Duration::MAX,
+    gone: std::time::Duration::MAX,
+};
+
+pub(super) struct Process {
+    pub(super) participant: Machine,
+    pub(super) request: JoinRequest,
+    /// The robot, until its first welcome.
+    robot: Option<Box<dyn Robot>>,
+    seat: Option<Seat>,
+    /// The newest welcome, until the tick that follows.
+    pub(super) welcome: Option<Welcome>,
+}
+
+/// The other robots' processes, as a robot queries them in a tick.
+pub(super) struct Others<'a> {
+    pub(super) processes: &'a BTreeMap<RobotName, Process>,
+    pub(super) query: StateQuery,
+}
+
+impl Network for Others<'_> {
+    fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
+        let other = self.processes.get(target).ok_or(Undelivered::Lost)?;
+
+        other
+            .participant
+            .query(self.query)
+            .map_err(|_| Undelivered::Lost)
+    }
+}
+
+impl Process {
+    /// A process that begins to join. `instance` is a text that no other process of the run has.
+    pub(super) fn new(
+        run: &RunName,
+        name: &RobotName,
+        instance: &str,
+        robot: Box<dyn Robot>,
+        actions: &mut Vec<MachineAction>,
+    ) -> Self {
+        let request = JoinRequest {
+            protocol: PROTOCOL_VERSION,
+            run: run.clone(),
+            name: name.clone(),
+            instance: instance.to_owned(),
+            bodies: robot.senses_bodies(),
+            sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
+        };
+
+        Self {
+            participant: Participant::new(PATIENCE, actions),
+            request,
+            robot: Some(robot),
+            seat: None,
+            welcome: None,
+        }
+    }
+
+    /// Runs the robot for a tick.
+    pub(super) fn run(&mut self, turn: &Turn<News>, others: &mut Others<'_>) -> Done {
+        if turn.begin != Begin::GoOn {
+            self.take_seat();
+        }
+        let seat = self.seat.as_mut().expect("a robot runs after its welcome");
+
+        seat.run(turn, others)
+            .unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn take_seat(&mut self) {
+        let welcome = self.welcome.take().expect("it has been admitted");
+        match self.robot.take() {
+            Some(robot) => self.seat = Some(Seat::new(robot, welcome)),
+            None => self
+                .seat
+                .as_mut()
+                .expect("a robot is seated once")
+                .start_over(welcome),
+        }
+    }
+}
