@@ -526,6 +526,98 @@ fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
 }
 
 #[test]
+fn large_queries_do_not_close_the_link_of_the_robot_that_gets_them() {
+    let castle = Castle::new("secure-large");
+    let keys = castle.keys.clone();
+    let intruder = castle.enter("Vonda");
+    let sending = std::thread::spawn(move || {
+        let key = keys.query(&name("Leguin"), STATE);
+        for bytes in [150_000, 300_000, 1_000_000, 1_000_000, 1_000_000] {
+            let answer = intruder.get(&key, "", Some(vec![b'x'; bytes])).unwrap();
+            assert!(answer.is_some(), "a query of {bytes} bytes is not answered");
+        }
+    });
+
+    let stepped = castle.control(&Control::Step { n: 60 });
+
+    assert_eq!(stepped.tick, 60);
+    sending.join().unwrap();
+    castle.finish_unharmed();
+}
+
+/// A participant's configuration with a session id of its own choice.
+fn config_with_id(castle: &Castle, participant: &str, id: &str) -> PathBuf {
+    let text = std::fs::read_to_string(config(&castle.folder, participant)).unwrap();
+    let with_id = text.replacen("\n{", &format!("\n{{\n  id: {id:?},"), 1);
+    assert_ne!(with_id, text, "the configuration begins otherwise");
+
+    castle
+        .lab
+        .write(&format!("{participant}-{id}.json5"), &with_id)
+}
+
+#[test]
+fn a_session_id_belongs_to_the_certificate_that_used_it_first() {
+    const ID: &str = "5ca1ab1e5ca1ab1e5ca1ab1e5ca1ab1e";
+
+    let castle = Castle::new("secure-id");
+    let own = config_with_id(&castle, "Leguin", ID);
+    let stolen = config_with_id(&castle, "Vonda", ID);
+    let owner = open(&castle.endpoint, Some(&own)).unwrap();
+    assert_eq!(owner.id(), ID);
+
+    // Whether the owner is connected or not: as after a broken link.
+    assert!(open(&castle.endpoint, Some(&stolen)).is_err());
+    owner.close();
+    let entered = open(&castle.endpoint, Some(&stolen));
+    assert!(entered.is_err(), "{entered:?}");
+
+    let back = eventually("the owner to be back", || {
+        open(&castle.endpoint, Some(&own)).ok()
+    });
+    assert_eq!(back.id(), ID);
+    back.close();
+    let other = castle.enter("Vonda");
+    other.close();
+    castle.control(&Control::Step { n: 60 });
+    castle.finish_unharmed();
+}
+
+/// The published TLS link corrupts memory when two threads use it: 2 of 8 runs ended so.
+#[test]
+fn threads_of_the_middleware_are_safe_under_tls() {
+    let lab = Lab::new();
+    let folder = certificates(&lab, "certificates").display().to_string();
+    let args = [
+        "launch",
+        HALL,
+        "--secure",
+        &folder,
+        "--no-console",
+        "--speed",
+        "max",
+    ];
+    let duration = ["--duration", "1000 s"];
+    lab.ok(&["run", HALL, "--run", "plain", duration[0], duration[1]]);
+
+    for threads in [
+        "(rx:(worker_threads:2),tx:(worker_threads:2))",
+        "(app:(worker_threads:4))",
+    ] {
+        for repetition in 0..4 {
+            let run = format!("threads-{}-{repetition}", threads.len());
+            let mut command = lab.cars(&args);
+            command.args(duration).args(["--run", &run]);
+            command.env("ZENOH_RUNTIME", threads);
+            let output = command.output().unwrap();
+            let text = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(output.status.success(), "{threads}: {text}");
+            assert_same(("plain", &lab.bytes("plain")), (&run, &lab.bytes(&run)));
+        }
+    }
+}
+
+#[test]
 fn silent_connections_keep_no_robot_out() {
     const SILENT: usize = 150;
 

@@ -19,7 +19,7 @@ use crate::error::BusError;
 use crate::qos::Qos;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
-use crate::runtime::{block, is_encrypted};
+use crate::runtime::block;
 use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
 
 /// What else may be the matter with an encrypted endpoint.
@@ -29,46 +29,18 @@ const TLS_HINT: &str = " (are both certificates of the same `cars secure init`, 
 #[derive(Debug, Clone)]
 pub struct Bus {
     session: zenoh::Session,
-    sending: Sending,
-}
-
-/// How large messages are sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Sending {
-    /// Another thread takes over the middleware's duties meanwhile.
-    HandsOver,
-    /// Two threads on one encrypted stream corrupt memory (see [`crate::runtime`]): the thread that sends goes on with its
-    /// duties afterwards.
-    KeepsThread,
 }
 
 /// A message of more bytes may fill the queue of its link, which holds two batches of 64 KiB.
 const LARGE: usize = 16 * 1024;
 
-impl Sending {
-    fn of(role: &Role, overrides: Option<&PathBuf>) -> Self {
-        let endpoints: Vec<&String> = match role {
-            Role::Router { listen, .. } => vec![listen],
-            Role::Client { connect, .. } => vec![connect],
-            Role::Relay {
-                listen, connect, ..
-            } => listen.iter().chain(connect).collect(),
-        };
-        if is_encrypted(endpoints, overrides.map(PathBuf::as_path)) {
-            Self::KeepsThread
-        } else {
-            Self::HandsOver
-        }
-    }
-
-    /// Sends a message. To send a large one may block until the link has taken most of it, and on the middleware's thread that
-    /// is to wait for oneself, unless another one empties the queue.
-    fn send<T>(self, message: Vec<u8>, send: impl FnOnce(Vec<u8>) -> T) -> T {
-        if message.len() > LARGE && self == Self::HandsOver {
-            block(|| send(message))
-        } else {
-            send(message)
-        }
+/// Sends a message. To send a large one may block until the link has taken most of it, and on the middleware's thread that is
+/// to wait for oneself, unless another one empties the queue.
+fn send<T>(message: Vec<u8>, send: impl FnOnce(Vec<u8>) -> T) -> T {
+    if message.len() > LARGE {
+        block(|| send(message))
+    } else {
+        send(message)
     }
 }
 
@@ -131,10 +103,7 @@ impl Bus {
             .wait()
             .map_err(|error| failed(format!("{error}{hint}")))?;
 
-        Ok(Self {
-            session,
-            sending: Sending::of(role, overrides),
-        })
+        Ok(Self { session })
     }
 
     /// The id of the session, unique among all.
@@ -185,11 +154,7 @@ impl Bus {
             used("watch subscribers of", key, inner.matching_status().wait())?.matching();
         watched.fetch_or(matching, Ordering::Relaxed);
 
-        Ok(Publisher {
-            inner,
-            sending: self.sending,
-            watched,
-        })
+        Ok(Publisher { inner, watched })
     }
 
     /// Puts one message.
@@ -197,7 +162,7 @@ impl Bus {
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key is not legal.
     pub fn put(&self, key: &str, message: Vec<u8>) -> Result<(), BusError> {
-        let put = self.sending.send(message, |message| {
+        let put = send(message, |message| {
             self.session
                 .put(key, message)
                 .congestion_control(CongestionControl::Block)
@@ -293,11 +258,10 @@ impl Bus {
         keys: &str,
         handle: impl Fn(Query) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        let sending = self.sending;
         let declared = self
             .session
             .declare_queryable(keys)
-            .callback(move |query: zenoh::query::Query| handle(Query { query, sending }))
+            .callback(move |query: zenoh::query::Query| handle(Query { query }))
             .wait();
         let declared = used("serve", keys, declared)?;
         Ok(Declared::new(declared))
@@ -466,7 +430,6 @@ impl Bus {
 #[derive(Debug)]
 pub struct Publisher {
     inner: zenoh::pubsub::Publisher<'static>,
-    sending: Sending,
     watched: Arc<AtomicBool>,
 }
 
@@ -476,9 +439,7 @@ impl Publisher {
     /// # Errors
     /// [`BusError::Use`] if the session is closed.
     pub fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
-        let put = self
-            .sending
-            .send(message, |message| self.inner.put(message).wait());
+        let put = send(message, |message| self.inner.put(message).wait());
         used("put on", self.inner.key_expr().as_str(), put)
     }
 
@@ -512,7 +473,6 @@ impl Reply {
 #[derive(Debug)]
 pub struct Query {
     query: zenoh::query::Query,
-    sending: Sending,
 }
 
 impl Query {
@@ -539,7 +499,7 @@ impl Query {
 
     /// Replies on `key`.
     pub fn reply(&self, key: &str, message: Vec<u8>) {
-        let replied = self.sending.send(message, |message| {
+        let replied = send(message, |message| {
             self.query.reply(key.to_owned(), message).wait()
         });
         if let Err(error) = replied {

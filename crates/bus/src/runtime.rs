@@ -4,15 +4,11 @@
 //! crosses several threads. One shared worker gave 1.2 to 2 times the ticks per second at half the processor time.
 
 use std::os::unix::process::CommandExt;
-use std::path::Path;
-
-use crate::endpoint;
 
 /// Environment variable that the middleware reads once, at its first use.
 pub const RUNTIME_VARIABLE: &str = "ZENOH_RUNTIME";
 
-/// All duties on one thread: the cheapest set-up, and under TLS the only safe one (two threads on one encrypted stream corrupt
-/// memory, eclipse-zenoh/zenoh issue 2557).
+/// All duties on one thread: the cheapest set-up.
 pub const ONE_THREAD: &str = "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))";
 
 /// The same, and a thread of its own for sending. What forwards messages needs it: a thread that receives blocks while the
@@ -28,37 +24,9 @@ pub fn use_one_thread() {
     use_threads(ONE_THREAD);
 }
 
-/// The same for a process that forwards messages between these endpoints and those of a configuration file of the
-/// middleware: a simulator or a router. Without TLS it gets [`OWN_SENDER`].
-pub fn use_router_threads<'a>(
-    endpoints: impl IntoIterator<Item = &'a str>,
-    zenoh_config: Option<&Path>,
-) {
-    use_threads(if is_encrypted(endpoints, zenoh_config) {
-        ONE_THREAD
-    } else {
-        OWN_SENDER
-    });
-}
-
-/// Whether one of these endpoints is encrypted, or one of a configuration file may be. A file that cannot be read is refused
-/// later, with the reason.
-pub(crate) fn is_encrypted(
-    endpoints: impl IntoIterator<Item = impl AsRef<str>>,
-    zenoh_config: Option<&Path>,
-) -> bool {
-    let mut endpoints = endpoints.into_iter();
-    if endpoints.any(|endpoint| endpoint::is_tls(endpoint.as_ref())) {
-        return true;
-    }
-
-    let Some(file) = zenoh_config else {
-        return false;
-    };
-    match std::fs::read_to_string(file) {
-        Ok(text) => text.contains(&format!("{}/", endpoint::TLS)),
-        Err(_) => true,
-    }
+/// The same for a process that forwards messages, a simulator or a router: [`OWN_SENDER`].
+pub fn use_router_threads() {
+    use_threads(OWN_SENDER);
 }
 
 fn use_threads(wanted: &str) {

@@ -32,8 +32,7 @@ pub(crate) struct RouterArgs {
 
 /// Forwards until a signal ends it.
 pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
-    let endpoints = args.listen.iter().chain(&args.connect);
-    bus::runtime::use_router_threads(endpoints.map(String::as_str), args.zenoh_config.as_deref());
+    bus::runtime::use_router_threads();
 
     let (end, ended) = std::sync::mpsc::sync_channel(1);
     ctrlc::set_handler(move || {

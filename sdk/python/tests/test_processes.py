@@ -203,6 +203,13 @@ def test_an_encrypted_endpoint_wants_a_certificate(lab: Lab) -> None:
     assert robot.returncode == 1 and "wants a certificate: name a file zenoh.json5" in said
 
 
+def test_an_encrypted_endpoint_wants_one_thread(lab: Lab) -> None:
+    arguments = ["--name", "A", "--connect", "tls/127.0.0.1:1", "--zenoh-config", "zenoh.json5"]
+    robot = lab.robot("walker.py", *arguments, ZENOH_RUNTIME="(app:(worker_threads:3))")
+    _, said = robot.communicate(timeout=30)
+    assert robot.returncode == 1 and "unsafe with the threads of ZENOH_RUNTIME" in said
+
+
 def test_the_kit_finds_no_fault(lab: Lab) -> None:
     """Every rule of docs/protocol.md, as `cars conform` checks it."""
     echo = Path(__file__).with_name("echo.py")

@@ -36,7 +36,8 @@ struct Talker {
     asks: Vec<String>,
 }
 
-/// Plays so many ticks of them twice and demands that the runs end, are the same, and that each asker got what was there.
+/// Plays so many ticks of them twice, the second time secured, and demands that the runs end, are the same, and that each
+/// asker got what was there.
 fn play(label: &str, talkers: &[Talker], ticks: u32) {
     let lab = Lab::new();
     let program = lab.write("talker.py", ROBOT);
@@ -67,9 +68,21 @@ fn play(label: &str, talkers: &[Talker], ticks: u32) {
     lab.write("large.toml", &scenario);
     let launch = lab.write("launch.toml", &launch).display().to_string();
 
-    let runs = ["first", "second"].map(|repetition| format!("{label}-{repetition}"));
-    for run in &runs {
-        let args = ["launch", &launch, "--no-console", "--speed", "max"];
+    let certificates = lab.out().join("certificates").display().to_string();
+    let names: Vec<&str> = talkers.iter().map(|talker| talker.name.as_str()).collect();
+    let init = [
+        "secure",
+        "init",
+        &certificates,
+        "--robots",
+        &names.join(","),
+    ];
+    let (code, text) = lab.cars_without_out(&init);
+    assert_eq!(code, 0, "{text}");
+    let runs = ["plain", "secured"].map(|kind| format!("{label}-{kind}"));
+    for (run, security) in runs.iter().zip([&[][..], &["--secure", &certificates]]) {
+        let mut args = vec!["launch", &launch, "--no-console", "--speed", "max"];
+        args.extend(security);
         lab.start(run, &args).finish();
         nobody_is_left(run);
     }

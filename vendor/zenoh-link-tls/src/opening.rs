@@ -13,7 +13,7 @@
 //! the first certificate that opens a session with an id owns the id, and a session that shows another one is refused.
 
 use std::{
-    collections::{HashMap, VecDeque},
+    collections::{BTreeMap, VecDeque},
     sync::{
         atomic::{AtomicU8, Ordering},
         LazyLock, Mutex, PoisonError,
@@ -36,8 +36,8 @@ static OWNERS: LazyLock<Mutex<Owners>> = LazyLock::new(Mutex::default);
 
 #[derive(Debug, Default)]
 struct Owners {
-    by_id: HashMap<SessionId, String>,
-    by_owner: HashMap<String, VecDeque<SessionId>>,
+    by_id: BTreeMap<SessionId, String>,
+    by_owner: BTreeMap<String, VecDeque<SessionId>>,
 }
 
 impl Owners {

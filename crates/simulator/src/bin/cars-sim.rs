@@ -60,7 +60,7 @@ struct Args {
 
 fn main() -> miette::Result<ExitCode> {
     let args = Args::parse();
-    bus::runtime::use_router_threads([args.listen.as_str()], args.zenoh_config.as_deref());
+    bus::runtime::use_router_threads();
     bus::logging::init(bus::logging::WARNINGS, false);
 
     let summary = run(&args)?;

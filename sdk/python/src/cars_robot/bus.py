@@ -118,6 +118,13 @@ class Bus:
                     f"{connect} wants a certificate: name a file zenoh.json5 that `cars secure init` made, by "
                     "--zenoh-config or CARS_ZENOH_CONFIG"
                 )
+            threads = os.environ[RUNTIME_VARIABLE]
+            if threads != ONE_THREAD:
+                raise BusError(
+                    f"{connect} is encrypted, and zenoh's TLS link is unsafe with the threads of {RUNTIME_VARIABLE}="
+                    f"{threads!r} (eclipse-zenoh/zenoh issue 2557); unset {RUNTIME_VARIABLE}, or use the one thread that this "
+                    "SDK sets"
+                )
             hint = (
                 " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)"
             )
