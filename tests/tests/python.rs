@@ -1,6 +1,11 @@
 //! Robots in Python: the tests of `sdk/python`, with the programs of this build; and the random streams of both languages,
 //! side by side.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot set up its subject fails"
+)]
+
 use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;

@@ -14,16 +14,22 @@ mod echo;
 mod process;
 mod stage;
 mod transcript;
+mod witness;
+
+use std::thread::JoinHandle;
 
 use bus::{Bus, Role};
-use protocol::keys::Keys;
-use protocol::messages::{Control, ControlAnswer};
+use protocol::messages::{Control, End};
 use protocol::random::{MAX_SEED, stream, unit};
-use protocol::{RobotName, RunName, decode, encode};
+use protocol::{RobotName, RunName};
 use rand_xoshiro::rand_core::Rng;
-use robot::Robot;
+use robot::{Host, HostOptions, Robot};
+use simulator::scenario::Changes;
+use simulator::server::{Options, REPEAT_AFTER, Server};
+use simulator::{RunFolder, Scenario};
 use stage::Stage;
 use system_tests::{Lab, PATIENCE, eventually, root};
+use witness::Witness;
 
 const ECHO: &str = "docs/vectors/echo.toml";
 /// Ticks of Leguin's story.
@@ -146,38 +152,6 @@ fn streams() {
     );
 }
 
-/// The messages of a transcript that are put once in every tick from tick 1 on, or less often: each line from its key on.
-fn puts(file: &str) -> Vec<String> {
-    let text = std::fs::read_to_string(root().join("docs/vectors").join(file)).unwrap();
-    let mut puts = Vec::new();
-    let from_tick_1 = text
-        .lines()
-        .skip_while(|line| !line.contains(r#""message":{"epoch":1,"tick":1"#));
-    for line in from_tick_1 {
-        // Joining is over, queries and states depend on who asks when, and the end comes with the test's own order.
-        let is_put = line.contains(r#""message":"#);
-        if is_put && !line.contains("/state\"") && !line.contains(r#""end""#) {
-            let (_, rest) = line.split_once(',').unwrap();
-            puts.push(rest.to_owned());
-        }
-    }
-
-    puts
-}
-
-/// Steps a run that waits for `start`, once its robots have joined.
-fn step(bus: &Bus, keys: &Keys, ticks: u64) {
-    let step = encode(&Control::Step { n: ticks });
-    eventually("tick 0", || {
-        let reply = bus
-            .get_within(&keys.control(), "", Some(step.clone()), PATIENCE)
-            .unwrap()?;
-        let answer = reply.result.unwrap();
-        let answer: ControlAnswer = decode("control", "simulator", &answer).unwrap();
-        matches!(answer, ControlAnswer::Done(_)).then_some(())
-    });
-}
-
 /// What simulator and Leguin put over zenoh between processes is in the transcript of the hall, byte for byte.
 #[test]
 fn leguin_in_the_hall_as_processes() {
@@ -198,42 +172,74 @@ fn leguin_in_the_hall_as_processes() {
         std::fs::read_to_string(lab.file(run, "endpoint")).ok()
     });
 
-    let role = Role::Client {
-        connect: endpoint.trim().to_owned(),
-        patience: PATIENCE,
-    };
-    let bus = Bus::open(&role, None).unwrap();
-    let keys = Keys::new(&RunName::new(run).unwrap());
-    let leguin = RobotName::new("Leguin").unwrap();
-    let butler = RobotName::new("Butler").unwrap();
-    let (sender, received) = std::sync::mpsc::channel();
-    let mut subscribers = Vec::new();
-    for key in [
-        keys.clock(),
-        keys.news(&leguin),
-        keys.report(&leguin),
-        keys.command(&butler, &leguin),
-    ] {
-        let sender = sender.clone();
-        let subscriber = bus.subscribe(&key, move |key, bytes| {
-            let message = String::from_utf8(bytes.to_vec()).unwrap();
-            let _is_over = sender.send(format!(r#""key":"{key}","message":{message}}}"#));
-        });
-        subscribers.push(subscriber.unwrap());
-    }
-    // The reply shows that what was declared before the query is in effect.
-    step(&bus, &keys, LEGUIN_TICKS);
-
-    let mut wanted = puts("leguin.jsonl");
-    assert!(wanted.len() > 2 * LEGUIN_TICKS as usize, "{}", wanted.len());
-    while !wanted.is_empty() {
-        let line = received
-            .recv_timeout(PATIENCE)
-            .unwrap_or_else(|_| panic!("not received: {wanted:#?}"));
-        // On a slow machine a clock is repeated.
-        wanted.retain(|wanted| *wanted != line);
-    }
+    let run_name = RunName::new(run).unwrap();
+    let witness = Witness::new(endpoint.trim(), &run_name, "Leguin", "Butler");
+    witness.step(LEGUIN_TICKS);
+    witness.assert_received("leguin.jsonl", 1);
 
     lab.ok(&["ctl", "stop", "--run", run]);
     launch.finish();
+}
+
+/// A robot that takes part over zenoh until the run ends.
+fn join(run: &RunName, endpoint: &str, name: &str, robot: Box<dyn Robot>) -> JoinHandle<()> {
+    let options = HostOptions {
+        run: run.clone(),
+        connect: endpoint.to_owned(),
+        patience: PATIENCE,
+        gone_patience: PATIENCE,
+        zenoh_config: None,
+    };
+    let robots = vec![(RobotName::new(name).unwrap(), robot)];
+
+    std::thread::spawn(move || {
+        let host = Host::connect(robots, options).unwrap();
+        assert_eq!(host.run().unwrap(), End::Stopped);
+    })
+}
+
+/// What simulator and Echo put over zenoh is in its transcript, byte for byte, through both epochs.
+#[test]
+fn echo_over_zenoh() {
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("simulator.sock");
+    let endpoint = format!("unixsock-stream/{}", socket.display());
+    let role = Role::Router {
+        listen: endpoint.clone(),
+        trusts_network: false,
+    };
+    let run = RunName::new("vectors").unwrap();
+    let options = Options {
+        run: run.clone(),
+        speed: None,
+        is_paused: true,
+        repeat_after: REPEAT_AFTER,
+    };
+    let scenario = Scenario::load(&root().join(ECHO), &Changes::default()).unwrap();
+    let server = Server::open(Bus::open(&role, None).unwrap(), &scenario, options).unwrap();
+    let run_folder = RunFolder::new(folder.path(), &run);
+    let lock = run_folder.create(&scenario).unwrap();
+    let simulator = std::thread::spawn(move || {
+        let _lock = lock;
+        server.run(scenario, &run_folder).unwrap();
+    });
+
+    let witness = Witness::new(&endpoint, &run, "Echo", "Caller");
+    witness.control(&Control::Status);
+    let caller = join(&run, &endpoint, "Caller", caller());
+    let echo = join(&run, &endpoint, "Echo", echo());
+    witness.step(28);
+    witness.command_as_operator("hello");
+    witness.step(2);
+    witness.control(&Control::Init {
+        seed: Some(8),
+        setup: None,
+    });
+    witness.step(4);
+    witness.assert_received("echo.jsonl", 0);
+
+    witness.control(&Control::Stop);
+    for thread in [caller, echo, simulator] {
+        thread.join().unwrap();
+    }
 }
