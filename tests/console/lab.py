@@ -66,9 +66,9 @@ class Processes:
         return "\n".join(f"== {file.name}\n{file.read_text()}" for file in sorted(self.folder.glob("*.log")))
 
 
-def start_console(processes, *arguments, environment=None):
+def start_console(processes, *arguments, bind="127.0.0.1:0", environment=None):
     """Starts a console and returns its URL."""
-    arguments = ("--bind", "127.0.0.1:0", *arguments)
+    arguments = ("--bind", bind, *arguments)
     process = processes.start("cars-console", *arguments, environment=environment, stdout=subprocess.PIPE)
 
     assert select.select([process.stdout], [], [], PATIENCE_S)[0], "the console prints no URL"
