@@ -20,8 +20,14 @@ def origin_of(address):
     return address.split("/?")[0]
 
 
-def connected(page):
-    expect(page.get_by_test_id("phase")).to_have_text("ready", ignore_case=True)
+def connected(page, phase="ready"):
+    expect(page.get_by_test_id("phase")).to_have_text(phase, ignore_case=True)
+
+
+def explains(page):
+    """Waits for the page that asks for the token."""
+    heading = page.get_by_role("heading", name="This console needs its token")
+    expect(heading).to_be_visible(timeout=20_000)
 
 
 @pytest.fixture
@@ -88,13 +94,13 @@ def test_another_browser_gets_a_page_that_explains_what_to_do(launch, open_page,
     for address in (origin_of(run.address), origin_of(run.address) + "/?token=" + 48 * "0", visited + "ws"):
         answer = page.goto(address)
         assert answer.status == 403
-        expect(page.get_by_role("heading")).to_have_text("This console needs its token")
+        explains(page)
         expect(page.locator("pre")).to_contain_text("?token=")
         assert context.cookies() == []
 
     # Its path alone shows the files of the page, and nothing of the run.
     page.goto(visited)
-    expect(page.get_by_role("heading")).to_have_text("This console needs its token")
+    explains(page)
     assert page.url == origin_of(run.address) + "/"
 
     page.goto(run.address)
@@ -110,7 +116,7 @@ def test_a_page_that_loses_its_cookie_says_so(launch, context):
     context.clear_cookies()
     page.reload()
 
-    expect(page.get_by_role("heading")).to_have_text("This console needs its token")
+    explains(page)
 
 
 def test_the_opened_file_leads_to_the_page(launch, open_page, tmp_path):
@@ -142,11 +148,11 @@ def test_two_consoles_in_one_browser_do_not_disturb_each_other(launch, context):
     connected(other_page)
 
     assert len(context.cookies()) == 2
-    for page in (one_page, other_page):
+    for page, phase, tick in ((one_page, "ready", 1), (other_page, "paused", 2)):
         page.reload()
-        connected(page)
+        connected(page, phase)
         page.get_by_test_id("btn-step").click()
-    eventually("two steps", lambda: run.status()["tick"] == 2)
+        eventually("the step", lambda: run.status()["tick"] == tick)
 
 
 def test_a_page_of_an_ended_console_leads_to_the_new_ones_explanation(processes, context):
@@ -164,7 +170,7 @@ def test_a_page_of_an_ended_console_leads_to_the_new_ones_explanation(processes,
     expect(page.get_by_test_id("connection")).to_have_text("console not reachable")
     start_console(processes, *arguments, bind=bind)
 
-    expect(page.get_by_role("heading")).to_have_text("This console needs its token", timeout=20_000)
+    explains(page)
 
 
 class Stranger(http.server.BaseHTTPRequestHandler):
@@ -237,7 +243,7 @@ def test_a_link_from_another_page_admits_who_has_the_token_only(launch, context,
         context.clear_cookies()
         page.goto(f"http://{host}:{stranger.server_port}/")
         page.evaluate("(url) => { location.href = url }", origin_of(run.address))
-        expect(page.get_by_role("heading")).to_have_text("This console needs its token")
+        explains(page)
 
 
 def test_no_run_changes_by_what_a_program_without_token_sends(launch):
