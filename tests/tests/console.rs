@@ -134,7 +134,9 @@ impl Run {
     fn printed(&mut self) -> Printed {
         self.launch.prints("console: http://");
         let printed = self.launch.printed();
-        let line = printed.lines().find(|line| line.contains("console: http://"));
+        let line = printed
+            .lines()
+            .find(|line| line.contains("console: http://"));
         Printed::parse(line.unwrap())
     }
 }
@@ -546,7 +548,10 @@ fn a_console_hardly_slows_a_run() {
 
 /// A program to set as `BROWSER`, which stays until the end of the run.
 fn lasting_browser(lab: &Lab) -> PathBuf {
-    let browser = lab.write("browser", "#!/bin/sh\necho \"$@\" > \"$0.started\"\nsleep 600\n");
+    let browser = lab.write(
+        "browser",
+        "#!/bin/sh\necho \"$@\" > \"$0.started\"\nsleep 600\n",
+    );
     std::fs::set_permissions(&browser, Permissions::from_mode(0o755)).unwrap();
     browser
 }
@@ -614,7 +619,11 @@ fn assert_controlled_by_the_owner_only(lab: &Lab, run: &mut Run) {
     let address = printed.address.clone();
     let entered = Entered::new(printed);
     let path = format!("{}ws", entered.path);
-    for cookie in ["", "cars-console=0", &entered.cookie[..entered.cookie.len() - 1]] {
+    for cookie in [
+        "",
+        "cars-console=0",
+        &entered.cookie[..entered.cookie.len() - 1],
+    ] {
         let (_, head) = request_socket(&address, &path, cookie);
         assert!(head.starts_with("HTTP/1.1 403 "), "{cookie}: {head}");
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Path, Query, Request, State, WebSocketUpgrade};
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, LOCATION, SET_COOKIE};
+use axum::http::header::{CACHE_CONTROL, CONNECTION, CONTENT_TYPE, LOCATION, SET_COOKIE};
 use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
@@ -130,8 +130,7 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
     let refusal = app.guard.refuse(request.headers(), uri.path(), uri.query());
 
     let mut response = match refusal {
-        Some(Refusal::Foreign(reason)) => (StatusCode::FORBIDDEN, reason).into_response(),
-        Some(Refusal::NoToken) => (StatusCode::FORBIDDEN, asset("token.html")).into_response(),
+        Some(refusal) => refused(refusal),
         None => next.run(request).await,
     };
 
@@ -141,6 +140,17 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
         .entry(CACHE_CONTROL)
         .or_insert(HeaderValue::from_static("no-store"));
     response
+}
+
+/// The response to a request that is not admitted. It closes the connection, so that clients without the token cannot keep
+/// all connections of the console.
+fn refused(refusal: Refusal) -> Response {
+    let explanation = match refusal {
+        Refusal::Foreign(reason) => reason.into_response(),
+        Refusal::NoToken => asset("token.html"),
+    };
+
+    (StatusCode::FORBIDDEN, [(CONNECTION, "close")], explanation).into_response()
 }
 
 /// Gives a browser that has shown the token its cookie, and sends it to the page, whose address has no token.

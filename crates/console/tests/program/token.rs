@@ -5,6 +5,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+use std::io::{Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -316,6 +317,27 @@ fn many_wrong_tokens_do_not_slow_others() {
     println!("{refused} wrong tokens; the slowest answer to a page took {slowest:?}");
     assert!(refused > 100, "{refused}");
     assert!(slowest < Duration::from_secs(1), "{slowest:?}");
+}
+
+#[test]
+fn clients_without_the_token_cannot_keep_all_connections() {
+    let console = Console::live();
+    let host = console.host();
+    let mut kept = Vec::new();
+
+    // More than the console serves at a time. They would stay open for a further request.
+    for _ in 0..300 {
+        let mut stream = console.connect();
+        write!(stream, "GET /?token=0 HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        kept.push(stream);
+    }
+
+    assert_eq!(console.page().until("hello")["mode"], "live");
+    for stream in &mut kept {
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 403 "), "{answer}");
+    }
 }
 
 /// A folder with a program to set as `BROWSER`, which writes down its arguments.
