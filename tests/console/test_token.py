@@ -125,7 +125,8 @@ def test_the_opened_file_leads_to_the_page(launch, open_page, tmp_path):
     browser = tmp_path / "browser.sh"
     browser.write_text(f'#!/bin/sh\necho "$@" > {opened}.writing\nmv {opened}.writing {opened}\n')
     browser.chmod(0o755)
-    start_console(run.processes, "--open", environment={**run.environment, "BROWSER": str(browser)})
+    environment = {**run.environment, "BROWSER": str(browser)}
+    start_console(run.processes, "--open", environment=environment, cwd=tmp_path)
     eventually("the browser", opened.exists)
     file = opened.read_text().strip()
 

@@ -43,9 +43,10 @@ impl Run {
         more: &[&str],
         config: Option<&PathBuf>,
     ) -> Self {
+        let file = root().join("launch/hors_doeuvres.toml");
         let args = [
             "launch",
-            "launch/hors_doeuvres.toml",
+            file.to_str().unwrap(),
             "--paused",
             "--speed",
             "max",
@@ -56,7 +57,8 @@ impl Run {
             "record.frames=false",
         ];
         let mut command = lab.cars(&[&args[..], more].concat());
-        command.args(["--run", name]);
+        // The console writes its file for the browser into the current folder.
+        command.args(["--run", name]).current_dir(lab.out());
         if let Some(browser) = browser {
             command.arg("--open").env("BROWSER", browser);
         }

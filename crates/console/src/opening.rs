@@ -14,8 +14,9 @@ use crate::app::App;
 /// How long a browser may take to read the file.
 const READ_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Opens `url` with the program in `BROWSER`, or else with the system's opener. The file is removed when a browser has entered, after [`READ_TIMEOUT`], or when the console
-/// ends. Failures are printed, because the user can open the printed address instead.
+/// Opens `url` with the program in `BROWSER`, or else with the system's opener. Failures are printed: the user can open the
+/// printed address instead. The file is removed when a browser has entered, after [`READ_TIMEOUT`], or when the console
+/// ends.
 pub(crate) fn open(url: &str, app: Arc<App>) {
     let file = match write_file(url) {
         Ok(file) => file,
