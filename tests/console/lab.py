@@ -45,12 +45,12 @@ class Processes:
         self.folder = folder
         self.all = []
 
-    def start(self, name, *arguments, environment=None, **options):
+    def start(self, name, *arguments, environment=None, cwd=ROOT, **options):
         log = open(self.folder / f"{name}-{len(self.all)}.log", "wb")
         environment = {**os.environ, **(environment or {})}
         command = [str(BIN / name), *map(str, arguments)]
 
-        process = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stderr=log, **options)
+        process = subprocess.Popen(command, cwd=cwd, env=environment, stdin=subprocess.DEVNULL, stderr=log, **options)
         log.close()
 
         self.all.append(process)
@@ -66,10 +66,10 @@ class Processes:
         return "\n".join(f"== {file.name}\n{file.read_text()}" for file in sorted(self.folder.glob("*.log")))
 
 
-def start_console(processes, *arguments, environment=None):
+def start_console(processes, *arguments, bind="127.0.0.1:0", **options):
     """Starts a console and returns its URL."""
-    arguments = ("--bind", "127.0.0.1:0", *arguments)
-    process = processes.start("cars-console", *arguments, environment=environment, stdout=subprocess.PIPE)
+    arguments = ("--bind", bind, *arguments)
+    process = processes.start("cars-console", *arguments, stdout=subprocess.PIPE, **options)
 
     assert select.select([process.stdout], [], [], PATIENCE_S)[0], "the console prints no URL"
 

@@ -154,7 +154,7 @@ def test_content_of_a_panel_or_line_is_not_executed(launch, open_page):
     assert page.evaluate("typeof window.hacked") == "undefined"
     assert page.locator("#injected").count() == 0
     assert page.locator("script:not([src^='assets/'])").count() == 0
-    foreign = [url for url in requests if not url.startswith((run.address, "data:", "ws:"))]
+    foreign = [url for url in requests if not url.startswith((page.url, "data:", "ws:"))]
     assert foreign == []
     assert run.simulator.poll() is None
 

@@ -3,9 +3,11 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+use std::fs::Permissions;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpStream};
-use std::path::Path;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
@@ -30,9 +32,21 @@ struct Run {
 
 impl Run {
     fn start(lab: &Lab, name: &str) -> Self {
+        Self::start_opening(lab, name, None, &[], None)
+    }
+
+    /// Starts a launch with `BROWSER` and further arguments; `config` is a zenoh configuration file for the session.
+    fn start_opening(
+        lab: &Lab,
+        name: &str,
+        browser: Option<&Path>,
+        more: &[&str],
+        config: Option<&PathBuf>,
+    ) -> Self {
+        let file = root().join("launch/hors_doeuvres.toml");
         let args = [
             "launch",
-            "launch/hors_doeuvres.toml",
+            file.to_str().unwrap(),
             "--paused",
             "--speed",
             "max",
@@ -42,7 +56,13 @@ impl Run {
             "--set",
             "record.frames=false",
         ];
-        let launch = lab.start(name, &args);
+        let mut command = lab.cars(&[&args[..], more].concat());
+        // The console writes its file for the browser into the current folder.
+        command.args(["--run", name]).current_dir(lab.out());
+        if let Some(browser) = browser {
+            command.arg("--open").env("BROWSER", browser);
+        }
+        let launch = Running::start(command, name, lab.file(name, ""));
         let endpoint = eventually("the simulator's endpoint", || {
             let text = std::fs::read_to_string(lab.file(name, "endpoint")).ok()?;
             text.ends_with('\n').then(|| text.trim().to_owned())
@@ -55,7 +75,7 @@ impl Run {
         let run = Self {
             name: name.to_owned(),
             endpoint,
-            bus: Bus::open(&role, None).unwrap(),
+            bus: Bus::open(&role, config).unwrap(),
             keys: Keys::new(&RunName::new(name).unwrap()),
             launch,
         };
@@ -106,16 +126,102 @@ impl Run {
         let mut line = String::new();
         BufReader::new(stdout).read_line(&mut line).unwrap();
 
-        let url = line.trim().strip_prefix("console: http://").unwrap();
-        let address = url.trim_end_matches('/').to_owned();
-        Console { child, address }
+        Console {
+            child,
+            entered: Entered::new(Printed::parse(line.trim())),
+        }
     }
+
+    /// The URL of the launch's own console.
+    fn printed(&mut self) -> Printed {
+        self.launch.prints("console: http://");
+        let printed = self.launch.printed();
+        let line = printed
+            .lines()
+            .find(|line| line.contains("console: http://"));
+        Printed::parse(line.unwrap())
+    }
+}
+
+/// A printed URL of a console.
+struct Printed {
+    address: String,
+    token: String,
+}
+
+impl Printed {
+    /// Parses a line that ends in the URL.
+    fn parse(line: &str) -> Self {
+        let (_, url) = line.split_once("console: http://").unwrap();
+        let (address, token) = url.split_once("/?token=").unwrap();
+        assert!(token.len() >= 32, "{line}");
+
+        Self {
+            address: address.to_owned(),
+            token: token.to_owned(),
+        }
+    }
+}
+
+/// What a browser knows after it has opened a console's URL.
+struct Entered {
+    address: String,
+    /// Path of the page, with a slash at both ends.
+    path: String,
+    cookie: String,
+}
+
+impl Entered {
+    /// Opens a printed URL.
+    fn new(printed: Printed) -> Self {
+        let path = format!("/?token={}", printed.token);
+        let head = request(&printed.address, &path, "").1;
+        assert!(head.starts_with("HTTP/1.1 303 "), "{head}");
+        let value = |name: &str| {
+            let line = head.lines().find_map(|line| line.strip_prefix(name));
+            let value = line.unwrap_or_else(|| panic!("no {name} in {head}"));
+            value.split(';').next().unwrap().to_owned()
+        };
+
+        Self {
+            path: value("location: "),
+            cookie: value("set-cookie: "),
+            address: printed.address,
+        }
+    }
+}
+
+/// Sends a request and reads the head of the response. `more` is further lines of the request's head.
+fn request(address: &str, path: &str, more: &str) -> (BufReader<TcpStream>, String) {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    write!(
+        stream,
+        "GET {path} HTTP/1.1\r\nHost: {address}\r\n{more}\r\n"
+    )
+    .unwrap();
+
+    let mut stream = BufReader::new(stream);
+    let mut head = String::new();
+    while !head.ends_with("\r\n\r\n") {
+        assert!(stream.read_line(&mut head).unwrap() > 0, "{head}");
+    }
+    (stream, head)
+}
+
+/// Requests a WebSocket; returns the head of the response, too.
+fn request_socket(address: &str, path: &str, cookie: &str) -> (BufReader<TcpStream>, String) {
+    let more = format!(
+        "Origin: http://{address}\r\nCookie: {cookie}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+    );
+    request(address, path, &more)
 }
 
 /// A running console; dropping it kills it.
 struct Console {
     child: Child,
-    address: String,
+    entered: Entered,
 }
 
 impl Console {
@@ -149,26 +255,11 @@ const PING: u8 = 9;
 const PONG: u8 = 10;
 
 impl Page {
-    fn open(console: &Console) -> Self {
-        let mut stream = TcpStream::connect(&console.address).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        write!(
-            stream,
-            "GET /ws HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
-            console.address
-        )
-        .unwrap();
-
-        let mut page = Self {
-            stream: BufReader::new(stream),
-        };
-        let mut head = String::new();
-        while !head.ends_with("\r\n\r\n") {
-            assert!(page.stream.read_line(&mut head).unwrap() > 0, "{head}");
-        }
+    fn open(entered: &Entered) -> Self {
+        let path = format!("{}ws", entered.path);
+        let (stream, head) = request_socket(&entered.address, &path, &entered.cookie);
         assert!(head.starts_with("HTTP/1.1 101 "), "{head}");
-        page
+        Self { stream }
     }
 
     /// The next frame: opcode and payload.
@@ -284,7 +375,7 @@ fn a_page_receives_frames_and_panels_and_controls_the_run() {
     let lab = Lab::new();
     let run = Run::start(&lab, "con-live");
     let console = run.console();
-    let mut page = Page::open(&console);
+    let mut page = Page::open(&console.entered);
     assert_eq!(page.receive().unwrap()["mode"], "live");
     let first = page.until(is_frame);
     assert_eq!(first["frame"]["tick"], 0);
@@ -325,7 +416,7 @@ fn a_simulator_that_hangs_gives_an_error_and_one_that_returns_is_found() {
     let lab = Lab::new();
     let run = Run::start(&lab, "con-hang");
     let console = run.console();
-    let mut page = Page::open(&console);
+    let mut page = Page::open(&console.entered);
     page.until(is_frame);
 
     let simulator = Pid::from_raw(i32::try_from(run.launch.process("cars-sim")).unwrap());
@@ -358,7 +449,7 @@ fn a_slow_browser_is_shown_the_newest_frame() {
     let lab = Lab::new();
     let run = Run::start(&lab, "con-slow");
     let console = run.console();
-    let mut page = Page::open(&console);
+    let mut page = Page::open(&console.entered);
     page.until(is_frame);
     run.control(&Control::Start).unwrap();
 
@@ -379,8 +470,8 @@ fn a_stalled_browser_costs_no_memory() {
     let lab = Lab::new();
     let run = Run::start(&lab, "con-stuck");
     let console = run.console();
-    let _reading = Page::open(&console).keep_reading();
-    let _stalled = Page::open(&console);
+    let _reading = Page::open(&console.entered).keep_reading();
+    let _stalled = Page::open(&console.entered);
     run.control(&Control::Start).unwrap();
 
     // From then on the feed holds as many lines of the log as it may.
@@ -444,8 +535,8 @@ fn a_console_hardly_slows_a_run() {
 
     let watched = paired_ratio(9, &run, || {
         let console = run.console();
-        let mut page = Page::open(&console);
-        let stalled = Page::open(&console);
+        let mut page = Page::open(&console.entered);
+        let stalled = Page::open(&console.entered);
         page.until(is_frame);
         (page.keep_reading(), stalled, console)
     });
@@ -455,6 +546,120 @@ fn a_console_hardly_slows_a_run() {
 
     assert!(unwatched > LEAST_RATIO, "{unwatched:.3}");
     assert!(watched > LEAST_RATIO, "{watched:.3}");
+}
+
+/// A program to set as `BROWSER`, which stays until the end of the run.
+fn lasting_browser(lab: &Lab) -> PathBuf {
+    let browser = lab.write(
+        "browser",
+        "#!/bin/sh\necho \"$@\" > \"$0.started\"\nsleep 600\n",
+    );
+    std::fs::set_permissions(&browser, Permissions::from_mode(0o755)).unwrap();
+    browser
+}
+
+/// Arguments of all processes of this machine.
+fn all_arguments() -> Vec<String> {
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir("/proc").unwrap().flatten() {
+        let arguments = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();
+        all.push(String::from_utf8_lossy(&arguments).into_owned());
+    }
+    all
+}
+
+/// The files below a folder that contain a text.
+fn files_with(folder: &Path, text: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            found.extend(files_with(&path, text));
+        } else if contains(&std::fs::read(&path).unwrap_or_default(), text) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+fn contains(bytes: &[u8], text: &str) -> bool {
+    let mut parts = bytes.windows(text.len());
+    parts.any(|part| part == text.as_bytes())
+}
+
+/// Asserts that a user of the machine without the token neither finds it nor gets through to the run, and that the owner
+/// does.
+fn assert_controlled_by_the_owner_only(lab: &Lab, run: &mut Run) {
+    let started = lab.out().join("browser.started");
+    eventually("the browser", || started.exists().then_some(()));
+    let printed = run.printed();
+    let token = &printed.token;
+
+    let arguments = all_arguments();
+    let browser = arguments.iter().any(|line| line.contains("/browser\0"));
+    assert!(browser, "the browser is not among the processes");
+    for line in arguments {
+        assert!(!line.contains(token), "{line}");
+    }
+
+    let log = lab.file(&run.name, "logs/console.log");
+    eventually("the log", || {
+        let bytes = std::fs::read(&log).unwrap_or_default();
+        contains(&bytes, token).then_some(())
+    });
+    let with_token = files_with(lab.out(), token);
+    assert!(with_token.contains(&log), "{with_token:?}");
+    for file in with_token {
+        let mode = std::fs::metadata(&file).unwrap().permissions().mode();
+        assert_eq!(mode & 0o077, 0, "{} has mode {mode:o}", file.display());
+    }
+
+    for path in ["/", "/ws", "/?token=", "/ws?token=", "/recording"] {
+        let (_, head) = request_socket(&printed.address, path, "");
+        assert!(head.starts_with("HTTP/1.1 403 "), "{path}: {head}");
+    }
+    let address = printed.address.clone();
+    let entered = Entered::new(printed);
+    let path = format!("{}ws", entered.path);
+    for cookie in [
+        "",
+        "cars-console=0",
+        &entered.cookie[..entered.cookie.len() - 1],
+    ] {
+        let (_, head) = request_socket(&address, &path, cookie);
+        assert!(head.starts_with("HTTP/1.1 403 "), "{cookie}: {head}");
+    }
+    assert_eq!(run.tick(), 0);
+
+    let mut page = Page::open(&entered);
+    let stepped = page.control(r#"{"do":"step","n":3}"#);
+    assert_eq!(stepped["answer"]["tick"], 3, "{stepped}");
+}
+
+#[test]
+fn only_the_token_gives_control_of_a_launch() {
+    let lab = Lab::new();
+    let browser = lasting_browser(&lab);
+    let mut run = Run::start_opening(&lab, "con-own", Some(&browser), &[], None);
+
+    assert_controlled_by_the_owner_only(&lab, &mut run);
+}
+
+#[test]
+fn only_the_token_gives_control_of_a_secured_launch() {
+    let lab = Lab::new();
+    let folder = lab.out().join("certificates");
+    let folder = folder.to_str().unwrap();
+    let init = ["secure", "init", folder, "--robots", "Butler,Leguin"];
+    let (code, text) = lab.cars_without_out(&init);
+    assert_eq!(code, 0, "{text}");
+    let operator = Path::new(folder).join("operator/zenoh.json5");
+    let browser = lasting_browser(&lab);
+    let more = ["--secure", folder];
+    let mut run = Run::start_opening(&lab, "con-sec", Some(&browser), &more, Some(&operator));
+    assert!(run.endpoint.starts_with("tls/"), "{}", run.endpoint);
+
+    assert_controlled_by_the_owner_only(&lab, &mut run);
 }
 
 /// How long all tests in the browser together may take.

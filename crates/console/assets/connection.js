@@ -42,19 +42,24 @@ export class Connection {
 
   /** Connects, and reconnects whenever the connection is lost. */
   open() {
-    const url = new URL(`ws${location.search}`, location.href);
+    const url = new URL("ws", location.href);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
 
     const socket = new WebSocket(url);
     this.socket = socket;
+    let wasOpen = false;
 
     socket.addEventListener("open", () => {
+      wasOpen = true;
       this.pause_ms = FIRST_PAUSE_MS;
       this.onConnection(true);
     });
 
     socket.addEventListener("message", (event) => this.receive(String(event.data)));
-    socket.addEventListener("close", () => this.closed());
+    socket.addEventListener("close", () => {
+      this.closed();
+      if (!wasOpen) leaveIfRefused();
+    });
   }
 
   /**
@@ -129,6 +134,19 @@ export class Connection {
 
     window.setTimeout(() => this.open(), this.pause_ms);
     this.pause_ms = Math.min(this.pause_ms * 2, LONGEST_PAUSE_MS);
+  }
+}
+
+/**
+ * Leaves the page if the server refuses this browser: its cookie is lost, or another console has the address now. The
+ * server's own page explains what to do. A script cannot see why a WebSocket was refused.
+ */
+async function leaveIfRefused() {
+  try {
+    const answer = await fetch("ws");
+    if (answer.status === 403) location.replace("/");
+  } catch {
+    // The server is not reachable.
   }
 }
 

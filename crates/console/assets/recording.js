@@ -215,7 +215,7 @@ function numbersIn(chunk) {
  */
 async function get(path, query = new URLSearchParams()) {
   const url = new URL(path, location.href);
-  url.search = new URLSearchParams([...new URLSearchParams(location.search), ...query]).toString();
+  url.search = query.toString();
   const answer = await fetch(url);
   if (!answer.ok) throw new Error(`The recording cannot be read: ${(await answer.text()) || answer.statusText}`);
   return answer.json();

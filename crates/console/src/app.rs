@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
+use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 
 use crate::guard::Guard;
 use crate::live::Live;
@@ -33,6 +33,7 @@ pub(crate) struct App {
     requests: Arc<Semaphore>,
     reads: Semaphore,
     ending: watch::Sender<bool>,
+    entry: Notify,
 }
 
 impl App {
@@ -45,6 +46,7 @@ impl App {
             requests: Arc::new(Semaphore::new(MAX_REQUESTS)),
             reads: Semaphore::new(MAX_READS),
             ending: watch::Sender::new(false),
+            entry: Notify::new(),
         }
     }
 
@@ -56,6 +58,16 @@ impl App {
     /// Resolves when [`App::end`] has been called.
     pub(crate) fn ending(&self) -> Ending {
         Ending(self.ending.subscribe())
+    }
+
+    /// Notes that a browser has shown the token.
+    pub(crate) fn on_entry(&self) {
+        self.entry.notify_one();
+    }
+
+    /// Waits until a browser has shown the token. For one task.
+    pub(crate) async fn entered(&self) {
+        self.entry.notified().await;
     }
 
     /// Closes the session with the run.

@@ -1,12 +1,18 @@
-//! Decides which HTTP requests are answered. Other web pages must not reach a run through the browser of a person who has
-//! the console open, neither through a host name that resolves to this machine (DNS rebinding) nor through a WebSocket
-//! across origins.
+//! Decides which HTTP requests are answered.
+//!
+//! Other users of this machine must not reach a run: a request needs the token, which only the printed address and the
+//! browser that opened it know. Other web pages must not reach it through the browser of a person who has the console
+//! open, neither through a host name that resolves to this machine (DNS rebinding) nor through a WebSocket across origins.
+//!
+//! The printed address exchanges the token for a cookie. A browser sends its cookies to every port of a host, so another
+//! user's server on this machine could collect them; it does not send them to other paths. The page is therefore at a
+//! path that is drawn for each console, and the cookie is limited to that path.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use axum::http::header::{
-    CONTENT_SECURITY_POLICY, HOST, HeaderMap, HeaderName, HeaderValue, ORIGIN, REFERRER_POLICY,
-    X_CONTENT_TYPE_OPTIONS,
+    CONTENT_SECURITY_POLICY, COOKIE, HOST, HeaderMap, HeaderName, HeaderValue, ORIGIN,
+    REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
 };
 use subtle::ConstantTimeEq;
 
@@ -30,39 +36,69 @@ pub(crate) const HEADERS: [(HeaderName, HeaderValue); 5] = [
     ),
 ];
 
+/// The path that exchanges the token for a cookie.
+pub(crate) const ENTRANCE: &str = "/";
 /// Random bytes in a token.
 const TOKEN_BYTES: usize = 24;
+/// Random bytes in the path of the page.
+const PATH_BYTES: usize = 8;
 
 /// Decides which requests are answered.
 #[derive(Debug)]
 pub(crate) struct Guard {
     address: SocketAddr,
-    /// What a request must contain; `None` if the console serves loopback only.
-    token: Option<String>,
+    /// The secret that admits a browser.
+    token: String,
+    /// Path of the page, with a slash at both ends.
+    path: String,
+    /// Cookies with this name contain the token. Consoles on one host have different ports and share the browser's cookies.
+    cookie_name: String,
+}
+
+/// Why a request is refused.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// It is for another host, or from another page; the text explains it.
+    Foreign(String),
+    /// It has no token, or a wrong one.
+    NoToken,
 }
 
 impl Guard {
-    /// A guard for what is served at `address`, with a new token if that is not loopback.
+    /// A guard with a new token for what is served at `address`.
     pub(crate) fn new(address: SocketAddr) -> Result<Self, getrandom::Error> {
-        let token = if address.ip().is_loopback() {
-            None
-        } else {
-            Some(new_token()?)
-        };
-        Ok(Self { address, token })
+        let token = random_hex::<TOKEN_BYTES>()?;
+        let path = random_hex::<PATH_BYTES>()?;
+
+        Ok(Self {
+            address,
+            token,
+            path: format!("/{path}/"),
+            cookie_name: format!("cars-console-{}", address.port()),
+        })
     }
 
-    /// The URL of the page, with the token if one is needed.
+    /// The URL that admits a browser, with the token.
     pub(crate) fn url(&self) -> String {
         let mut address = self.address;
         if address.ip().is_unspecified() {
             address.set_ip(loopback_like(address.ip()));
         }
 
-        match &self.token {
-            Some(token) => format!("http://{address}/?token={token}"),
-            None => format!("http://{address}/"),
-        }
+        format!("http://{address}{ENTRANCE}?token={}", self.token)
+    }
+
+    /// Path of the page, with a slash at both ends.
+    pub(crate) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// The value of `Set-Cookie` for a browser that has shown the token.
+    pub(crate) fn cookie(&self) -> String {
+        format!(
+            "{}={}; Path={}; HttpOnly; SameSite=Strict",
+            self.cookie_name, self.token, self.path
+        )
     }
 
     /// Why a request is refused; `None` if it is admitted.
@@ -71,25 +107,24 @@ impl Guard {
         headers: &HeaderMap,
         path: &str,
         query: Option<&str>,
-    ) -> Option<String> {
+    ) -> Option<Refusal> {
         let Some(host) = single(headers, &HOST).filter(|host| self.is_own(host)) else {
-            return Some(format!(
+            return Some(Refusal::Foreign(format!(
                 "This console is at {}: a request must name that address, or localhost, with its port.\n",
                 self.address
-            ));
+            )));
         };
         if is_from_other_page(headers, host) {
-            return Some("A page from elsewhere may not use this console.\n".to_owned());
+            return Some(Refusal::Foreign(
+                "A page from elsewhere may not use this console.\n".to_owned(),
+            ));
         }
 
-        // The files of the page are public; only what the page shows and does is protected.
-        if path.starts_with("/assets/") || self.has_token(query) {
-            return None;
-        }
-        Some(
-            "This console is open to the network: use the address with ?token= that it printed.\n"
-                .to_owned(),
-        )
+        let is_admitted = match path.strip_prefix(&self.path) {
+            Some(rest) => is_static(rest) || self.has_cookie(headers),
+            None => path == ENTRANCE && self.has_token(query),
+        };
+        (!is_admitted).then_some(Refusal::NoToken)
     }
 
     fn is_own(&self, host: &str) -> bool {
@@ -107,16 +142,39 @@ impl Guard {
     }
 
     fn has_token(&self, query: Option<&str>) -> bool {
-        let Some(token) = &self.token else {
-            return true;
-        };
-
         let mut parameters = query.unwrap_or_default().split('&');
-        let given = parameters
+        parameters
             .find_map(|parameter| parameter.strip_prefix("token="))
-            .unwrap_or_default();
-        given.as_bytes().ct_eq(token.as_bytes()).into()
+            .is_some_and(|given| self.is_token(given.as_bytes()))
     }
+
+    /// Whether one of the request's cookies contains the token. Pages on other ports of the host may have set cookies with
+    /// the same name, or with bytes that are not text.
+    fn has_cookie(&self, headers: &HeaderMap) -> bool {
+        for header in headers.get_all(COOKIE) {
+            for cookie in header.as_bytes().split(|byte| *byte == b';') {
+                let value = cookie
+                    .trim_ascii()
+                    .strip_prefix(self.cookie_name.as_bytes())
+                    .and_then(|rest| rest.strip_prefix(b"="));
+                if value.is_some_and(|value| self.is_token(value)) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Takes the same time for every wrong token of the right length.
+    fn is_token(&self, given: &[u8]) -> bool {
+        given.ct_eq(self.token.as_bytes()).into()
+    }
+}
+
+/// Whether this part of the page is a file of the program, with nothing of the run in it. After a visit through a link from
+/// elsewhere, a browser requests these files without the cookie, because that is `SameSite=Strict`.
+fn is_static(path: &str) -> bool {
+    path.is_empty() || path.starts_with("assets/")
 }
 
 /// The value of a `Host` header.
@@ -185,8 +243,9 @@ fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     values.next().is_none().then_some(first)
 }
 
-fn new_token() -> Result<String, getrandom::Error> {
-    let mut bytes = [0; TOKEN_BYTES];
+/// `N` random bytes as hexadecimal digits.
+fn random_hex<const N: usize>() -> Result<String, getrandom::Error> {
+    let mut bytes = [0; N];
     getrandom::fill(&mut bytes)?;
 
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
@@ -209,15 +268,28 @@ mod tests {
         headers
     }
 
-    fn admits(guard: &Guard, host: &str, path: &str, query: &str) -> bool {
+    /// Whether a request with the right token is admitted.
+    fn admits(guard: &Guard, host: &str) -> bool {
+        let query = format!("token={}", guard.token);
         guard
-            .refuse(&headers(host, None), path, Some(query))
+            .refuse(&headers(host, None), ENTRANCE, Some(&query))
             .is_none()
     }
 
     fn admits_origin(guard: &Guard, origin: &str) -> bool {
         let headers = headers("localhost:7007", Some(origin));
-        guard.refuse(&headers, "/", None).is_none()
+        let query = format!("token={}", guard.token);
+        guard.refuse(&headers, ENTRANCE, Some(&query)).is_none()
+    }
+
+    /// Whether a request with these cookies is admitted to a part of the page.
+    fn admits_cookies(guard: &Guard, cookies: &[&[u8]], part: &str) -> bool {
+        let mut headers = headers("127.0.0.1:7007", None);
+        for cookie in cookies {
+            headers.append(COOKIE, HeaderValue::from_bytes(cookie).unwrap());
+        }
+        let path = format!("{}{part}", guard.path);
+        guard.refuse(&headers, &path, None).is_none()
     }
 
     #[test]
@@ -230,7 +302,7 @@ mod tests {
             "LOCALHOST:7007",
             "[::1]:7007",
         ] {
-            assert!(admits(&guard, own, "/", ""), "{own} was refused");
+            assert!(admits(&guard, own), "{own} was refused");
         }
         for foreign in [
             "evil.example:7007",
@@ -245,7 +317,7 @@ mod tests {
             "",
             ":7007",
         ] {
-            assert!(!admits(&guard, foreign, "/", ""), "{foreign} was served");
+            assert!(!admits(&guard, foreign), "{foreign} was served");
         }
     }
 
@@ -255,8 +327,10 @@ mod tests {
         let mut twice = headers("localhost:7007", None);
         twice.append(HOST, "evil.example".parse().unwrap());
 
-        assert!(guard.refuse(&twice, "/", None).is_some());
-        assert!(guard.refuse(&HeaderMap::new(), "/", None).is_some());
+        for wrong in [twice, HeaderMap::new()] {
+            let refusal = guard.refuse(&wrong, ENTRANCE, None);
+            assert!(matches!(refusal, Some(Refusal::Foreign(_))), "{refusal:?}");
+        }
     }
 
     #[test]
@@ -276,37 +350,117 @@ mod tests {
     }
 
     #[test]
-    fn an_open_console_requires_its_token_and_an_ip_address() {
-        let guard = guard("0.0.0.0:7007");
-        let token = guard.token.clone().unwrap();
-        let right = format!("token={token}");
-        assert_eq!(token.len(), 2 * TOKEN_BYTES);
-        assert_eq!(guard.url(), format!("http://127.0.0.1:7007/?token={token}"));
-
-        let host = "10.0.0.1:7007";
-        assert!(admits(&guard, host, "/ws", &right));
-        assert!(admits(
-            &guard,
-            host,
-            "/recording/ticks",
-            &format!("from=1&{right}")
-        ));
-        assert!(admits(&guard, host, "/assets/app.js", ""));
-
-        for wrong in [
-            "",
-            "token=",
-            "token=0",
-            &format!("token={token}0"),
-            &format!("token={}", &token[1..]),
+    fn the_printed_address_has_the_token() {
+        for (address, host) in [
+            ("127.0.0.1:7007", "127.0.0.1:7007"),
+            ("0.0.0.0:7007", "127.0.0.1:7007"),
+            ("[::]:7007", "[::1]:7007"),
+            ("10.0.0.1:7007", "10.0.0.1:7007"),
         ] {
-            assert!(!admits(&guard, host, "/", wrong), "{wrong} was admitted");
+            let guard = guard(address);
+            let token = &guard.token;
+            assert_eq!(token.len(), 2 * TOKEN_BYTES);
+            assert_eq!(guard.url(), format!("http://{host}/?token={token}"));
         }
-        assert!(!admits(&guard, "evil.example:7007", "/", &right));
     }
 
     #[test]
-    fn every_token_is_new() {
-        assert_ne!(guard("0.0.0.0:7007").token, guard("0.0.0.0:7007").token);
+    fn the_entrance_requires_the_token_at_every_address() {
+        for address in ["127.0.0.1:7007", "[::1]:7007", "0.0.0.0:7007"] {
+            let guard = guard(address);
+            let token = &guard.token;
+            let headers = headers("127.0.0.1:7007", None);
+
+            for wrong in [
+                "",
+                "token",
+                "token=",
+                "token=0",
+                &format!("token={token}0"),
+                &format!("token={}", &token[1..]),
+                &format!("token={}", "0".repeat(token.len())),
+                &format!("token=0&token={token}"),
+                &format!("Token={token}"),
+                &format!("x=token={token}"),
+                token,
+            ] {
+                let refusal = guard.refuse(&headers, ENTRANCE, Some(wrong));
+                assert_eq!(refusal, Some(Refusal::NoToken), "{wrong:?} at {address}");
+            }
+            assert!(guard.refuse(&headers, ENTRANCE, None).is_some());
+
+            let right = format!("x=1&token={token}");
+            assert_eq!(guard.refuse(&headers, ENTRANCE, Some(&right)), None);
+            assert!(!admits(&guard, "evil.example:7007"));
+        }
+    }
+
+    #[test]
+    fn the_token_in_the_query_admits_to_the_entrance_only() {
+        let guard = guard("127.0.0.1:7007");
+        let headers = headers("127.0.0.1:7007", None);
+        let query = format!("token={}", guard.token);
+
+        for path in [
+            "/ws",
+            "/recording",
+            "//",
+            "/.",
+            "",
+            &format!("{}ws", guard.path),
+            &format!("/{}{}ws", guard.path, guard.path),
+        ] {
+            let refusal = guard.refuse(&headers, path, Some(&query));
+            assert_eq!(refusal, Some(Refusal::NoToken), "{path:?}");
+        }
+    }
+
+    #[test]
+    fn the_page_requires_the_cookie_of_this_console() {
+        let guard = guard("127.0.0.1:7007");
+        let own = format!("cars-console-7007={}", guard.token);
+        assert!(guard.cookie().starts_with(&own), "{}", guard.cookie());
+
+        let own = own.as_bytes();
+        let other: &[u8] = b"cars-console-7008=0123; theme=dark";
+        let bytes: &[u8] = b"name=\xff\xfe";
+        let tossed: &[u8] = b"cars-console-7007=0123";
+        let joined = [tossed, own].join(&b"; "[..]);
+        for right in [
+            &[own] as &[&[u8]],
+            &[other, own],
+            &[bytes, own],
+            &[tossed, own],
+            &[&joined],
+        ] {
+            assert!(admits_cookies(&guard, right, "ws"), "{right:?}");
+        }
+
+        let renamed = format!("cars-console-7008={}", guard.token);
+        let prefixed = format!("x-cars-console-7007={}", guard.token);
+        let longer = format!("cars-console-7007={}0", guard.token);
+        for wrong in [
+            &[] as &[&[u8]],
+            &[b""],
+            &[b"cars-console-7007"],
+            &[b"cars-console-7007="],
+            &[other, tossed],
+            &[renamed.as_bytes()],
+            &[prefixed.as_bytes()],
+            &[longer.as_bytes()],
+        ] {
+            assert!(!admits_cookies(&guard, wrong, "ws"), "{wrong:?}");
+            assert!(admits_cookies(&guard, wrong, ""));
+            assert!(admits_cookies(&guard, wrong, "assets/app.js"));
+        }
+    }
+
+    #[test]
+    fn every_token_and_every_path_is_new() {
+        let one = guard("127.0.0.1:7007");
+        let other = guard("127.0.0.1:7007");
+
+        assert_ne!(one.token, other.token);
+        assert_ne!(one.path, other.path);
     }
 }

@@ -8,6 +8,7 @@ mod browser;
 mod feed;
 mod guard;
 mod live;
+mod opening;
 mod page;
 mod recording;
 mod server;
@@ -16,7 +17,7 @@ mod tick_file;
 use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::process::{Command, ExitCode, Stdio};
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -55,7 +56,8 @@ struct Args {
     #[arg(long, env = "CARS_ZENOH_CONFIG", value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
     /// Address and port to serve at; port 0 takes a free one. The default is 127.0.0.1:7007, or a free port if that one
-    /// is in use. Any address but loopback opens the run to the network, to everyone with the token in the printed URL.
+    /// is in use. Only browsers that open the printed URL, which contains a token, are admitted; any address but loopback
+    /// also serves those on other machines, unencrypted.
     #[arg(long, env = "CARS_CONSOLE_BIND", value_name = "ADDRESS:PORT")]
     bind: Option<SocketAddr>,
     /// Show the recording in this run's folder, or this recording, instead of a run in progress.
@@ -122,7 +124,7 @@ async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), 
 
     announce(address, &url);
     if opens {
-        open_browser(&url);
+        opening::open(&url, app.clone());
     }
 
     let serving = tokio::spawn(server::serve(listener, app.clone()));
@@ -146,27 +148,6 @@ fn announce(address: SocketAddr, url: &str) {
         );
     }
     println!("console: {url}");
-}
-
-/// Opens the page with the program in `BROWSER`, or else with the system's opener. A failure is only reported: the URL
-/// has been printed.
-fn open_browser(url: &str) {
-    let opener = if cfg!(target_os = "macos") {
-        "open"
-    } else {
-        "xdg-open"
-    };
-    let program = std::env::var("BROWSER").unwrap_or_else(|_| opener.to_owned());
-
-    let started = Command::new(&program)
-        .arg(url)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn();
-
-    if let Err(error) = started {
-        eprintln!("{program} cannot be started ({error}): open the address above yourself");
-    }
 }
 
 fn handle(kind: SignalKind) -> Result<Signal, String> {

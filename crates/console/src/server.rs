@@ -8,7 +8,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Path, Query, Request, State, WebSocketUpgrade};
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::http::header::{CACHE_CONTROL, CONNECTION, CONTENT_TYPE, LOCATION, SET_COOKIE};
 use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
@@ -24,7 +24,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::app::{App, Ending, Mode};
 use crate::browser;
-use crate::guard::HEADERS;
+use crate::guard::{ENTRANCE, HEADERS, Refusal};
 use crate::recording::MAX_TICKS;
 
 /// Most connections at a time; a browser uses one for its WebSocket and up to six for HTTP requests.
@@ -40,15 +40,18 @@ const ACCEPT_RETRY: Duration = Duration::from_millis(100);
 struct Assets;
 
 fn routes(app: Arc<App>) -> Router {
+    let page = app.guard.path();
+
     Router::new()
-        .route("/", get(async || asset("index.html")))
+        .route(ENTRANCE, get(enter))
+        .route(page, get(async || asset("index.html")))
         .route(
-            "/assets/{*path}",
+            &format!("{page}assets/{{*path}}"),
             get(async |Path(path): Path<String>| asset(&path)),
         )
-        .route("/ws", get(socket))
-        .route("/recording", get(recording))
-        .route("/recording/ticks", get(ticks))
+        .route(&format!("{page}ws"), get(socket))
+        .route(&format!("{page}recording"), get(recording))
+        .route(&format!("{page}recording/ticks"), get(ticks))
         .fallback(async || not_found())
         .layer(from_fn_with_state(app.clone(), guard))
         .with_state(app)
@@ -127,7 +130,7 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
     let refusal = app.guard.refuse(request.headers(), uri.path(), uri.query());
 
     let mut response = match refusal {
-        Some(reason) => (StatusCode::FORBIDDEN, reason).into_response(),
+        Some(refusal) => refused(refusal),
         None => next.run(request).await,
     };
 
@@ -137,6 +140,28 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
         .entry(CACHE_CONTROL)
         .or_insert(HeaderValue::from_static("no-store"));
     response
+}
+
+/// The response to a request that is not admitted. It closes the connection, so that clients without the token cannot keep
+/// all connections of the console.
+fn refused(refusal: Refusal) -> Response {
+    let explanation = match refusal {
+        Refusal::Foreign(reason) => reason.into_response(),
+        Refusal::NoToken => asset("token.html"),
+    };
+
+    (StatusCode::FORBIDDEN, [(CONNECTION, "close")], explanation).into_response()
+}
+
+/// Gives a browser that has shown the token its cookie, and sends it to the page, whose address has no token.
+async fn enter(State(app): State<Arc<App>>) -> Response {
+    app.on_entry();
+
+    let headers = [
+        (LOCATION, app.guard.path().to_owned()),
+        (SET_COOKIE, app.guard.cookie()),
+    ];
+    (StatusCode::SEE_OTHER, headers).into_response()
 }
 
 fn asset(path: &str) -> Response {

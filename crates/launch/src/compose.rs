@@ -100,8 +100,8 @@ fn simulator_service(
     Ok(())
 }
 
-/// The console, for a browser on the same machine. In its container it listens at all interfaces, so its address has a
-/// token, which the log of the service shows.
+/// The console, for a browser on the same machine. In its container it listens at all interfaces; the log of the service
+/// shows its address with the token.
 fn console_service(text: &mut String, process: &Process, run: &RunName, host: usize) {
     let mut command = process.command.clone();
     command.retain(|word| !word.starts_with("--bind"));

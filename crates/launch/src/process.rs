@@ -1,8 +1,9 @@
 //! One process: its group, its output, its end. The rest of a group is killed when its leader exits, and every group is
 //! killed when the launcher's task ends.
 
-use std::fs::File;
+use std::fs::{File, Permissions};
 use std::io::Write;
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::sync::Arc;
@@ -50,6 +51,8 @@ pub(super) struct Output {
     pub(super) index: usize,
     /// Path of its log.
     pub(super) log: PathBuf,
+    /// Whether only the owner may read the log.
+    pub(super) is_private: bool,
     pub(super) tail: Tail,
 }
 
@@ -87,7 +90,7 @@ pub(super) fn start(command: &CommandLine) -> std::io::Result<Started> {
 impl Started {
     /// Waits for the exit of the process and the end of its output.
     pub(super) async fn run(mut self, output: Output) -> std::io::Result<ExitStatus> {
-        let file = Arc::new(open_log(&output.log)?);
+        let file = Arc::new(open_log(&output.log, output.is_private)?);
         let mut copies = Vec::new();
         if let Some(pipe) = self.child.stdout().take() {
             copies.push(tokio::spawn(copy(
@@ -113,8 +116,19 @@ impl Started {
 }
 
 /// Opens the log to append: two pipes write to it, and so does a restarted process.
-fn open_log(path: &Path) -> std::io::Result<File> {
-    File::options().create(true).append(true).open(path)
+fn open_log(path: &Path, is_private: bool) -> std::io::Result<File> {
+    let mode = if is_private { 0o600 } else { 0o666 };
+    let log = File::options()
+        .create(true)
+        .append(true)
+        .mode(mode)
+        .open(path)?;
+
+    if is_private {
+        // An earlier log that could not be removed has the permissions of then.
+        log.set_permissions(Permissions::from_mode(mode))?;
+    }
+    Ok(log)
 }
 
 /// Copies a pipe: bytes to the log, lines to the terminal.

@@ -213,6 +213,8 @@ impl Supervisor {
             screen: self.screen.clone(),
             index,
             log: log_of(&self.logs, &supervised.planned.name),
+            // The console prints its token.
+            is_private: supervised.planned.part == Part::Observer,
             tail: supervised.tail.clone(),
         };
         tokio::spawn(async move {

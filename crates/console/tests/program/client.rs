@@ -51,20 +51,38 @@ pub(crate) fn fails(args: &[&str]) -> String {
     String::from_utf8(output.stderr).unwrap()
 }
 
-/// A running console; dropping it kills it.
+/// A running console, and what a browser that opened the printed URL knows; dropping it kills it.
 pub(crate) struct Console {
     child: Child,
-    /// The line that it printed on its standard output.
-    pub(crate) line: String,
     pub(crate) port: u16,
-    /// `?token=…`, or nothing.
     pub(crate) token: String,
+    /// Path of the page, with a slash at both ends.
+    pub(crate) path: String,
+    /// Name and value of the cookie.
+    pub(crate) cookie: String,
 }
 
 impl Console {
-    /// Starts a console with these arguments and waits until it has printed its URL.
+    /// Starts a console with these arguments and opens the URL that it prints.
     pub(crate) fn start(args: &[&str]) -> Self {
-        let mut child = program(args).spawn().unwrap();
+        Self::start_program(program(args))
+    }
+
+    /// Like [`Console::start`], with a command of [`program`].
+    pub(crate) fn start_program(command: Command) -> Self {
+        let mut console = Self::start_unopened(command);
+        let entrance = console.get_with(&console.entrance(), &[("Host", &console.host())]);
+        assert_eq!(entrance.status, 303, "{}", entrance.body);
+
+        console.path = entrance.header("location").to_owned();
+        let cookie = entrance.header("set-cookie").split(';').next().unwrap();
+        console.cookie = cookie.to_owned();
+        console
+    }
+
+    /// Starts a console and waits until it has printed its URL, which no browser opens.
+    pub(crate) fn start_unopened(mut command: Command) -> Self {
+        let mut child = command.spawn().unwrap();
         let stdout = child.stdout.as_mut().unwrap();
         let mut line = String::new();
         BufReader::new(stdout).read_line(&mut line).unwrap();
@@ -73,15 +91,17 @@ impl Console {
             .trim()
             .strip_prefix("console: http://")
             .unwrap_or_else(|| panic!("{line:?}"));
-        let (address, token) = url.split_once('/').unwrap();
+        let (address, token) = url
+            .split_once("/?token=")
+            .unwrap_or_else(|| panic!("no token: {line:?}"));
         let address: SocketAddr = address.parse().unwrap();
-        let token = token.to_owned();
 
         Self {
             child,
-            line,
             port: address.port(),
-            token,
+            token: token.to_owned(),
+            path: String::new(),
+            cookie: String::new(),
         }
     }
 
@@ -109,13 +129,36 @@ impl Console {
         stream
     }
 
-    /// Requests a path as a browser does.
-    pub(crate) fn get(&self, path: &str) -> Response {
+    /// Path and query of the printed URL.
+    pub(crate) fn entrance(&self) -> String {
+        format!("/?token={}", self.token)
+    }
+
+    /// Requests a part of the page as its browser does.
+    pub(crate) fn get(&self, part: &str) -> Response {
+        self.get_with(
+            &self.path_of(part),
+            &[("Host", &self.host()), ("Cookie", &self.cookie)],
+        )
+    }
+
+    /// Path of a part of the page.
+    pub(crate) fn path_of(&self, part: &str) -> String {
+        format!("{}{part}", self.path)
+    }
+
+    /// Requests a path as a program without cookies does.
+    pub(crate) fn get_without_cookie(&self, path: &str) -> Response {
         self.get_with(path, &[("Host", &self.host())])
     }
 
     /// Requests a path with exactly these headers.
     pub(crate) fn get_with(&self, path: &str, headers: &[(&str, &str)]) -> Response {
+        self.request("GET", path, headers)
+    }
+
+    /// Requests a path with this method and exactly these headers.
+    pub(crate) fn request(&self, method: &str, path: &str, headers: &[(&str, &str)]) -> Response {
         let headers: String = headers
             .iter()
             .map(|(name, value)| format!("{name}: {value}\r\n"))
@@ -124,7 +167,7 @@ impl Console {
         let mut stream = self.connect();
         write!(
             stream,
-            "GET {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n"
+            "{method} {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n"
         )
         .unwrap();
 
@@ -145,12 +188,21 @@ impl Console {
     /// # Errors
     /// The HTTP status of a refusal.
     pub(crate) fn page_of(&self, origin: Option<&str>) -> Result<Page, u16> {
-        let url = format!("ws://{}/ws{}", self.host(), self.token);
+        let mut headers = vec![("Cookie", self.cookie.as_str())];
+        headers.extend(origin.map(|origin| ("Origin", origin)));
+        self.socket(&self.path_of("ws"), &headers)
+    }
+
+    /// A WebSocket at any path, with these headers in addition to those of the handshake.
+    ///
+    /// # Errors
+    /// The HTTP status of a refusal.
+    pub(crate) fn socket(&self, path: &str, headers: &[(&'static str, &str)]) -> Result<Page, u16> {
+        let url = format!("ws://{}{path}", self.host());
         let mut request = url.into_client_request().unwrap();
-        if let Some(origin) = origin {
-            request
-                .headers_mut()
-                .insert("Origin", HeaderValue::from_str(origin).unwrap());
+        for (name, value) in headers {
+            let value = HeaderValue::from_str(value).unwrap();
+            request.headers_mut().append(*name, value);
         }
 
         match tungstenite::client(request, self.connect()) {

@@ -9,19 +9,26 @@ use crate::client::{Console, fails};
 fn a_request_for_another_host_is_refused() {
     let console = Console::live();
 
-    for path in ["/", "/ws", "/assets/app.js", "/recording"] {
+    for path in [
+        "/",
+        &console.entrance(),
+        &console.path,
+        &console.path_of("ws"),
+    ] {
         for host in [
             "evil.example",
             &format!("evil.example:{}", console.port),
             "127.0.0.1",
             "",
         ] {
-            let answer = console.get_with(path, &[("Host", host)]);
+            let headers = [("Host", host), ("Cookie", &console.cookie)];
+            let answer = console.get_with(path, &headers);
             assert_eq!(answer.status, 403, "{path} of {host:?}");
+            assert_eq!(answer.header("set-cookie"), "");
             assert!(answer.body.contains(&console.host()), "{}", answer.body);
         }
 
-        let without_host = console.get_with(path, &[]);
+        let without_host = console.get_with(path, &[("Cookie", &console.cookie)]);
         assert_eq!(without_host.status, 403, "{path} without a host");
     }
 }
@@ -35,7 +42,8 @@ fn a_request_for_the_own_address_is_served() {
         format!("localhost:{}", console.port),
         format!("[::1]:{}", console.port),
     ] {
-        let answer = console.get_with("/nothing", &[("Host", &host)]);
+        let headers = [("Host", host.as_str()), ("Cookie", &console.cookie)];
+        let answer = console.get_with(&console.path_of("nothing"), &headers);
         assert_eq!(answer.status, 404, "{host}");
     }
 }
@@ -64,11 +72,13 @@ fn every_answer_forbids_what_the_page_does_not_need() {
     let console = Console::live();
     let foreign = [("Host", "evil.example")];
     let answers = [
-        console.get("/"),
-        console.get("/nothing"),
-        console.get("/assets/nothing"),
-        console.get("/recording"),
-        console.get("/ws"),
+        console.get(""),
+        console.get("nothing"),
+        console.get("assets/nothing"),
+        console.get("recording"),
+        console.get("ws"),
+        console.get_without_cookie("/"),
+        console.get_without_cookie(&console.entrance()),
         console.get_with("/", &foreign),
     ];
 
@@ -86,40 +96,9 @@ fn every_answer_forbids_what_the_page_does_not_need() {
 }
 
 #[test]
-fn an_open_console_requires_its_token() {
-    let console = Console::start(&["--bind", "0.0.0.0:0", "--connect", "tcp/127.0.0.1:1"]);
-    let token = console
-        .token
-        .strip_prefix("?token=")
-        .unwrap_or_else(|| panic!("no token: {}", console.line));
-    assert!(
-        token.len() >= 32 && token.bytes().all(|byte| byte.is_ascii_hexdigit()),
-        "{token}"
-    );
-
-    for path in ["/", "/ws", "/recording", "/recording/ticks?from=0&count=1"] {
-        for query in ["", "token=", "token=0", "token=0000", &token[1..]] {
-            let separator = if path.contains('?') { '&' } else { '?' };
-            let answer = console.get(&format!("{path}{separator}{query}"));
-            assert_eq!(answer.status, 403, "{path} with {query:?}");
-            assert!(answer.body.contains("?token="), "{}", answer.body);
-        }
-    }
-
-    let with_token = console.get(&format!("/{}", console.token));
-    assert_ne!(with_token.status, 403);
-    let asset = console.get("/assets/nothing");
-    assert_eq!(asset.status, 404, "the files of the page are public");
-    assert_eq!(console.page().until("hello")["mode"], "live");
-
-    let other = Console::start(&["--bind", "0.0.0.0:0"]);
-    assert_ne!(other.token, console.token, "every console has a new token");
-}
-
-#[test]
 fn the_page_is_served_with_all_its_parts() {
     let console = Console::live();
-    let page = console.get("/");
+    let page = console.get("");
     assert_eq!(page.status, 200);
     assert_eq!(page.header("content-type"), "text/html; charset=utf-8");
 
@@ -131,7 +110,7 @@ fn the_page_is_served_with_all_its_parts() {
     assert!(parts.len() > 2, "{parts:?}");
 
     for part in parts {
-        let answer = console.get(&format!("/{part}"));
+        let answer = console.get(part);
         let expected = match part.rsplit('.').next() {
             Some("js") => "text/javascript; charset=utf-8",
             Some("css") => "text/css; charset=utf-8",
@@ -148,23 +127,23 @@ fn nothing_but_the_page_can_be_read() {
     let console = Console::live();
 
     for path in [
-        "/assets/../src/main.rs",
-        "/assets/../../Cargo.toml",
-        "/assets/%2e%2e/Cargo.toml",
-        "/assets/..%2fCargo.toml",
-        "/assets/%2e%2e%2f%2e%2e%2f%2e%2e%2fetc%2fpasswd",
-        "/assets//etc/passwd",
-        "/assets/%2fetc%2fpasswd",
-        "/assets/",
-        "/../../../etc/passwd",
-        "/assets/..\\Cargo.toml",
+        "assets/../src/main.rs",
+        "assets/../../Cargo.toml",
+        "assets/%2e%2e/Cargo.toml",
+        "assets/..%2fCargo.toml",
+        "assets/%2e%2e%2f%2e%2e%2f%2e%2e%2fetc%2fpasswd",
+        "assets//etc/passwd",
+        "assets/%2fetc%2fpasswd",
+        "assets/",
+        "../../../etc/passwd",
+        "assets/..\\Cargo.toml",
     ] {
         let answer = console.get(path);
         assert_eq!(answer.status, 404, "{path}");
         assert_eq!(answer.body, "Not found.\n", "{path}");
     }
 
-    let answer = console.get("/recording");
+    let answer = console.get("recording");
     assert_eq!(
         answer.status, 404,
         "a run in progress has no recording: {}",
@@ -194,7 +173,7 @@ fn malformed_http_does_no_harm() {
         assert!(!answer.starts_with(b"HTTP/1.1 200"), "{junk:?}");
     }
 
-    assert_eq!(console.get("/nothing").status, 404, "it still serves");
+    assert_eq!(console.get("nothing").status, 404, "it still serves");
 }
 
 #[test]

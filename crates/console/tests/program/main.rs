@@ -4,3 +4,4 @@ mod client;
 mod guards;
 mod playback;
 mod sockets;
+mod token;

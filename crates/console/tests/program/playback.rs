@@ -108,7 +108,7 @@ fn open(path: &Path) -> Console {
 
 fn get_range(console: &Console, from: u64, count: u64) -> Value {
     console
-        .get(&format!("/recording/ticks?from={from}&count={count}"))
+        .get(&format!("recording/ticks?from={from}&count={count}"))
         .json()
 }
 
@@ -124,7 +124,7 @@ fn ticks(list: &Value) -> Vec<u64> {
 #[test]
 fn the_header_is_what_was_recorded() {
     let folder = run_folder(1200);
-    let header = open(folder.path()).get("/recording").json();
+    let header = open(folder.path()).get("recording").json();
 
     assert_eq!(header["ticks"], 1199);
     assert_eq!(header["run"], "past");
@@ -197,7 +197,7 @@ fn a_malformed_range_is_refused() {
         "?from=0&count=513",
         "?from=x&count=1",
     ] {
-        let answer = console.get(&format!("/recording/ticks{query}"));
+        let answer = console.get(&format!("recording/ticks{query}"));
         assert_eq!(answer.status, 400, "{query}: {answer:?}");
         assert!(answer.body.contains("up to 512"), "{query}: {answer:?}");
     }
@@ -235,7 +235,7 @@ fn a_last_line_that_a_crash_left_unfinished_is_ignored() {
 
     let console = open(folder.path());
 
-    assert_eq!(console.get("/recording").json()["ticks"], 98);
+    assert_eq!(console.get("recording").json()["ticks"], 98);
     let range = get_range(&console, 98, 9);
     assert_eq!(ticks(&range["ticks"]), [98]);
 }

@@ -1,6 +1,8 @@
 //! Supervision of real little processes: shells that play simulator and robots.
 
 use std::collections::BTreeMap;
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::kill;
@@ -163,6 +165,34 @@ fn who_watches_is_told_when_the_run_is_over_and_does_not_end_it() {
 
     assert_eq!((outcome.failure, outcome.asked), (None, None));
     assert!(told.exists());
+}
+
+/// Whether users other than the owner may read a file.
+fn is_public(file: &Path) -> bool {
+    let permissions = std::fs::metadata(file).unwrap().permissions();
+    permissions.mode() & 0o077 != 0
+}
+
+#[test]
+fn only_the_owner_can_read_the_log_of_an_observer() {
+    let observer = Planned {
+        part: Part::Observer,
+        ..shell("console", "echo secret; touch $DIR/shown; sleep 600")
+    };
+    let hall = Hall::new("until [ -e $DIR/shown ]; do sleep 0.01; done; echo plain").with(observer);
+    let log = hall.path("console.log");
+    std::fs::write(&log, "earlier\n").unwrap();
+    std::fs::set_permissions(&log, Permissions::from_mode(0o644)).unwrap();
+
+    assert_eq!(hall.run(&[], &[]).failure, None);
+    assert_eq!(hall.read("console.log"), "earlier\nsecret\n");
+    assert!(!is_public(&log));
+
+    std::fs::remove_file(&log).unwrap();
+    std::fs::remove_file(hall.path("shown")).unwrap();
+    assert_eq!(hall.run(&[], &[]).failure, None);
+    assert_eq!(hall.read("console.log"), "secret\n");
+    assert!(!is_public(&log));
 }
 
 #[test]
