@@ -13,6 +13,7 @@ mod error;
 mod memory;
 mod middleware;
 mod qos;
+mod reason;
 mod reply;
 mod role;
 pub mod runtime;

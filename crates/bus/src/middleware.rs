@@ -17,6 +17,7 @@ use crate::declared::Declared;
 use crate::endpoint::{is_local, is_tls};
 use crate::error::BusError;
 use crate::qos::Qos;
+use crate::reason::reason;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
 use crate::runtime::{block, is_encrypted};
@@ -76,7 +77,7 @@ fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T
     result.map_err(|error| BusError::Use {
         doing,
         key: key.to_owned(),
-        reason: error.to_string(),
+        reason: reason(&error),
     })
 }
 
@@ -122,7 +123,7 @@ impl Session {
         let hint = if is_tls(&endpoint) { TLS_HINT } else { "" };
         let session = zenoh::open(config)
             .wait()
-            .map_err(|error| failed(format!("{error}{hint}")))?;
+            .map_err(|error| failed(reason(&error) + hint))?;
         Ok(Self {
             session,
             sending: Sending::of(role, overrides),
@@ -474,7 +475,7 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
     let mut set = |key: &str, value: &str| {
         config
             .insert_json5(key, value)
-            .map_err(|error| format!("setting {key} = {value}: {error}"))
+            .map_err(|error| format!("setting {key} = {value}: {}", reason(&error)))
     };
     let mode = match role {
         Role::Router { listen, .. } => {
@@ -509,7 +510,7 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
 }
 
 fn from_file(file: &Path) -> Result<Config, String> {
-    Config::from_file(file).map_err(|error| format!("{}: {error}", file.display()))
+    Config::from_file(file).map_err(|error| format!("{}: {}", file.display(), reason(&error)))
 }
 
 /// An endpoint to listen at, with what an encrypted one needs in addition.

@@ -68,28 +68,19 @@ struct Args {
 
 fn main() -> ExitCode {
     bus::runtime::use_one_thread();
-    let args = Args::parse();
-    init_tracing();
+    let args: Args = match terminal::arguments() {
+        Ok(args) => args,
+        Err(code) => return code,
+    };
+    terminal::print_diagnostics("warn,zenoh=error");
 
     match run(args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            terminal::note(format_args!("error: {error}"));
             ExitCode::FAILURE
         }
     }
-}
-
-fn init_tracing() {
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
-
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .with_target(false)
-        .init();
 }
 
 fn run(args: Args) -> Result<(), String> {
@@ -153,11 +144,14 @@ async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), 
 
 fn announce(address: SocketAddr, url: &str) {
     if !address.ip().is_loopback() {
-        eprintln!(
+        terminal::note(format_args!(
             "the console is open to the network at {address}; anyone with the token controls the run"
-        );
+        ));
     }
-    println!("console: {url}");
+    // Without a reader of the address, browsers that have it can still connect.
+    if let Err(error) = terminal::print_line(format_args!("console: {url}")) {
+        tracing::warn!("{error}");
+    }
 }
 
 /// Opens the page with the program in `BROWSER`, or else with the system's opener. A failure is only reported: the URL
@@ -177,7 +171,9 @@ fn open_browser(url: &str) {
         .spawn();
 
     if let Err(error) = started {
-        eprintln!("{program} cannot be started ({error}): open the address above yourself");
+        terminal::note(format_args!(
+            "{program} cannot be started ({error}): open the address above yourself"
+        ));
     }
 }
 
@@ -201,7 +197,9 @@ async fn listen(requested: Option<SocketAddr>) -> Result<TcpListener, String> {
 }
 
 async fn listen_on_free_port() -> Result<TcpListener, String> {
-    eprintln!("{DEFAULT_BIND} is in use, perhaps by another console; this one takes a free port");
+    terminal::note(format_args!(
+        "{DEFAULT_BIND} is in use, perhaps by another console; this one takes a free port"
+    ));
 
     TcpListener::bind(FALLBACK_BIND)
         .await

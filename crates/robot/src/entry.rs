@@ -71,24 +71,20 @@ impl RobotArgs {
 pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> ExitCode {
     bus::runtime::use_one_thread();
 
-    let mut args = RobotArgs::parse();
+    let mut args: RobotArgs = match terminal::arguments() {
+        Ok(args) => args,
+        Err(code) => return code,
+    };
     if args.names.is_empty() {
         args.names.extend(RobotName::new(default_name));
     }
 
-    let filter =
-        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .with_target(false)
-        .init();
+    terminal::print_diagnostics("warn");
 
     match take_part(&args, make) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            terminal::note(format_args!("error: {error}"));
             ExitCode::FAILURE
         }
     }

@@ -10,6 +10,7 @@ use tempfile::NamedTempFile;
 
 use super::links::{Links, Start};
 use super::shape::{Flow, Shape};
+use crate::child::{self, AtExit};
 
 /// The network of the compose file that connects the processes.
 const NETWORK: &str = "cars";
@@ -71,7 +72,8 @@ impl Compose {
 
     /// A command of compose for this project. Paths in the compose file are relative to the current folder.
     fn compose(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(self.tool[0]);
+        // It ends with this process, and the containers with it.
+        let mut command = child::command(AtExit::Terminate, self.tool[0]);
         command
             .args(&self.tool[1..])
             .args(["--project-name", &self.project])
@@ -111,7 +113,7 @@ impl Compose {
 impl Drop for Compose {
     fn drop(&mut self) {
         if let Err(error) = output(&mut self.compose(&["down", "--volumes", "--timeout", "1"])) {
-            eprintln!("containers may be left over: {error}");
+            terminal::note(format_args!("containers may be left over: {error}"));
         }
     }
 }

@@ -58,26 +58,23 @@ struct Args {
     insecure: bool,
 }
 
-fn main() -> miette::Result<ExitCode> {
-    let args = Args::parse();
+fn main() -> ExitCode {
+    let args: Args = match terminal::arguments() {
+        Ok(args) => args,
+        Err(code) => return code,
+    };
     bus::runtime::use_router_threads([args.listen.as_str()], args.zenoh_config.as_deref());
+    terminal::print_diagnostics("warn,zenoh=error");
 
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "warn,zenoh=error".into());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .without_time()
-        .with_target(false)
-        .init();
+    terminal::conclude(run(&args).map(|summary| exit_code(&summary)))
+}
 
-    let summary = run(&args)?;
-
-    Ok(if summary.end == Some(End::Aborted) {
+fn exit_code(summary: &Summary) -> ExitCode {
+    if summary.end == Some(End::Aborted) {
         ExitCode::FAILURE
     } else {
         ExitCode::SUCCESS
-    })
+    }
 }
 
 fn run(args: &Args) -> miette::Result<Summary> {

@@ -2,6 +2,8 @@
 //! own. Without arguments it is correct; with `--wrong RULE` or `--wrong RULE:HOW` one input or output is altered, which
 //! that rule of `docs/protocol.md` forbids.
 
+#![expect(clippy::print_stderr, reason = "a test reads what this robot prints")]
+
 mod answering;
 mod arriving;
 mod host;
