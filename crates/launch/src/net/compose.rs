@@ -72,8 +72,7 @@ impl Compose {
 
     /// A command of compose for this project. Paths in the compose file are relative to the current folder.
     fn compose(&self, args: &[&str]) -> Command {
-        // It ends with this process, and the containers with it.
-        let mut command = child::command(AtExit::Terminate, self.tool[0]);
+        let mut command = Command::new(self.tool[0]);
         command
             .args(&self.tool[1..])
             .args(["--project-name", &self.project])
@@ -120,7 +119,12 @@ impl Drop for Compose {
 
 impl Links for Compose {
     fn command(&self, _: &Start) -> miette::Result<Command> {
-        Ok(self.compose(&["up", "--no-color", "--exit-code-from", "simulator"]))
+        let up = self.compose(&["up", "--no-color", "--exit-code-from", "simulator"]);
+
+        // It ends with this process, and the containers with it.
+        let mut command = child::command(AtExit::Terminate, up.get_program());
+        command.args(up.get_args());
+        Ok(command)
     }
 
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
