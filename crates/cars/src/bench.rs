@@ -11,6 +11,8 @@ mod table;
 pub(crate) mod tcp;
 mod workload;
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -58,7 +60,9 @@ pub(crate) struct BenchArgs {
 /// Measures every subject in each round and prints a table.
 pub(crate) fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
     // A new folder with a random name, for this user alone: nothing that is there already is followed.
-    let scratch = tempfile::tempdir()
+    let scratch = tempfile::Builder::new()
+        .permissions(Permissions::from_mode(0o700))
+        .tempdir()
         .into_diagnostic()
         .wrap_err("making a temporary folder")?;
     let outcome = measure_all(args, scratch.path());

@@ -279,7 +279,8 @@ fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
         return find_project().ok_or_else(|| {
             miette!(
                 help = help,
-                "the CARS project, whose SDK this robot uses, is neither around this program nor around the current folder"
+                "the CARS project, whose SDK this robot uses, is neither around this program nor \
+                 around the current folder"
             )
         });
     };

@@ -13,23 +13,10 @@ pub use config::{Changes, Override};
 use config::{FileError, Source};
 pub use protocol::messages::OnLate;
 
-pub use checked::{DEFAULT_SEED, Lateness, Record, RobotSpec, Scenario};
+pub use checked::{DEFAULT_SEED, Lateness, MAX_GUESTS, Record, RobotSpec, Scenario};
 pub(crate) use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use network::Network;
-
-/// Most guests of a scenario. The frame of more would be longer than a message, and placing them would hold the clock.
-pub const MAX_GUESTS: usize = 20_000;
-
-/// Checks the number of guests.
-fn check_guests(count: usize) -> Result<(), String> {
-    if count <= MAX_GUESTS {
-        return Ok(());
-    }
-    Err(format!(
-        "{count} guests, more than the {MAX_GUESTS} allowed"
-    ))
-}
 
 impl Scenario {
     /// Reads, changes and checks a scenario file.

@@ -4,8 +4,8 @@ use crate::stage::{Stage, nobody_is_left};
 
 /// A log line with a line break, an escape sequence and a bidirectional control, and raw bytes on the standard error.
 const FORGER: &str = r#"
+say '{"type":"log","text":"seen\n      1.0 s  simulator    forged\u001b[2J\u202e\u009b"}'
 if is init; then
-    say '{"type":"log","text":"seen\n      1.0 s  simulator    forged\u001b[2J\u202e\u009b"}'
     printf 'raw\033[2J\rforged\302\233\n' >&2
 fi"#;
 
@@ -17,7 +17,7 @@ fn has_controls(text: &str) -> bool {
 fn a_robot_forges_no_lines_and_steers_no_terminal() {
     let run = "exec-forging";
     let stage = Stage::each_tick(FORGER, "");
-    let mut launch = stage.start(run, &[]);
+    let mut launch = stage.start(run, &["--speed", "10"]);
     launch.finish();
     nobody_is_left(run);
 

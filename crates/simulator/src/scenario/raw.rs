@@ -237,7 +237,7 @@ impl Scenario {
         let mut count = 0;
         if let Some(guests) = guests {
             count = *guests.count.get_ref();
-            super::check_guests(count)
+            checked::check_guests(count)
                 .map_err(|reason| FileError::at(source, Some(guests.count.span()), &reason))?;
         }
 
