@@ -38,11 +38,11 @@ fn with_output(name: &str, args: &[&str], output: Stdio) -> (String, Option<i32>
 #[track_caller]
 fn check_output(name: &str, args: &[&str]) {
     let (stderr, code) = with_output(name, args, closed());
-    assert_eq!(code, Some(0), "{name} {args:?}, nobody reads: {stderr}");
+    assert_eq!(code, Some(0), "{name} {args:?}, without a reader: {stderr}");
     assert!(!stderr.contains("rror"), "{name} {args:?}: {stderr}");
 
     let (stderr, code) = with_output(name, args, full());
-    assert_eq!(code, Some(1), "{name} {args:?}, no room: {stderr}");
+    assert_eq!(code, Some(1), "{name} {args:?}, without room: {stderr}");
     assert!(
         stderr.contains("No space left on device") && !stderr.contains("panicked"),
         "{name} {args:?}: {stderr}"
@@ -142,7 +142,15 @@ fn output_without_a_reader_or_without_room_is_no_panic() {
         deadlock.clone(),
         [deadlock.as_slice(), &["--json"]].concat(),
         vec![
-            "bench", "--only", "TCP", "--robots", "2", "--rounds", "1", "--ticks", "10",
+            "bench",
+            "--only",
+            "bare lock-step",
+            "--robots",
+            "2",
+            "--rounds",
+            "1",
+            "--ticks",
+            "10",
         ],
     ] {
         check_output("cars", &args);
@@ -157,7 +165,7 @@ fn output_without_a_reader_or_without_room_is_no_panic() {
 }
 
 #[test]
-fn what_is_wrong_decides_the_exit_status_where_nobody_reads() {
+fn an_error_decides_the_exit_status_without_a_reader() {
     let lab = Lab::new();
     let bad = lab.write("bad.toml", "sede = 1\n");
     let bad = bad.to_str().unwrap();
