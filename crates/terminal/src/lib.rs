@@ -16,9 +16,15 @@ use protocol::plain::{escape_report, escape_text};
 /// The standard output cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write to the standard output: {0}")]
-pub struct OutputError(#[from] std::io::Error);
+pub struct OutputError(std::io::Error);
 
 impl miette::Diagnostic for OutputError {}
+
+impl From<std::io::Error> for OutputError {
+    fn from(error: std::io::Error) -> Self {
+        Self(error)
+    }
+}
 
 impl OutputError {
     /// Whether the reader has closed its end of the pipe, as `head` does. It wants no more output, which is not a failure.
