@@ -2,6 +2,12 @@
 //!
 //! `cargo run --release -p system-tests --example picture > docs/hall.svg`
 
+#![expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "an example prints its result"
+)]
+
 use std::fmt::Write;
 
 use system_tests::hall::{Hall, scenario};

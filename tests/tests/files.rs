@@ -4,7 +4,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -221,4 +222,98 @@ fn the_program_survives_damaged_files() {
             );
         }
     }
+}
+
+/// Runs `cars check` on a scenario, but not for ever. Returns its exit status and its output.
+fn check(folder: &Path, name: &str, text: &str) -> (Option<i32>, String) {
+    let file = folder.join(name);
+    std::fs::write(&file, text).unwrap();
+    let mut check = Command::new(programs().join("cars"));
+    check.arg("check").arg(&file).env("COLUMNS", "400");
+    let mut child = check
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+
+    let begun = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if begun.elapsed() > Duration::from_secs(20) {
+            child.kill().unwrap();
+            panic!("checking {name} does not end");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = child.wait_with_output().unwrap();
+    let streams = [&output.stdout, &output.stderr];
+    let printed = streams.map(|bytes| String::from_utf8_lossy(bytes)).concat();
+    (output.status.code(), printed)
+}
+
+#[test]
+fn a_file_named_by_another_is_a_regular_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let fifo = folder.path().join("pipe");
+    assert!(
+        Command::new("mkfifo")
+            .arg(&fifo)
+            .status()
+            .unwrap()
+            .success()
+    );
+
+    for named in ["pipe", "/dev/zero", "/dev/tty", "."] {
+        let robot = "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n";
+        let text = format!("{robot}params_from = \"{named}\"\n");
+        let (code, printed) = check(folder.path(), "named.toml", &text);
+        assert_eq!(code, Some(1), "{printed}");
+        for part in ["named.toml:4:15", &format!("{named} is not a regular file")] {
+            assert!(printed.contains(part), "no {part:?} in\n{printed}");
+        }
+
+        let text = format!("scenario = \"{named}\"\n");
+        let (code, printed) = check(folder.path(), "launch.toml", &text);
+        assert_eq!(code, Some(1), "{printed}");
+        assert!(printed.contains("launch.toml:1:12"), "{printed}");
+    }
+}
+
+#[test]
+fn the_number_of_guests_has_a_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |count: usize| {
+        format!("[field]\nsize = [\"400 m\", \"400 m\"]\n[guests]\ncount = {count}\n")
+    };
+    let most = simulator::scenario::MAX_GUESTS;
+    let (code, printed) = check(folder.path(), "most.toml", &text(most));
+    assert_eq!(code, Some(0), "{printed}");
+
+    for count in [most + 1, 16_000_000] {
+        let (code, printed) = check(folder.path(), "more.toml", &text(count));
+        let expected = format!("{count} guests, more than the {most} allowed");
+        assert_eq!(code, Some(1));
+        assert!(
+            printed.contains("more.toml:4:9") && printed.contains(&expected),
+            "{printed}"
+        );
+    }
+}
+
+#[test]
+fn the_excerpt_of_a_file_cannot_steer_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "seed = 1 # \u{202e}\nguests = \"\u{9b}\u{1b}[2J\"\n";
+    let (code, printed) = check(folder.path(), "bad.toml", text);
+    assert_eq!(code, Some(1));
+    assert!(printed.contains("bad.toml:2:"), "{printed}");
+    assert!(printed.contains(r"seed = 1 # \u{202e}"), "{printed}");
+    assert!(
+        printed.contains(r#"guests = "\u{9b}\u{1b}[2J""#),
+        "{printed}"
+    );
+    let rest = printed.replace('\n', "");
+    assert!(
+        !rest.contains(char::is_control) && !rest.contains('\u{202e}'),
+        "{printed:?}"
+    );
 }

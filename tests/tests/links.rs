@@ -1,6 +1,7 @@
 //! Real links that are really cut: through proxies, between network namespaces, between containers; and a run across
 //! three hosts.
 
+#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
 #![expect(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -348,6 +349,48 @@ fn an_interrupted_play_leaves_nothing_behind() {
             "a run that was interrupted did not finish"
         );
         nothing_is_left(&run, &player);
+    }
+}
+
+#[test]
+fn a_killed_play_leaves_nothing_but_what_the_next_one_removes() {
+    let vias: &[&str] = if has_namespaces("killed") {
+        &["proxy", "namespaces"]
+    } else {
+        &["proxy"]
+    };
+
+    for via in vias {
+        let (lab, run) = (Lab::new(), format!("killed-{via}"));
+        let plan = plan(&lab, 60, "\"cut\"");
+        let mut player = play(&lab, &run, via, &plan, &[]);
+        player.prints("the link of Leguin is cut");
+        player.signal(Signal::SIGKILL);
+        player.wait();
+        eventually("the last process to be gone", || {
+            find(&run).is_empty().then_some(())
+        });
+        assert_eq!(lab.events(&run).pop().unwrap()["event"], "end");
+        if *via == "proxy" {
+            continue;
+        }
+
+        // A process of the play that does not end by itself.
+        let left = namespaces_of(player.id());
+        assert_eq!(left.len(), 4, "{left:?}");
+        let mut stays = Command::new("ip");
+        stays.args(["netns", "exec", &left[0], "sleep", "600"]);
+        let mut stays = stays.spawn().unwrap();
+        let mut next = play(&lab, "next-play", via, &plan, &[]);
+        for name in &left {
+            next.prints(&format!("removed the network namespace {name} of a play"));
+        }
+        assert!(!stays.wait().unwrap().success(), "it was killed");
+        next.prints("the link of Leguin is cut");
+        next.signal(Signal::SIGTERM);
+        next.wait();
+        nothing_is_left("next-play", &player);
+        nothing_is_left("next-play", &next);
     }
 }
 

@@ -8,9 +8,9 @@
 mod declared;
 pub mod endpoint;
 mod error;
-pub mod logging;
 mod middleware;
 mod qos;
+mod reason;
 mod reply;
 mod role;
 pub mod runtime;

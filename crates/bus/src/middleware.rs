@@ -17,6 +17,7 @@ use crate::declared::Declared;
 use crate::endpoint::{is_local, is_tls};
 use crate::error::BusError;
 use crate::qos::Qos;
+use crate::reason::reason;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
 use crate::runtime::block;
@@ -48,7 +49,7 @@ fn used<T>(doing: &'static str, key: &str, result: zenoh::Result<T>) -> Result<T
     result.map_err(|error| BusError::Use {
         doing,
         key: key.to_owned(),
-        reason: error.to_string(),
+        reason: reason(&error),
     })
 }
 
@@ -101,7 +102,7 @@ impl Bus {
         let hint = if is_tls(&endpoint) { TLS_HINT } else { "" };
         let session = zenoh::open(config)
             .wait()
-            .map_err(|error| failed(format!("{error}{hint}")))?;
+            .map_err(|error| failed(reason(&error) + hint))?;
 
         Ok(Self { session })
     }
@@ -527,7 +528,7 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
     let mut set = |key: &str, value: &str| {
         config
             .insert_json5(key, value)
-            .map_err(|error| format!("setting {key} = {value}: {error}"))
+            .map_err(|error| format!("setting {key} = {value}: {}", reason(&error)))
     };
     let mode = match role {
         Role::Router { listen, .. } => {
@@ -562,7 +563,7 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
 }
 
 fn from_file(file: &Path) -> Result<Config, String> {
-    Config::from_file(file).map_err(|error| format!("{}: {error}", file.display()))
+    Config::from_file(file).map_err(|error| format!("{}: {}", file.display(), reason(&error)))
 }
 
 /// An endpoint to listen at, with what an encrypted one needs in addition.

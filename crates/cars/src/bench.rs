@@ -11,6 +11,8 @@ mod table;
 pub(crate) mod tcp;
 mod workload;
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -57,14 +59,16 @@ pub(crate) struct BenchArgs {
 
 /// Measures every subject in each round and prints a table.
 pub(crate) fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
-    let scratch = std::env::temp_dir().join(format!("cars-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&scratch)
+    // A new folder with a random name, for this user alone: nothing that is there already is followed.
+    let scratch = tempfile::Builder::new()
+        .permissions(Permissions::from_mode(0o700))
+        .tempdir()
         .into_diagnostic()
-        .wrap_err_with(|| format!("making {}", scratch.display()))?;
-    let outcome = measure_all(args, &scratch);
-    std::fs::remove_dir_all(&scratch).into_diagnostic()?;
+        .wrap_err("making a temporary folder")?;
+    let outcome = measure_all(args, scratch.path());
+    scratch.close().into_diagnostic()?;
 
-    table::print(&outcome?);
+    table::print(&outcome?)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -86,7 +90,10 @@ fn measure_all(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Results>>
     for round in 0..args.rounds {
         for results in &mut all {
             let number = round + 1;
-            eprintln!("round {number} of {}: {}", args.rounds, results.subject);
+            terminal::note(format_args!(
+                "round {number} of {}: {}",
+                args.rounds, results.subject
+            ));
             let is_other_first = round % 2 == 1;
             measure_once(&workload, results, &here, there.as_ref(), is_other_first)?;
         }

@@ -7,6 +7,7 @@ use clap::Args;
 use config::{Changes, FileError};
 use launch::{LaunchFile, is_launch_file};
 use simulator::Scenario;
+use terminal::OutputError;
 
 /// `cars check`.
 #[derive(Debug, Args)]
@@ -21,10 +22,14 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
     let mut are_all_good = true;
     for path in &args.files {
         match describe(path) {
-            Ok(text) => println!("ok {}: {text}", path.display()),
+            Ok(text) => {
+                let line = format!("ok {}: {text}", path.display());
+                // The exit status is that of all files also where a reader has seen enough of them.
+                OutputError::unless_closed(terminal::print_line(line))?;
+            }
             Err(error) => {
                 are_all_good = false;
-                eprintln!("{:?}", miette::Report::new(error));
+                terminal::note(format_args!("{:?}", miette::Report::new(error)));
             }
         }
     }

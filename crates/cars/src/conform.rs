@@ -9,6 +9,7 @@ use conform::{Report, Role, Rule, Setting};
 use miette::miette;
 use protocol::{RobotName, Tick};
 use simulator::Scenario;
+use terminal::OutputError;
 
 /// `cars conform`.
 ///
@@ -51,25 +52,27 @@ fn parse_rule(name: &str) -> Result<Rule, String> {
 }
 
 /// Checks a robot and prints the report.
-pub(crate) fn conform(args: &ConformArgs) -> ExitCode {
+pub(crate) fn conform(args: &ConformArgs) -> miette::Result<ExitCode> {
     let report = match check(args) {
         Ok(report) => report,
         Err(error) => {
-            eprintln!("{error:?}");
-            return ExitCode::from(2);
+            terminal::note(format_args!("{error:?}"));
+            return Ok(ExitCode::from(2));
         }
     };
 
-    if args.json {
-        println!("{:#}", report.to_json());
+    let printed = if args.json {
+        terminal::data(format_args!("{:#}\n", report.to_json()))
     } else {
-        print!("{}", report.to_tap());
-    }
+        terminal::print(report.to_tap())
+    };
+    // The exit status is that of the checks also where a reader has seen enough of them.
+    OutputError::unless_closed(printed)?;
 
     if report.is_passed() {
-        ExitCode::SUCCESS
+        Ok(ExitCode::SUCCESS)
     } else {
-        ExitCode::FAILURE
+        Ok(ExitCode::FAILURE)
     }
 }
 

@@ -225,10 +225,11 @@ pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
 
     match answer? {
         ControlAnswer::Done(status) if args.json => {
-            println!("{}", serde_json::to_string(&status).into_diagnostic()?);
+            let status = serde_json::to_string(&status).into_diagnostic()?;
+            terminal::data(format_args!("{status}\n"))?;
         }
-        ControlAnswer::Done(status) => print!("{}", describe(&status)),
-        ControlAnswer::Setup(answer) => print!("{}", answer.scenario),
+        ControlAnswer::Done(status) => terminal::print(describe(&status))?,
+        ControlAnswer::Setup(answer) => terminal::data(answer.scenario)?,
         ControlAnswer::Refused { explanation, .. } => {
             return Err(miette!("refused: {explanation}"));
         }
@@ -340,8 +341,11 @@ pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     // Epoch and tick around the value are for programs.
     let value = answer.get("value").unwrap_or(&answer);
     match value.as_str() {
-        Some(text) => println!("{text}"),
-        None => println!("{}", serde_json::to_string_pretty(value).into_diagnostic()?),
+        Some(text) => terminal::print_line(text)?,
+        None => {
+            let value = serde_json::to_string_pretty(value).into_diagnostic()?;
+            terminal::data(format_args!("{value}\n"))?;
+        }
     }
 
     Ok(ExitCode::SUCCESS)
@@ -376,10 +380,10 @@ pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
             args.robot
         ));
     }
-    println!(
+    terminal::print_line(format_args!(
         "{} receives {:?} at the tick after {}",
         args.robot, args.command, status.tick
-    );
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -415,7 +419,7 @@ pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
     if args.follow {
         follow(&args.run, &past.unwrap_or_default())?;
     } else {
-        print!("{}", past?);
+        terminal::print(past?)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -443,10 +447,10 @@ fn follow(run: &RunRef, past: &str) -> miette::Result<()> {
 
     let all: Vec<&str> = past.lines().collect();
     for line in all.iter().skip(all.len().saturating_sub(TAIL)) {
-        println!("{line}");
+        terminal::print_line(line)?;
     }
     while let Ok(Some(line)) = received.recv() {
-        println!("{}", log_line(&line));
+        terminal::print_line(log_line(&line))?;
     }
     Ok(())
 }

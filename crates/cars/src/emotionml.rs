@@ -47,7 +47,7 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
         Ok(notes) => {
             // The document may be on its way to another program, so the notes go to the standard error.
             for note in notes {
-                eprintln!("note: {note}");
+                terminal::note(format_args!("note: {note}"));
             }
             Ok(ExitCode::SUCCESS)
         }

@@ -4,7 +4,8 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::exec::{Ended, exec as run_program, start as become_program};
+use launch::child::{AtExit, become_program};
+use launch::exec::{Ended, exec as run_program};
 use miette::miette;
 use robot::RobotArgs;
 
@@ -18,11 +19,14 @@ pub(crate) struct ExecArgs {
     command: Vec<OsString>,
 }
 
-/// `cars exec-start`, which `cars exec` starts in place of the program.
+/// `cars child`, through which this program starts others.
 #[derive(Debug, Args)]
-pub(crate) struct StartArgs {
-    /// Process id of `cars exec`.
+pub(crate) struct ChildArgs {
+    /// Process id of the parent.
     parent: i32,
+    /// Send SIGTERM at the parent's exit, instead of SIGKILL.
+    #[arg(long)]
+    terminate: bool,
     /// The program and its arguments.
     #[arg(last = true, required = true)]
     command: Vec<OsString>,
@@ -39,19 +43,25 @@ pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
         ));
     };
 
-    match run_program(name, args.robot.options(), &args.command)? {
+    let silence = conform::unflushed(&args.command);
+    match run_program(name, args.robot.options(), &args.command, &silence)? {
         Ended::WithRun => Ok(ExitCode::SUCCESS),
         Ended::BySignal(code) => Ok(ExitCode::from(code)),
         Ended::Failed(reason) => {
-            eprintln!("error: {reason}");
+            terminal::note(format_args!("error: {reason}"));
             Ok(ExitCode::FAILURE)
         }
     }
 }
 
-/// Replaces this process by the program that `cars exec` runs.
-pub(crate) fn start(args: &StartArgs) -> ExitCode {
-    let Err(error) = become_program(args.parent, &args.command);
-    eprintln!("{error}");
+/// Replaces this process by a program that ends with its parent.
+pub(crate) fn child(args: &ChildArgs) -> ExitCode {
+    let at_exit = if args.terminate {
+        AtExit::Terminate
+    } else {
+        AtExit::Kill
+    };
+    let Err(error) = become_program(args.parent, at_exit, &args.command);
+    terminal::note(error.to_string());
     ExitCode::from(error.code())
 }

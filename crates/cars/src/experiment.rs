@@ -114,9 +114,11 @@ pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
     let compared = experiment.compared(&options);
     if is_json {
         let all = serde_json::json!({ "compared": compared, "runs": outcomes, "estimates": cells });
-        println!("{}", serde_json::to_string_pretty(&all).into_diagnostic()?);
+        let all = serde_json::to_string_pretty(&all).into_diagnostic()?;
+        terminal::data(format_args!("{all}\n"))?;
     } else {
-        print!("{compared}\n{}\n", render(&experiment, &cells));
+        let table = render(&experiment, &cells);
+        terminal::print(format_args!("{compared}\n{table}\n"))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,7 @@ use config::units::Time;
 use launch::{Launch, LaunchOptions, Outcome, Planned, ProcessLink, What, code_of};
 use miette::miette;
 use simulator::RunFolder;
+use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
 use crate::table;
@@ -82,15 +83,15 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
     let launch = Launch::load(what, options)?;
     match export {
         Some(Format::Compose) => {
-            print!("{}", launch.export()?);
+            terminal::data(launch.export()?)?;
             Ok(ExitCode::SUCCESS)
         }
         None if is_dry_run => {
-            print_plan(launch.planned()?);
+            print_plan(launch.planned()?)?;
             Ok(ExitCode::SUCCESS)
         }
         None => {
-            let (outcome, folder) = launch.play(|text| eprintln!("{text}"))?;
+            let (outcome, folder) = launch.play(|text| terminal::note(text))?;
             conclude(&outcome, &folder, is_quiet)
         }
     }
@@ -121,25 +122,30 @@ impl LaunchArgs {
     }
 }
 
-fn print_plan(planned: Vec<Planned>) {
+fn print_plan(planned: Vec<Planned>) -> Result<(), OutputError> {
     for process in planned {
         let note = if process.is_extern {
             " (to be started by you)"
         } else {
             ""
         };
-        println!("# {}{note}\n{}", process.name, process.command);
+        terminal::print_line(format_args!(
+            "# {}{note}\n{}",
+            process.name, process.command
+        ))?;
     }
+    Ok(())
 }
 
 /// Prints the summary of the run, or its failure; returns the exit status.
 fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> miette::Result<ExitCode> {
     if !is_quiet && let Some(summary) = lab::folder::read_summary(folder)? {
-        table::print(&summary, folder.path());
+        // A reader that has seen enough does not change how the run ended.
+        OutputError::unless_closed(table::print(&summary, folder.path()))?;
     }
 
     if let Some(failure) = &outcome.failure {
-        eprintln!("{failure}");
+        terminal::note(failure);
         return Ok(ExitCode::from(failure.code));
     }
 

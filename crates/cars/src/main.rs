@@ -71,7 +71,7 @@ enum Subcommands {
         shell: clap_complete::Shell,
     },
     #[command(hide = true)]
-    ExecStart(exec::StartArgs),
+    Child(exec::ChildArgs),
     #[command(hide = true)]
     BenchRobot(robot::RobotArgs),
     #[command(hide = true)]
@@ -82,10 +82,14 @@ enum Subcommands {
     BenchStarClient(bench::star::ClientArgs),
 }
 
-fn main() -> miette::Result<ExitCode> {
-    let cli = Cli::parse();
-    bus::logging::init(bus::logging::WARNINGS, true);
-    dispatch(cli.subcommand)
+fn main() -> ExitCode {
+    let cli: Cli = match terminal::arguments() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
+    terminal::print_diagnostics("warn,zenoh=error");
+
+    terminal::conclude(dispatch(cli.subcommand))
 }
 
 /// Calls the subcommand; the hidden ones follow the public ones.
@@ -102,20 +106,25 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
         Subcommands::Emotionml(args) => emotionml::emotionml(args),
-        Subcommands::Conform(args) => Ok(conform::conform(&args)),
+        Subcommands::Conform(args) => conform::conform(&args),
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),
         Subcommands::Secure(args) => secure::secure(args),
         Subcommands::Bench(args) => bench::bench(&args),
-        Subcommands::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "cars", &mut std::io::stdout());
-            Ok(ExitCode::SUCCESS)
-        }
+        Subcommands::Completions { shell } => print_completions(shell),
 
-        Subcommands::ExecStart(args) => Ok(exec::start(&args)),
+        Subcommands::Child(args) => Ok(exec::child(&args)),
         Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
         Subcommands::BenchEcho(args) => bench::tcp::echo(&args),
         Subcommands::BenchStar(args) => bench::star::router(&args),
         Subcommands::BenchStarClient(args) => bench::star::client(&args),
     }
+}
+
+fn print_completions(shell: clap_complete::Shell) -> miette::Result<ExitCode> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "cars", &mut script);
+
+    terminal::data(String::from_utf8_lossy(&script))?;
+    Ok(ExitCode::SUCCESS)
 }

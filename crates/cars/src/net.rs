@@ -1,6 +1,7 @@
 //! `cars net`: plays faults on real links.
 
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::io::BufRead;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use launch::net::{self, Flow, LinkOrder, Plan, Proxy, Shape, address};
 use miette::{IntoDiagnostic, WrapErr};
 use protocol::RobotName;
+use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
 
@@ -94,7 +96,11 @@ fn proxy(args: ProxyArgs) -> miette::Result<ExitCode> {
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot listen at {}", args.listen))?;
     let proxy = Arc::new(proxy);
-    println!("listening at {}, on to {}", proxy.address(), args.to);
+    show(format_args!(
+        "listening at {}, on to {}",
+        proxy.address(),
+        args.to
+    ))?;
 
     if let Some(plan) = plan {
         let proxy = proxy.clone();
@@ -108,10 +114,19 @@ fn proxy(args: ProxyArgs) -> miette::Result<ExitCode> {
     }
 }
 
+/// Prints a line. The proxy forwards also where its lines are not read.
+fn show(line: impl Display) -> Result<(), OutputError> {
+    OutputError::unless_closed(terminal::print_line(line))
+}
+
 fn play_plan(proxy: &Proxy, plan: &Plan, closes: bool) {
     proxy.play(plan, |shape, at| {
         proxy.set(closing(shape, closes));
-        println!("{:.3} s: {}", at.as_secs_f64(), proxy.shape());
+        let line = format!("{:.3} s: {}", at.as_secs_f64(), proxy.shape());
+        // The plan is played to its end also where its lines cannot be shown.
+        if let Err(error) = show(line) {
+            tracing::warn!("{error}");
+        }
     });
 }
 
@@ -122,9 +137,9 @@ fn obey_input(proxy: &Proxy, closes: bool) -> miette::Result<()> {
         match line.parse::<LinkOrder>() {
             Ok(order) => {
                 proxy.set(closing(order.apply(proxy.shape()), closes));
-                println!("{}", proxy.shape());
+                show(proxy.shape())?;
             }
-            Err(error) => eprintln!("{error}"),
+            Err(error) => terminal::note(error),
         }
     }
     Ok(())
@@ -154,7 +169,7 @@ fn play(args: PlayArgs) -> miette::Result<ExitCode> {
         options: args.execution.options(),
         launch_args: args.launch_args,
     };
-    let code = net::play(&play, |line| eprintln!("{line}"))?;
+    let code = net::play(&play, terminal::note)?;
 
     Ok(ExitCode::from(code))
 }

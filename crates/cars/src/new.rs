@@ -32,8 +32,8 @@ struct RobotArgs {
     /// Where the folder is made.
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// The folder of the CARS project, for robots that use its SDK (Rust, Python); without it the one that this program was
-    /// built from.
+    /// The folder of the CARS project, for robots that use its SDK (Rust, Python); without it the one around this program or
+    /// around the current folder.
     #[arg(long, value_name = "DIR")]
     cars: Option<PathBuf>,
 }
@@ -181,9 +181,13 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
     }
 
     let language = skeleton.language;
-    println!("{} is a robot in {language}. Next:\n", folder.display());
     let readme = folder.join("README.md");
-    println!("{}\n\nand read {}", template.steps(), readme.display());
+    terminal::print_line(format_args!(
+        "{} is a robot in {language}. Next:\n\n{}\n\nand read {}",
+        folder.display(),
+        template.steps(),
+        readme.display()
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -270,21 +274,42 @@ fn shown(folder: &Path) -> String {
 
 /// The folder of the CARS project.
 fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
-    let built_from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = given.unwrap_or(&built_from);
-    let found = folder
-        .canonicalize()
-        .ok()
-        .filter(|folder| folder.join("crates/robot/Cargo.toml").is_file());
+    let help = "give the folder that you have cloned: --cars DIR";
+    let Some(given) = given else {
+        return find_project().ok_or_else(|| {
+            miette!(
+                help = help,
+                "the CARS project, whose SDK this robot uses, is neither around this program nor \
+                 around the current folder"
+            )
+        });
+    };
 
+    let found = given.canonicalize().ok().filter(|path| is_project(path));
     found.ok_or_else(|| {
-        let help = "give the folder that you have cloned: --cars DIR";
         miette!(
             help = help,
             "the CARS project, whose SDK this robot uses, is not at {}",
-            folder.display()
+            given.display()
         )
     })
+}
+
+/// The first folder around this program (`target/release` is in the project), then around the current one, that is the
+/// project.
+fn find_project() -> Option<PathBuf> {
+    let places = [std::env::current_exe(), std::env::current_dir()];
+    for place in places.into_iter().flatten() {
+        let place = place.canonicalize().unwrap_or(place);
+        if let Some(project) = place.ancestors().find(|folder| is_project(folder)) {
+            return Some(project.to_owned());
+        }
+    }
+    None
+}
+
+fn is_project(folder: &Path) -> bool {
+    folder.join("crates/robot/Cargo.toml").is_file()
 }
 
 /// Writes a file; a script is made executable.

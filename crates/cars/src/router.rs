@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use bus::{Bus, Role};
 use clap::Args;
 use miette::IntoDiagnostic;
+use terminal::OutputError;
 
 /// `cars router`.
 #[derive(Debug, Args)]
@@ -47,11 +48,13 @@ pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
         trusts_network: args.insecure,
     };
     let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
-    if args.listen.is_empty() {
-        println!("forwarding at the endpoints of the configuration file");
+    let endpoints = if args.listen.is_empty() {
+        "the endpoints of the configuration file".to_owned()
     } else {
-        println!("forwarding at {}", args.listen.join(", "));
-    }
+        args.listen.join(", ")
+    };
+    let printed = terminal::print_line(format_args!("forwarding at {endpoints}"));
+    OutputError::unless_closed(printed)?; // It forwards also where its line is not read.
     ended.recv().into_diagnostic()?;
     bus.close();
 

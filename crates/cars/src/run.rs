@@ -42,7 +42,7 @@ pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
     let speed = options.speed.and_then(|speed| speed.0);
     let summary = execute(scenario, &run, &folder, speed)?;
     if !args.quiet {
-        table::print(&summary, folder.path());
+        table::print(&summary, folder.path())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 use launch::Certificates;
 use protocol::{RobotName, RunName};
+use terminal::OutputError;
 
 /// `cars secure`.
 #[derive(Debug, Args)]
@@ -54,13 +55,13 @@ pub(crate) fn secure(args: SecureArgs) -> miette::Result<ExitCode> {
         replaces: init.force,
     };
     let validity = certificates.make()?;
-    explain(&certificates, &validity);
+    explain(&certificates, &validity)?;
 
     Ok(ExitCode::SUCCESS)
 }
 
 /// Prints what was made and how it is used.
-fn explain(certificates: &Certificates, validity: &str) {
+fn explain(certificates: &Certificates, validity: &str) -> Result<(), OutputError> {
     let folder = certificates.folder.display();
     let clients: Vec<&str> = certificates.clients().collect();
     let clients = clients.join(", ");
@@ -69,16 +70,16 @@ fn explain(certificates: &Certificates, validity: &str) {
         None => "any run".to_owned(),
     };
 
-    println!(
+    terminal::print_line(format_args!(
         "made {folder}, for {runs}, valid until {validity}:\n\
          \x20 ca.pem             the certificate authority; its key is not kept, so it issues no more certificates\n\
          \x20 simulator/zenoh.json5  for cars-sim: its certificate and the access control\n\
          \x20 NAME/zenoh.json5       for NAME, one of {clients}; it holds a private key\n\
          \x20 NAME/cert.pem, key.pem the same as separate files"
-    );
-    println!(
+    ))?;
+    terminal::print_line(format_args!(
         "In a launch file: secure = \"{folder}\"; on the command line: `cars launch FILE --secure {folder}`;\n\
          for a single program: --zenoh-config {folder}/NAME/zenoh.json5, which is all that another machine needs.\n\
          To change the roster, or after a key is lost, run the command again with --force."
-    );
+    ))
 }

@@ -6,19 +6,27 @@ use lab::table::{HEAD, heading, held_up, rows};
 use simulator::Summary;
 use tabled::builder::Builder;
 use tabled::settings::Style;
+use terminal::OutputError;
 
 /// Prints the summary of a run.
-pub(crate) fn print(summary: &Summary, folder: &Path) {
+///
+/// # Errors
+/// [`OutputError`] if the standard output cannot be written.
+pub(crate) fn print(summary: &Summary, folder: &Path) -> Result<(), OutputError> {
     let mut table = Builder::default();
     table.push_record(HEAD);
     for row in rows(summary) {
         table.push_record(row);
     }
 
-    println!("\n{}", heading(summary));
-    print!("{}", table.build().with(Style::rounded()));
+    let heading = heading(summary);
+    let mut table = table.build();
+    let table = table.with(Style::rounded());
+    let mut text = format!("\n{heading}\n{table}");
     for line in held_up(summary) {
-        print!("\n{line}");
+        text += &format!("\n{line}");
     }
-    println!("\n\nrecord: {}", folder.display());
+
+    let folder = folder.display();
+    terminal::print_line(format_args!("{text}\n\nrecord: {folder}"))
 }

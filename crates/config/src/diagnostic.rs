@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use protocol::plain::{escape_line, escape_text};
 
 /// Longest file, bytes, so that an endless one cannot exhaust the memory.
 const MAX_FILE_BYTES: u64 = 16 << 20;
@@ -50,7 +51,7 @@ impl FileError {
     #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
         Self {
-            message: message.into(),
+            message: escape_text(&message.into()),
             help: None,
             place: None,
         }
@@ -62,15 +63,17 @@ impl FileError {
         Self::new(format!("cannot read {}: {error}", path.display()))
     }
 
-    /// An error at a place in a text.
+    /// An error at a place in a text. Control characters of the text are shown escaped.
     #[must_use]
     pub fn at(source: &Source, span: Option<Range<usize>>, message: &str) -> Self {
+        let name = escape_line(&source.name);
+        let (text, span) = escaped_with_span(&source.text, span.unwrap_or(0..0));
         let place = Place {
-            source: NamedSource::new(&source.name, source.text.clone()).with_language("toml"),
-            label: LabeledSpan::at(span.unwrap_or(0..0), message),
+            source: NamedSource::new(&name, text).with_language("toml"),
+            label: LabeledSpan::at(span, escape_text(message)),
         };
         Self {
-            message: format!("{} cannot be used", source.name),
+            message: format!("{name} cannot be used"),
             help: None,
             place: Some(Box::new(place)),
         }
@@ -94,6 +97,7 @@ impl FileError {
     /// The error of a file that another file names.
     #[must_use]
     pub fn named_by(mut self, name: &str) -> Self {
+        let name = escape_line(name);
         self.message = format!("{}, named by {name}", self.message);
         self
     }
@@ -101,9 +105,27 @@ impl FileError {
     /// The error with a help text.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
-        self.help = Some(help.into());
+        self.help = Some(escape_text(&help.into()));
         self
     }
+}
+
+/// A text with its control characters escaped, and the place in it that a span of the text becomes.
+fn escaped_with_span(text: &str, span: Range<usize>) -> (String, Range<usize>) {
+    let text = text.replace("\r\n", " \n"); // As long, so that the span stays.
+    let before = text.get(..span.start);
+    let within = text.get(span.clone());
+    let after = text.get(span.end..);
+    let (Some(before), Some(within), Some(after)) = (before, within, after) else {
+        return (escape_text(&text), 0..0);
+    };
+
+    let mut escaped = escape_text(before);
+    let start = escaped.len();
+    escaped += &escape_text(within);
+    let end = escaped.len();
+    escaped += &escape_text(after);
+    (escaped, start..end)
 }
 
 /// A text and its name.
@@ -129,6 +151,21 @@ impl Source {
         }
 
         Ok(Self { name, text })
+    }
+
+    /// Checks a file that this text names at `span`: it must be a regular one, because reading another one, such as a pipe or
+    /// a terminal, might never end.
+    ///
+    /// # Errors
+    /// [`FileError`] at `span`.
+    pub fn check_named(&self, span: Range<usize>, path: &Path) -> Result<(), FileError> {
+        let name = path.display();
+        let reason = match path.metadata() {
+            Ok(metadata) if metadata.is_file() => return Ok(()),
+            Ok(_) => format!("{name} is not a regular file"),
+            Err(error) => format!("cannot read {name}: {error}"),
+        };
+        Err(FileError::at(self, Some(span), &reason))
     }
 
     /// Reads a TOML text into a type that refuses unknown keys.

@@ -70,13 +70,16 @@ struct Args {
 
 fn main() -> ExitCode {
     bus::runtime::use_one_thread();
-    let args = Args::parse();
-    bus::logging::init(bus::logging::WARNINGS, false);
+    let args: Args = match terminal::arguments() {
+        Ok(args) => args,
+        Err(code) => return code,
+    };
+    terminal::print_diagnostics("warn,zenoh=error");
 
     match run(args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            terminal::note(format_args!("error: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -143,11 +146,14 @@ async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), 
 
 fn announce(address: SocketAddr, url: &str) {
     if !address.ip().is_loopback() {
-        eprintln!(
+        terminal::note(format_args!(
             "the console is open to the network at {address}; anyone with the token controls the run"
-        );
+        ));
     }
-    println!("console: {url}");
+    // Without a reader of the address, browsers that have it can still connect.
+    if let Err(error) = terminal::print_line(format_args!("console: {url}")) {
+        tracing::warn!("{error}");
+    }
 }
 
 fn handle(kind: SignalKind) -> Result<Signal, String> {
@@ -170,7 +176,9 @@ async fn listen(requested: Option<SocketAddr>) -> Result<TcpListener, String> {
 }
 
 async fn listen_on_free_port() -> Result<TcpListener, String> {
-    eprintln!("{DEFAULT_BIND} is in use, perhaps by another console; this one takes a free port");
+    terminal::note(format_args!(
+        "{DEFAULT_BIND} is in use, perhaps by another console; this one takes a free port"
+    ));
 
     TcpListener::bind(FALLBACK_BIND)
         .await

@@ -21,9 +21,9 @@ pub(crate) fn open(url: &str, app: Arc<App>) {
     let file = match write_file(url) {
         Ok(file) => file,
         Err(error) => {
-            eprintln!(
+            terminal::note(format_args!(
                 "a file for the browser cannot be written ({error}): open the address above yourself"
-            );
+            ));
             return;
         }
     };
@@ -68,7 +68,9 @@ fn start_browser(file: &Path) -> bool {
         .spawn();
 
     if let Err(error) = &started {
-        eprintln!("{program} cannot be started ({error}): open the address above yourself");
+        terminal::note(format_args!(
+            "{program} cannot be started ({error}): open the address above yourself"
+        ));
     }
     started.is_ok()
 }

@@ -4,7 +4,6 @@
 mod line;
 mod program;
 mod proxy;
-mod start;
 
 use std::ffi::OsString;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -20,7 +19,6 @@ use crate::ending::code_of;
 use line::EndReason;
 use program::{ASKING, END_PATIENCE, Program};
 use proxy::Proxy;
-pub use start::{StartError, start};
 
 /// How long to wait for a signal that has killed the program: a signal to the process group reaches this process, too.
 const SAME_SIGNAL: Duration = Duration::from_secs(1);
@@ -38,11 +36,17 @@ pub enum Ended {
 
 /// Runs a program as the robot `name` until the run or the program ends.
 ///
-/// It must be called before this process has other threads, because it blocks the signals to end.
+/// It must be called before this process has other threads, because it blocks the signals to end. `silence` is what to report,
+/// once, when the program does not answer for some seconds.
 ///
 /// # Errors
 /// If the program cannot be started.
-pub fn exec(name: &RobotName, options: HostOptions, command: &[OsString]) -> miette::Result<Ended> {
+pub fn exec(
+    name: &RobotName,
+    options: HostOptions,
+    command: &[OsString],
+    silence: &str,
+) -> miette::Result<Ended> {
     // All later threads inherit the mask, so only the thread in `listen` receives these signals. The program does not
     // inherit it.
     let asking: SigSet = ASKING.into_iter().collect();
@@ -51,7 +55,11 @@ pub fn exec(name: &RobotName, options: HostOptions, command: &[OsString]) -> mie
     let stopper = Arc::new(OnceLock::new());
     let (program, events) = Program::start(name, command, stopper.clone())?;
     let asked = listen(asking, &program, stopper.clone());
-    let proxy = Box::new(Proxy::new(program.clone(), events));
+    let proxy = Box::new(Proxy::new(
+        program.clone(),
+        events,
+        format!("{name}: {silence}"),
+    ));
     let outcome = Host::connect(vec![(name.clone(), proxy)], options).and_then(|host| {
         let stopper = stopper.get_or_init(|| host.stopper());
         if program.status().is_some() {

@@ -228,6 +228,9 @@ impl LaunchFile {
     /// # Errors
     /// [`FileError`] of the scenario file, which also names the launch file.
     pub fn load_scenario(&self, changes: &Changes) -> Result<Scenario, FileError> {
+        if let Some(span) = &self.scenario_span {
+            self.source.check_named(span.clone(), &self.scenario)?;
+        }
         Scenario::load(&self.scenario, changes).map_err(|error| error.named_by(&self.source.name))
     }
 

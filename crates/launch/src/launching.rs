@@ -258,13 +258,18 @@ impl Launch {
         ));
     }
 
-    /// Runs the processes to their end, with an observer that feeds the terminal and the supervisor.
+    /// Runs the processes to their end, with an observer that feeds the terminal and the supervisor. They are started on this
+    /// thread, and end with it.
     fn supervise(
         &self,
-        planned: Vec<Planned>,
+        mut planned: Vec<Planned>,
         endpoint: &str,
         folder: &RunFolder,
     ) -> miette::Result<Outcome> {
+        for process in planned.iter_mut().filter(|process| !process.is_extern) {
+            process.tie();
+        }
+
         let grace = Duration::try_from_secs_f64(self.options.grace.0)
             .into_diagnostic()
             .wrap_err("--grace")?;

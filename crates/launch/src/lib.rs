@@ -2,6 +2,7 @@
 //! links ([`net`]), and certificates for runs that other machines can reach ([`Certificates`]).
 
 mod bar;
+pub mod child;
 mod compose;
 mod ending;
 mod endpoint;

@@ -1,9 +1,11 @@
 //! Splits the bytes of a pipe into lines for a terminal.
 
+use protocol::plain::escape_line;
+
 /// Longest line, bytes; a longer one is split.
 const MAX_LINE: usize = 4096;
 
-/// Splits pieces of a stream into lines.
+/// Splits pieces of a stream into lines, which are escaped: another program wrote them.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     rest: Vec<u8>,
@@ -29,15 +31,9 @@ impl Lines {
 
     fn take(&mut self) -> String {
         let line = std::mem::take(&mut self.rest);
-        String::from_utf8_lossy(&line)
-            .trim_end_matches(['\n', '\r'])
-            .to_owned()
+        let line = String::from_utf8_lossy(&line);
+        escape_line(line.trim_end_matches(['\n', '\r']))
     }
-}
-
-/// Replaces terminal control sequences in untrusted text.
-pub(crate) fn harmless(text: &str) -> String {
-    text.replace(char::is_control, "\u{fffd}")
 }
 
 #[cfg(test)]
@@ -62,6 +58,10 @@ mod tests {
         );
         assert_eq!(lines(&[b"\xff\n"]), ["\u{fffd}"]);
         assert_eq!(lines(&[]), [""; 0]);
+        assert_eq!(
+            lines(&[b"\x1b[2Jgone\rforged\n"]),
+            [r"\u{1b}[2Jgone\rforged"]
+        );
     }
 
     #[test]

@@ -10,6 +10,7 @@ use protocol::{RobotName, RunName};
 use simulator::RunFolder;
 use simulator::recorder::SCENARIO;
 
+use super::child::{self, AtExit};
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
 use super::program::{NotFound, Places};
 use super::restart::Restart;
@@ -49,6 +50,23 @@ pub struct Planned {
     pub part: Part,
     /// The robots that it runs.
     pub robots: Vec<RobotName>,
+}
+
+impl Planned {
+    /// Changes the command line so that the process ends with this one. The simulator ends the run in order.
+    pub(super) fn tie(&mut self) {
+        let at_exit = if self.part == Part::Simulator {
+            AtExit::Terminate
+        } else {
+            AtExit::Kill
+        };
+        let own = child::own_program();
+        let program = std::mem::replace(&mut self.command.program, own);
+
+        let mut prefix = child::prefix(at_exit);
+        prefix.push(program.display().to_string());
+        self.command.args.splice(0..0, prefix);
+    }
 }
 
 /// The part of a process in a run.

@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use protocol::event::log_line;
 use protocol::messages::{LogKind, LogRecord};
+use protocol::plain::{escape_line, escape_text};
 
 use super::bar::{Bar, Progress};
-use super::lines::harmless;
 
 /// Most lines in the queue; further ones are counted and not shown. The run's folder contains all lines.
 const MAX_WAITING: usize = 10_000;
@@ -270,19 +270,13 @@ impl Painter {
     }
 
     fn log_line(&self, record: &LogRecord) -> String {
-        // Robots must not control the terminal.
-        let record = LogRecord {
-            text: harmless(&record.text),
-            source: harmless(&record.source),
-            ..record.clone()
-        };
-        let line = log_line(&record);
-
+        let line = log_line(record);
         if !self.look.has_colors_out {
             return line + "\n";
         }
 
-        let (head, text) = line.split_at(line.len() - record.text.len());
+        let text_bytes = escape_line(&record.text).len();
+        let (head, text) = line.split_at(line.len() - text_bytes);
         format!("{}{text}\n", color(self.color_of(&record.source), head))
     }
 
@@ -299,6 +293,7 @@ impl Painter {
     }
 
     fn notice_line(&self, text: &str) -> String {
+        let text = escape_text(text);
         if self.look.has_colors_err {
             format!("\u{1b}[1m{text}\u{1b}[0m\n")
         } else {
@@ -417,7 +412,7 @@ mod tests {
         assert_eq!(err, "\u{1b}[33mLeguin    |\u{1b}[0m here\n");
         assert_eq!(
             out,
-            "\u{1b}[33m      1.5 s  Leguin       \u{1b}[0m\u{fffd}[2Jhello\n"
+            "\u{1b}[33m      1.5 s  Leguin       \u{1b}[0m\\u{1b}[2Jhello\n"
         );
     }
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::messages::{End, FaultKind, LogKind, LogRecord, Performative, Point};
 use crate::name::RobotName;
+use crate::plain::escape_line;
 use crate::{Generation, Seq, Tick};
 
 /// One line of `events.jsonl`.
@@ -400,11 +401,10 @@ fn change(what: &str, from: Option<&String>, to: &str) -> String {
     }
 }
 
-/// A line of the readable log, in columns: simulated time, source, text.
+/// A line of the readable log, in columns: simulated time, source, text. Robots write parts of it, so it is escaped.
 #[must_use]
 pub fn log_line(record: &LogRecord) -> String {
-    format!(
-        "{:>9.1} s  {:<12} {}",
-        record.time_s, record.source, record.text
-    )
+    let source = escape_line(&record.source);
+    let text = escape_line(&record.text);
+    format!("{:>9.1} s  {source:<12} {text}", record.time_s)
 }

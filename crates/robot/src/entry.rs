@@ -71,17 +71,20 @@ impl RobotArgs {
 pub fn main(default_name: &str, make: impl Fn(&RobotName) -> Box<dyn Robot>) -> ExitCode {
     bus::runtime::use_one_thread();
 
-    let mut args = RobotArgs::parse();
+    let mut args: RobotArgs = match terminal::arguments() {
+        Ok(args) => args,
+        Err(code) => return code,
+    };
     if args.names.is_empty() {
         args.names.extend(RobotName::new(default_name));
     }
 
-    bus::logging::init("warn", false);
+    terminal::print_diagnostics("warn");
 
     match take_part(&args, make) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            terminal::note(format_args!("error: {error}"));
             ExitCode::FAILURE
         }
     }

@@ -8,6 +8,7 @@ use protocol::RobotName;
 use protocol::messages::{Point, Range, Setup};
 use simulator::Scenario;
 use simulator::diagnostic::Source;
+use simulator::scenario::MAX_GUESTS;
 
 fn scenario() -> Scenario {
     let text = "seed = 7\nduration = \"33 s\"\n[guests]\ncount = 5\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n\
@@ -58,6 +59,22 @@ fn what_is_changed_is_changed_and_the_rest_stays() {
 
     assert_eq!(changed.setup(), setup);
     assert_eq!(changed.robots[&name("A")].parameters["x"], 1);
+}
+
+#[test]
+fn the_number_of_guests_has_a_limit() {
+    let mut setup = scenario().setup();
+    setup.field_m = [400.0, 400.0];
+    setup.guests = u32::try_from(MAX_GUESTS).unwrap();
+    assert!(scenario().with_setup(&setup).is_ok());
+
+    setup.guests += 1;
+    let errors = scenario().with_setup(&setup).unwrap_err();
+    assert_eq!(errors[0].field, "guests");
+    assert_eq!(
+        errors[0].reason,
+        "20001 guests, more than the 20000 allowed"
+    );
 }
 
 #[test]

@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p world --example crowd_rate`
 
+#![expect(clippy::print_stdout, reason = "an example prints its result")]
+
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::time::Instant;

@@ -29,6 +29,17 @@ fn sigterm_ends_the_program_in_order() {
 }
 
 #[test]
+fn killing_the_launch_leaves_nobody() {
+    let stage = Stage::each_tick(PID, "");
+    let mut launch = stage.start("exec-launch-killed", &["--speed", "10"]);
+    let program = stage.written("pid");
+    launch.signal(Signal::SIGKILL);
+    launch.wait();
+    is_gone(&program);
+    nobody_is_left("exec-launch-killed");
+}
+
+#[test]
 fn a_program_that_hears_nothing_is_killed() {
     // It hangs in the middle of tick 3, reads nothing, ignores the signal, and has a child.
     let hang =

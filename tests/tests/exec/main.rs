@@ -6,6 +6,7 @@
 )]
 
 mod ending;
+mod forging;
 mod limits;
 mod program;
 mod rubbish;

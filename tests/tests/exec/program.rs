@@ -164,3 +164,27 @@ fn init_starts_the_same_process_over() {
     );
     nobody_is_left("exec-again");
 }
+
+#[test]
+fn a_program_that_does_not_flush_is_told_once_and_waited_for() {
+    // sed keeps what it writes to a pipe back.
+    let stage = Stage::new(
+        r#"while hear; do say '{"type":"done"}'; done | sed 's/x/x/'"#,
+        "",
+    );
+    let mut launch = stage.start("exec-unflushed", &[]);
+    launch.prints("Leguin: its program has not flushed its standard output");
+    let once = launch.prints("sed -u, grep --line-buffered, stdbuf -oL");
+    launch.prints_after("waiting for Leguin", None);
+
+    std::thread::sleep(std::time::Duration::from_secs(6));
+    assert_eq!(
+        launch.prints("has not flushed"),
+        once,
+        "it is the same line"
+    );
+    assert_eq!(launch.printed().matches("has not flushed").count(), 1);
+    launch.signal(nix::sys::signal::Signal::SIGTERM);
+    launch.wait();
+    nobody_is_left("exec-unflushed");
+}

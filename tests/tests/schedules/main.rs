@@ -4,6 +4,7 @@
 //!
 //! `CARS_SCHEDULES=5000` executes more of them, `CARS_SCHEDULE_SEED=17` one alone.
 
+#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
 #![expect(
     clippy::expect_used,
     reason = "a test that cannot set up its subject fails"

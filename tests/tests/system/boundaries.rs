@@ -5,24 +5,32 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// For each crate of this project: which others of this project it may depend on, tests included.
-const ALLOWED: [(&str, &[&str]); 15] = [
+const ALLOWED: [(&str, &[&str]); 16] = [
     ("world", &[]),
     ("affect", &[]),
     ("protocol", &[]),
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
     ("bus", &["protocol"]),
-    ("robot", &["bus", "lockstep", "protocol"]),
+    ("terminal", &["protocol"]),
+    ("robot", &["bus", "lockstep", "protocol", "terminal"]),
     ("robots", &["robot", "affect", "lockstep", "protocol"]),
     (
         "simulator",
-        &["world", "bus", "config", "lockstep", "protocol"],
+        &["world", "bus", "config", "lockstep", "protocol", "terminal"],
     ),
-    ("console", &["bus", "protocol"]),
+    ("console", &["bus", "protocol", "terminal"]),
     ("conform", &["bus", "lockstep", "protocol"]),
     (
         "launch",
-        &["simulator", "robot", "bus", "config", "protocol"],
+        &[
+            "simulator",
+            "robot",
+            "bus",
+            "config",
+            "protocol",
+            "terminal",
+        ],
     ),
     (
         "lab",
@@ -46,6 +54,7 @@ const ALLOWED: [(&str, &[&str]); 15] = [
             "bus",
             "config",
             "protocol",
+            "terminal",
         ],
     ),
     (

@@ -1,5 +1,6 @@
 //! The whole system: real processes, real zenoh, the shipped files.
 
+#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
 #![expect(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -13,5 +14,9 @@ mod control;
 mod determinism;
 mod experiment;
 mod faults;
+mod killed;
+mod output;
+mod paths;
 mod shell;
+mod temporary;
 mod wire;

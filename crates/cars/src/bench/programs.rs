@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
+use launch::child::{self, AtExit};
 use miette::{IntoDiagnostic, WrapErr, miette};
 
 /// How often the processes are polled for their end. It is no part of the measured time, which the process with the clock
@@ -63,7 +64,7 @@ pub(super) fn own_command() -> miette::Result<Command> {
 }
 
 fn command(program: &Path) -> Command {
-    let mut command = Command::new(program);
+    let mut command = child::command(AtExit::Kill, program);
     command
         .stdin(Stdio::null())
         .env(RUNTIME_VARIABLE, ONE_THREAD);

@@ -145,7 +145,8 @@ pub(crate) fn router(args: &StarArgs) -> miette::Result<ExitCode> {
     center.put_clock(END).into_diagnostic()?;
     bus.close();
 
-    println!("{}", args.ticks as f64 / (ended - begun).as_secs_f64());
+    let rate = args.ticks as f64 / (ended - begun).as_secs_f64();
+    terminal::print_line(rate)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -3,12 +3,13 @@
 use tabled::builder::Builder;
 use tabled::settings::object::Columns;
 use tabled::settings::{Alignment, Style};
+use terminal::OutputError;
 
 use super::results::{Results, median, paired_ratio};
 use super::subject::Subject;
 
 /// Prints median, best and worst of each subject, and medians of ratios.
-pub(super) fn print(all: &[Results]) {
+pub(super) fn print(all: &[Results]) -> Result<(), OutputError> {
     let is_compared = all.iter().any(|results| !results.there.is_empty());
     let mut table = Builder::default();
     table.push_record(head(is_compared));
@@ -20,8 +21,9 @@ pub(super) fn print(all: &[Results]) {
     table
         .with(Style::rounded())
         .modify(Columns::new(1..), Alignment::right());
-    println!("{table}");
-    println!("Ratios are medians over rounds of pairs that were measured in the same round.");
+    terminal::print_line(format_args!(
+        "{table}\nRatios are medians over rounds of pairs that were measured in the same round."
+    ))
 }
 
 fn head(is_compared: bool) -> Vec<&'static str> {

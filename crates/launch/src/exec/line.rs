@@ -7,13 +7,12 @@ use protocol::messages::{
     End, MAX_TEXT_BYTES, Panel, Parameters, Performative, Point, PublicState, SensedRobot,
     StateVariables, Variable,
 };
+use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
 use robot::Welcome;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-
-use crate::lines::harmless;
 
 /// Most characters of a bad line in an error.
 const QUOTED: usize = 200;
@@ -303,11 +302,11 @@ fn variable(name: &str, value: Value) -> Result<Variable, String> {
 pub(super) fn quote(line: &[u8]) -> String {
     // A character has at most four bytes.
     let beginning = String::from_utf8_lossy(&line[..line.len().min(4 * QUOTED)]);
-    let beginning = harmless(beginning.trim_end());
-    let shown: String = beginning.chars().take(QUOTED).collect();
+    let shown: String = beginning.trim_end().chars().take(QUOTED).collect();
 
     let is_whole = shown.len() >= String::from_utf8_lossy(line).trim_end().len();
-    format!("`{shown}{}`", if is_whole { "" } else { "..." })
+    let rest = if is_whole { "" } else { "..." };
+    format!("`{}{rest}`", escape_line(&shown))
 }
 
 #[cfg(test)]
@@ -421,7 +420,7 @@ mod tests {
         let wrong = FromProgram::read(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes())
             .unwrap_err();
         assert!(
-            wrong.starts_with("its line `\u{fffd}[2J\u{e9}\u{e9}"),
+            wrong.starts_with("its line `\\u{1b}[2J\u{e9}\u{e9}"),
             "{wrong}"
         );
         assert!(

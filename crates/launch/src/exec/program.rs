@@ -2,12 +2,12 @@
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use miette::{IntoDiagnostic, WrapErr};
+use miette::{IntoDiagnostic, WrapErr, miette};
 use nix::sys::signal::Signal;
 use nix::sys::wait::{Id, WaitPidFlag, waitid};
 use nix::unistd::Pid;
@@ -15,6 +15,7 @@ use protocol::RobotName;
 use robot::Stopper;
 
 use super::line::{EndReason, ToProgram};
+use crate::child::{self, AtExit};
 use crate::ending::Ended;
 use crate::lines::Lines;
 use crate::tail::Tail;
@@ -213,15 +214,14 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Starts the program by way of `cars exec-start`, with all three standard streams as pipes.
+/// Starts the program, which ends with this process, with all three standard streams as pipes.
 fn spawn(command: &[OsString]) -> miette::Result<Child> {
-    let own = std::env::current_exe()
-        .into_diagnostic()
-        .wrap_err("the path of this program is not known")?;
+    let Some((program, arguments)) = command.split_first() else {
+        return Err(miette!("no program is given"));
+    };
 
-    Command::new(own)
-        .args(["exec-start", &std::process::id().to_string(), "--"])
-        .args(command)
+    child::command(AtExit::Kill, program)
+        .args(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

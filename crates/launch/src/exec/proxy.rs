@@ -1,7 +1,8 @@
 //! The robot whose decisions are made by a program: one exchange of lines in each tick.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::time::Duration;
 
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::messages::{Panel, Performative};
@@ -14,6 +15,8 @@ use super::program::{MAX_LINE, Program, ProgramEvent};
 
 /// Most lines that a program may write in a tick.
 const MAX_LINES: usize = 1 << 16;
+/// How long a program may take to answer before people are told what may be wrong.
+const SILENCE: Duration = Duration::from_secs(5);
 /// Most commands that it may send in a tick, as a report allows.
 const MAX_COMMANDS: usize = protocol::messages::MAX_ENTRIES;
 /// Most bytes of its lines that become part of the report. The rest of a message is for the other fields of the report.
@@ -23,6 +26,8 @@ const MAX_REPORTED: usize = MAX_MESSAGE_BYTES - (1 << 17);
 pub(super) struct Proxy {
     program: Arc<Program>,
     events: Receiver<ProgramEvent>,
+    /// What to report when the program does not answer for [`SILENCE`]; `None` once it has been reported.
+    silence: Option<String>,
     /// Whether the line `init` was the last one that the program was sent, so that it may be answering it.
     is_initializing: bool,
     /// The last line `done`.
@@ -31,10 +36,15 @@ pub(super) struct Proxy {
 }
 
 impl Proxy {
-    pub(super) fn new(program: Arc<Program>, events: Receiver<ProgramEvent>) -> Self {
+    pub(super) fn new(
+        program: Arc<Program>,
+        events: Receiver<ProgramEvent>,
+        silence: String,
+    ) -> Self {
         Self {
             program,
             events,
+            silence: Some(silence),
             is_initializing: false,
             done: Done::default(),
             panel: Panel::default(),
@@ -67,9 +77,9 @@ impl Proxy {
         let mut commands = 0;
         let mut reported = 0;
         for _ in 0..MAX_LINES {
-            let line = match self.events.recv() {
-                Ok(ProgramEvent::Line(line)) => line,
-                other => return Err(self.failure(other.unwrap_or(ProgramEvent::Ended))),
+            let line = match self.next() {
+                ProgramEvent::Line(line) => line,
+                other => return Err(self.failure(other)),
             };
 
             let message = FromProgram::read(&line)?;
@@ -92,6 +102,20 @@ impl Proxy {
         Err(format!(
             "its program said more than {MAX_LINES} lines in one tick and not done"
         ))
+    }
+
+    /// Waits for the next event of the program. The first long wait is reported.
+    fn next(&mut self) -> ProgramEvent {
+        if let Some(silence) = &self.silence {
+            match self.events.recv_timeout(SILENCE) {
+                Ok(event) => return event,
+                Err(RecvTimeoutError::Disconnected) => return ProgramEvent::Ended,
+                Err(RecvTimeoutError::Timeout) => terminal::note(silence),
+            }
+            self.silence = None;
+        }
+
+        self.events.recv().unwrap_or(ProgramEvent::Ended)
     }
 
     fn carry_out(

@@ -10,6 +10,7 @@ use tempfile::NamedTempFile;
 
 use super::links::{Links, Start};
 use super::shape::{Flow, Shape};
+use crate::child::{self, AtExit};
 
 /// The network of the compose file that connects the processes.
 const NETWORK: &str = "cars";
@@ -111,14 +112,19 @@ impl Compose {
 impl Drop for Compose {
     fn drop(&mut self) {
         if let Err(error) = output(&mut self.compose(&["down", "--volumes", "--timeout", "1"])) {
-            eprintln!("containers may be left over: {error}");
+            terminal::note(format_args!("containers may be left over: {error}"));
         }
     }
 }
 
 impl Links for Compose {
     fn command(&self, _: &Start) -> miette::Result<Command> {
-        Ok(self.compose(&["up", "--no-color", "--exit-code-from", "simulator"]))
+        let up = self.compose(&["up", "--no-color", "--exit-code-from", "simulator"]);
+
+        // It ends with this process, and the containers with it.
+        let mut command = child::command(AtExit::Terminate, up.get_program());
+        command.args(up.get_args());
+        Ok(command)
     }
 
     fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {

@@ -11,11 +11,15 @@
 
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use miette::{IntoDiagnostic, WrapErr, miette};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 
 use super::links::{Links, Start};
 use super::shape::{Flow, Shape};
+use crate::child::{self, AtExit};
 use crate::file::Process;
 use crate::link::ProcessLink;
 
@@ -29,6 +33,11 @@ const MAX_PROCESSES: usize = 250;
 /// Milliseconds between two ARP requests. The kernel's default of one second would be most of the time that a healed link
 /// needs.
 const ARP_RETRY_MS: u32 = 100;
+
+/// How long the processes of a play that was killed may take to exit before they are killed, too.
+const END_PATIENCE: Duration = Duration::from_secs(5);
+/// How often to look for them.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
 const NO_CONSOLE: &str = "--no-console";
 
@@ -47,7 +56,6 @@ impl Namespaces {
             ));
         }
 
-        remove_abandoned();
         let names = processes.iter().map(|process| process.name.clone());
 
         // Its drop removes what has been made, also if `make` fails.
@@ -93,7 +101,8 @@ impl Namespaces {
         ip(&format!("-n {host} addr add {address}/24 dev eth0"))?;
         ip(&format!("-n {host} link set eth0 up"))?;
         let arp = format!("name arp_cache dev eth0 retrans {ARP_RETRY_MS}");
-        ip(&format!("-n {host} ntable change {arp}"))
+        ip(&format!("-n {host} ntable change {arp}"))?;
+        Ok(())
     }
 
     fn switch(&self) -> String {
@@ -133,7 +142,7 @@ impl Links for Namespaces {
         let own = std::env::current_exe()
             .into_diagnostic()
             .wrap_err("the path of this program is not known")?;
-        let mut command = Command::new("ip");
+        let mut command = child::command(AtExit::Terminate, "ip");
         command
             .args(["netns", "exec", &self.host(0)])
             .arg(own)
@@ -159,7 +168,9 @@ impl Links for Namespaces {
             Flow::Cut | Flow::Closed => "down",
         };
 
-        ip(&format!("-n {switch} link set {port} {state}")).map_err(|error| miette!("{error}"))
+        ip(&format!("-n {switch} link set {port} {state}"))
+            .map(drop)
+            .map_err(|error| miette!("{error}"))
     }
 }
 
@@ -171,21 +182,60 @@ fn address(index: usize) -> String {
     format!("{NETWORK}.{}", index + 1)
 }
 
-/// Removes the namespaces of processes that were killed.
-fn remove_abandoned() {
-    let Ok(output) = Command::new("ip").args(["netns", "list"]).output() else {
-        return;
-    };
+/// Removes the namespaces of processes that were killed, and ends the processes in them. `report` receives a line for each
+/// namespace.
+pub(super) fn remove_abandoned(report: &mut dyn FnMut(String)) {
+    // Without `ip` there are none.
+    let listed = ip("netns list").unwrap_or_default();
+    let names = listed
+        .lines()
+        .filter_map(|line| line.split_whitespace().next());
+    let abandoned: Vec<&str> = names.filter(|name| is_abandoned(name)).collect();
 
-    let listed = String::from_utf8_lossy(&output.stdout);
-    for line in listed.lines() {
-        let name = line.split_whitespace().next().unwrap_or_default();
-        let is_abandoned =
-            maker(name).is_some_and(|pid| !Path::new(&format!("/proc/{pid}")).exists());
-        if is_abandoned && let Err(error) = ip(&format!("netns del {name}")) {
-            tracing::warn!("{error}");
-        }
+    end_processes(&abandoned);
+    for name in abandoned {
+        report(match ip(&format!("netns del {name}")) {
+            Ok(_) => format!("removed the network namespace {name} of a play that was killed"),
+            Err(error) => {
+                format!("the network namespace {name} of a play that was killed: {error}")
+            }
+        });
     }
+}
+
+/// Whether the process that has made a namespace does not exist any more. Namespaces of other programs are not ours to judge.
+fn is_abandoned(name: &str) -> bool {
+    maker(name).is_some_and(|pid| !Path::new(&format!("/proc/{pid}")).exists())
+}
+
+/// Waits for the exit of all processes in these namespaces, which have received SIGTERM when their play was killed, and
+/// kills those that stay.
+fn end_processes(namespaces: &[&str]) {
+    let begun = Instant::now();
+    loop {
+        let mut left = Vec::new();
+        for name in namespaces {
+            left.extend(processes_in(name));
+        }
+        if left.is_empty() {
+            return;
+        }
+
+        if begun.elapsed() > END_PATIENCE {
+            for process in left {
+                let _exited_already = kill(process, Signal::SIGKILL);
+            }
+            return;
+        }
+        std::thread::sleep(LOOK_AGAIN);
+    }
+}
+
+/// The processes in a namespace.
+fn processes_in(namespace: &str) -> Vec<Pid> {
+    let listed = ip(&format!("netns pids {namespace}")).unwrap_or_default();
+    let pids = listed.lines().filter_map(|line| line.trim().parse().ok());
+    pids.map(Pid::from_raw).collect()
 }
 
 /// The id of the process that has made a namespace; `None` for namespaces of other programs.
@@ -194,15 +244,15 @@ fn maker(name: &str) -> Option<u32> {
     pid.parse().ok()
 }
 
-/// Runs `ip` with these arguments, separated by spaces.
-fn ip(args: &str) -> Result<(), String> {
+/// Runs `ip` with these arguments, separated by spaces; returns its output.
+fn ip(args: &str) -> Result<String, String> {
     let output = Command::new("ip")
         .args(args.split(' '))
         .stdin(Stdio::null())
         .output()
         .map_err(|error| format!("ip {args}: {error}"))?;
     if output.status.success() {
-        return Ok(());
+        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
     }
 
     let error = String::from_utf8_lossy(&output.stderr);

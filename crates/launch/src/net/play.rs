@@ -20,10 +20,11 @@ use std::time::{Duration, Instant, SystemTime};
 
 use super::compose::Compose;
 use super::links::{Links, Start};
-use super::namespaces::Namespaces;
+use super::namespaces::{self, Namespaces};
 use super::plan::Plan;
 use super::proxy::{self, Proxy};
 use super::shape::Shape;
+use crate::child::{self, AtExit};
 use crate::endpoint;
 use crate::file::LaunchFile;
 use crate::link::ProcessLink;
@@ -94,7 +95,7 @@ impl Links for Proxies {
             });
         }
 
-        let mut command = Command::new(std::env::current_exe().into_diagnostic()?);
+        let mut command = child::command(AtExit::Terminate, child::own_program());
         command
             .args(start.args(&links))
             .arg(format!("--listen={}", self.endpoint));
@@ -115,7 +116,7 @@ impl Links for Proxies {
 ///
 /// # Errors
 /// If a file cannot be used, the links cannot be made, or a fault cannot be played.
-pub fn play(play: &Play, report: impl FnMut(String)) -> miette::Result<u8> {
+pub fn play(play: &Play, mut report: impl FnMut(String)) -> miette::Result<u8> {
     let file = LaunchFile::load(&play.file)?;
     let run = play.options.run_name(&play.file).into_diagnostic()?;
     let process_of = process_of(&file);
@@ -140,7 +141,7 @@ pub fn play(play: &Play, report: impl FnMut(String)) -> miette::Result<u8> {
         more: &play.launch_args,
     };
     let signals = Signals::forward()?;
-    let mut links = make_links(play.via, &file, &plan, &start)?;
+    let mut links = make_links(play.via, &file, &plan, &start, &mut report)?;
 
     let folder = RunFolder::new(&play.options.out, &run);
     let begun = SystemTime::now();
@@ -179,12 +180,14 @@ fn make_links(
     file: &LaunchFile,
     plan: &Plan,
     start: &Start,
+    report: &mut dyn FnMut(String),
 ) -> miette::Result<Box<dyn Links>> {
     match via {
         Via::Proxy => Ok(Box::new(Proxies::new(file)?)),
         Via::Namespaces => {
             plan.check_cuts_only("the link of a namespace")?;
             check_not_secured(file)?;
+            namespaces::remove_abandoned(report);
             Ok(Box::new(Namespaces::new(&file.processes)?))
         }
         Via::Compose => {

@@ -58,18 +58,23 @@ struct Args {
     insecure: bool,
 }
 
-fn main() -> miette::Result<ExitCode> {
-    let args = Args::parse();
+fn main() -> ExitCode {
+    let args: Args = match terminal::arguments() {
+        Ok(args) => args,
+        Err(code) => return code,
+    };
     bus::runtime::use_router_threads();
-    bus::logging::init(bus::logging::WARNINGS, false);
+    terminal::print_diagnostics("warn,zenoh=error");
 
-    let summary = run(&args)?;
+    terminal::conclude(run(&args).map(|summary| exit_code(&summary)))
+}
 
-    Ok(if summary.end == Some(End::Aborted) {
+fn exit_code(summary: &Summary) -> ExitCode {
+    if summary.end == Some(End::Aborted) {
         ExitCode::FAILURE
     } else {
         ExitCode::SUCCESS
-    })
+    }
 }
 
 fn run(args: &Args) -> miette::Result<Summary> {

@@ -11,6 +11,21 @@ use super::network::Network;
 
 /// Seed if neither the file nor the command line gives one. It is fixed, so runs are reproducible by default.
 pub const DEFAULT_SEED: u64 = 1;
+/// Most guests of a scenario. The frame of more would be longer than a message, and placing them would hold the clock.
+pub const MAX_GUESTS: usize = 20_000;
+
+/// Checks the number of guests.
+///
+/// # Errors
+/// What is wrong with it.
+pub(super) fn check_guests(count: usize) -> Result<(), String> {
+    if count <= MAX_GUESTS {
+        return Ok(());
+    }
+    Err(format!(
+        "{count} guests, more than the {MAX_GUESTS} allowed"
+    ))
+}
 
 /// A scenario, checked and complete.
 #[derive(Debug, Clone)]

@@ -68,7 +68,7 @@ struct SensingTable {
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct GuestsTable {
-    count: usize,
+    count: Spanned<usize>,
     speed: Option<Spanned<Range<Speed>>>,
     duration: Option<Spanned<Range<Time>>>,
 }
@@ -94,7 +94,7 @@ struct Robot {
     class: Option<String>,
     at: [Length; 2],
     on_late: Option<OnLate>,
-    params_from: Option<PathBuf>,
+    params_from: Option<Spanned<PathBuf>>,
     #[serde(default)]
     params: toml::Table,
 }
@@ -234,9 +234,15 @@ impl Scenario {
         let guests = self.guests.as_ref().map(Spanned::get_ref);
         let speed = guests.and_then(|guests| guests.speed.as_ref());
         let duration = guests.and_then(|guests| guests.duration.as_ref());
+        let mut count = 0;
+        if let Some(guests) = guests {
+            count = *guests.count.get_ref();
+            checked::check_guests(count)
+                .map_err(|reason| FileError::at(source, Some(guests.count.span()), &reason))?;
+        }
 
         Ok(world::Guests {
-            count: guests.map_or(0, |guests| guests.count),
+            count,
             speed_mps: triangular(source, speed, GUEST_SPEED)?,
             duration_s: triangular(source, duration, GUEST_DURATION)?,
         })
@@ -334,7 +340,9 @@ fn robots(
 fn spec(robot: Robot, source: &Source, folder: &Path) -> Result<RobotSpec, FileError> {
     let mut parameters = Parameters::new();
     if let Some(file) = &robot.params_from {
-        let read = Source::read(&folder.join(file)).and_then(|file| file.parse());
+        let path = folder.join(file.get_ref());
+        source.check_named(file.span(), &path)?;
+        let read = Source::read(&path).and_then(|file| file.parse());
         let table = read.map_err(|error| error.named_by(&source.name))?;
         parameters.extend(to_parameters(&table));
     }
@@ -457,7 +465,7 @@ impl From<&world::Guests> for GuestsTable {
         };
 
         Self {
-            count: guests.count,
+            count: unplaced(guests.count),
             speed: Some(unplaced(speed)),
             duration: Some(unplaced(duration)),
         }

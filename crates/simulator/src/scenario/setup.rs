@@ -3,7 +3,7 @@
 use protocol::messages::{FieldError, LogFile, Range, Setup};
 use world::{Guests, Triangular};
 
-use super::checked::Scenario;
+use super::checked::{Scenario, check_guests};
 use super::placing;
 use crate::files;
 
@@ -84,6 +84,10 @@ impl Scenario {
     fn guests_of(&self, setup: &Setup, errors: &mut Errors) -> Guests {
         let speed_mps = errors.triangular("guest_speed_mps", &setup.guest_speed_mps);
         let duration_s = errors.triangular("guest_duration_s", &setup.guest_duration_s);
+        if let Err(reason) = check_guests(setup.guests as usize) {
+            errors.add("guests", &reason);
+        }
+
         Guests {
             count: setup.guests as usize,
             speed_mps: speed_mps.unwrap_or(self.guests.speed_mps),

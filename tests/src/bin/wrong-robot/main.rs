@@ -2,6 +2,8 @@
 //! correct; with `--wrong RULE` or `--wrong RULE:HOW` it alters one input or output and so breaks that rule of
 //! `docs/protocol.md`.
 
+#![expect(clippy::print_stderr, reason = "a test reads what this robot prints")]
+
 mod answering;
 mod arriving;
 mod host;
