@@ -393,7 +393,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         from: &RobotName,
         epoch: Epoch,
         tick: Tick,
-        on: RobotName,
+        on: &RobotName,
         out: &mut Vec<Output<R, C>>,
     ) {
         if self.phase != Phase::Open || (epoch, tick) != (self.epoch, self.tick) {
@@ -405,7 +405,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         };
 
         member.turn.waits_for = Some(on.clone());
-        self.stand_in(&on, out);
+        self.stand_in(on, out);
         if self.is_announced {
             out.push(Output::Held);
         }

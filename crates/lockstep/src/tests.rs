@@ -171,11 +171,11 @@ fn the_state_of_a_robot_that_is_given_up_is_put_on_its_behalf() {
     let stands_in = |out: &Outputs| out.contains(&Output::StandIn(name("B")));
 
     let mut early = Vec::new();
-    barrier.waiting(&name("A"), 1, 0, name("B"), &mut early);
+    barrier.waiting(&name("A"), 1, 0, &name("B"), &mut early);
     let mut given_up = Vec::new();
     barrier.timer(&Timer::Deadline, &mut given_up);
     let mut late = Vec::new();
-    barrier.waiting(&name("A"), 1, 0, name("B"), &mut late);
+    barrier.waiting(&name("A"), 1, 0, &name("B"), &mut late);
     let mut again = Vec::new();
     barrier.timer(&Timer::Repeat, &mut again);
 

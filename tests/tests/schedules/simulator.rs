@@ -222,7 +222,7 @@ impl World {
     fn stand_in(&mut self, robot: &RobotName) {
         let state = self.simulator.simulation.last_state(robot);
         if let Some(state) = state.filter(|_| self.plan.flaw != Flaw::NobodyStandsIn) {
-            self.put_state(robot, encode(&state).into());
+            self.put_state(robot, &encode(&state).into());
         }
     }
 
@@ -542,7 +542,7 @@ impl World {
             robot,
             waiting.epoch,
             waiting.tick,
-            waiting.on,
+            &waiting.on,
             &mut simulator.outputs,
         );
     }

@@ -318,7 +318,7 @@ impl World {
             Message::Command { to, bytes } => self.on_command(&robot, to, &bytes),
             Message::Report(bytes) => self.on_report(&robot, &bytes),
             Message::Waiting(bytes) => self.on_waiting(&robot, &bytes),
-            Message::State(of, bytes) => self.put_state(&of, bytes),
+            Message::State(of, bytes) => self.put_state(&of, &bytes),
             Message::Query { of, query, .. } => {
                 for other in self.links_where(|other| other.is_declared && other.robot == of) {
                     let asker = Some(link);
@@ -356,7 +356,7 @@ impl World {
     }
 
     /// Puts a robot's state to the sessions that follow it.
-    pub(crate) fn put_state(&mut self, of: &RobotName, bytes: Bytes) {
+    pub(crate) fn put_state(&mut self, of: &RobotName, bytes: &Bytes) {
         for link in self.links_where(|link| link.follows.contains(of)) {
             self.send(link, Way::Down, Message::State(of.clone(), bytes.clone()));
         }

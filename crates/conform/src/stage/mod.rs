@@ -267,7 +267,7 @@ impl<'k> Stage<'k> {
         };
 
         self.drive(|barrier, out| {
-            barrier.waiting(&robot, waiting.epoch, waiting.tick, waiting.on, out);
+            barrier.waiting(&robot, waiting.epoch, waiting.tick, &waiting.on, out);
         });
     }
 

@@ -574,7 +574,7 @@ impl Server {
             Event::Waiting {
                 robot,
                 waiting: Ok(waiting),
-            } => self.on_waiting(&robot, waiting),
+            } => self.on_waiting(&robot, &waiting),
             Event::Report {
                 report: Err(error), ..
             }
@@ -653,7 +653,7 @@ impl Server {
         self.operator.push((to, command));
     }
 
-    fn on_waiting(&mut self, robot: &str, waiting: Waiting) {
+    fn on_waiting(&mut self, robot: &str, waiting: &Waiting) {
         let Some(name) = self.known(robot) else {
             return;
         };
@@ -662,7 +662,7 @@ impl Server {
             &name,
             waiting.epoch,
             waiting.tick,
-            waiting.on,
+            &waiting.on,
             &mut self.outputs,
         );
     }
