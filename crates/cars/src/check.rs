@@ -1,4 +1,4 @@
-//! `cars check`: reads scenario and launch files as a run does, and runs nothing.
+//! `cars check`: reads scenario and launch files as a run does, and runs nothing; compares the record of a run with its seals.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -7,12 +7,13 @@ use clap::Args;
 use config::{Changes, FileError};
 use launch::{LaunchFile, is_launch_file};
 use simulator::Scenario;
+use simulator::seal::{self, Checked};
 use terminal::OutputError;
 
 /// `cars check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// Scenario and launch files.
+    /// Scenario files, launch files, and folders of runs.
     #[arg(required = true)]
     files: Vec<PathBuf>,
 }
@@ -43,6 +44,10 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
 
 /// The content of a file in one line.
 fn describe(path: &Path) -> Result<String, FileError> {
+    if path.is_dir() {
+        return describe_run(path);
+    }
+
     let changes = Changes::default();
     if !is_launch_file(path)? {
         let scenario = Scenario::load(path, &changes)?;
@@ -55,6 +60,50 @@ fn describe(path: &Path) -> Result<String, FileError> {
 
     let processes = count(file.processes.len(), "process", "processes");
     Ok(format!("{processes}, {}", content(&scenario)))
+}
+
+/// The record of a run: its events, those of earlier epochs, too.
+fn describe_run(folder: &Path) -> Result<String, FileError> {
+    let mut epochs = Vec::new();
+    for entry in std::fs::read_dir(folder)
+        .map_err(|error| FileError::unreadable(folder, &error))?
+        .flatten()
+    {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with("events") && name.ends_with(".jsonl") {
+            epochs.push(entry.path());
+        }
+    }
+    if epochs.is_empty() {
+        let place = folder.display();
+        return Err(
+            FileError::new(format!("{place} is not the folder of a run"))
+                .with_help("name a folder with an events.jsonl, such as runs/latest"),
+        );
+    }
+
+    // Earlier epochs first: events-epoch1.jsonl, events.jsonl.
+    epochs.sort();
+    let mut described = Vec::new();
+    for path in epochs {
+        let checked = seal::check(&path)?;
+        let ticks = count_ticks(&checked);
+        let lines = count(checked.lines, "line", "lines");
+        described.push(format!("{ticks}, {lines} as written"));
+    }
+    Ok(described.join("; then "))
+}
+
+/// How far a run has come, and how it ended.
+fn count_ticks(checked: &Checked) -> String {
+    let tick = checked.tick;
+    let rest = count(checked.incomplete_lines, "line", "lines");
+    match (checked.has_end, checked.incomplete_lines) {
+        (true, _) => format!("{tick} ticks to the end"),
+        (false, 0) => format!("{tick} ticks, no end"),
+        (false, _) => format!("{tick} ticks, no end, {rest} of a tick that was not completed"),
+    }
 }
 
 fn content(scenario: &Scenario) -> String {

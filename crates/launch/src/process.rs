@@ -87,6 +87,31 @@ pub(super) fn start(command: &CommandLine) -> std::io::Result<Started> {
     })
 }
 
+/// How often to look whether a process is stopped.
+const LOOK_EVERY: Duration = Duration::from_millis(300);
+
+/// Tells people when a process is stopped by a signal or a debugger, and when it runs again. Returns when it has exited, and
+/// at once on systems without `/proc`.
+pub(super) async fn watch_stops(group: Group, name: String, screen: ScreenHandle) {
+    let file = format!("/proc/{}/stat", group.0);
+    let mut was_stopped = false;
+    // The name of the program, in parentheses, may contain anything; the state follows it.
+    while let Ok(text) = std::fs::read_to_string(&file)
+        && let Some((_, fields)) = text.rsplit_once(") ")
+    {
+        let is_stopped = fields.starts_with(['T', 't']);
+        if is_stopped != was_stopped {
+            screen.notice(if is_stopped {
+                format!("{name} is stopped by a signal or a debugger, and the clock is held")
+            } else {
+                format!("{name} runs again")
+            });
+        }
+        was_stopped = is_stopped;
+        tokio::time::sleep(LOOK_EVERY).await;
+    }
+}
+
 impl Started {
     /// Waits for the exit of the process and the end of its output.
     pub(super) async fn run(mut self, output: Output) -> std::io::Result<ExitStatus> {

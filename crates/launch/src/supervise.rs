@@ -209,6 +209,11 @@ impl Supervisor {
         };
 
         supervised.group = Some(started.group);
+        if supervised.planned.part == Part::Simulator {
+            let name = supervised.planned.name.clone();
+            let screen = self.screen.clone();
+            tokio::spawn(process::watch_stops(started.group, name, screen));
+        }
         let output = Output {
             screen: self.screen.clone(),
             index,

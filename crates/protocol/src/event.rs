@@ -181,6 +181,9 @@ pub enum Event {
     Tick {
         /// Digest over everything up to and including this tick: bodies and reports.
         digest: String,
+        /// In a file: XXH3-64 of all its bytes before this field, and a closing brace.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        seal: Option<String>,
     },
     /// The run is over.
     End {
@@ -188,6 +191,9 @@ pub enum Event {
         reason: End,
         /// Digest of the run: that of its last complete tick.
         digest: String,
+        /// In a file: XXH3-64 of all its bytes before this field, and a closing brace.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        seal: Option<String>,
     },
 }
 
@@ -262,6 +268,12 @@ impl Line {
 }
 
 impl Event {
+    /// Whether it ends a tick or the run. In a file such a line has a seal.
+    #[must_use]
+    pub fn is_sealed(&self) -> bool {
+        matches!(self, Self::Tick { .. } | Self::End { .. })
+    }
+
     /// The event as a line of the readable log, with its source and kind; `None` for what only machines read.
     #[must_use]
     pub fn readable(&self) -> Option<(String, LogKind, String)> {
@@ -380,7 +392,7 @@ impl Event {
                 format!("messages from {from} to {to} pass again"),
             ),
             Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
-            Self::End { reason, digest } => {
+            Self::End { reason, digest, .. } => {
                 let how = match reason {
                     End::Finished => "finished",
                     End::Stopped => "stopped",

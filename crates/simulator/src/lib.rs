@@ -9,6 +9,7 @@ pub mod medium;
 pub mod recorder;
 pub mod roster;
 pub mod scenario;
+pub mod seal;
 pub mod server;
 pub mod simulation;
 pub mod summary;

@@ -1,16 +1,19 @@
-//! The folder of a run and its record. Every tick is written at once, so a crash loses at most the current one.
+//! The folder of a run and its record. Every tick is written at once, so a crash of the simulator loses at most the current
+//! one; `record.sync` in the scenario says when it also survives a crash of the machine.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use config::FileError;
 use protocol::event::log_line;
 use protocol::messages::{LogRecord, RecordedRobot, RecordedTick, RecordingHeader};
-use protocol::{Epoch, Event, RobotName, RunName};
+use protocol::{Epoch, Event, Line, RobotName, RunName};
 
 use crate::files::{LOCK, check_log_name};
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, SyncPoint};
+use crate::seal::Seal;
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::Summary;
 
@@ -166,12 +169,6 @@ impl RunFolder {
         &self.path
     }
 
-    fn open(&self, name: &str, options: &OpenOptions) -> Result<BufWriter<File>, FileError> {
-        let file = options.open(self.file(name));
-        file.map(BufWriter::new)
-            .map_err(|error| self.failed("write to", &error))
-    }
-
     fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
         FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
     }
@@ -187,12 +184,64 @@ fn has_entries(path: &Path) -> bool {
     std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some())
 }
 
+/// How often [`SyncPoint::Second`] synchronizes.
+const SYNC_INTERVAL: Duration = Duration::from_secs(1);
+
+/// A file of the record. Its errors name it.
+struct Lines {
+    path: PathBuf,
+    file: BufWriter<File>,
+}
+
+impl Lines {
+    fn open(path: PathBuf, options: &OpenOptions) -> Result<Self, FileError> {
+        match options.open(&path) {
+            Ok(file) => Ok(Self {
+                path,
+                file: BufWriter::new(file),
+            }),
+            Err(error) => Err(unwritable(&path, &error)),
+        }
+    }
+
+    /// A new file.
+    fn create(path: PathBuf) -> Result<Self, FileError> {
+        Self::open(
+            path,
+            File::options().create(true).write(true).truncate(true),
+        )
+    }
+
+    fn add(&mut self, line: &str) -> Result<(), FileError> {
+        writeln!(self.file, "{line}").map_err(|error| unwritable(&self.path, &error))
+    }
+
+    /// Hands everything to the operating system.
+    fn flush(&mut self) -> Result<(), FileError> {
+        self.file
+            .flush()
+            .map_err(|error| unwritable(&self.path, &error))
+    }
+
+    /// Waits until everything is on the disk.
+    fn sync(&self) -> Result<(), FileError> {
+        self.file
+            .get_ref()
+            .sync_data()
+            .map_err(|error| unwritable(&self.path, &error))
+    }
+}
+
 /// Writes the record of one epoch.
 pub struct Recorder {
     folder: RunFolder,
-    events: BufWriter<File>,
-    log: Option<BufWriter<File>>,
-    recording: Option<BufWriter<File>>,
+    events: Lines,
+    /// The lines of `events` so far.
+    seal: Seal,
+    log: Option<Lines>,
+    recording: Option<Lines>,
+    sync: SyncPoint,
+    synced_at: Instant,
     summary: Summary,
 }
 
@@ -214,30 +263,29 @@ impl Recorder {
             folder.write_scenario(scenario)?;
         }
 
-        let events = folder.open(
-            EVENTS,
-            File::options().create(true).write(true).truncate(true),
-        )?;
         let mut log = None;
         if scenario.record.log {
-            let name = &scenario.record.log_name;
-            log = Some(folder.open(name, File::options().create(true).append(true))?);
+            let path = folder.file(&scenario.record.log_name);
+            log = Some(Lines::open(
+                path,
+                File::options().create(true).append(true),
+            )?);
         }
         let mut recording = None;
         if scenario.record.frames {
-            let mut file = folder.open(
-                RECORDING,
-                File::options().create(true).write(true).truncate(true),
-            )?;
-            writeln!(file, "{}", json(&header(run, simulation))).map_err(unwritable)?;
+            let mut file = Lines::create(folder.file(RECORDING))?;
+            file.add(&json(&header(run, simulation)))?;
             recording = Some(file);
         }
 
         Ok(Self {
             folder: folder.clone(),
-            events,
+            events: Lines::create(folder.file(EVENTS))?,
+            seal: Seal::default(),
             log,
             recording,
+            sync: scenario.record.sync,
+            synced_at: Instant::now(),
             summary: Summary::begin(run, simulation),
         })
     }
@@ -253,7 +301,6 @@ impl Recorder {
     ) -> Result<Vec<LogRecord>, FileError> {
         let mut lines = Vec::new();
         for line in record.lines() {
-            writeln!(self.events, "{}", line.to_json()).map_err(unwritable)?;
             self.summary.count(simulation, &line);
             if let Some((source, kind, text)) = line.event.readable() {
                 lines.push(LogRecord {
@@ -265,28 +312,59 @@ impl Recorder {
                     text,
                 });
             }
+            self.add_event(&line)?;
         }
-        self.events.flush().map_err(unwritable)?;
-        self.write_log(&lines).map_err(unwritable)?;
+        self.events.flush()?;
+        self.write_log(&lines)?;
 
         // The event of the end belongs to the last tick, which is recorded already.
         let is_end = matches!(record.events.last(), Some(Event::End { .. }));
         if !is_end && let Some(recording) = &mut self.recording {
-            writeln!(recording, "{}", json(&recorded(simulation))).map_err(unwritable)?;
-            recording.flush().map_err(unwritable)?;
+            recording.add(&json(&recorded(simulation)))?;
+            recording.flush()?;
         }
 
+        if is_end || self.is_sync_due() {
+            self.sync()?;
+        }
         Ok(lines)
     }
 
-    fn write_log(&mut self, lines: &[LogRecord]) -> std::io::Result<()> {
+    fn add_event(&mut self, line: &Line) -> Result<(), FileError> {
+        let mut text = line.to_json();
+        if line.event.is_sealed() {
+            text = self.seal.seal(&text);
+        }
+        self.seal.add(text.as_bytes());
+        self.events.add(&text)
+    }
+
+    fn write_log(&mut self, lines: &[LogRecord]) -> Result<(), FileError> {
         let Some(log) = self.log.as_mut().filter(|_| !lines.is_empty()) else {
             return Ok(());
         };
         for line in lines {
-            writeln!(log, "{}", log_line(line))?;
+            log.add(&log_line(line))?;
         }
         log.flush()
+    }
+
+    fn is_sync_due(&self) -> bool {
+        match self.sync {
+            SyncPoint::Tick => true,
+            SyncPoint::Second => self.synced_at.elapsed() >= SYNC_INTERVAL,
+            SyncPoint::End => false,
+        }
+    }
+
+    fn sync(&mut self) -> Result<(), FileError> {
+        self.events.sync()?;
+        for file in [&self.log, &self.recording].into_iter().flatten() {
+            file.sync()?;
+        }
+
+        self.synced_at = Instant::now();
+        Ok(())
     }
 
     /// The summary so far.
@@ -303,9 +381,10 @@ impl Recorder {
         self.summary.finish(simulation);
         let text = serde_json::to_string_pretty(&self.summary)
             .map_err(|error| FileError::new(error.to_string()))?;
-        let file = self.folder.file(SUMMARY);
-        std::fs::write(file, text + "\n")
-            .map_err(|error| self.folder.failed("write to", &error))?;
+        let mut file = Lines::create(self.folder.file(SUMMARY))?;
+        file.add(&text)?;
+        file.flush()?;
+        file.sync()?;
         Ok(self.summary)
     }
 }
@@ -317,9 +396,12 @@ fn superseded_prefix(file: &str) -> String {
     format!("{}-epoch", file.split('.').next().unwrap_or(file))
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
-fn unwritable(error: std::io::Error) -> FileError {
-    FileError::new(format!("cannot write the record of the run: {error}"))
+fn unwritable(path: &Path, error: &std::io::Error) -> FileError {
+    let place = path.display();
+    FileError::new(format!("cannot write {place}: {error}")).with_help(format!(
+        "what was recorded before is kept; `cars check {}` says how far it is good",
+        path.parent().unwrap_or(path).display()
+    ))
 }
 
 fn json(value: &impl serde::Serialize) -> String {

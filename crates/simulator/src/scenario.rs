@@ -13,7 +13,7 @@ pub use config::{Changes, Override};
 use config::{FileError, Source};
 pub use protocol::messages::OnLate;
 
-pub use checked::{DEFAULT_SEED, Lateness, MAX_GUESTS, Record, RobotSpec, Scenario};
+pub use checked::{DEFAULT_SEED, Lateness, MAX_GUESTS, Record, RobotSpec, Scenario, SyncPoint};
 pub(crate) use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use network::Network;

@@ -14,5 +14,6 @@ mod orders;
 mod pace;
 mod process;
 mod timers;
+mod watchdog;
 
 pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError};

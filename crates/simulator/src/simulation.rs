@@ -216,6 +216,7 @@ impl Simulation {
         self.digest.close(&digest);
         self.events.push(Event::Tick {
             digest: self.digest.to_string(),
+            seal: None,
         });
         TickRecord {
             tick: self.tick,
@@ -545,6 +546,7 @@ impl Simulation {
             events: vec![Event::End {
                 reason,
                 digest: self.digest.to_string(),
+                seal: None,
             }],
         }
     }

@@ -143,7 +143,7 @@ impl Summary {
                 generation: Some(_),
                 ..
             } => self.robot(robot).returns += 1,
-            Event::End { reason, digest } => {
+            Event::End { reason, digest, .. } => {
                 self.end = Some(*reason);
                 self.digest.clone_from(digest);
             }

@@ -557,3 +557,26 @@ fn impossible_faults_are_refused_where_they_stand() {
     let (_, text) = lab.fails(&["launch", FILE, "--set", fault, "--set", goes_on]);
     assert!(text.contains("say `until`"), "{text}");
 }
+
+#[test]
+fn a_stopped_simulator_is_named_while_it_is_stopped_and_afterwards() {
+    let lab = Lab::new();
+    let args = ["launch", FILE, "--speed", "20", "--duration", "60 s"];
+    let mut launch = lab.start("sim-stopped", &args);
+    launch.prints("behavior");
+
+    let simulator = launch.process("cars-sim");
+    send(simulator, Signal::SIGSTOP);
+    launch.prints("simulator is stopped");
+    std::thread::sleep(Duration::from_secs(1));
+    send(simulator, Signal::SIGCONT);
+    launch.prints("simulator runs again");
+    launch.prints("process did not run for");
+    launch.finish();
+
+    lab.ok(&["run", FILE, "--duration", "60 s", "--run", "sim-undisturbed"]);
+    assert_same(
+        ("stopped", &lab.bytes("sim-stopped")),
+        ("undisturbed", &lab.bytes("sim-undisturbed")),
+    );
+}

@@ -17,6 +17,7 @@ mod faults;
 mod killed;
 mod output;
 mod paths;
+mod record;
 mod shell;
 mod temporary;
 mod wire;

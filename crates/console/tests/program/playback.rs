@@ -77,6 +77,7 @@ fn events_of_tick(tick: u64) -> Vec<String> {
     }
     events.push(Event::Tick {
         digest: "x".to_owned(),
+        seal: None,
     });
 
     events

@@ -367,6 +367,7 @@ mod tests {
         let robot = || RobotName::new("Butler").unwrap();
         let tick = || Event::Tick {
             digest: String::new(),
+            seal: None,
         };
         let emotion = |to: &str| Event::Emotion {
             robot: robot(),

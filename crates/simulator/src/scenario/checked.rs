@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use protocol::messages::{OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
+use serde::{Deserialize, Serialize};
 use world::{Field, Guests, Hall};
 
 use super::fault::Fault;
@@ -69,6 +70,22 @@ pub struct Record {
     pub log_name: String,
     /// Whether every tick is recorded, for replay in the console.
     pub frames: bool,
+    /// When the record is on the disk for certain.
+    pub sync: SyncPoint,
+}
+
+/// When the files of a record are synchronized with the disk: what was written before survives a crash of the machine. A crash
+/// of the simulator alone loses nothing but the tick in progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SyncPoint {
+    /// At the end of every tick.
+    Tick,
+    /// At the end of a tick, when a second has passed since the last time.
+    Second,
+    /// At the end of the run.
+    #[default]
+    End,
 }
 
 impl Default for Record {
@@ -77,6 +94,7 @@ impl Default for Record {
             log: true,
             log_name: crate::files::LOG.to_owned(),
             frames: true,
+            sync: SyncPoint::default(),
         }
     }
 }

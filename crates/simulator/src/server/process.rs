@@ -23,6 +23,7 @@ use super::observers::Observers;
 use super::orders::{Orders, Underway};
 use super::pace::Pace;
 use super::timers::Timers;
+use super::watchdog::{Doing, Watchdog};
 
 /// While the clock is held it is repeated this often: what was lost on the wire is then sent again.
 pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
@@ -149,6 +150,7 @@ pub struct Server {
     pub(super) barrier: Barrier<Arc<Report>, CommandText>,
     pub(super) outputs: Vec<Output<Arc<Report>, CommandText>>,
     timers: Timers,
+    watchdog: Watchdog,
     pub(super) stage: Stage,
     /// Robots whose news list the bodies around them.
     pub(super) with_bodies: BTreeSet<RobotName>,
@@ -193,6 +195,7 @@ impl Server {
             barrier,
             outputs: Vec::new(),
             timers: Timers::default(),
+            watchdog: Watchdog::start(|line| tracing::warn!("{line}")),
             stage: Stage::Robots,
             with_bodies: BTreeSet::new(),
             waiting_since: Instant::now(),
@@ -303,7 +306,10 @@ impl Server {
                     epoch += 1;
                 }
                 Interrupt::End(end) => return self.end(end, &mut simulation, recorder),
-                Interrupt::Failed(error) => return Err(error),
+                Interrupt::Failed(error) => {
+                    self.abandon(&mut simulation);
+                    return Err(error);
+                }
             }
         }
     }
@@ -461,7 +467,10 @@ impl Server {
         self.blame_culprits();
         let record = simulation.end_tick(outcome);
         self.observers.note(&record);
-        self.observers.log(&recorder.write(simulation, &record)?);
+        self.watchdog.note(Some(Doing::Record));
+        let lines = recorder.write(simulation, &record)?;
+        self.watchdog.note(Some(Doing::Work));
+        self.observers.log(&lines);
         if record.tick == 0 {
             self.pace.ready();
         }
@@ -508,24 +517,45 @@ impl Server {
         mut self,
         end: End,
         simulation: &mut Simulation,
-        mut recorder: Recorder,
+        recorder: Recorder,
     ) -> Result<Summary, ServerError> {
         self.pace.end();
         if let Some(query) = self.pace.give_up_stepping() {
             self.answer_status(&query, simulation);
         }
-        let lines = recorder.write(simulation, &simulation.end(end))?;
-        self.observers.log(&lines);
-        self.observers.frame(simulation, &self.status(simulation));
-        recorder.summary().wall = std::mem::take(&mut self.wall);
-        let summary = recorder.finish(simulation)?;
+        let recorded = self.record_end(end, simulation, recorder);
 
+        // Also if the record could not be written.
         let clock = self.barrier.end(end);
         self.clock.put(encode(&clock))?;
         self.say_goodbye(&clock, simulation);
         self.declared.clear();
         self.bus.close();
-        Ok(summary)
+        Ok(recorded?)
+    }
+
+    fn record_end(
+        &mut self,
+        end: End,
+        simulation: &Simulation,
+        mut recorder: Recorder,
+    ) -> Result<Summary, FileError> {
+        let lines = recorder.write(simulation, &simulation.end(end))?;
+        self.observers.log(&lines);
+        self.observers.frame(simulation, &self.status(simulation));
+
+        recorder.summary().wall = std::mem::take(&mut self.wall);
+        recorder.finish(simulation)
+    }
+
+    /// Ends a run that cannot go on, so that its robots end, too.
+    fn abandon(mut self, simulation: &mut Simulation) {
+        let clock = self.barrier.end(End::Aborted);
+        if let Err(error) = self.clock.put(encode(&clock)) {
+            tracing::debug!("{error}");
+        }
+
+        self.say_goodbye(&clock, simulation);
     }
 
     /// Waits for the robots to leave, for a limited time. A robot whose link has just lost the end of the run gets it again.
@@ -693,7 +723,10 @@ impl Work for Running {
     type Interrupt = Interrupt;
 
     fn work(&mut self) -> Result<Option<Duration>, Interrupt> {
-        self.server.work(&mut self.simulation, &mut self.recorder)
+        self.server.watchdog.note(Some(Doing::Work));
+        let outcome = self.server.work(&mut self.simulation, &mut self.recorder);
+        self.server.watchdog.note(None);
+        outcome
     }
 }
 

@@ -1,0 +1,129 @@
+//! Seals of a record: at the end of each tick a file of lines states what its bytes before that line are, so that a reader
+//! finds damage.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+use config::FileError;
+use protocol::Tick;
+use protocol::event::{Event, Line};
+use xxhash_rust::xxh3::Xxh3;
+
+/// What a seal begins with, in the last field of a line.
+const FIELD: &[u8] = b",\"seal\":\"";
+/// Hexadecimal digits of a seal.
+const DIGITS: usize = 16;
+/// Bytes from the beginning of a seal to the end of its line.
+const TAIL: usize = FIELD.len() + DIGITS + 2;
+
+/// Digest of all lines of a file so far.
+#[derive(Clone, Default)]
+pub(crate) struct Seal {
+    hash: Xxh3,
+}
+
+impl Seal {
+    /// Adds a line, which has no line break at its end.
+    pub(crate) fn add(&mut self, line: &[u8]) {
+        self.hash.update(line);
+        self.hash.update(b"\n");
+    }
+
+    /// The seal of the lines so far and of the beginning of the next one, a JSON object that is closed here.
+    fn of(&self, line: &[u8]) -> String {
+        let mut hash = self.hash.clone();
+        hash.update(line);
+        hash.update(b"}");
+        format!("{:0DIGITS$x}", hash.digest())
+    }
+
+    /// Seals a line, which is a JSON object.
+    pub(crate) fn seal(&self, line: &str) -> String {
+        let body = line.strip_suffix('}').unwrap_or(line);
+        format!("{body},\"seal\":\"{}\"}}", self.of(body.as_bytes()))
+    }
+
+    /// Whether a line has the right seal; `None` if it has none.
+    fn is_right(&self, line: &[u8]) -> Option<bool> {
+        let (body, tail) = line.split_at_checked(line.len().checked_sub(TAIL)?)?;
+        let stated = tail.strip_prefix(FIELD)?.get(..DIGITS)?;
+        Some(stated == self.of(body).as_bytes())
+    }
+}
+
+/// What a file of events is, as far as it is undamaged.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Checked {
+    /// Lines up to the last one with a seal.
+    pub lines: usize,
+    /// The last complete tick.
+    pub tick: Tick,
+    /// Whether the run has ended in order.
+    pub has_end: bool,
+    /// Lines after the last seal, of a tick that was never completed: the simulator was killed, or the run is in progress.
+    pub incomplete_lines: usize,
+}
+
+/// Reads a file of events and compares it with its seals.
+///
+/// # Errors
+/// [`FileError`] if the file cannot be read, or names the first lines that are damaged.
+pub fn check(path: &Path) -> Result<Checked, FileError> {
+    let file = File::open(path).map_err(|error| FileError::unreadable(path, &error))?;
+    let mut checked = Checked {
+        lines: 0,
+        tick: 0,
+        has_end: false,
+        incomplete_lines: 0,
+    };
+    let mut seal = Seal::default();
+    let mut reader = BufReader::new(file);
+    let mut bytes = Vec::new();
+    loop {
+        bytes.clear();
+        let count = reader
+            .read_until(b'\n', &mut bytes)
+            .map_err(|error| FileError::unreadable(path, &error))?;
+        if count == 0 {
+            return Ok(checked);
+        }
+        if checked.has_end {
+            return Err(damaged(
+                path,
+                &checked,
+                "something follows the end of the run",
+            ));
+        }
+
+        checked.incomplete_lines += 1;
+        if bytes.pop_if(|byte| *byte == b'\n').is_none() {
+            return Ok(checked); // A line that the simulator was about to write.
+        }
+        let Ok(line) = serde_json::from_slice::<Line>(&bytes) else {
+            return Err(damaged(path, &checked, "the last of them is not an event"));
+        };
+        if line.event.is_sealed() {
+            if seal.is_right(&bytes) != Some(true) {
+                return Err(damaged(path, &checked, "they are not what was written"));
+            }
+            checked.lines += std::mem::take(&mut checked.incomplete_lines);
+            checked.tick = line.tick;
+            checked.has_end = matches!(line.event, Event::End { .. });
+        }
+        seal.add(&bytes);
+    }
+}
+
+fn damaged(path: &Path, checked: &Checked, reason: &str) -> FileError {
+    let first = checked.lines + 1;
+    let last = checked.lines + checked.incomplete_lines.max(1);
+    let place = path.display();
+    FileError::new(format!(
+        "{place}: lines {first} to {last} are damaged: {reason}"
+    ))
+    .with_help(format!(
+        "the record is good up to the end of tick {}; execute the run again from its scenario.toml",
+        checked.tick
+    ))
+}

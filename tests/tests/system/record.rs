@@ -1,0 +1,143 @@
+//! What can happen to a record: damage, a crash, a disk that takes no more.
+
+use std::process::{Command, Stdio};
+
+use system_tests::{Lab, programs};
+
+const HALL: &str = "launch/hors_doeuvres.toml";
+
+fn check(lab: &Lab, folder: &str) -> (i32, String) {
+    lab.cars_without_out(&["check", folder])
+}
+
+#[test]
+fn damage_anywhere_in_a_record_is_found_and_named() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--duration", "30 s", "--run", "whole"]);
+    let folder = lab.out().join("whole");
+    let path = folder.display().to_string();
+    let events = folder.join("events.jsonl");
+    let whole = std::fs::read(&events).unwrap();
+    let (code, said) = check(&lab, &path);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("60 ticks to the end"), "{said}");
+
+    let mut places: Vec<usize> = (0..whole.len()).step_by(whole.len() / 60).collect();
+    places.extend(whole.len() - 120..whole.len() - 1);
+    for place in places {
+        let mut damaged = whole.clone();
+        damaged[place] ^= 1;
+        std::fs::write(&events, &damaged).unwrap();
+
+        let (code, text) = check(&lab, &path);
+        assert_eq!(code, 1, "byte {place}: {text}");
+        let line = 1 + whole[..place].iter().filter(|byte| **byte == b'\n').count();
+        let (first, last) = lines_of(&text);
+        assert!(
+            (first..=last).contains(&line),
+            "byte {place}, line {line}: {text}"
+        );
+    }
+}
+
+/// The lines that an error names: `lines 3 to 9 are damaged`.
+fn lines_of(text: &str) -> (usize, usize) {
+    let words: Vec<&str> = text
+        .split_whitespace()
+        .filter(|word| *word != "│")
+        .collect();
+    let at = words.iter().position(|word| *word == "lines").unwrap();
+
+    (
+        words[at + 1].parse().unwrap(),
+        words[at + 3].parse().unwrap(),
+    )
+}
+
+#[test]
+fn a_record_that_ends_anywhere_is_good_up_to_its_last_complete_tick() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--duration", "10 s", "--run", "cut"]);
+    let folder = lab.out().join("cut");
+    let path = folder.display().to_string();
+    let events = folder.join("events.jsonl");
+    let whole = std::fs::read(&events).unwrap();
+
+    for kept in (0..whole.len()).step_by(whole.len() / 40) {
+        std::fs::write(&events, &whole[..kept]).unwrap();
+        let (code, said) = check(&lab, &path);
+        let lines = String::from_utf8_lossy(&whole[..kept]);
+        let (complete, _) = lines.rsplit_once('\n').unwrap_or_default();
+        let ticks = complete.lines().filter(|line| line.contains("\"seal\""));
+        let last = ticks.count().saturating_sub(1);
+        assert_eq!(code, 0, "{kept} bytes: {said}");
+        assert!(
+            said.contains(&format!("{last} ticks, no end")),
+            "{kept} bytes: {said}"
+        );
+    }
+}
+
+/// A file may not grow beyond some blocks, as on a full disk.
+fn with_little_space(lab: &Lab, args: &[&str]) -> Command {
+    let mut command = Command::new("sh");
+    let program = programs().join("cars");
+    command
+        .args(["-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "sh"])
+        .arg(program)
+        .args(args)
+        .arg("--out")
+        .arg(lab.out())
+        .stdin(Stdio::null());
+    command
+}
+
+#[test]
+fn a_record_that_cannot_be_written_is_named_and_ends_the_run() {
+    let lab = Lab::new();
+    let long = ["--duration", "5000 s", "--run"];
+    let launch = ["launch", HALL, "--no-console", "--speed", "max"];
+    for (run, args) in [("full-run", &["run", HALL][..]), ("full-launch", &launch)] {
+        let mut command = with_little_space(&lab, args);
+        let output = command.args(long).arg(run).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr);
+        let text: String = text
+            .split_whitespace()
+            .filter(|word| *word != "│")
+            .collect();
+
+        assert_eq!(output.status.code(), Some(1), "{run}: {text}");
+        assert!(
+            text.contains("cannotwrite") && text.contains(&format!("{run}/")),
+            "{text}"
+        );
+        assert!(text.contains("Filetoolarge"), "{text}");
+        assert!(!text.contains("panicked"), "{text}");
+        let (code, said) = check(&lab, &lab.out().join(run).display().to_string());
+        assert_eq!(code, 0, "{said}");
+        assert!(said.contains("no end"), "{said}");
+    }
+}
+
+#[test]
+fn records_are_synchronized_as_the_scenario_says() {
+    let lab = Lab::new();
+    for sync in ["tick", "second", "end"] {
+        let set = format!("record.sync={sync}");
+        lab.ok(&[
+            "run",
+            HALL,
+            "--duration",
+            "10 s",
+            "--run",
+            sync,
+            "--set",
+            &set,
+        ]);
+    }
+    assert_eq!(lab.bytes("tick"), lab.bytes("end"));
+    assert_eq!(lab.bytes("second"), lab.bytes("end"));
+
+    let (_, text) = lab.fails(&["run", HALL, "--set", "record.sync=never"]);
+    assert!(text.contains("second"), "{text}");
+}
