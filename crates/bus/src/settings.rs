@@ -30,7 +30,7 @@ pub(crate) const ROUTER_MODE: Setting = setting(
 );
 
 /// What every session is set to, unless a configuration file says otherwise.
-pub(crate) const SETTINGS: [Setting; 12] = [
+pub(crate) const SETTINGS: [Setting; 13] = [
     setting(
         "scouting/delay",
         "0",
@@ -45,6 +45,11 @@ pub(crate) const SETTINGS: [Setting; 12] = [
         "scouting/gossip/enabled",
         "false",
         "One path between any two keeps messages in order.",
+    ),
+    setting(
+        "timestamping/enabled",
+        "false",
+        "No wall clock has a part in a run; a clock that is set back gave two warnings for each message.",
     ),
     setting(
         "transport/link/tx/lease",

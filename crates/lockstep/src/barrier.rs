@@ -568,9 +568,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// An incarnation takes part from the open tick on. One that was taken in before it and has not reported leaves no trace.
     fn note_joined(&mut self, name: &RobotName, generation: Generation) {
-        let is_of_other =
-            |change: &Membership| !matches!(change, Membership::Joined(robot, _) if robot == name);
-        self.membership.retain(is_of_other);
+        self.membership
+            .retain(|change| !matches!(change, Membership::Joined(robot, _) if robot == name));
         self.membership
             .push(Membership::Joined(name.clone(), generation));
     }

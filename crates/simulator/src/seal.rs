@@ -2,7 +2,7 @@
 //! finds damage.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use config::FileError;
@@ -16,6 +16,9 @@ const FIELD: &[u8] = b",\"seal\":\"";
 const DIGITS: usize = 16;
 /// Bytes from the beginning of a seal to the end of its line.
 const TAIL: usize = FIELD.len() + DIGITS + 2;
+
+/// Most bytes of a line; no event is nearly as long.
+const MAX_LINE: u64 = 1024 * 1024;
 
 /// Digest of all lines of a file so far.
 #[derive(Clone, Default)]
@@ -82,7 +85,8 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
-        let count = reader
+        let count = (&mut reader)
+            .take(MAX_LINE)
             .read_until(b'\n', &mut bytes)
             .map_err(|error| FileError::unreadable(path, &error))?;
         if count == 0 {
@@ -98,6 +102,9 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
 
         checked.incomplete_lines += 1;
         if bytes.pop_if(|byte| *byte == b'\n').is_none() {
+            if count as u64 == MAX_LINE {
+                return Err(damaged(path, &checked, "the last of them is too long"));
+            }
             return Ok(checked); // A line that the simulator was about to write.
         }
         let Ok(line) = serde_json::from_slice::<Line>(&bytes) else {

@@ -574,7 +574,14 @@ fn a_stopped_simulator_is_named_while_it_is_stopped_and_afterwards() {
     launch.prints("process did not run for");
     launch.finish();
 
-    lab.ok(&["run", FILE, "--duration", "60 s", "--run", "sim-undisturbed"]);
+    lab.ok(&[
+        "run",
+        FILE,
+        "--duration",
+        "60 s",
+        "--run",
+        "sim-undisturbed",
+    ]);
     assert_same(
         ("stopped", &lab.bytes("sim-stopped")),
         ("undisturbed", &lab.bytes("sim-undisturbed")),
