@@ -207,7 +207,7 @@ fn build(command: &mut Command) {
 }
 
 /// The robot in Rust. What it depends on is what the project depends on, and compiling that takes minutes; so it is built
-/// in the project's target folder, with the project's versions and with the features that the project gives them.
+/// in the project's target folder, as a member of a twin of the project's workspace.
 fn rust() -> Robot {
     // The same folder every time: cargo keeps what it builds by place, and a program is large.
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("new-rust");
@@ -215,31 +215,31 @@ fn rust() -> Robot {
         std::fs::remove_dir_all(&out).unwrap();
     }
     let robot = Robot::new_in(&out, Lab::new(), "rust");
-    share_features(&robot.folder);
+    has_the_link_of_the_project(&robot.folder);
+    join_a_twin_of_the_workspace(&out);
 
     let target = programs().parent().unwrap();
     let output = cargo()
-        .current_dir(&robot.folder)
+        .current_dir(&out)
         .env("CARGO_TARGET_DIR", target)
-        .args(["build", "--offline", "--release", "--workspace"])
+        .args(["build", "--offline", "--release"])
+        .args(["-p", "cars-rosie", "-p", "features"])
         .output()
         .unwrap();
     let printed = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{printed}");
     for line in printed.lines() {
-        let word = line.split_whitespace().next();
-        assert!(
-            matches!(
-                word,
-                Some("Compiling" | "Finished" | "Locking" | "Adding" | "Blocking")
+        let mut words = line.split_whitespace();
+        match (words.next(), words.next()) {
+            (Some("Compiling"), Some(name)) => assert!(
+                ["features", "cars-rosie"].contains(&name),
+                "compiled a second time, with other features:\n{printed}"
             ),
-            "a warning:\n{printed}"
-        );
-        // Only packages of a folder have it in their line: the robot, the SDK, and nothing that they have from elsewhere.
-        assert!(
-            word != Some("Compiling") || line.ends_with(')'),
-            "compiled a second time, with other features:\n{printed}"
-        );
+            (word, _) => assert!(
+                matches!(word, Some("Finished" | "Locking" | "Adding" | "Blocking")),
+                "a warning:\n{printed}"
+            ),
+        }
     }
 
     // Where its files name the program.
@@ -247,31 +247,74 @@ fn rust() -> Robot {
     robot
 }
 
-/// Puts a package beside a robot that depends on all that the project depends on. The robot itself stays as it is: it sees
-/// the dependencies that it names and no others, but with the features that the two have together.
-fn share_features(robot: &Path) {
-    let project = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
-    let project: toml::Table = project.parse().unwrap();
-    let mut dependencies = project["workspace"]["dependencies"]
+/// By itself, as it was made, a robot is built with the TLS link of the project, and not with the published one.
+fn has_the_link_of_the_project(robot: &Path) {
+    let output = cargo()
+        .current_dir(robot)
+        .args(["metadata", "--offline", "--format-version", "1"])
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let links: Vec<&str> = metadata["packages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|package| package["name"] == "zenoh-link-tls")
+        .map(|package| package["manifest_path"].as_str().unwrap())
+        .collect();
+    let own = root().join("vendor/zenoh-link-tls/Cargo.toml");
+    assert_eq!(links, [own.to_str().unwrap()]);
+}
+
+/// Makes a folder the twin of the project's workspace: the same crates at the same places, and the robot beside them. To
+/// cargo they are the crates that are built already. A package that depends on all that the project depends on gives them
+/// the features that they have there; the robot itself sees the dependencies that it names and no others.
+fn join_a_twin_of_the_workspace(twin: &Path) {
+    let project = root();
+    for shared in ["crates", "sdk", "tests", "vendor"] {
+        std::os::unix::fs::symlink(project.join(shared), twin.join(shared)).unwrap();
+    }
+    std::fs::copy(project.join("Cargo.lock"), twin.join("Cargo.lock")).unwrap();
+
+    let read = |path: PathBuf| -> toml::Table {
+        let text = std::fs::read_to_string(path).unwrap();
+        text.parse().unwrap()
+    };
+    let write = |path: PathBuf, table: &toml::Table| {
+        std::fs::write(path, toml::to_string(table).unwrap()).unwrap();
+    };
+
+    let mut workspace = read(project.join("Cargo.toml"));
+    let members = workspace["workspace"]["members"].as_array_mut().unwrap();
+    members.extend(["Rosie".into(), "features".into()]);
+    write(twin.join("Cargo.toml"), &workspace);
+
+    // What a member of a workspace leaves to the workspace.
+    let mut robot = read(twin.join("Rosie/Cargo.toml"));
+    for key in ["workspace", "patch", "profile"] {
+        assert!(robot.remove(key).is_some(), "{key}");
+    }
+    robot["dependencies"]["robot"]["path"] = "../crates/robot".into();
+    write(twin.join("Rosie/Cargo.toml"), &robot);
+
+    let mut features: toml::Table = "package = { name = \"features\", edition = \"2024\" }"
+        .parse()
+        .unwrap();
+    let mut dependencies = workspace["workspace"]["dependencies"]
         .as_table()
         .unwrap()
         .clone();
     dependencies.retain(|_, dependency| dependency.get("path").is_none());
-
-    let mut manifest: toml::Table = "package = { name = \"features\", edition = \"2024\" }"
-        .parse()
-        .unwrap();
-    manifest.insert("dependencies".to_owned(), dependencies.into());
-    let manifest = toml::to_string(&manifest).unwrap();
-
-    std::fs::create_dir_all(robot.join("features/src")).unwrap();
-    std::fs::write(robot.join("features/Cargo.toml"), manifest).unwrap();
-    std::fs::write(robot.join("features/src/lib.rs"), "").unwrap();
-
-    let own = robot.join("Cargo.toml");
-    let text = std::fs::read_to_string(&own).unwrap();
-    assert!(text.trim_end().ends_with("[workspace]"), "{text}");
-    std::fs::write(own, text + "members = [\"features\"]\n").unwrap();
+    features.insert("dependencies".to_owned(), dependencies.into());
+    std::fs::create_dir_all(twin.join("features/src")).unwrap();
+    std::fs::write(twin.join("features/src/lib.rs"), "").unwrap();
+    write(twin.join("features/Cargo.toml"), &features);
 }
 
 /// As the README of the robot says.

@@ -57,6 +57,7 @@ const ALLOWED: [(&str, &[&str]); 16] = [
             "terminal",
         ],
     ),
+    ("zenoh-link-tls", &[]),
     (
         "system-tests",
         &[

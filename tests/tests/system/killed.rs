@@ -53,7 +53,9 @@ fn port_of_console(launch: &Running) -> u16 {
 }
 
 fn port_of_simulator(lab: &Lab, run: &str) -> u16 {
-    let endpoint = std::fs::read_to_string(lab.file(run, "endpoint")).unwrap();
+    let endpoint = eventually("the endpoint", || {
+        std::fs::read_to_string(lab.file(run, "endpoint")).ok()
+    });
     let (_, port) = endpoint.trim().rsplit_once(':').unwrap();
     port.parse().unwrap()
 }

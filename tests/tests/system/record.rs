@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-use system_tests::{Lab, programs};
+use system_tests::{Lab, programs, root};
 
 const HALL: &str = "launch/hors_doeuvres.toml";
 
@@ -88,6 +88,7 @@ fn with_little_space(lab: &Lab, args: &[&str]) -> Command {
         .args(args)
         .arg("--out")
         .arg(lab.out())
+        .current_dir(root())
         .stdin(Stdio::null());
     command
 }
