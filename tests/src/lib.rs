@@ -11,6 +11,7 @@ pub mod conformance;
 pub mod hall;
 pub mod network;
 pub mod processes;
+pub mod pytest;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

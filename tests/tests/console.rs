@@ -9,7 +9,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, Role};
@@ -20,6 +20,7 @@ use protocol::messages::{Control, ControlAnswer, Phase, Status};
 use protocol::{RunName, decode, encode};
 use serde_json::Value;
 use system_tests::processes::Running;
+use system_tests::pytest::pytest;
 use system_tests::{Lab, PATIENCE, eventually, programs, root};
 
 /// A launch that runs until it is stopped, and a session with its simulator.
@@ -663,9 +664,6 @@ fn only_the_token_gives_control_of_a_secured_launch() {
     assert_controlled_by_the_owner_only(&lab, &mut run);
 }
 
-/// How long all tests in the browser together may take.
-const BROWSER_PATIENCE: Duration = Duration::from_secs(540);
-
 /// Runs `tests/console` in Chromium if it is installed.
 #[test]
 fn the_page_works_in_a_browser() {
@@ -677,57 +675,22 @@ fn the_page_works_in_a_browser() {
         return;
     }
 
-    let lab = Lab::new();
-    let output = lab.out().join("pytest.txt");
-    let mut pytest = start_pytest(&output);
-    let status = wait_or_interrupt(&mut pytest);
-
-    println!("{}", std::fs::read_to_string(&output).unwrap_or_default());
-    let status = status.unwrap_or_else(|| panic!("not done after {BROWSER_PATIENCE:?}"));
-    assert!(status.success(), "pytest: {status}");
-}
-
-fn start_pytest(output: &Path) -> Child {
-    let mut pytest = Command::new("python3");
-    pytest
-        .args(["-m", "pytest", "-v", "-rP", "--tb=short"])
-        .args(["-p", "no:cacheprovider", "tests/console"])
-        .current_dir(root())
-        .env("CARS_BIN", programs())
-        .env("PYTHONDONTWRITEBYTECODE", "1");
-    for variable in [
-        "CARS_RUN",
-        "CARS_CONNECT",
-        "CARS_LISTEN",
-        "CARS_CONSOLE_BIND",
-    ] {
-        pytest.env_remove(variable);
-    }
-
-    let file = std::fs::File::create(output).unwrap();
-    pytest
-        .stdin(Stdio::null())
-        .stdout(file.try_clone().unwrap())
-        .stderr(file)
-        .spawn()
-        .unwrap()
-}
-
-/// The exit status; `None` if it took longer than [`BROWSER_PATIENCE`].
-fn wait_or_interrupt(pytest: &mut Child) -> Option<ExitStatus> {
-    let started = Instant::now();
-    while started.elapsed() < BROWSER_PATIENCE {
-        if let Some(status) = pytest.try_wait().unwrap() {
-            return Some(status);
+    pytest(&root().join("tests/console"), || {
+        let mut python = Command::new("python3");
+        python
+            .current_dir(root())
+            .env("CARS_BIN", programs())
+            .env("PYTHONDONTWRITEBYTECODE", "1");
+        for variable in [
+            "CARS_RUN",
+            "CARS_CONNECT",
+            "CARS_LISTEN",
+            "CARS_CONSOLE_BIND",
+        ] {
+            python.env_remove(variable);
         }
-        std::thread::sleep(Duration::from_millis(50));
-    }
-
-    // An interrupted pytest ends the processes that its tests have started.
-    let pid = Pid::from_raw(i32::try_from(pytest.id()).unwrap());
-    kill(pid, Signal::SIGINT).unwrap();
-    pytest.wait().unwrap();
-    None
+        python
+    });
 }
 
 /// What the tests in a browser lack, and how to install it.

@@ -382,11 +382,8 @@ fn a_killed_play_leaves_nothing_but_what_the_next_one_removes() {
         stays.args(["netns", "exec", &left[0], "sleep", "600"]);
         let mut stays = stays.spawn().unwrap();
         let mut next = play(&lab, "next-play", via, &plan, &[]);
-        for name in &left {
-            next.prints(&format!("removed the network namespace {name} of a play"));
-        }
-        assert!(!stays.wait().unwrap().success(), "it was killed");
         next.prints("the link of Leguin is cut");
+        assert!(!stays.wait().unwrap().success(), "it was killed");
         next.signal(Signal::SIGTERM);
         next.wait();
         nothing_is_left("next-play", &player);

@@ -1,24 +1,13 @@
 //! Robots in Python: the tests of `sdk/python`, with the programs of this build; and the random streams of both languages,
 //! side by side.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a test that cannot set up its subject fails"
-)]
-
 use std::io::Write;
-use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
-use std::process::{Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
 
-use nix::sys::signal::{Signal, killpg};
-use nix::unistd::Pid;
 use protocol::random::{MAX_SEED, stream, unit};
-use system_tests::{Lab, programs, root};
-
-/// Longest that the tests in Python may take, all together.
-const PATIENCE: Duration = Duration::from_secs(540);
+use system_tests::pytest::pytest;
+use system_tests::{programs, root};
 
 /// A Python that knows the package of this checkout.
 fn python() -> Command {
@@ -61,43 +50,12 @@ fn the_package_passes_its_tests() {
         return;
     }
 
-    let lab = Lab::new();
-    let printed = lab.out().join("pytest.txt");
-    let file = std::fs::File::create(&printed).unwrap();
-    let mut command = python();
-    command
-        .current_dir(root().join("sdk/python"))
-        .env("CARS_BIN_DIR", programs())
-        .args(["-m", "pytest", "-v", "-ra", "--tb=short"])
-        .args(["-p", "no:cacheprovider"])
-        .arg("--basetemp")
-        .arg(lab.out().join("pytest"))
-        .stdout(file.try_clone().unwrap())
-        .stderr(file);
-    let status = status_of_group(command);
-
-    println!("{}", std::fs::read_to_string(&printed).unwrap_or_default());
-    let status = status.unwrap_or_else(|| panic!("not done after {PATIENCE:?}"));
-    assert!(status.success(), "pytest: {status}");
-}
-
-/// Runs a command in a process group of its own, so that nothing that it starts outlives it. `None` if it is not done after
-/// [`PATIENCE`].
-fn status_of_group(mut command: Command) -> Option<ExitStatus> {
-    let mut child = command.process_group(0).spawn().unwrap();
-    let group = Pid::from_raw(i32::try_from(child.id()).unwrap());
-    let begun = Instant::now();
-
-    while begun.elapsed() <= PATIENCE {
-        if let Some(status) = child.try_wait().unwrap() {
-            return Some(status);
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
-
-    killpg(group, Signal::SIGKILL).unwrap();
-    child.wait().unwrap();
-    None
+    let folder = root().join("sdk/python");
+    pytest(&folder.join("tests"), || {
+        let mut python = python();
+        python.current_dir(&folder).env("CARS_BIN_DIR", programs());
+        python
+    });
 }
 
 /// Draws of many streams, as a program in Python prints them.

@@ -324,13 +324,22 @@ impl Supervisor {
 
     fn on_asked(&mut self, signal: Signal) {
         self.outcome.asked.get_or_insert(signal);
-        if self.stage >= Shutdown::Terminating || signal == Signal::SIGQUIT {
-            self.notice("killing all processes");
-            self.kill();
-        } else {
-            self.notice("ending all processes; a second signal kills them");
-            self.terminate();
+        let is_ending = self.stage >= Shutdown::Terminating;
+        match signal {
+            Signal::SIGQUIT => self.kill_all(),
+            Signal::SIGINT if is_ending => self.kill_all(),
+            // One death of a parent can be several signals, one for each of its threads.
+            _ if is_ending => {}
+            _ => {
+                self.notice("ending all processes; Ctrl-C kills them");
+                self.terminate();
+            }
         }
+    }
+
+    fn kill_all(&mut self) {
+        self.notice("killing all processes");
+        self.kill();
     }
 
     fn on_grace_over(&mut self, stage: Shutdown) {

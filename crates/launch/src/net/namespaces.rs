@@ -194,12 +194,20 @@ pub(super) fn remove_abandoned(report: &mut dyn FnMut(String)) {
 
     end_processes(&abandoned);
     for name in abandoned {
-        report(match ip(&format!("netns del {name}")) {
-            Ok(_) => format!("removed the network namespace {name} of a play that was killed"),
-            Err(error) => {
-                format!("the network namespace {name} of a play that was killed: {error}")
+        let removed = ip(&format!("netns del {name}"));
+        if let Err(error) = removed {
+            // Another play that starts now may have removed it.
+            let is_there = ip("netns list").is_ok_and(|listed| listed.contains(name));
+            if is_there {
+                report(format!(
+                    "the network namespace {name} of a play that was killed: {error}"
+                ));
             }
-        });
+        } else {
+            report(format!(
+                "removed the network namespace {name} of a play that was killed"
+            ));
+        }
     }
 }
 

@@ -318,7 +318,8 @@ fn exit_code(status: ExitStatus) -> u8 {
     code.and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
 }
 
-/// Forwards Ctrl-C and SIGTERM to the launch, which ends the run. The links are removed after that.
+/// Forwards Ctrl-C and SIGTERM to the launch, which ends the run. The links are removed after that. The first signal arrives
+/// there as SIGTERM, further ones as SIGINT.
 struct Signals {
     launch: Arc<AtomicI32>,
     is_asked: Arc<AtomicBool>,
@@ -333,8 +334,12 @@ impl Signals {
         let launch = signals.launch.clone();
         let is_asked = signals.is_asked.clone();
         ctrlc::set_handler(move || {
-            is_asked.store(true, Ordering::SeqCst);
-            terminate(launch.load(Ordering::SeqCst));
+            let signal = if is_asked.swap(true, Ordering::SeqCst) {
+                Signal::SIGINT
+            } else {
+                Signal::SIGTERM
+            };
+            ask(launch.load(Ordering::SeqCst), signal);
         })
         .into_diagnostic()?;
 
@@ -361,14 +366,14 @@ impl Signals {
     }
 
     fn end(&self) {
-        terminate(self.launch.load(Ordering::SeqCst));
+        ask(self.launch.load(Ordering::SeqCst), Signal::SIGTERM);
     }
 }
 
-/// Sends SIGTERM to a launch, if it has been started.
-fn terminate(launch: i32) {
+/// Sends a signal to a launch, if it has been started.
+fn ask(launch: i32, signal: Signal) {
     if launch > 0 {
-        let _over = kill(Pid::from_raw(launch), Signal::SIGTERM);
+        let _over = kill(Pid::from_raw(launch), signal);
     }
 }
 

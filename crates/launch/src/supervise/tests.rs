@@ -351,6 +351,19 @@ fn asked_once_all_are_ended_also_one_that_is_stopped() {
 }
 
 #[test]
+fn the_death_of_a_parent_is_one_request_however_many_signals_it_sends() {
+    let simulator = "trap 'sleep 0.3; echo whole > $DIR/record; exit 0' TERM; touch $DIR/up; \
+                     while :; do sleep 0.01; done";
+    let hall = Hall::new(simulator);
+    let outcome = hall.run(&["up"], &[Signal::SIGTERM, Signal::SIGTERM, Signal::SIGHUP]);
+    assert_eq!(
+        (outcome.failure, outcome.asked),
+        (None, Some(Signal::SIGTERM))
+    );
+    assert_eq!(hall.read("record"), "whole\n");
+}
+
+#[test]
 fn asked_twice_all_are_killed_at_once() {
     let hall = Hall::new(FOREVER).with(shell("Butler", DEAF));
     let hall = Hall {
