@@ -27,9 +27,9 @@ def eventually(what, ready, patience_s=PATIENCE_S):
         time.sleep(0.02)
 
 
-def until(page, expression):
+def until(page, expression, patience_s=PATIENCE_S):
     """Waits until an expression is true in the page, whose policy forbids Playwright's own `wait_for_function`."""
-    return eventually(expression, lambda: page.evaluate(expression))
+    return eventually(expression, lambda: page.evaluate(expression), patience_s)
 
 
 def free_port():

@@ -20,7 +20,6 @@ use protocol::messages::{Control, ControlAnswer, Phase, Status};
 use protocol::{RunName, decode, encode};
 use serde_json::Value;
 use system_tests::processes::Running;
-use system_tests::pytest::pytest;
 use system_tests::{Lab, PATIENCE, eventually, programs, root};
 
 /// A launch that runs until it is stopped, and a session with its simulator.
@@ -519,7 +518,7 @@ fn rate_with<T>(run: &Run, start: &impl Fn() -> T) -> f64 {
 }
 
 /// How long a rate is measured.
-const RATE_WINDOW: Duration = Duration::from_millis(1200);
+const RATE_WINDOW: Duration = Duration::from_millis(600);
 
 /// The design demands a change of less than 5 %. That cannot be measured on a machine under other load, so the limit of
 /// the test is far below.
@@ -662,53 +661,4 @@ fn only_the_token_gives_control_of_a_secured_launch() {
     assert!(run.endpoint.starts_with("tls/"), "{}", run.endpoint);
 
     assert_controlled_by_the_owner_only(&lab, &mut run);
-}
-
-/// Runs `tests/console` in Chromium if it is installed.
-#[test]
-fn the_page_works_in_a_browser() {
-    if let Some(missing) = missing_tools() {
-        let text = format!("the tests of the console in a browser are skipped: {missing}");
-        assert!(std::env::var_os("CI").is_none(), "{text}");
-        // Not with `eprintln!`, whose output the test harness captures.
-        let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
-        return;
-    }
-
-    pytest(&root().join("tests/console"), || {
-        let mut python = Command::new("python3");
-        python
-            .current_dir(root())
-            .env("CARS_BIN", programs())
-            .env("PYTHONDONTWRITEBYTECODE", "1");
-        for variable in [
-            "CARS_RUN",
-            "CARS_CONNECT",
-            "CARS_LISTEN",
-            "CARS_CONSOLE_BIND",
-        ] {
-            python.env_remove(variable);
-        }
-        python
-    });
-}
-
-/// What the tests in a browser lack, and how to install it.
-fn missing_tools() -> Option<String> {
-    if !Path::new("/usr/bin/chromium").exists() {
-        return Some("there is no /usr/bin/chromium; `apt-get install chromium`".to_owned());
-    }
-
-    let python = Command::new("python3")
-        .args(["-c", "import pytest, playwright.sync_api"])
-        .output();
-    match python {
-        Ok(output) if output.status.success() => None,
-        Ok(_) => Some(
-            "python3 has no pytest or no playwright; `pip install pytest playwright`".to_owned(),
-        ),
-        Err(error) => Some(format!(
-            "python3 does not run ({error}); install Python 3.11 or later"
-        )),
-    }
 }

@@ -9,16 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from lab import EXAMPLES, ROOT, Lab, assert_same
 
 RUST = {"Butler": "cars-butler", "Leguin": "cars-leguin", "Vonda": "cars-vonda"}
 PYTHON = RUST | {"Leguin": "leguin.py", "Vonda": "leguin.py"}
-LOSSY = (
-    'network.commands={ loss = 0.2, duplication = 0.3, delay = { min = "0 s", mode = "1 s", max = "10 s" }, '
-    "burst = { enter = 0.05, leave = 0.2 } }"
-)
-
 EMPTY_HALL = """
 seed = 1
 tick = "0.5 s"
@@ -32,49 +26,6 @@ def hall(*robots: str, duration: str = "100 s") -> str:
     """A scenario with nothing in it but robots."""
     places = (f'[[robot]]\nname = "{name}"\nat = ["10 m", "{3 + 2 * i} m"]\n' for i, name in enumerate(robots))
     return EMPTY_HALL % duration + "".join(places)
-
-
-@pytest.mark.parametrize(
-    ("scenario", "team", "changes"),
-    [
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], []),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--seed", "7"]),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--set", LOSSY, "--set", "network.queries.loss=0.2"]),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--set", "robot.Leguin.params.affect=off"]),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--set", "guests.count=180", "--seed", "99"]),
-        ("partition.toml", ["Butler", "Leguin"], []),
-        ("museum.toml", ["Butler", "Leguin"], ["--seed", "12345"]),
-        ("three_robots.toml", ["Butler", "Leguin", "Vonda"], ["--set", "robot.Butler.params.refiller=Vonda"]),
-    ],
-)
-def test_leguin_in_python_gives_the_same_run(lab: Lab, scenario: str, team: list[str], changes: list[str]) -> None:
-    """Byte for byte, as the Rust Leguin, as a process and in one process."""
-    python = lab.launch("python", scenario, {name: PYTHON[name] for name in team}, *changes)
-    assert len(python) > 1200
-    assert_same(python, lab.launch("rust", scenario, {name: RUST[name] for name in team}, *changes))
-    assert_same(python, lab.play("local", scenario, *changes))
-
-
-FAULTS = {
-    "a crash while the run goes on": 'robot = "Leguin", do = "crash", at = "100 s", until = "120 s"',
-    "a crash that is waited for": 'robot = "Leguin", do = "crash", at = "100 s", for = "0.5 s"',
-    # Long enough that its link is given up, too.
-    "a hang that is waited for": 'robot = "Leguin", do = "hang", at = "100 s", for = "3 s"',
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_leguin_that_falters_gives_the_same_run(lab: Lab, fault: str) -> None:
-    """What happens to a process is part of the seed, too; who returns takes over as in Rust."""
-    on_late = "wait" if "waited" in fault else "continue"
-    changes = ["--set", f"fault=[{{ {FAULTS[fault]} }}]", "--set", f"on_late={on_late}", "--duration", "140 s"]
-    # A fault that is due before the launcher listens to the simulator does not happen.
-    changes += ["--speed", "50"]
-    names = ("Butler", "Leguin")
-    python = lab.launch("python", "hors_doeuvres.toml", {name: PYTHON[name] for name in names}, *changes)
-    assert_same(python, lab.launch("rust", "hors_doeuvres.toml", {name: RUST[name] for name in names}, *changes))
-    returned = [event["robot"] for event in lab.of_kind("python", "joined") if event["tick"] > 0]
-    assert returned == ([] if fault == "a hang that is waited for" else ["Leguin"])
 
 
 def test_the_launch_file_of_the_project_plays(lab: Lab) -> None:

@@ -1,4 +1,4 @@
-"""Random streams: the same numbers as in Rust. `tests/tests/python.rs` compares more of them with the Rust ones."""
+"""Random streams: the same numbers as in Rust. `tests/tests/system/python.rs` compares more of them with the Rust ones."""
 
 from __future__ import annotations
 

@@ -307,7 +307,16 @@ fn a_step_is_answered_although_others_ask_meanwhile() {
             let tick = status(&lab, "ctl-asked")["tick"].as_u64().unwrap();
             (tick > 0).then_some(())
         });
-        assert_eq!(stepped.join().unwrap()["tick"], 4_000);
+
+        let answer = stepped.join().unwrap();
+        let is_held = answer["awaiting"]
+            .as_array()
+            .is_some_and(|names| !names.is_empty());
+        // Who steps a clock that is held, by a robot that a busy machine keeps waiting, is told how far it is.
+        assert!(answer["tick"] == 4_000 || is_held, "{answer}");
+    });
+    eventually("the last of the steps", || {
+        (status(&lab, "ctl-asked")["tick"] == 4_000).then_some(())
     });
 
     ctl(&lab, "ctl-asked", &["stop"]);

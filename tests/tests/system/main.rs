@@ -9,15 +9,24 @@
 
 mod bench;
 mod boundaries;
+mod browser;
 mod chaos;
+mod conform;
 mod control;
 mod determinism;
+mod exec;
 mod experiment;
 mod faults;
+mod files;
 mod killed;
+mod links;
 mod output;
+mod page;
 mod paths;
+mod programs;
+mod python;
 mod record;
+mod secure;
 mod shell;
 mod temporary;
 mod wire;

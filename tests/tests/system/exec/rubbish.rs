@@ -1,6 +1,6 @@
 //! A program that does not keep to the contract ends its robot, and the reason is named.
 
-use crate::stage::{Stage, nobody_is_left, says};
+use super::stage::{Stage, nobody_is_left, says};
 
 /// What a program does in tick 3, and what is said about it.
 const MISHAPS: &[(&str, &str, &[&str])] = &[

@@ -2,7 +2,7 @@
 
 use system_tests::{Lab, assert_same};
 
-use crate::stage::nobody_is_left;
+use super::stage::nobody_is_left;
 
 /// Asks the robots named after the first word, in every tick, and publishes as many texts of so many bytes.
 const ROBOT: &str = r#"#!/usr/bin/env python3

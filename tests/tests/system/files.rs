@@ -1,8 +1,6 @@
 //! Damaged scenario and launch files: reading one gives what it says, or an error that names the file; nothing else ever
 //! happens. Damage is drawn anew each time; what once failed is kept beside this file and tried first.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

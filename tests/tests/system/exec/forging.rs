@@ -1,6 +1,6 @@
 //! What a program writes can neither steer a terminal nor forge lines of a log.
 
-use crate::stage::{Stage, nobody_is_left};
+use super::stage::{Stage, nobody_is_left};
 
 /// A log line with a line break, an escape sequence and a bidirectional control, and raw bytes on the standard error.
 const FORGER: &str = r#"

@@ -1,10 +1,5 @@
 //! `docs/protocol.md` agrees with the code: keys, limits, times, variables, rules, examples, random streams, links.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a test that cannot set up its subject fails"
-)]
-
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use system_tests::processes::Running;
 use system_tests::{Lab, assert_same, cargo, programs, root};
 
-use crate::stage::{nobody_is_left, ready};
+use super::stage::{nobody_is_left, ready};
 
 /// A new robot in a folder of its own.
 struct Robot {

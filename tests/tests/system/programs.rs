@@ -1,11 +1,6 @@
 //! Robots in other languages over their standard input and output (`sdk/stdio`): compiled as their pages say, and launched
 //! as they are shipped.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a test that cannot set up its subject fails"
-)]
-
 use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,6 @@
 //! The conformance kit on the robots of the project, which pass, and on robots that are wrong in one thing each, which
 //! fail by the rule that forbids it.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;

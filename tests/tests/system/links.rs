@@ -1,7 +1,6 @@
 //! Real links that are really cut: through proxies, between network namespaces, between containers; and a run across
 //! three hosts.
 
-#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
 #![expect(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -1,7 +1,5 @@
 //! A secured run and intruders: what is refused, what is harmless, and that the record does not change.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
-
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -6,7 +6,7 @@ use nix::sys::signal::Signal;
 use system_tests::processes::{Running, find, named, send};
 use system_tests::{eventually, programs};
 
-use crate::stage::{Stage, is_gone, nobody_is_left, says};
+use super::stage::{Stage, is_gone, nobody_is_left, says};
 
 const PID: &str = "if is init; then echo $$ > pid; fi";
 

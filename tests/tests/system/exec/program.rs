@@ -2,7 +2,7 @@
 
 use system_tests::assert_same;
 
-use crate::stage::{Stage, nobody_is_left, ready, says};
+use super::stage::{Stage, nobody_is_left, ready, says};
 
 /// Walks to and fro by chance, asks, looks around, commands and says what it hears.
 const WALKER: &str = r#"

@@ -1,0 +1,57 @@
+//! The console's page in a browser: `tests/console`.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+
+use system_tests::pytest::pytest;
+use system_tests::{programs, root};
+
+/// Runs `tests/console` in Chromium if it is installed.
+#[test]
+fn the_page_works_in_a_browser() {
+    if let Some(missing) = missing_tools() {
+        let text = format!("the tests of the console in a browser are skipped: {missing}");
+        assert!(std::env::var_os("CI").is_none(), "{text}");
+        // Not with `eprintln!`, whose output the test harness captures.
+        let _ = writeln!(std::io::stderr(), "\nSKIPPED: {text}\n");
+        return;
+    }
+
+    pytest(&root().join("tests/console"), || {
+        let mut python = Command::new("python3");
+        python
+            .current_dir(root())
+            .env("CARS_BIN", programs())
+            .env("PYTHONDONTWRITEBYTECODE", "1");
+        for variable in [
+            "CARS_RUN",
+            "CARS_CONNECT",
+            "CARS_LISTEN",
+            "CARS_CONSOLE_BIND",
+        ] {
+            python.env_remove(variable);
+        }
+        python
+    });
+}
+
+/// What the tests in a browser lack, and how to install it.
+fn missing_tools() -> Option<String> {
+    if !Path::new("/usr/bin/chromium").exists() {
+        return Some("there is no /usr/bin/chromium; `apt-get install chromium`".to_owned());
+    }
+
+    let python = Command::new("python3")
+        .args(["-c", "import pytest, playwright.sync_api"])
+        .output();
+    match python {
+        Ok(output) if output.status.success() => None,
+        Ok(_) => Some(
+            "python3 has no pytest or no playwright; `pip install pytest playwright`".to_owned(),
+        ),
+        Err(error) => Some(format!(
+            "python3 does not run ({error}); install Python 3.11 or later"
+        )),
+    }
+}
