@@ -29,4 +29,5 @@ mod record;
 mod secure;
 mod shell;
 mod temporary;
+mod wall_clock;
 mod wire;
