@@ -11,7 +11,7 @@ from lab import ROOT, Launch
 CHROMIUM = "/usr/bin/chromium"
 SCREENSHOTS = pathlib.Path(os.environ.get("CARS_SCREENSHOTS", ROOT / "target" / "console-screenshots"))
 
-expect.set_options(timeout=10_000)
+expect.set_options(timeout=30_000)
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = pathlib.Path(os.environ["CARS_BIN"])
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def eventually(what, ready, patience_s=PATIENCE_S):
@@ -27,9 +27,9 @@ def eventually(what, ready, patience_s=PATIENCE_S):
         time.sleep(0.02)
 
 
-def until(page, expression, patience_s=PATIENCE_S):
+def until(page, expression):
     """Waits until an expression is true in the page, whose policy forbids Playwright's own `wait_for_function`."""
-    return eventually(expression, lambda: page.evaluate(expression), patience_s)
+    return eventually(expression, lambda: page.evaluate(expression))
 
 
 def free_port():

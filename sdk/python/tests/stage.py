@@ -15,7 +15,7 @@ from typing import Any
 import zenoh
 from lab import environment, eventually, free_endpoint
 
-PATIENCE_S = 20.0
+PATIENCE_S = 90.0
 PROBE = Path(__file__).with_name("probe.py")
 Json = dict[str, Any]
 
