@@ -28,7 +28,9 @@ def launch(tmp_path):
     started = []
 
     def start(**options):
-        started.append(Launch(tmp_path, **options))
+        folder = tmp_path / f"launch-{len(started)}"
+        folder.mkdir()
+        started.append(Launch(folder, **options))
         return started[-1]
 
     yield start

@@ -8,8 +8,8 @@ from lab import until
 SIZES = [(1440, 900), (390, 844)]
 # The design demands this on an otherwise idle machine.
 WANTED_FPS = 25
-# The limit of the test is lower, because other machines are slower or under load.
-LEAST_FPS = 15
+# Of the rate with few guests at the same time: other machines are slower or under load.
+LEAST_RATIO = 0.2
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -69,20 +69,24 @@ def test_robots_obstacles_and_floor_are_drawn_in_their_colors(launch, open_page)
 
 
 def test_ten_thousand_guests_move_smoothly(launch, open_page, screenshots):
-    crowd = ("--set", "guests.count=10000", "--set", 'field.size=["150 m", "150 m"]')
-    run = launch(options=("--speed", "5", "--duration", "100000 s", *crowd))
-    page = open_page(run.address)
-    expect(page.get_by_test_id("tick")).to_have_text("0")
-    page.get_by_test_id("btn-start").click()
-    until(page, "window.carsConsole.frame().tick > 10")
-    assert len(page.evaluate("window.carsConsole.frame().guests")) == 10_000
+    field = ("--set", 'field.size=["150 m", "150 m"]')
+    pages = []
+    for guests in (10_000, 10):
+        crowd = ("--set", f"guests.count={guests}", *field)
+        run = launch(options=("--speed", "5", "--duration", "100000 s", *crowd))
+        page = open_page(run.address)
+        expect(page.get_by_test_id("tick")).to_have_text("0")
+        page.get_by_test_id("btn-start").click()
+        until(page, "window.carsConsole.frame().tick > 10")
+        assert len(page.evaluate("window.carsConsole.frame().guests")) == guests
+        pages.append(page)
 
     rates = []
     for _ in range(5):
-        page.wait_for_timeout(1000)
-        rates.append(page.evaluate("window.carsConsole.fps()"))
+        pages[0].wait_for_timeout(1000)
+        rates.append([page.evaluate("window.carsConsole.fps()") for page in pages])
 
-    page.screenshot(path=screenshots / "ten-thousand-guests.png")
-    rate = sorted(rates)[len(rates) // 2]
-    print(f"10,000 guests: {rate:.0f} frames/s (median of {rates}), wanted {WANTED_FPS}")
-    assert rate >= LEAST_FPS
+    pages[0].screenshot(path=screenshots / "ten-thousand-guests.png")
+    print(f"frames/s with 10,000 guests and with 10: {rates}, wanted {WANTED_FPS}")
+    ratios = sorted(crowded / few for crowded, few in rates)
+    assert ratios[len(ratios) // 2] >= LEAST_RATIO
