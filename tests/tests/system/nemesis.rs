@@ -23,7 +23,7 @@ use system_tests::processes::{Running, find, named, send};
 use system_tests::{Lab, assert_same, eventually};
 
 use cable::Cable;
-use plan::{Fault, Plan};
+use plan::{Fault, Flood, Plan};
 use rogue::Rogue;
 
 /// Launches of the short version: every size, both policies, plain and secured, every kind of fault.
@@ -291,6 +291,29 @@ impl<'a> Hall<'a> {
         );
     }
 
+    /// The simulator has received what the rogue client put, and ignored it.
+    fn has_ignored_floods(&self, plan: &Plan) {
+        for fault in &plan.faults {
+            let reasons = match fault {
+                Fault::Flood(Flood::Rubbish) => &["malformed"][..],
+                // The robot whose name is forged may be lost.
+                Fault::Flood(Flood::Forged) => &["stale", "lost"],
+                // With a robot's certificate, a client receives no reports of others that it could put again.
+                Fault::Flood(Flood::Stale) if !plan.is_secured => &["stale", "lost"],
+                _ => continue,
+            };
+            within(
+                FOLLOW,
+                &format!("messages to be ignored, {reasons:?}"),
+                || {
+                    let ignored = &self.status()?["ignored"];
+                    let mut counts = reasons.iter().filter_map(|reason| ignored[reason].as_u64());
+                    counts.any(|count| count > 0).then_some(())
+                },
+            );
+        }
+    }
+
     /// Ends the run. Nothing is left behind.
     fn finish(mut self) {
         self.lab.ok(&["ctl", "stop", "--run", &self.run]);
@@ -366,6 +389,7 @@ fn play(plan: &Plan) {
     let struck = hall.strike(plan);
     hall.heal();
     hall.recovers();
+    hall.has_ignored_floods(plan);
     hall.finish();
 
     let (code, text) =
