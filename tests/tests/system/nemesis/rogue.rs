@@ -17,7 +17,7 @@ use protocol::messages::{
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Generation, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::plan::{Flood, below, milliseconds};
 
@@ -171,7 +171,7 @@ impl Intruder<'_> {
                 let recorded = recorded.clone();
                 let record = move |key: &str, message: &[u8]| {
                     let mut recorded = recorded.lock().expect("no panic");
-                    if recorded.len() < RECORDED {
+                    if recorded.len() < RECORDED && is_of_run(message) {
                         recorded.push((key.to_owned(), message.to_vec()));
                     }
                 };
@@ -364,6 +364,11 @@ impl Intruder<'_> {
             String::from_utf8_lossy(&answer)
         );
     }
+}
+
+/// Whether a message is of a tick of the run, and not the rubbish of another flood.
+fn is_of_run(message: &[u8]) -> bool {
+    serde_json::from_slice::<Value>(message).is_ok_and(|message| message["epoch"] == 1)
 }
 
 /// A robot that is not in the scenario.
