@@ -291,15 +291,13 @@ impl<'a> Hall<'a> {
         );
     }
 
-    /// The simulator has received what the rogue client put, and ignored it.
+    /// The simulator has received what the rogue client put, and ignored it. (Stale messages may all be clocks.)
     fn has_ignored_floods(&self, plan: &Plan) {
         for fault in &plan.faults {
             let reasons = match fault {
                 Fault::Flood(Flood::Rubbish) => &["malformed"][..],
                 // The robot whose name is forged may be lost.
                 Fault::Flood(Flood::Forged) => &["stale", "lost"],
-                // With a robot's certificate, a client receives no reports of others that it could put again.
-                Fault::Flood(Flood::Stale) if !plan.is_secured => &["stale", "lost"],
                 _ => continue,
             };
             within(
