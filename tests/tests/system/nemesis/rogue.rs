@@ -38,6 +38,9 @@ const OTHER_EPOCH: Epoch = 99;
 /// A tick and an incarnation that these runs never reach.
 const FAR: u32 = 1_000_000_000;
 
+/// A key, and what is put on it.
+type Message = (String, Vec<u8>);
+
 /// Where a rogue client connects, and as what.
 #[derive(Debug, Clone)]
 pub(super) struct Rogue {
@@ -106,11 +109,7 @@ impl Intruder<'_> {
     }
 
     /// Puts bursts of messages, with pauses between them.
-    fn burst(
-        &self,
-        chance: &mut Stream,
-        mut draw: impl FnMut(&mut Stream) -> (String, Vec<u8>),
-    ) -> usize {
+    fn burst(&self, chance: &mut Stream, mut draw: impl FnMut(&mut Stream) -> Message) -> usize {
         for _ in 0..BURSTS {
             for _ in 0..MESSAGES {
                 let (key, message) = draw(chance);
@@ -164,7 +163,7 @@ impl Intruder<'_> {
         } else {
             vec![self.keys.all()]
         };
-        let recorded: Arc<Mutex<Vec<(String, Vec<u8>)>>> = Arc::default();
+        let recorded: Arc<Mutex<Vec<Message>>> = Arc::default();
         let recording: Vec<_> = allowed
             .iter()
             .map(|key| {
@@ -220,7 +219,7 @@ impl Intruder<'_> {
     }
 
     /// A message of an epoch, a tick or an incarnation that the run does not have.
-    fn forged(&self, chance: &mut Stream) -> (String, Vec<u8>) {
+    fn forged(&self, chance: &mut Stream) -> Message {
         let keys = &self.keys;
         let robot = self.robot(chance);
         let other = self.robot(chance);
@@ -279,7 +278,7 @@ impl Intruder<'_> {
     }
 
     /// A message that would change the run if access control did not drop it.
-    fn forged_in_the_open_tick(&self, chance: &mut Stream) -> (String, Vec<u8>) {
+    fn forged_in_the_open_tick(&self, chance: &mut Stream) -> Message {
         let keys = &self.keys;
         // Any robot but the one whose certificate it has.
         let robot = &self.rogue.robots[1 + below(chance, self.rogue.robots.len() - 1)];
