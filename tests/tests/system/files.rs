@@ -135,7 +135,7 @@ fn shipped(folder: &str) -> Vec<PathBuf> {
 }
 
 /// A shipped file of this folder, damaged: its text.
-fn damaged(folder: &str) -> impl Strategy<Value = String> + use<> {
+pub(crate) fn damaged(folder: &str) -> impl Strategy<Value = String> + use<> {
     let texts: Vec<String> = shipped(folder)
         .iter()
         .map(|file| std::fs::read_to_string(file).unwrap())
@@ -168,6 +168,18 @@ proptest! {
     }
 }
 
+/// Makes a folder for damaged files of one kind. Launch files find their scenarios beside them, and scenarios their robots'
+/// parameters.
+pub(crate) fn make_surroundings(folder: &Path, kind: &str, others: &str) {
+    for name in [kind, others, "configs/robots"] {
+        std::fs::create_dir_all(folder.join(name)).unwrap();
+    }
+    for file in shipped(others).into_iter().chain(shipped("configs/robots")) {
+        let copy = folder.join(file.strip_prefix(root()).unwrap());
+        std::fs::copy(&file, copy).unwrap();
+    }
+}
+
 /// The real program, with the errors as people see them.
 #[test]
 fn the_program_survives_damaged_files() {
@@ -176,17 +188,7 @@ fn the_program_survives_damaged_files() {
     let folder = tempfile::tempdir().unwrap();
 
     for (kind, others) in [("launch", "configs"), ("configs", "launch")] {
-        // Launch files find their scenarios beside them, and scenarios their robots' parameters.
-        for name in [kind, others, "configs/robots"] {
-            std::fs::create_dir_all(folder.path().join(name)).unwrap();
-        }
-        for file in shipped(others).into_iter().chain(shipped("configs/robots")) {
-            std::fs::copy(
-                &file,
-                folder.path().join(file.strip_prefix(root()).unwrap()),
-            )
-            .unwrap();
-        }
+        make_surroundings(folder.path(), kind, others);
         let (mut runner, strategy) = (TestRunner::default(), damaged(kind));
         let files: Vec<PathBuf> = (0..FILES)
             .map(|i| {
@@ -227,8 +229,19 @@ fn check(folder: &Path, name: &str, text: &str) -> (Option<i32>, String) {
     let file = folder.join(name);
     std::fs::write(&file, text).unwrap();
     let mut check = Command::new(programs().join("cars"));
-    check.arg("check").arg(&file).env("COLUMNS", "400");
-    let mut child = check
+    check.arg("check").arg(&file);
+
+    ends_within(Duration::from_secs(20), check, &format!("checking {name}"))
+}
+
+/// Runs a program that must end within `limit`. Returns its exit status and its output, whose lines are not broken.
+pub(crate) fn ends_within(
+    limit: Duration,
+    mut command: Command,
+    what: &str,
+) -> (Option<i32>, String) {
+    let mut child = command
+        .env("COLUMNS", "400")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -236,9 +249,9 @@ fn check(folder: &Path, name: &str, text: &str) -> (Option<i32>, String) {
 
     let begun = Instant::now();
     while child.try_wait().unwrap().is_none() {
-        if begun.elapsed() > Duration::from_secs(20) {
+        if begun.elapsed() > limit {
             child.kill().unwrap();
-            panic!("checking {name} does not end");
+            panic!("{what} does not end within {limit:?}");
         }
         std::thread::sleep(Duration::from_millis(5));
     }

@@ -10,7 +10,6 @@
 mod bench;
 mod boundaries;
 mod browser;
-mod chaos;
 mod conform;
 mod control;
 mod determinism;
@@ -20,6 +19,7 @@ mod faults;
 mod files;
 mod killed;
 mod links;
+mod nemesis;
 mod output;
 mod page;
 mod paths;

@@ -6,7 +6,8 @@ use system_tests::{Lab, programs, root};
 
 const HALL: &str = "launch/hors_doeuvres.toml";
 
-fn check(lab: &Lab, folder: &str) -> (i32, String) {
+/// Checks the record in a folder. Returns the exit status and the output of `cars check`.
+pub(crate) fn check(lab: &Lab, folder: &str) -> (i32, String) {
     lab.cars_without_out(&["check", folder])
 }
 
@@ -41,7 +42,7 @@ fn damage_anywhere_in_a_record_is_found_and_named() {
 }
 
 /// The lines that an error names: `lines 3 to 9 are damaged`.
-fn lines_of(text: &str) -> (usize, usize) {
+pub(crate) fn lines_of(text: &str) -> (usize, usize) {
     let words: Vec<&str> = text
         .split_whitespace()
         .filter(|word| *word != "│")
