@@ -12,10 +12,12 @@ pub mod hall;
 pub mod network;
 pub mod processes;
 pub mod pytest;
+pub mod tools;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use processes::Running;
@@ -239,14 +241,54 @@ pub fn side_by_side(checks: &[(&str, &(dyn Fn() + Sync))]) {
     assert!(failed.is_empty(), "{failed:?} failed; see above");
 }
 
-/// Waits until `ready` returns a value; fails after [`PATIENCE`].
-pub fn eventually<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
-    let begun = Instant::now();
-    loop {
-        if let Some(found) = ready() {
-            return found;
+/// Does something with each of these items, some at a time, and returns what `check` has to say against them.
+pub fn objections<T: Sync>(
+    items: &[T],
+    at_a_time: usize,
+    check: impl Fn(&T) -> Option<String> + Sync,
+) -> Vec<String> {
+    let next = AtomicUsize::new(0);
+    let objections = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..at_a_time {
+            scope.spawn(|| {
+                while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let objection = check(item);
+                    objections.lock().unwrap().extend(objection);
+                }
+            });
         }
-        assert!(begun.elapsed() < PATIENCE, "waited in vain for {what}");
+    });
+
+    objections.into_inner().unwrap()
+}
+
+/// Waits until `ready` returns a value; fails after [`PATIENCE`].
+pub fn eventually<T>(what: &str, ready: impl FnMut() -> Option<T>) -> T {
+    within(PATIENCE, what, ready)
+}
+
+/// Waits until `ready` returns a value; fails after `limit`.
+pub fn within<T>(limit: Duration, what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
+    let mut found = None;
+    let is_ready = is_within(limit, || {
+        found = ready();
+        found.is_some()
+    });
+    assert!(is_ready, "waited {limit:?} in vain for {what}");
+
+    found.unwrap()
+}
+
+/// Waits until a condition holds, but not longer than `limit`; returns whether it does.
+pub fn is_within(limit: Duration, mut holds: impl FnMut() -> bool) -> bool {
+    let begun = Instant::now();
+    while !holds() {
+        if begun.elapsed() >= limit {
+            return false;
+        }
         std::thread::sleep(Duration::from_millis(10));
     }
+
+    true
 }

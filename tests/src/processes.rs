@@ -171,6 +171,13 @@ pub fn send(pid: u32, signal: Signal) {
     kill(pid_of(pid), signal).expect("the process is there");
 }
 
+/// Waits until a run has no process any more.
+pub fn nobody_is_left(run: &str) {
+    eventually("the last process to be gone", || {
+        find(run).is_empty().then_some(())
+    });
+}
+
 /// Processes with the name of a run in their environment or arguments. Each test has its own names of runs.
 #[must_use]
 pub fn find(run: &str) -> Vec<(u32, String)> {

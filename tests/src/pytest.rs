@@ -4,13 +4,12 @@ use std::fs::File;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
-use crate::Lab;
+use crate::{Lab, is_within, objections};
 
 /// How many files are tested at a time. They mostly wait.
 const AT_A_TIME: usize = 2;
@@ -24,25 +23,8 @@ const PATIENCE: Duration = Duration::from_secs(540);
 /// If a test fails, with what pytest printed about its file.
 pub fn pytest(folder: &Path, python: impl Fn() -> Command + Sync) {
     let lab = Lab::new();
-    let files = Mutex::new(files_of(folder));
-    let failed = Mutex::new(Vec::new());
-
-    std::thread::scope(|scope| {
-        for _ in 0..AT_A_TIME {
-            scope.spawn(|| {
-                loop {
-                    let Some(file) = files.lock().unwrap().pop() else {
-                        return;
-                    };
-                    if let Err(text) = test(lab.out(), &file, python()) {
-                        failed.lock().unwrap().push(text);
-                    }
-                }
-            });
-        }
-    });
-
-    let failed = failed.into_inner().unwrap();
+    let files = files_of(folder);
+    let failed = objections(&files, AT_A_TIME, |file| test(lab.out(), file, python()));
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
@@ -59,8 +41,9 @@ fn files_of(folder: &Path) -> Vec<PathBuf> {
     tests
 }
 
-/// Tests one file, in a process group of its own, so that nothing that it starts outlives it.
-fn test(out: &Path, file: &Path, mut python: Command) -> Result<(), String> {
+/// Tests one file, in a process group of its own, so that nothing that it starts outlives it. Returns what pytest printed and
+/// how it ended, if a test fails.
+fn test(out: &Path, file: &Path, mut python: Command) -> Option<String> {
     let name = file.file_stem().unwrap().to_string_lossy();
     let printed = out.join(format!("{name}.txt"));
     let output = File::create(&printed).unwrap();
@@ -77,23 +60,18 @@ fn test(out: &Path, file: &Path, mut python: Command) -> Result<(), String> {
         .unwrap();
     let group = Pid::from_raw(i32::try_from(pytest.id()).unwrap());
 
-    let begun = Instant::now();
-    let status = loop {
-        if let Some(status) = pytest.try_wait().unwrap() {
-            break Some(status);
-        }
-        if begun.elapsed() > PATIENCE {
-            killpg(group, Signal::SIGKILL).unwrap();
-            pytest.wait().unwrap();
-            break None;
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    };
-
-    let text = || std::fs::read_to_string(&printed).unwrap_or_default();
-    match status {
-        Some(status) if status.success() => Ok(()),
-        Some(status) => Err(format!("{}\npytest: {status}", text())),
-        None => Err(format!("{}\nnot done after {PATIENCE:?}", text())),
+    let is_done = is_within(PATIENCE, || pytest.try_wait().unwrap().is_some());
+    if !is_done {
+        killpg(group, Signal::SIGKILL).unwrap();
     }
+    let status = pytest.wait().unwrap();
+    if status.success() {
+        return None;
+    }
+
+    let text = std::fs::read_to_string(&printed).unwrap();
+    let how = if is_done { "ended" } else { "was killed" };
+    Some(format!(
+        "{text}\npytest {how}, {status}; it may take {PATIENCE:?}"
+    ))
 }

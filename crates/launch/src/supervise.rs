@@ -325,21 +325,14 @@ impl Supervisor {
     fn on_asked(&mut self, signal: Signal) {
         self.outcome.asked.get_or_insert(signal);
         let is_ending = self.stage >= Shutdown::Terminating;
-        match signal {
-            Signal::SIGQUIT => self.kill_all(),
-            Signal::SIGINT if is_ending => self.kill_all(),
-            // One death of a parent can be several signals, one for each of its threads.
-            _ if is_ending => {}
-            _ => {
-                self.notice("ending all processes; Ctrl-C kills them");
-                self.terminate();
-            }
+        if signal == Signal::SIGQUIT || is_ending && signal == Signal::SIGINT {
+            self.notice("killing all processes");
+            self.kill();
+        } else if !is_ending {
+            self.notice("ending all processes; Ctrl-C kills them");
+            self.terminate();
         }
-    }
-
-    fn kill_all(&mut self) {
-        self.notice("killing all processes");
-        self.kill();
+        // Further signals of other kinds ask for nothing new: one death of a parent can be several, one for each of its threads.
     }
 
     fn on_grace_over(&mut self, stage: Shutdown) {

@@ -16,6 +16,10 @@ ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "sdk" / "python" / "examples"
 PATIENCE_S = 90.0
 """Longest that anything here may take before it counts as hung."""
+RUST = {"Butler": "cars-butler", "Leguin": "cars-leguin", "Vonda": "cars-vonda"}
+"""Program of each robot, in Rust."""
+PYTHON = RUST | {"Leguin": "leguin.py", "Vonda": "leguin.py"}
+"""The same, in Python where there is one."""
 
 T = TypeVar("T")
 

@@ -9,10 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from lab import EXAMPLES, ROOT, Lab, assert_same
+from lab import EXAMPLES, PYTHON, ROOT, Lab, assert_same
 
-RUST = {"Butler": "cars-butler", "Leguin": "cars-leguin", "Vonda": "cars-vonda"}
-PYTHON = RUST | {"Leguin": "leguin.py", "Vonda": "leguin.py"}
 EMPTY_HALL = """
 seed = 1
 tick = "0.5 s"

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from lab import Lab, assert_same
+from lab import PYTHON, RUST, Lab, assert_same
 
-RUST = {"Butler": "cars-butler", "Leguin": "cars-leguin", "Vonda": "cars-vonda"}
-PYTHON = RUST | {"Leguin": "leguin.py", "Vonda": "leguin.py"}
 LOSSY = (
     'network.commands={ loss = 0.2, duplication = 0.3, delay = { min = "0 s", mode = "1 s", max = "10 s" }, '
     "burst = { enter = 0.05, leave = 0.2 } }"

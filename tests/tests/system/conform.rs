@@ -5,11 +5,9 @@ use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use conform::{PAGE, RULES, Rule, Setting, Verdict};
-use system_tests::{Lab, programs, root};
+use system_tests::{Lab, objections, programs, root};
 
 /// Robots that pass: a name for the report, more arguments of `cars conform`, the command from the project's root.
 const ROBOTS: [(&str, &[&str], &[&str]); 7] = [
@@ -205,20 +203,7 @@ fn misjudged(how: &str, rules: &[Rule]) -> Option<String> {
 
 /// Judges robots side by side.
 fn judge(robots: &[(&str, Vec<Rule>)]) {
-    let next = AtomicUsize::new(0);
-    let misjudgments = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..KITS {
-            scope.spawn(|| {
-                while let Some((how, rules)) = robots.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let found = misjudged(how, rules);
-                    misjudgments.lock().unwrap().extend(found);
-                }
-            });
-        }
-    });
-
-    let misjudgments = misjudgments.into_inner().unwrap();
+    let misjudgments = objections(robots, KITS, |(how, rules)| misjudged(how, rules));
     assert!(misjudgments.is_empty(), "{}", misjudgments.join("\n"));
 }
 

@@ -7,8 +7,8 @@ use nix::sys::signal::Signal;
 use protocol::keys::Keys;
 use protocol::messages::Clock;
 use protocol::{RunName, encode};
-use system_tests::processes::{find, send};
-use system_tests::{Lab, PATIENCE, assert_same, eventually, root, side_by_side};
+use system_tests::processes::{nobody_is_left, send};
+use system_tests::{Lab, PATIENCE, assert_same, root, side_by_side};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
 
@@ -21,12 +21,6 @@ fn launch_file(lab: &Lab, leguin: &str) -> String {
         scenario.display().to_string()
     );
     lab.write("launch.toml", &text).to_str().unwrap().to_owned()
-}
-
-fn nobody_is_left(run: &str) {
-    eventually("the last process to be gone", || {
-        find(run).is_empty().then_some(())
-    });
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
-use system_tests::processes::{Running, find};
+use system_tests::processes::{Running, nobody_is_left};
 use system_tests::{Lab, eventually};
 
 /// How long the processes of a killed launcher may take to exit.
@@ -31,9 +31,7 @@ fn a_killed_launcher_leaves_no_process_no_port_and_a_whole_record() {
     launch.signal(Signal::SIGKILL);
     let killed = Instant::now();
     launch.wait();
-    eventually("the last process to be gone", || {
-        find(run).is_empty().then_some(())
-    });
+    nobody_is_left(run);
 
     assert!(killed.elapsed() < PATIENCE, "{:?}", killed.elapsed());
     for port in ports {

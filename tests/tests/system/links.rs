@@ -12,9 +12,10 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
-use system_tests::network::{Row, has_namespaces, lacks_tool, namespaces_of, skip};
-use system_tests::processes::{Running, find};
-use system_tests::{Lab, assert_same, eventually, programs, root, side_by_side};
+use system_tests::network::{Row, has_namespaces, namespaces_of};
+use system_tests::processes::{Running, nobody_is_left};
+use system_tests::tools::{lacks_tool, skip};
+use system_tests::{Lab, assert_same, programs, root, side_by_side};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
 /// A link that is silent for so long is given up (`bus`).
@@ -42,10 +43,17 @@ fn play(lab: &Lab, run: &str, via: &str, plan: &str, more: &[&str]) -> Running {
     lab.start(run, &[args.as_slice(), more].concat())
 }
 
+/// What links can be made of here.
+fn vias(test: &str) -> &'static [&'static str] {
+    if has_namespaces(test) {
+        &["proxy", "namespaces"]
+    } else {
+        &["proxy"]
+    }
+}
+
 fn nothing_is_left(run: &str, player: &Running) {
-    eventually("the last process to be gone", || {
-        find(run).is_empty().then_some(())
-    });
+    nobody_is_left(run);
     assert_eq!(
         namespaces_of(player.id()),
         Vec::<String>::new(),
@@ -331,13 +339,7 @@ fn a_slow_a_narrow_and_a_closed_link_change_nothing() {
 
 #[test]
 fn an_interrupted_play_leaves_nothing_behind() {
-    let vias: &[&str] = if has_namespaces("interrupt") {
-        &["proxy", "namespaces"]
-    } else {
-        &["proxy"]
-    };
-
-    for via in vias {
+    for via in vias("interrupt") {
         let (lab, run) = (Lab::new(), format!("stop-{via}"));
         let plan = plan(&lab, 60, "\"cut\"");
         let mut player = play(&lab, &run, via, &plan, &[]);
@@ -353,22 +355,14 @@ fn an_interrupted_play_leaves_nothing_behind() {
 
 #[test]
 fn a_killed_play_leaves_nothing_but_what_the_next_one_removes() {
-    let vias: &[&str] = if has_namespaces("killed") {
-        &["proxy", "namespaces"]
-    } else {
-        &["proxy"]
-    };
-
-    for via in vias {
+    for via in vias("killed") {
         let (lab, run) = (Lab::new(), format!("killed-{via}"));
         let plan = plan(&lab, 60, "\"cut\"");
         let mut player = play(&lab, &run, via, &plan, &[]);
         player.prints("the link of Leguin is cut");
         player.signal(Signal::SIGKILL);
         player.wait();
-        eventually("the last process to be gone", || {
-            find(&run).is_empty().then_some(())
-        });
+        nobody_is_left(&run);
         assert_eq!(lab.events(&run).pop().unwrap()["event"], "end");
         if *via == "proxy" {
             continue;

@@ -19,8 +19,8 @@ use nix::sys::signal::Signal;
 use protocol::messages::OnLate;
 use protocol::{RobotName, RunName};
 use serde_json::Value;
-use system_tests::processes::{Running, find, named, send};
-use system_tests::{Lab, assert_same, eventually};
+use system_tests::processes::{Running, named, nobody_is_left, send};
+use system_tests::{Lab, assert_same, eventually, is_within, within};
 
 use cable::Cable;
 use plan::{Fault, Flood, Plan};
@@ -318,9 +318,7 @@ impl<'a> Hall<'a> {
     fn finish(mut self) {
         self.lab.ok(&["ctl", "stop", "--run", &self.run]);
         self.launch.finish();
-        eventually("the last process to be gone", || {
-            find(&self.run).is_empty().then_some(())
-        });
+        nobody_is_left(&self.run);
     }
 }
 
@@ -332,31 +330,6 @@ fn status(lab: &Lab, run: &str) -> Option<Value> {
         .unwrap();
 
     serde_json::from_slice(&output.stdout).ok()
-}
-
-/// Waits until `ready` returns a value; fails after `limit`.
-fn within<T>(limit: Duration, what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
-    let mut found = None;
-    let is_ready = is_within(limit, || {
-        found = ready();
-        found.is_some()
-    });
-    assert!(is_ready, "waited {limit:?} in vain for {what}");
-
-    found.unwrap()
-}
-
-/// Waits until a condition holds, but not longer than `limit`; returns whether it does.
-fn is_within(limit: Duration, mut holds: impl FnMut() -> bool) -> bool {
-    let begun = Instant::now();
-    while !holds() {
-        if begun.elapsed() >= limit {
-            return false;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-
-    true
 }
 
 /// Prints how to repeat a launch if it fails.

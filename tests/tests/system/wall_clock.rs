@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use system_tests::network::lacks_tool;
 use system_tests::processes::Running;
+use system_tests::tools::lacks_tool;
 use system_tests::{Lab, assert_same, eventually};
 
 const FILE: &str = "launch/hors_doeuvres.toml";

@@ -185,30 +185,29 @@ fn address(index: usize) -> String {
 /// Removes the namespaces of processes that were killed, and ends the processes in them. `report` receives a line for each
 /// namespace.
 pub(super) fn remove_abandoned(report: &mut dyn FnMut(String)) {
-    // Without `ip` there are none.
+    let mut abandoned = namespaces();
+    abandoned.retain(|name| is_abandoned(name));
+
+    end_processes(&abandoned);
+    for name in abandoned {
+        report(match ip(&format!("netns del {name}")) {
+            Ok(_) => format!("removed the network namespace {name} of a play that was killed"),
+            Err(error) if namespaces().contains(&name) => {
+                format!("the network namespace {name} of a play that was killed: {error}")
+            }
+            // Another play that starts now has removed it.
+            Err(_) => continue,
+        });
+    }
+}
+
+/// The network namespaces of this machine that have names. Without `ip` there are none.
+fn namespaces() -> Vec<String> {
     let listed = ip("netns list").unwrap_or_default();
     let names = listed
         .lines()
         .filter_map(|line| line.split_whitespace().next());
-    let abandoned: Vec<&str> = names.filter(|name| is_abandoned(name)).collect();
-
-    end_processes(&abandoned);
-    for name in abandoned {
-        let removed = ip(&format!("netns del {name}"));
-        if let Err(error) = removed {
-            // Another play that starts now may have removed it.
-            let is_there = ip("netns list").is_ok_and(|listed| listed.contains(name));
-            if is_there {
-                report(format!(
-                    "the network namespace {name} of a play that was killed: {error}"
-                ));
-            }
-        } else {
-            report(format!(
-                "removed the network namespace {name} of a play that was killed"
-            ));
-        }
-    }
+    names.map(str::to_owned).collect()
 }
 
 /// Whether the process that has made a namespace does not exist any more. Namespaces of other programs are not ours to judge.
@@ -218,7 +217,7 @@ fn is_abandoned(name: &str) -> bool {
 
 /// Waits for the exit of all processes in these namespaces, which have received SIGTERM when their play was killed, and
 /// kills those that stay.
-fn end_processes(namespaces: &[&str]) {
+fn end_processes(namespaces: &[String]) {
     let begun = Instant::now();
     loop {
         let mut left = Vec::new();

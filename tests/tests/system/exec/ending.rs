@@ -3,10 +3,10 @@
 use std::process::{Command, Stdio};
 
 use nix::sys::signal::Signal;
-use system_tests::processes::{Running, find, named, send};
+use system_tests::processes::{Running, find, named, nobody_is_left, send};
 use system_tests::{eventually, programs};
 
-use super::stage::{Stage, is_gone, nobody_is_left, says};
+use super::stage::{Stage, is_gone, says};
 
 const PID: &str = "if is init; then echo $$ > pid; fi";
 

@@ -1,6 +1,8 @@
 //! What a program writes can neither steer a terminal nor forge lines of a log.
 
-use super::stage::{Stage, nobody_is_left};
+use system_tests::processes::nobody_is_left;
+
+use super::stage::Stage;
 
 /// A log line with a line break, an escape sequence and a bidirectional control, and raw bytes on the standard error.
 const FORGER: &str = r#"

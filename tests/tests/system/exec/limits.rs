@@ -1,8 +1,7 @@
 //! States as large as a message allows, asked for in every tick, end to end between processes.
 
+use system_tests::processes::nobody_is_left;
 use system_tests::{Lab, assert_same};
-
-use super::stage::nobody_is_left;
 
 /// Asks the robots named after the first word, in every tick, and publishes as many texts of so many bytes.
 const ROBOT: &str = r#"#!/usr/bin/env python3

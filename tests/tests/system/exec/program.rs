@@ -1,8 +1,9 @@
 //! A program takes part as any robot does.
 
 use system_tests::assert_same;
+use system_tests::processes::nobody_is_left;
 
-use super::stage::{Stage, nobody_is_left, ready, says};
+use super::stage::{Stage, ready, says};
 
 /// Walks to and fro by chance, asks, looks around, commands and says what it hears.
 const WALKER: &str = r#"

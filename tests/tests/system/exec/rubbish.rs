@@ -1,6 +1,8 @@
 //! A program that does not keep to the contract ends its robot, and the reason is named.
 
-use super::stage::{Stage, nobody_is_left, says};
+use system_tests::processes::nobody_is_left;
+
+use super::stage::{Stage, says};
 
 /// What a program does in tick 3, and what is said about it.
 const MISHAPS: &[(&str, &str, &[&str])] = &[

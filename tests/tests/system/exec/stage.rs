@@ -3,7 +3,7 @@
 use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
-use system_tests::processes::{Running, find};
+use system_tests::processes::Running;
 use system_tests::{Lab, PATIENCE, eventually, root};
 
 /// What a script can use: `json` is the line that it was told, `is TYPE` asks for its type, `say` says a line and `ask`
@@ -71,13 +71,6 @@ impl Stage {
             text.ends_with('\n').then(|| text.trim_end().to_owned())
         })
     }
-}
-
-/// Waits until a run has no process any more.
-pub(crate) fn nobody_is_left(run: &str) {
-    eventually("the last process to be gone", || {
-        find(run).is_empty().then_some(())
-    });
 }
 
 /// Waits until a program has printed all of this; it may be over, and its last lines still on their way.
