@@ -6,7 +6,7 @@
 
 use std::fs::Permissions;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{Shutdown, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -115,10 +115,15 @@ impl Run {
     }
 
     fn console(&self) -> Console {
+        self.console_at(&self.endpoint)
+    }
+
+    /// A console that finds the simulator at another endpoint than the simulator's own.
+    fn console_at(&self, endpoint: &str) -> Console {
         let mut child = Command::new(programs().join("cars-console"))
             .args(["--bind", "127.0.0.1:0"])
             .args(["--run", &self.name])
-            .args(["--connect", &self.endpoint])
+            .args(["--connect", endpoint])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .spawn()
@@ -410,6 +415,44 @@ fn a_page_receives_frames_and_panels_and_controls_the_run() {
     let answer = page.control(r#"{"do":"start"}"#);
     let error = answer["error"].as_str().unwrap();
     assert!(error.contains("no simulator of run con-live"), "{error}");
+}
+
+/// Accepts one connection after another, each to the simulator at `endpoint`.
+fn forward(listener: &TcpListener, endpoint: &str) {
+    let address = endpoint.strip_prefix("tcp/").unwrap();
+
+    for stream in listener.incoming() {
+        let (Ok(stream), Ok(simulator)) = (stream, TcpStream::connect(address)) else {
+            return;
+        };
+        for (mut from, mut to) in [
+            (stream.try_clone().unwrap(), simulator.try_clone().unwrap()),
+            (simulator, stream),
+        ] {
+            std::thread::spawn(move || std::io::copy(&mut from, &mut to));
+        }
+    }
+}
+
+#[test]
+fn a_request_waits_for_a_simulator_that_is_not_found_yet() {
+    let lab = Lab::new();
+    let run = Run::start(&lab, "con-early");
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let console = run.console_at(&format!("tcp/{}", listener.local_addr().unwrap()));
+    let mut page = Page::open(&console.entered);
+    assert_eq!(
+        page.until(|message| message["type"] == "simulator")["present"],
+        false
+    );
+
+    page.request(r#"{"do":"step","n":3}"#);
+    let endpoint = run.endpoint.clone();
+    std::thread::spawn(move || forward(&listener, &endpoint));
+
+    let stepped = page.until(|message| message["type"] == "answer");
+    assert_eq!(stepped["answer"]["tick"], 3, "{stepped}");
+    assert_eq!(run.tick(), 3);
 }
 
 #[test]

@@ -32,6 +32,8 @@ pub(crate) struct Feed {
 struct State {
     /// Whether the simulator's liveliness token is declared.
     is_present: bool,
+    /// Whether it ever was.
+    was_present: bool,
     frame: Option<EncodedFrame>,
     /// Number of the newest frame, from 1.
     frame_count: u64,
@@ -93,12 +95,20 @@ impl Feed {
 
     /// The simulator's liveliness token was declared or undeclared.
     pub(crate) fn set_present(&self, is_present: bool) {
-        self.change(|state| state.is_present = is_present);
+        self.change(|state| {
+            state.is_present = is_present;
+            state.was_present |= is_present;
+        });
     }
 
     /// Whether the simulator's liveliness token is declared.
     pub(crate) fn is_present(&self) -> bool {
         self.lock().is_present
+    }
+
+    /// Whether the simulator's liveliness token has been declared at least once.
+    pub(crate) fn was_present(&self) -> bool {
+        self.lock().was_present
     }
 
     /// Number of frames so far.

@@ -27,6 +27,9 @@ const CONNECT_RETRY: Duration = Duration::from_millis(200);
 const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long to wait for the reply to `step`, which comes when its ticks are complete.
 const STEP_TIMEOUT: Duration = Duration::from_secs(600);
+/// How long a request waits for a simulator that the console has not found yet. Both start at the same time, and a page
+/// may be open before one has found the other.
+const FIRST_CONTACT_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long to wait for a requested frame before it is requested again; doubled each time.
 const FRAME_RETRY: Duration = Duration::from_millis(100);
 /// Upper bound of the doubled [`FRAME_RETRY`].
@@ -206,7 +209,7 @@ impl Live {
             ..Command::default()
         };
         message.check().map_err(|error| malformed(&error))?;
-        let bus = self.bus.get().ok_or_else(|| self.no_simulator())?;
+        let bus = self.found_simulator()?;
         let key = self.keys.command(to, &RobotName::operator());
         bus.put(&key, encode(&message))
             .map_err(|error| error.to_string())?;
@@ -223,7 +226,7 @@ impl Live {
 
     fn query(&self, control: &Control, timeout: Duration) -> Result<ControlAnswer, String> {
         control.check().map_err(|error| malformed(&error))?;
-        let bus = self.bus.get().ok_or_else(|| self.no_simulator())?;
+        let bus = self.found_simulator()?;
         let key = self.keys.control();
 
         let sent_at = Instant::now();
@@ -233,6 +236,19 @@ impl Live {
             .ok_or_else(|| self.no_reply(sent_at.elapsed(), timeout))?;
 
         decode(&key, "simulator", &reply.result?).map_err(|error| error.to_string())
+    }
+
+    /// The connection to the simulator; waits until the simulator has been found once.
+    fn found_simulator(&self) -> Result<&Bus, String> {
+        let waited =
+            self.changed
+                .wait_timeout_while(self.lock(), FIRST_CONTACT_TIMEOUT, |demand| {
+                    !demand.is_over && !self.feed.was_present()
+                });
+        drop(waited);
+
+        let bus = self.bus.get().filter(|_| self.feed.was_present());
+        bus.ok_or_else(|| self.no_simulator())
     }
 
     fn no_simulator(&self) -> String {
