@@ -489,7 +489,7 @@ fn a_robot_that_is_cut_off_while_the_run_is_initialized_returns() {
     let mut hall = Hall::start(&lab, run, &plan, &files);
     hall.cables[0].cut();
     lab.ok(&["ctl", "init", "--run", run]);
-    let status = || status(&lab, run).unwrap();
+    let status = || within(FOLLOW, "the status of the run", || status(&lab, run));
     eventually("tick 0 of the next epoch", || {
         let status = status();
         (status["epoch"] == 2 && status["phase"] == "ready").then_some(())

@@ -328,6 +328,8 @@ impl Page {
                     };
                 }
                 Ok(_) => {}
+                // This process was stopped and goes on.
+                Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => {}
                 Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::WouldBlock => {
                     panic!("received nothing for {PATIENCE:?}")
                 }
