@@ -53,6 +53,16 @@ impl Stalls {
         found.iter().map(|(begin, end)| *end - *begin).sum()
     }
 
+    /// How many stalls lasted for longer than this.
+    #[must_use]
+    pub fn longer_than(&self, limit: Duration) -> usize {
+        let found = self.found.lock().expect("no panic");
+        found
+            .iter()
+            .filter(|(begin, end)| *end - *begin > limit)
+            .count()
+    }
+
     /// The time from one instant to a later one without the stalls in between; zero if it is not later.
     #[must_use]
     pub fn time_between(&self, from: Instant, to: Instant) -> Duration {

@@ -209,6 +209,10 @@ fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
     launch.prints("is lost");
     set_deadline(&lab, "late-own", "60 s");
     send(leguin, Signal::SIGCONT);
+    launch.prints("Leguin       is back");
+    // Otherwise a machine that stands still for longer than the lease of a link loses her again.
+    let wait = ["ctl", "late", "wait", "--robot", "Leguin"];
+    lab.ok(&[&wait[..], &["--run", "late-own"]].concat());
     launch.finish();
     let events = lab.events("late-own");
     let of = |kind: &str| -> Vec<u64> {
