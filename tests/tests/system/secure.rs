@@ -141,19 +141,25 @@ impl Castle {
     }
 
     fn control(&self, control: &Control) -> Status {
+        self.try_control(control).expect("an operator is answered")
+    }
+
+    /// The status after a request; `None` without a reply.
+    fn try_control(&self, control: &Control) -> Option<Status> {
         let answer = self
             .operator
             .get_within(&self.keys.control(), "", Some(encode(control)), PATIENCE)
             .unwrap();
-        let bytes = answer.expect("an operator is answered").result.unwrap();
+        let bytes = answer?.result.unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
-            ControlAnswer::Done(status) => *status,
+            ControlAnswer::Done(status) => Some(*status),
             other => panic!("{other:?}"),
         }
     }
 
+    /// There is no reply while a link that a stall of the machine has broken is opened anew.
     fn status(&self) -> Status {
-        self.control(&Control::Status)
+        eventually("the status", || self.try_control(&Control::Status))
     }
 
     /// Steps from tick 0 to this one, which is complete then.
