@@ -1,5 +1,6 @@
 """A real launch to test the console with: simulator, robots and console, each in its own process."""
 
+import itertools
 import json
 import os
 import pathlib
@@ -32,10 +33,21 @@ def until(page, expression):
     return eventually(expression, lambda: page.evaluate(expression))
 
 
+# Not the ports that the kernel gives to connections: another process would take one before it is used.
+PORTS = itertools.cycle(range(11_000, 31_000))
+for _ in range(os.getpid() % 20_000):
+    next(PORTS)
+
+
 def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    for port in PORTS:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+        return port
 
 
 class Processes:
@@ -116,6 +128,11 @@ class Launch:
 
         answer = subprocess.run(command, capture_output=True, timeout=PATIENCE_S, cwd=self.folder)
         return json.loads(answer.stdout) if answer.returncode == 0 else None
+
+    def settled(self):
+        """The status when no tick is open; `None` while one is."""
+        status = self.status()
+        return status if status and not status["awaiting"] else None
 
     def events(self):
         lines = (self.run_folder / "events.jsonl").read_text().splitlines()

@@ -2,7 +2,7 @@
 
 from playwright.sync_api import expect
 
-from lab import eventually, until
+from lab import PATIENCE_S, eventually, until
 
 
 def tick(page):
@@ -40,7 +40,7 @@ def test_step_start_pause_speed_and_init(launch, open_page):
 
     page.get_by_test_id("btn-pause").click()
     shows(page, "paused")
-    held = run.status()
+    held = eventually("the last tick", run.settled)
     assert held["phase"] == "paused"
     assert held["tick"] > 20
     # The last frame may be older than the tick at which the run paused.
@@ -80,7 +80,7 @@ def test_stop_asks_for_confirmation_and_the_last_frame_stays(launch, open_page):
     page.get_by_test_id("btn-stop").click()
     assert run.simulator.poll() is None, "the page asks for confirmation"
     page.get_by_test_id("btn-stop-confirm").click()
-    assert run.simulator.wait(10) == 0
+    assert run.simulator.wait(PATIENCE_S) == 0
 
     expect(page.get_by_test_id("connection")).to_have_text("no simulator")
     assert tick(page) == 1

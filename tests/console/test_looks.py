@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from lab import until
+from lab import eventually, until
 
 SIZES = [(1440, 900), (390, 844)]
 # The design demands this on an otherwise idle machine.
@@ -50,7 +50,6 @@ def test_robots_obstacles_and_floor_are_drawn_in_their_colors(launch, open_page)
     run = launch(options=("--set", "guests.count=0"))
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
-    page.wait_for_timeout(300)
 
     pixel = """([x, y]) => {
         const canvas = document.querySelector('[data-testid=plan]'), box = canvas.getBoundingClientRect();
@@ -60,9 +59,11 @@ def test_robots_obstacles_and_floor_are_drawn_in_their_colors(launch, open_page)
         return [...copy.getImageData(0, 0, 1, 1).data].slice(0, 3);
     }"""
 
-    obstacle = page.evaluate(pixel, [0.45, 0.45])
-    floor = page.evaluate(pixel, [12.3, 11.3])
-    assert sum(obstacle) < 200 < sum(floor), (obstacle, floor)
+    def is_dark(x, y):
+        return sum(page.evaluate(pixel, [x, y])) < 200
+
+    # The plan is empty until it is drawn for the first time.
+    eventually("an obstacle on the floor", lambda: is_dark(0.45, 0.45) and not is_dark(12.3, 11.3))
 
     red, green, blue = page.evaluate(pixel, [7.62 + 0.22, 7.62])
     assert red > green and red > blue, (red, green, blue)

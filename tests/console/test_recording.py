@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from lab import Processes, eventually, start_console, until
+from lab import PATIENCE_S, Processes, eventually, start_console, until
 
 
 @pytest.fixture
@@ -11,7 +11,7 @@ def recorded(launch, tmp_path):
     """The address of a console that shows the recording of a run of 200 ticks."""
     run = launch(options=("--speed", "max", "--duration", "100 s"))
     run.start("cars", "ctl", "start", "--run", run.RUN, "--connect", run.endpoint)
-    assert run.simulator.wait(30) == 0
+    assert run.simulator.wait(PATIENCE_S) == 0
     return start_console(run.processes, "--recording", run.run_folder)
 
 

@@ -12,15 +12,18 @@ pub mod hall;
 pub mod network;
 pub mod processes;
 pub mod pytest;
+pub mod stalls;
 pub mod tools;
 
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU16, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use processes::Running;
+use serde_json::Value;
 
 /// Longest wait of a test.
 pub const PATIENCE: Duration = Duration::from_secs(90);
@@ -161,6 +164,45 @@ impl Lab {
         Running::start(command, run, self.folder.path().join(run))
     }
 
+    /// Requests something of a run in progress; returns the status with which the simulator replies.
+    pub fn ctl(&self, run: &str, args: &[&str]) -> Value {
+        let mut all = vec!["ctl"];
+        all.extend(args);
+        all.extend(["--json", "--run", run]);
+        serde_json::from_str(&self.ok(&all)).unwrap()
+    }
+
+    /// Waits until the robots of a run that begins paused have done tick 0.
+    pub fn until_ready(&self, run: &str) {
+        eventually("the run to be ready", || {
+            let args = ["ctl", "status", "--json", "--run", run];
+            let output = self.cars(&args).output().unwrap();
+            let status: Value = serde_json::from_slice(&output.stdout).ok()?;
+            (status["phase"] == "ready").then_some(())
+        });
+    }
+
+    /// Steps a run that is paused by so many ticks; returns the last one, which is complete.
+    pub fn step(&self, run: &str, ticks: u64) -> u64 {
+        let last = self.settled(run) + ticks;
+        let reply = self.ctl(run, &["step", &ticks.to_string()]);
+        assert_stepped(&reply, last);
+
+        let reached = self.settled(run);
+        assert_eq!(reached, last);
+        reached
+    }
+
+    /// Waits until a run that is paused has no open tick and no steps to go; returns its tick.
+    #[must_use]
+    pub fn settled(&self, run: &str) -> u64 {
+        eventually("the end of the last step", || {
+            let status = self.ctl(run, &["status"]);
+            let is_settled = !is_held(&status) && status["pending_steps"] == 0;
+            is_settled.then(|| status["tick"].as_u64().unwrap())
+        })
+    }
+
     /// A file of a run.
     #[must_use]
     pub fn file(&self, run: &str, name: &str) -> PathBuf {
@@ -187,6 +229,38 @@ impl Lab {
     #[must_use]
     pub fn summary(&self, run: &str) -> serde_json::Value {
         serde_json::from_slice(&std::fs::read(self.file(run, "summary.json")).unwrap()).unwrap()
+    }
+}
+
+/// Asserts that the reply to `step` states the last tick. The reply comes earlier where the clock is held, for a robot that
+/// the machine keeps waiting, for example; then it names the robot, and the steps are still carried out.
+pub fn assert_stepped(reply: &Value, last: u64) {
+    assert!(reply["tick"] == last || is_held(reply), "{reply}");
+}
+
+/// Whether the clock waits for a robot in this status.
+fn is_held(status: &Value) -> bool {
+    let awaiting = status["awaiting"].as_array();
+    awaiting.is_some_and(|robots| !robots.is_empty())
+}
+
+/// A port of this machine at which no process listens. It is not one of those that the kernel gives to connections and to
+/// listeners without a port, so no other process takes it before it is used.
+#[must_use]
+pub fn free_port() -> u16 {
+    static OFFSET: AtomicU16 = AtomicU16::new(0);
+    const FIRST: u16 = 11_000;
+    const COUNT: u16 = 20_000;
+
+    // Processes of tests begin at different places.
+    let begin = std::process::id() % u32::from(COUNT);
+    loop {
+        let offset = u32::from(OFFSET.fetch_add(1, Ordering::Relaxed));
+        let port = u32::from(FIRST) + (begin + offset) % u32::from(COUNT);
+        let port = u16::try_from(port).unwrap();
+        if TcpListener::bind(("127.0.0.1", port)).is_ok() {
+            return port;
+        }
     }
 }
 

@@ -16,8 +16,8 @@ use std::process::ExitCode;
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
-/// How long to wait for the simulator or a robot.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// How long to wait for the simulator or a robot. They reply at once, but a machine under load may keep them from it.
+const PATIENCE: Duration = Duration::from_secs(10);
 /// How long to wait for a step, which takes as long as its ticks.
 const STEP_PATIENCE: Duration = Duration::from_secs(3600);
 /// Number of past lines that `log -f` begins with.
@@ -329,7 +329,7 @@ pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     let (bus, keys) = args.run.open()?;
     let what = args.what.as_deref().unwrap_or(STATE);
     let reply = bus
-        .get(&keys.query(&args.robot, what), "", None)
+        .get_within(&keys.query(&args.robot, what), "", None, PATIENCE)
         .into_diagnostic()?;
     bus.close();
 

@@ -16,7 +16,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 const SCENARIO: &str = "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n";
-const TIME: Duration = Duration::from_secs(20);
+const TIME: Duration = Duration::from_secs(90);
 
 /// A folder with a scenario and a launch file.
 struct Folder(tempfile::TempDir);
@@ -130,7 +130,11 @@ const DEAF: &str = "trap '' TERM; (sleep 600; true) & echo $! > $DIR/child; touc
 
 #[test]
 fn a_run_that_finishes_exits_with_0_and_leaves_logs() {
-    let folder = Folder::new("echo hello; sleep 0.2", "echo ready >&2; sleep 0.1", "");
+    let folder = Folder::new(
+        "echo hello; until [ -e $DIR/done ]; do sleep 0.01; done",
+        "echo ready >&2; touch $DIR/done; sleep 0.1",
+        "",
+    );
     let output = folder.cars(&[]).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert_eq!(text(&output.stderr), "Butler    | ready\n");

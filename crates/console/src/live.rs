@@ -30,6 +30,8 @@ const STEP_TIMEOUT: Duration = Duration::from_secs(600);
 /// How long a request waits for a simulator that the console has not found yet. Both start at the same time, and a page
 /// may be open before one has found the other.
 const FIRST_CONTACT_TIMEOUT: Duration = Duration::from_secs(5);
+/// After this long without a simulator it is not about to be found, and requests do not wait for it.
+const SEARCH: Duration = Duration::from_secs(30);
 /// How long to wait for a requested frame before it is requested again; doubled each time.
 const FRAME_RETRY: Duration = Duration::from_millis(100);
 /// Upper bound of the doubled [`FRAME_RETRY`].
@@ -64,6 +66,8 @@ pub(crate) struct Live {
     connect: String,
     keys: Keys,
     feed: Feed,
+    /// When the console began to look for the simulator.
+    started_at: Instant,
     /// Set when the simulator has been reached.
     bus: OnceLock<Bus>,
     demand: Mutex<Demand>,
@@ -131,6 +135,7 @@ impl Live {
             run,
             connect,
             feed: Feed::new(),
+            started_at: Instant::now(),
             bus: OnceLock::new(),
             demand: Mutex::default(),
             changed: Condvar::new(),
@@ -240,11 +245,13 @@ impl Live {
 
     /// The connection to the simulator; waits until the simulator has been found once.
     fn found_simulator(&self) -> Result<&Bus, String> {
-        let waited =
-            self.changed
-                .wait_timeout_while(self.lock(), FIRST_CONTACT_TIMEOUT, |demand| {
-                    !demand.is_over && !self.feed.was_present()
-                });
+        let rest_of_search = SEARCH.saturating_sub(self.started_at.elapsed());
+        let timeout = FIRST_CONTACT_TIMEOUT.min(rest_of_search);
+        let waited = self
+            .changed
+            .wait_timeout_while(self.lock(), timeout, |demand| {
+                !demand.is_over && !self.feed.was_present()
+            });
         drop(waited);
 
         let bus = self.bus.get().filter(|_| self.feed.was_present());

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import socket
@@ -45,11 +46,23 @@ def environment(**more: str) -> dict[str, str]:
     return own | more
 
 
+PORTS = itertools.cycle(range(11_000, 31_000))
+"""Not those that the kernel gives to connections: another process would take one before it is used."""
+for _ in range(os.getpid() % 20_000):
+    next(PORTS)
+
+
 def free_endpoint(protocol: str = "tcp") -> str:
-    """An endpoint of the loopback interface at which nobody listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+    """An endpoint of the loopback interface at which no process listens."""
+    for port in PORTS:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+        return f"{protocol}/127.0.0.1:{port}"
+    raise AssertionError("the ports never end")
 
 
 class Lab:
@@ -85,6 +98,16 @@ class Lab:
             return (asked.returncode == 0 and "ready" in asked.stdout) or None
 
         eventually("the robots", is_ready)
+
+    def step(self, ticks: int, *ctl: str) -> None:
+        """Steps a run and waits until the last tick is complete: while the clock is held, the answer comes before."""
+        self.cars("ctl", *ctl, "step", str(ticks))
+
+        def is_settled() -> bool | None:
+            status = json.loads(self.cars("ctl", *ctl, "status", "--json"))
+            return (status["pending_steps"] == 0 and not status["awaiting"]) or None
+
+        eventually("the last step", is_settled)
 
     def _run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         command = [str(self.programs / "cars"), *arguments]

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from lab import EXAMPLES, PYTHON, ROOT, Lab, assert_same
+from lab import EXAMPLES, PATIENCE_S, PYTHON, ROOT, Lab, assert_same
 
 EMPTY_HALL = """
 seed = 1
@@ -41,7 +41,7 @@ def test_threads_of_the_middleware_and_start_order_change_nothing(lab: Lab) -> N
         more = {"ZENOH_RUNTIME": runtime} if runtime else {}
         arguments = [[word for name in group for word in ("--name", name)] for group in groups]
         robots = [lab.robot("walker.py", *words, **at, **more) for words in arguments]
-        assert [robot.wait(60) for robot in robots] == [0] * len(groups)
+        assert [robot.wait(PATIENCE_S) for robot in robots] == [0] * len(groups)
         lab.ended(run)
         runs.append(lab.events(run))
     assert_same(*runs)
@@ -54,12 +54,12 @@ def test_init_begins_the_same_run_anew(lab: Lab) -> None:
     digests = []
     for _ in range(2):
         lab.until_ready(*ctl)
-        lab.cars("ctl", *ctl, "step", "60")
+        lab.step(60, *ctl)
         digests.append([event["digest"] for event in lab.of_kind("again", "tick")][-60:])
         lab.cars("ctl", *ctl, "init")
     assert digests[0] == digests[1]
     lab.cars("ctl", *ctl, "stop")
-    assert [robot.wait(30) for robot in robots] == [0, 0]
+    assert [robot.wait(PATIENCE_S) for robot in robots] == [0, 0]
 
 
 def test_one_who_is_killed_comes_back_and_takes_over(lab: Lab) -> None:
@@ -69,12 +69,12 @@ def test_one_who_is_killed_comes_back_and_takes_over(lab: Lab) -> None:
     butler = lab.start([str(lab.programs / "cars-butler")], **at)
     first = lab.robot("leguin.py", **at)
     lab.until_ready(*ctl)
-    lab.cars("ctl", *ctl, "step", "300")
+    lab.step(300, *ctl)
     first.kill()
     second = lab.robot("leguin.py", **at)
-    lab.cars("ctl", *ctl, "step", "300")
+    lab.step(300, *ctl)
     lab.cars("ctl", *ctl, "stop")
-    assert (butler.wait(30), second.wait(30)) == (0, 0)
+    assert (butler.wait(PATIENCE_S), second.wait(PATIENCE_S)) == (0, 0)
     lab.ended("back")
     said = [event["text"] for event in lab.of_kind("back", "say") if event["robot"] == "Leguin"]
     assert "is back, and takes over where the last one was lost" in said
@@ -82,7 +82,7 @@ def test_one_who_is_killed_comes_back_and_takes_over(lab: Lab) -> None:
 
 def status(lab: Lab, program: list[str], *arguments: str, **more: str) -> int:
     """The exit status of a program that ends by itself."""
-    return lab.start([*program, *arguments], **more).wait(30)
+    return lab.start([*program, *arguments], **more).wait(PATIENCE_S)
 
 
 def test_exit_statuses_are_those_of_robots_in_rust(lab: Lab) -> None:
@@ -108,7 +108,7 @@ def test_exit_statuses_are_those_of_robots_in_rust(lab: Lab) -> None:
 def test_a_robot_that_refuses_its_parameters_says_which(lab: Lab) -> None:
     scenario = hall("Leguin") + "params = { cautoin = 1 }\n"
     robot = lab.robot("leguin.py", **lab.simulator("params", scenario))
-    _, said = robot.communicate(timeout=30)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 1
     assert said.startswith("error: parameters of Leguin: unknown parameter cautoin; known are waiter, goods")
 
@@ -135,7 +135,7 @@ def test_waiting_costs_nothing(lab: Lab) -> None:
         subprocess.run(["sleep", "0.1"], check=True)
     assert switches() - before < 200
     robot.send_signal(signal.SIGTERM)
-    assert robot.wait(10) == -signal.SIGTERM
+    assert robot.wait(PATIENCE_S) == -signal.SIGTERM
 
 
 def test_a_secured_run_takes_a_robot_with_its_certificate(lab: Lab) -> None:
@@ -148,14 +148,14 @@ def test_a_secured_run_takes_a_robot_with_its_certificate(lab: Lab) -> None:
 
 def test_an_encrypted_endpoint_wants_a_certificate(lab: Lab) -> None:
     robot = lab.robot("walker.py", "--name", "A", "--connect", "tls/127.0.0.1:1")
-    _, said = robot.communicate(timeout=30)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 1 and "wants a certificate: name a file zenoh.json5" in said
 
 
 def test_an_encrypted_endpoint_wants_one_thread(lab: Lab) -> None:
     arguments = ["--name", "A", "--connect", "tls/127.0.0.1:1", "--zenoh-config", "zenoh.json5"]
     robot = lab.robot("walker.py", *arguments, ZENOH_RUNTIME="(app:(worker_threads:3))")
-    _, said = robot.communicate(timeout=30)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 1 and "unsafe with the threads of ZENOH_RUNTIME" in said
 
 
@@ -169,14 +169,14 @@ def test_the_kit_finds_no_fault(lab: Lab) -> None:
 def test_the_benchmark_measures(lab: Lab) -> None:
     bench = [sys.executable, str(ROOT / "sdk/python/bench.py"), "--rounds", "1", "--robots", "2", "--ticks", "400"]
     measured = lab.start(bench, CARS_BIN_DIR=str(lab.programs))
-    printed, said = measured.communicate(timeout=60)
+    printed, said = measured.communicate(timeout=PATIENCE_S)
     assert measured.returncode == 0, said
     assert [line.split()[1] for line in printed.splitlines()[1:]] == ["Python,", "Rust,", "Python,"]
 
 
 def test_the_summary_names_the_state_variables(lab: Lab) -> None:
     robot = lab.robot("walker.py", **lab.simulator("sum", hall("Walker")))
-    assert robot.wait(60) == 0
+    assert robot.wait(PATIENCE_S) == 0
     lab.ended("sum")
     summary = json.loads((lab.folder / "sum" / "summary.json").read_text())
     assert summary["robots"]["Walker"]["state_variables"]["steps"] > 100

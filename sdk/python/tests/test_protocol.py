@@ -8,7 +8,7 @@ import subprocess
 from typing import Any
 
 import pytest
-from lab import EXAMPLES, eventually
+from lab import EXAMPLES, PATIENCE_S, eventually
 from stage import Stage, flag, welcome
 
 from cars_robot import stream
@@ -64,7 +64,7 @@ def test_a_refusal_ends_it_with_the_reason(stage: Stage) -> None:
     """[join.refused]"""
     stage.welcome = lambda _: {"answer": "refused", "reason": "unknown_name", "explanation": "who is A?"}
     robot = stage.robot()
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert (robot.returncode, said) == (1, "error: A may not join: who is A?\n")
 
 
@@ -76,7 +76,7 @@ def test_a_name_that_is_taken_is_asked_for_again(stage: Stage) -> None:
     assert len(stage.joins) == 3
     stage.welcome = lambda _: taken
     robot = stage.robot("--name", "B", CARS_PATIENCE_S="0.3")
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert (robot.returncode, said) == (1, "error: B may not join: another one is A\n")
 
 
@@ -383,7 +383,7 @@ def test_one_who_is_replaced_ends(stage: Stage) -> None:
     """[return.replaced]"""
     robot = begin(stage)
     stage.clock(1, A={"joined": 2})
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert (robot.returncode, said) == (1, "error: another process is A now\n")
     stage.until_alive()
 
@@ -393,7 +393,7 @@ def test_it_ends_with_the_run(stage: Stage, end: str) -> None:
     """[end.clock]"""
     robot = begin(stage)
     stage.clock(1, end=end)
-    assert robot.wait(20) == 0
+    assert robot.wait(PATIENCE_S) == 0
     stage.until_alive()
 
 
@@ -407,7 +407,7 @@ def test_a_signal_ends_it_cleanly(stage: Stage, number: signal.Signals, order_: 
         if order_ == "ask B":
             stage.heard("robot/A/waiting")
     robot.send_signal(number)
-    assert robot.wait(20) == -number
+    assert robot.wait(PATIENCE_S) == -number
     # The token was taken back before: a process that is killed is noticed as fast, but closes nothing.
     stage.until_alive()
 
@@ -419,7 +419,7 @@ def test_a_flood_holds_the_link_and_not_the_end(stage: Stage) -> None:
     for tick in range(2, 12_000):
         stage.news("A", tick, commands=[says("note " + "x" * 100)])
     robot.send_signal(signal.SIGTERM)
-    assert robot.wait(20) == -signal.SIGTERM
+    assert robot.wait(PATIENCE_S) == -signal.SIGTERM
 
 
 def test_a_flood_is_survived(stage: Stage) -> None:
@@ -481,7 +481,7 @@ def test_what_is_damaged_changes_nothing(stage: Stage) -> None:
     assert "command B note fine" in report["log"]
     assert robot.poll() is None
     stage.clock(2, end="finished")
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 0
     assert said.count("malformed message on cars/r/clock from simulator") == len(DAMAGED)
     assert said.count("malformed message on cars/r/robot/A/news from simulator: field") == len(WRONG)
@@ -504,7 +504,7 @@ def test_numbers_that_are_none_do_not_travel(stage: Stage) -> None:
 def test_a_robot_that_fails_ends_with_its_traceback(stage: Stage) -> None:
     robot = begin(stage)
     stage.clock(1, A={"commands": [says("fail")]})
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 1 and "ZeroDivisionError: as it was told" in said and said.endswith("see above\n")
     stage.until_alive()
 
@@ -531,14 +531,14 @@ def test_several_robots_share_a_session(stage: Stage) -> None:
 def test_a_simulator_that_is_gone_is_waited_for(stage: Stage) -> None:
     robot = begin(stage, "--gone-patience-s", "0.5")
     stage.session.close()  # type: ignore[no-untyped-call]
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 1 and said.endswith("error: the simulator has been gone for 0.5 s\n"), said
 
 
 def test_where_nobody_is_it_says_what_to_do(stage: Stage) -> None:
     robot = stage.robot("--run", "another", CARS_PATIENCE_S="0.3")
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 1 and "no simulator of run another answers at tcp/" in said
     robot = stage.robot("--connect", "tcp/127.0.0.1:1", CARS_PATIENCE_S="0.3")
-    _, said = robot.communicate(timeout=20)
+    _, said = robot.communicate(timeout=PATIENCE_S)
     assert robot.returncode == 1 and "cannot reach the simulator at tcp/127.0.0.1:1" in said and ".rs" not in said

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use system_tests::processes::{Running, send};
-use system_tests::{Lab, assert_same, eventually};
+use system_tests::{Lab, assert_same, assert_stepped, eventually};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
 
@@ -13,26 +13,12 @@ fn status(lab: &Lab, run: &str) -> Value {
     serde_json::from_str(&lab.ok(&["ctl", "status", "--json", "--run", run])).unwrap()
 }
 
-fn ctl(lab: &Lab, run: &str, args: &[&str]) -> Value {
-    let mut all = vec!["ctl"];
-    all.extend(args);
-    all.extend(["--json", "--run", run]);
-    serde_json::from_str(&lab.ok(&all)).unwrap()
-}
-
 /// A launch that has gathered its robots and waits for `start`.
 fn paused(lab: &Lab, run: &str, more: &[&str]) -> Running {
     let mut args = vec!["launch", FILE, "--paused", "--speed", "max"];
     args.extend(more);
     let launch = lab.start(run, &args);
-    eventually("the launch to be ready", || {
-        let output = lab
-            .cars(&["ctl", "status", "--json", "--run", run])
-            .output()
-            .unwrap();
-        let status: Value = serde_json::from_slice(&output.stdout).ok()?;
-        (status["phase"] == "ready").then_some(())
-    });
+    lab.until_ready(run);
 
     launch
 }
@@ -42,20 +28,20 @@ fn step_answers_with_the_tick_reached_and_the_buttons_do_what_they_say() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-buttons", &["--duration", "60 s"]);
     assert_eq!(status(&lab, "ctl-buttons")["tick"], 0);
-    assert_eq!(ctl(&lab, "ctl-buttons", &["step", "10"])["tick"], 10);
-    assert_eq!(ctl(&lab, "ctl-buttons", &["step"])["tick"], 11);
-    assert_eq!(ctl(&lab, "ctl-buttons", &["speed", "2"])["speed"], 2.0);
-    assert_eq!(ctl(&lab, "ctl-buttons", &["start"])["phase"], "running");
+    assert_eq!(lab.step("ctl-buttons", 10), 10);
+    assert_stepped(&lab.ctl("ctl-buttons", &["step"]), 11);
+    assert_eq!(lab.settled("ctl-buttons"), 11);
+    assert_eq!(lab.ctl("ctl-buttons", &["speed", "2"])["speed"], 2.0);
+    assert_eq!(lab.ctl("ctl-buttons", &["start"])["phase"], "running");
 
     let (code, text) = lab.fails(&["ctl", "step", "--run", "ctl-buttons"]);
     assert!(code == 1 && text.contains("pause it to step"), "{text}");
-    assert_eq!(ctl(&lab, "ctl-buttons", &["pause"])["phase"], "paused");
+    assert_eq!(lab.ctl("ctl-buttons", &["pause"])["phase"], "paused");
 
-    let at = status(&lab, "ctl-buttons")["tick"].as_u64().unwrap();
-    assert_eq!(ctl(&lab, "ctl-buttons", &["step", "3"])["tick"], at + 3);
+    lab.step("ctl-buttons", 3);
 
-    ctl(&lab, "ctl-buttons", &["speed", "max"]);
-    ctl(&lab, "ctl-buttons", &["start"]);
+    lab.ctl("ctl-buttons", &["speed", "max"]);
+    lab.ctl("ctl-buttons", &["start"]);
     launch.finish();
     assert_eq!(lab.summary("ctl-buttons")["ticks"], 120);
 }
@@ -64,8 +50,8 @@ fn step_answers_with_the_tick_reached_and_the_buttons_do_what_they_say() {
 fn pausing_and_stepping_change_nothing_in_the_record() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-paused", &["--duration", "60 s"]);
-    ctl(&lab, "ctl-paused", &["step", "33"]);
-    ctl(&lab, "ctl-paused", &["start"]);
+    lab.step("ctl-paused", 33);
+    lab.ctl("ctl-paused", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-straight", "--duration", "60 s"]);
     assert_same(
@@ -78,9 +64,9 @@ fn pausing_and_stepping_change_nothing_in_the_record() {
 fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-init", &["--duration", "60 s"]);
-    ctl(&lab, "ctl-init", &["step", "50"]);
+    lab.step("ctl-init", 50);
     let before = launch.processes();
-    ctl(&lab, "ctl-init", &["init"]);
+    lab.ctl("ctl-init", &["init"]);
     let again = eventually("the new epoch", || {
         let status = status(&lab, "ctl-init");
         (status["phase"] == "ready" && status["epoch"] == 2).then_some(status)
@@ -88,7 +74,7 @@ fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
     assert_eq!(again["tick"], 0);
     assert_eq!(launch.processes(), before);
 
-    ctl(&lab, "ctl-init", &["start"]);
+    lab.ctl("ctl-init", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-fresh", "--duration", "60 s"]);
     assert_same(
@@ -109,11 +95,11 @@ fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
 fn init_with_another_seed_is_another_run() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-seed", &["--duration", "30 s"]);
-    ctl(&lab, "ctl-seed", &["init", "--seed", "77"]);
+    lab.ctl("ctl-seed", &["init", "--seed", "77"]);
     eventually("the new epoch", || {
         (status(&lab, "ctl-seed")["phase"] == "ready").then_some(())
     });
-    ctl(&lab, "ctl-seed", &["start"]);
+    lab.ctl("ctl-seed", &["start"]);
     launch.finish();
     lab.ok(&[
         "run",
@@ -136,13 +122,13 @@ fn init_with_another_seed_is_another_run() {
 fn control_answers_at_once_while_the_clock_is_held() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-held", &["--duration", "60 s"]);
-    ctl(&lab, "ctl-held", &["step", "5"]);
+    lab.step("ctl-held", 5);
     let leguin = launch.process("cars-leguin");
     send(leguin, Signal::SIGSTOP);
 
     // Less than the time after which an asker gives up.
     let begun = Instant::now();
-    let stepped = ctl(&lab, "ctl-held", &["step", "10"]);
+    let stepped = lab.ctl("ctl-held", &["step", "10"]);
     assert!(
         begun.elapsed() < Duration::from_secs(10),
         "step took {:?}",
@@ -158,11 +144,11 @@ fn control_answers_at_once_while_the_clock_is_held() {
         .collect();
 
     assert!(awaited.contains(&"Leguin"), "{stepped}");
-    assert_eq!(ctl(&lab, "ctl-held", &["pause"])["phase"], "paused");
+    assert_eq!(lab.ctl("ctl-held", &["pause"])["phase"], "paused");
     assert_eq!(status(&lab, "ctl-held")["phase"], "paused");
 
     send(leguin, Signal::SIGCONT);
-    ctl(&lab, "ctl-held", &["start"]);
+    lab.ctl("ctl-held", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-not-held", "--duration", "60 s"]);
     assert_same(
@@ -175,16 +161,16 @@ fn control_answers_at_once_while_the_clock_is_held() {
 fn init_ends_a_tick_that_hangs() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-rescue", &["--duration", "30 s"]);
-    ctl(&lab, "ctl-rescue", &["step", "5"]);
+    lab.step("ctl-rescue", 5);
     let leguin = launch.process("cars-leguin");
     send(leguin, Signal::SIGSTOP);
-    ctl(&lab, "ctl-rescue", &["step", "10"]);
-    ctl(&lab, "ctl-rescue", &["init"]);
+    lab.ctl("ctl-rescue", &["step", "10"]);
+    lab.ctl("ctl-rescue", &["init"]);
     send(leguin, Signal::SIGCONT);
     eventually("the new epoch", || {
         (status(&lab, "ctl-rescue")["phase"] == "ready").then_some(())
     });
-    ctl(&lab, "ctl-rescue", &["start"]);
+    lab.ctl("ctl-rescue", &["start"]);
     launch.finish();
     lab.ok(&["run", FILE, "--run", "ctl-no-rescue", "--duration", "30 s"]);
     assert_same(
@@ -197,7 +183,7 @@ fn init_ends_a_tick_that_hangs() {
 fn stop_ends_the_run_with_its_record_complete() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-stop", &[]);
-    ctl(&lab, "ctl-stop", &["step", "20"]);
+    lab.step("ctl-stop", 20);
     lab.ok(&["ctl", "stop", "--run", "ctl-stop"]);
     launch.finish();
     let events = lab.events("ctl-stop");
@@ -217,7 +203,7 @@ fn stop_ends_the_run_with_its_record_complete() {
 fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-load", &["--duration", "60 s"]);
-    ctl(&lab, "ctl-load", &["step", "20"]);
+    lab.step("ctl-load", 20);
     let processes = launch.processes();
     let scenario = lab.ok(&["ctl", "scenario", "--run", "ctl-load"]);
     assert!(scenario.contains("count = 100"), "{scenario}");
@@ -229,7 +215,7 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
             .replace("seed = 2002", "seed = 5"),
     );
     let fewer = fewer.to_str().unwrap();
-    ctl(&lab, "ctl-load", &["load", fewer]);
+    lab.ctl("ctl-load", &["load", fewer]);
     eventually("the new epoch", || {
         let status = status(&lab, "ctl-load");
         (status["phase"] == "ready" && status["epoch"] == 2 && status["seed"] == 5).then_some(())
@@ -246,7 +232,7 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
 
     assert!(text.contains("Vonda"), "{text}");
 
-    ctl(&lab, "ctl-load", &["start"]);
+    lab.ctl("ctl-load", &["start"]);
     launch.finish();
 
     // What is kept of the second epoch is what a fresh run of its scenario gives, and the first epoch is kept, too.
@@ -286,14 +272,14 @@ fn a_clock_that_waits_for_nobody_can_be_paused() {
         "on_late=continue",
     ];
     let mut launch = paused(&lab, "ctl-nobody", &args);
-    ctl(&lab, "ctl-nobody", &["start"]);
+    lab.ctl("ctl-nobody", &["start"]);
     eventually("ticks without robots", || {
         let tick = status(&lab, "ctl-nobody")["tick"].as_u64().unwrap();
         (tick > 1_000).then_some(())
     });
 
-    assert_eq!(ctl(&lab, "ctl-nobody", &["pause"])["phase"], "paused");
-    ctl(&lab, "ctl-nobody", &["stop"]);
+    assert_eq!(lab.ctl("ctl-nobody", &["pause"])["phase"], "paused");
+    lab.ctl("ctl-nobody", &["stop"]);
     launch.wait();
 }
 
@@ -302,23 +288,16 @@ fn a_step_is_answered_although_others_ask_meanwhile() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-asked", &["--duration", "10000 s"]);
     std::thread::scope(|scope| {
-        let stepped = scope.spawn(|| ctl(&lab, "ctl-asked", &["step", "4000"]));
+        let stepped = scope.spawn(|| lab.ctl("ctl-asked", &["step", "4000"]));
         eventually("the steps to be under way", || {
             let tick = status(&lab, "ctl-asked")["tick"].as_u64().unwrap();
             (tick > 0).then_some(())
         });
 
-        let answer = stepped.join().unwrap();
-        let is_held = answer["awaiting"]
-            .as_array()
-            .is_some_and(|names| !names.is_empty());
-        // Who steps a clock that is held, by a robot that a busy machine keeps waiting, is told how far it is.
-        assert!(answer["tick"] == 4_000 || is_held, "{answer}");
+        assert_stepped(&stepped.join().unwrap(), 4_000);
     });
-    eventually("the last of the steps", || {
-        (status(&lab, "ctl-asked")["tick"] == 4_000).then_some(())
-    });
+    assert_eq!(lab.settled("ctl-asked"), 4_000);
 
-    ctl(&lab, "ctl-asked", &["stop"]);
+    lab.ctl("ctl-asked", &["stop"]);
     launch.wait();
 }

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use system_tests::network::{Row, has_namespaces, namespaces_of};
 use system_tests::processes::{Running, nobody_is_left};
+use system_tests::stalls::Stalls;
 use system_tests::tools::{lacks_tool, skip};
 use system_tests::{Lab, assert_same, programs, root, side_by_side};
 
@@ -66,6 +67,7 @@ fn nothing_is_left(run: &str, player: &Running) {
 fn a_cut_changes_nothing(via: &str, cut_s: u64) {
     let (lab, run) = (Lab::new(), format!("cut-{via}-{cut_s}"));
     let plan = plan(&lab, cut_s, "\"cut\"");
+    let stalls = Stalls::watch();
     let mut player = play(&lab, &run, via, &plan, &["--duration", "60 s"]);
     let cut = player.prints("the link of Leguin is cut");
     let named = player.prints_after("waiting for Leguin", Some(cut));
@@ -73,11 +75,9 @@ fn a_cut_changes_nothing(via: &str, cut_s: u64) {
     let healed = player.prints_after("the link of Leguin is whole", Some(cut));
     // The two lines come from two processes: the clock may go on before the healing is printed.
     let went_on = player.prints_after("the clock goes on", Some(gone));
-    let (named, gone, went_on) = (
-        named - cut,
-        gone - cut,
-        went_on.saturating_duration_since(healed),
-    );
+    let named = stalls.time_between(cut, named);
+    let gone = stalls.time_between(cut, gone);
+    let went_on = stalls.time_between(healed, went_on);
     println!(
         "{via}, {cut_s} s: named after {named:?}, gone after {gone:?}, on {went_on:?} after healing"
     );
@@ -112,14 +112,28 @@ fn a_cut_changes_nothing(via: &str, cut_s: u64) {
             .map(|(a, b)| b - a <= 1),
         Some(true)
     );
+    // The player may be late to cut the link.
+    let time_s = |change: usize| record[change]["time_s"].as_f64().unwrap();
+    let was_cut_s = time_s(1) - time_s(0);
     let held_s = lab.summary(&run)["wall"]["held_up_by"]["Leguin"]["longest_s"]
         .as_f64()
         .unwrap();
     assert!(
-        held_s > cut_s as f64 - 0.5,
-        "the summary says who held up the run: {held_s}"
+        held_s > was_cut_s - 0.5,
+        "the summary names who held up the run: {held_s} s of {was_cut_s} s"
     );
     nothing_is_left(&run, &player);
+}
+
+/// The link of Butler was whole: the clock never waited for him, but for what the machine took.
+fn assert_butler_is_heard(lab: &Lab, run: &str, stalls: &Stalls) {
+    let held = lab.summary(run)["wall"]["held_up_by"]["Butler"]["longest_s"].clone();
+    let held_s = held.as_f64().unwrap_or(0.0);
+    let most = ROOM + stalls.total();
+    assert!(
+        held_s < most.as_secs_f64(),
+        "{held_s} s, more than {most:?}"
+    );
 }
 
 /// `on_late = "continue"`: the run goes on without Leguin, and says in its record when she was lost and when she was back.
@@ -129,23 +143,25 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
 
     // Twenty ticks a second: the run is still under way when the link has healed.
     let duration = format!("{} s", 10 * (cut_s + 6));
+    // The clock waits for Butler, whom the machine may keep waiting for longer than the deadline.
     let set = [
         "--set",
-        "on_late=continue",
+        "robot.Leguin.on_late=continue",
         "--set",
         "deadline=0.5 s",
         "--duration",
         &duration,
     ];
+    let stalls = Stalls::watch();
     let mut player = play(&lab, &run, via, &plan, &set);
-    let healed = player.prints("the link of Leguin is whole");
-    let back = player.prints_after("Leguin       is back", Some(healed));
-    println!("{via}, {cut_s} s: back {:?} after healing", back - healed);
-    assert!(
-        back - healed < HEALED + ROOM,
-        "back {:?} after healing",
-        back - healed
-    );
+    let cut = player.prints("the link of Leguin is cut");
+    let lost = player.prints_after("Leguin       is lost", Some(cut));
+    let healed = player.prints_after("the link of Leguin is whole", Some(cut));
+    // She may be back before the other process has printed that her link is whole.
+    let back = player.prints_after("Leguin       is back", Some(lost));
+    let back = stalls.time_between(healed, back);
+    println!("{via}, {cut_s} s: back {back:?} after healing");
+    assert!(back < HEALED + ROOM, "back {back:?} after healing");
 
     player.finish();
     let events = lab.events(&run);
@@ -161,16 +177,21 @@ fn a_cut_loses_a_robot_that_returns(via: &str, cut_s: u64) {
     println!("{via}, {cut_s} s: lost at tick {lost}, back at tick {joined}");
     assert!(lost > 0 && lost < joined);
 
+    assert_butler_is_heard(&lab, &run, &stalls);
+
     let missed = events.iter().filter(|event| event["event"] == "missed");
-    assert!(
-        missed.clone().all(|event| event["robot"] == "Leguin"),
-        "only the cut robot missed ticks"
-    );
     assert!(
         missed.count() as u64 >= joined - lost,
         "every tick without her is recorded"
     );
-    assert_eq!(lab.summary(&run)["robots"]["Leguin"]["returns"], 1);
+    // A machine that stands still for about as long as the lease makes both sides give a whole link up.
+    let stalls = stalls.longer_than(LEASE / 2) as u64;
+    let returns = lab.summary(&run)["robots"]["Leguin"]["returns"].as_u64();
+    let returns = returns.expect("a number");
+    assert!(
+        (1..=1 + stalls).contains(&returns),
+        "{returns} returns, {stalls} stalls"
+    );
 
     nothing_is_left(&run, &player);
 }
@@ -217,7 +238,7 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
     let (lab, run) = (Lab::new(), "partition-on-links");
     let file = "launch/partition.toml";
 
-    // From 120 s to 240 s at this speed: from 2 s to 4 s of the wall clock.
+    // From 120 s to 240 s at this speed: from 4 s to 8 s of the wall clock.
     let mut player = lab.start(
         run,
         &[
@@ -227,7 +248,7 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
             "--via",
             "proxy",
             "--speed",
-            "60",
+            "30",
             "--duration",
             "300 s",
         ],
@@ -279,22 +300,26 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
     ];
     let set = [
         "--set",
-        "on_late=continue",
+        "robot.Leguin.on_late=continue",
+        "--set",
+        "robot.Vonda.on_late=continue",
         "--set",
         "deadline=0.5 s",
         "--duration",
         "120 s",
     ];
+    let stalls = Stalls::watch();
     let mut player = lab.start(
         run,
         &[&args, [plan.to_str().unwrap()].as_slice(), &set].concat(),
     );
-    let healed = player.prints("the link of Vonda is whole");
+    let cut = player.prints("the link of Vonda is cut");
+    let healed = player.prints_after("the link of Vonda is whole", Some(cut));
 
-    for robot in ["Leguin       is back", "Vonda        is back"] {
-        let back = player
-            .prints_after(robot, Some(healed - ROOM))
-            .saturating_duration_since(healed);
+    for robot in ["Leguin", "Vonda"] {
+        let lost = player.prints_after(&format!("{robot:<12} is lost"), Some(cut));
+        let back = player.prints_after(&format!("{robot:<12} is back"), Some(lost));
+        let back = stalls.time_between(healed, back);
         println!("{robot} {back:?} after healing");
         assert!(back < HEALED + ROOM, "{robot} {back:?} after healing");
     }
@@ -309,7 +334,7 @@ fn several_links_cut_at_once_hold_up_nobody_else() {
     };
 
     assert!(missed("Leguin") > 0 && missed("Vonda") > 0);
-    assert_eq!(missed("Butler"), 0, "his link was whole");
+    assert_butler_is_heard(&lab, run, &stalls);
 
     nothing_is_left(run, &player);
 }

@@ -10,7 +10,6 @@ mod plan;
 mod rogue;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -20,7 +19,7 @@ use protocol::messages::OnLate;
 use protocol::{RobotName, RunName};
 use serde_json::Value;
 use system_tests::processes::{Running, named, nobody_is_left, send};
-use system_tests::{Lab, assert_same, eventually, is_within, within};
+use system_tests::{Lab, assert_same, eventually, free_port, is_within, within};
 
 use cable::Cable;
 use plan::{Fault, Flood, Plan};
@@ -113,11 +112,7 @@ struct Hall<'a> {
 impl<'a> Hall<'a> {
     /// Starts a launch and waits until its clock runs.
     fn start(lab: &'a Lab, run: &str, plan: &Plan, files: &Files) -> Self {
-        let port = TcpListener::bind(("127.0.0.1", 0))
-            .unwrap()
-            .local_addr()
-            .unwrap()
-            .port();
+        let port = free_port();
         let scheme = if plan.is_secured { "tls" } else { "tcp" };
         let robots: Vec<RobotName> = (0..plan.robots)
             .map(|i| RobotName::new(&format!("R{i}")).unwrap())
@@ -494,7 +489,7 @@ fn a_robot_that_is_cut_off_while_the_run_is_initialized_returns() {
     let mut hall = Hall::start(&lab, run, &plan, &files);
     hall.cables[0].cut();
     lab.ok(&["ctl", "init", "--run", run]);
-    let status = || status(&lab, run).unwrap();
+    let status = || within(FOLLOW, "the status of the run", || status(&lab, run));
     eventually("tick 0 of the next epoch", || {
         let status = status();
         (status["epoch"] == 2 && status["phase"] == "ready").then_some(())

@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bus::{Bus, Declared, Role};
+use bus::{Bus, Declared, Reply, Role};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{Clock, Control, ControlAnswer, Status};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::json;
 use system_tests::processes::Running;
-use system_tests::{Lab, PATIENCE, assert_same, eventually, programs};
+use system_tests::{Lab, PATIENCE, assert_same, eventually, free_port, programs};
 
 /// A message that is not valid JSON.
 const RUBBISH: &[u8] = b"rubbish";
@@ -51,12 +51,27 @@ fn flat(text: &str) -> String {
         .join(" ")
 }
 
+/// Opens a session that may be refused.
 fn open(endpoint: &str, config: Option<&PathBuf>) -> Result<Bus, String> {
+    open_within(Duration::from_millis(500), endpoint, config)
+}
+
+fn open_within(
+    patience: Duration,
+    endpoint: &str,
+    config: Option<&PathBuf>,
+) -> Result<Bus, String> {
     let role = Role::Client {
         connect: endpoint.to_owned(),
-        patience: Duration::from_millis(500),
+        patience,
     };
     Bus::open(&role, config).map_err(|error| error.to_string())
+}
+
+/// Sends a query without a body that is answered.
+fn get(bus: &Bus, key: &str) -> Reply {
+    let reply = bus.get_within(key, "", None, PATIENCE).unwrap();
+    reply.unwrap_or_else(|| panic!("{key} is not answered"))
 }
 
 /// The hall, launched with certificates and stepped by hand.
@@ -98,7 +113,8 @@ impl Castle {
 
         assert!(endpoint.starts_with("tls/127.0.0.1:"), "{endpoint}");
 
-        let operator = open(&endpoint, Some(&config(&folder, "operator"))).unwrap();
+        let certificate = config(&folder, "operator");
+        let operator = open_within(PATIENCE, &endpoint, Some(&certificate)).unwrap();
         let run = RunName::new(run).unwrap();
         let keys = Keys::new(&run);
         let castle = Self {
@@ -120,23 +136,36 @@ impl Castle {
 
     /// A further session with a participant's certificate: a stolen key, or a robot that misbehaves.
     fn enter(&self, participant: &str) -> Bus {
-        open(&self.endpoint, Some(&config(&self.folder, participant))).unwrap()
+        let certificate = config(&self.folder, participant);
+        open_within(PATIENCE, &self.endpoint, Some(&certificate)).unwrap()
     }
 
     fn control(&self, control: &Control) -> Status {
+        self.try_control(control).expect("an operator is answered")
+    }
+
+    /// The status after a request; `None` without a reply.
+    fn try_control(&self, control: &Control) -> Option<Status> {
         let answer = self
             .operator
             .get_within(&self.keys.control(), "", Some(encode(control)), PATIENCE)
             .unwrap();
-        let bytes = answer.expect("an operator is answered").result.unwrap();
+        let bytes = answer?.result.unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
-            ControlAnswer::Done(status) => *status,
+            ControlAnswer::Done(status) => Some(*status),
             other => panic!("{other:?}"),
         }
     }
 
+    /// There is no reply while a link that a stall of the machine has broken is opened anew.
     fn status(&self) -> Status {
-        self.control(&Control::Status)
+        eventually("the status", || self.try_control(&Control::Status))
+    }
+
+    /// Steps from tick 0 to this one, which is complete then.
+    fn step(&self, last: u64) {
+        let run = self.run.as_str();
+        assert_eq!(self.lab.step(run, last), last);
     }
 
     /// How many messages the simulator has counted and ignored, once they are `expected`.
@@ -190,7 +219,7 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
     let lab = &castle.lab;
 
     // Its owner names the run only: the address and the certificate are in the run's folder.
-    lab.ok(&["ctl", "step", "30", "--run", "secure-same"]);
+    assert_eq!(lab.step("secure-same", 30), 30);
     assert!(
         lab.ok(&["ctl", "status", "--run", "secure-same"])
             .contains("tick 30")
@@ -277,11 +306,7 @@ fn no_robot_passes_for_the_simulator() {
     // Leguin's certificate, where the simulator's should be.
     let own = std::fs::read_to_string(config(&folder, "Leguin")).unwrap();
     let forged = lab.write("forged.json5", &own.replace("connect_", "listen_"));
-    let port = std::net::TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap()
-        .port();
+    let port = free_port();
     let endpoint = format!("tls/127.0.0.1:{port}");
     let role = Role::Router {
         listen: endpoint.clone(),
@@ -318,8 +343,7 @@ fn a_participant_puts_nothing_in_anothers_name() {
     ]
     .map(|key| received.on(&castle.operator, &key));
     // A reply on the same link follows what was declared before: from here on the subscribers are in effect.
-    let reply = witness.get(&keys.query(&leguin, STATE), "", None).unwrap();
-    assert!(reply.is_some());
+    get(&witness, &keys.query(&leguin, STATE));
     castle.status();
 
     let clock = Clock {
@@ -425,14 +449,13 @@ fn a_robot_neither_queries_nor_receives_nor_replies_what_is_not_its_own() {
     }
 
     // Under its own key, in another robot's name: access control lets it pass, and the simulator refuses it.
-    let reply = thief.get(&keys.join_as(&leguin), "", Some(as_butler));
+    let reply = thief.get_within(&keys.join_as(&leguin), "", Some(as_butler), PATIENCE);
     let answer = reply.unwrap().unwrap().result.unwrap();
     assert!(
         String::from_utf8_lossy(&answer).contains("Leguin cannot join as Butler"),
         "{answer:?}"
     );
-    let state = thief.get(&keys.query(&butler, STATE), "", None).unwrap();
-    assert!(state.is_some());
+    get(&thief, &keys.query(&butler, STATE));
 
     // It subscribes to what is not its own.
     let secrets = Received::default();
@@ -466,14 +489,13 @@ fn a_robot_neither_queries_nor_receives_nor_replies_what_is_not_its_own() {
             })
             .unwrap()
     });
-    let state = listener.get(&keys.query(&butler, STATE), "", None).unwrap();
-    assert!(state.is_some());
+    get(&listener, &keys.query(&butler, STATE));
 
-    castle.control(&Control::Step { n: 80 });
+    castle.step(80);
     eventually("clocks", || (clocks.keys().len() >= 80).then_some(()));
     assert!(!own_news.keys().is_empty(), "it gets its own news");
-    let reply = castle.operator.get(&keys.query(&butler, STATE), "", None);
-    let state = reply.unwrap().unwrap().result.unwrap();
+    let state = get(&castle.operator, &keys.query(&butler, STATE));
+    let state = state.result.unwrap();
     assert!(String::from_utf8_lossy(&state).contains("\"tick\":80"));
     assert_eq!(secrets.keys(), Vec::<String>::new());
     assert_eq!(queries.load(Ordering::Relaxed), 0);
@@ -531,8 +553,9 @@ fn large_queries_do_not_close_the_link_of_the_robot_that_gets_them() {
     let sending = std::thread::spawn(move || {
         let key = keys.query(&name("Leguin"), STATE);
         for bytes in [150_000, 300_000, 1_000_000, 1_000_000, 1_000_000] {
-            let answer = intruder.get(&key, "", Some(vec![b'x'; bytes])).unwrap();
-            assert!(answer.is_some(), "a query of {bytes} bytes is not answered");
+            let answer = intruder.get_within(&key, "", Some(vec![b'x'; bytes]), PATIENCE);
+            let is_answered = answer.unwrap().is_some();
+            assert!(is_answered, "a query of {bytes} bytes is not answered");
         }
     });
 
@@ -561,7 +584,7 @@ fn a_session_id_belongs_to_the_certificate_that_used_it_first() {
     let castle = Castle::new("secure-id");
     let own = config_with_id(&castle, "Leguin", ID);
     let stolen = config_with_id(&castle, "Vonda", ID);
-    let owner = open(&castle.endpoint, Some(&own)).unwrap();
+    let owner = open_within(PATIENCE, &castle.endpoint, Some(&own)).unwrap();
     assert_eq!(owner.id(), ID);
 
     // Whether the owner is connected or not: as after a broken link.
@@ -577,7 +600,7 @@ fn a_session_id_belongs_to_the_certificate_that_used_it_first() {
     back.close();
     let other = castle.enter("Vonda");
     other.close();
-    castle.control(&Control::Step { n: 60 });
+    castle.step(60);
     castle.finish_unharmed();
 }
 
@@ -672,11 +695,7 @@ fn silent_connections_keep_no_robot_out() {
 #[test]
 fn nothing_listens_for_strangers_unless_that_is_said() {
     let lab = Lab::new();
-    let port = std::net::TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap()
-        .port();
+    let port = free_port();
     let listen = format!("--listen=tcp/0.0.0.0:{port}");
     let args = [
         "launch",

@@ -1,6 +1,6 @@
 //! From a shell: the calls between robots, the log, checks, the plain roster.
 
-use system_tests::{Lab, eventually};
+use system_tests::Lab;
 
 #[test]
 fn a_robot_can_be_asked_and_commanded_from_a_shell() {
@@ -15,13 +15,8 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
             "60 s",
         ],
     );
-    eventually("the run", || {
-        lab.cars(&["ctl", "step", "--run", "shell"])
-            .status()
-            .unwrap()
-            .success()
-            .then_some(())
-    });
+    lab.until_ready("shell");
+    lab.step("shell", 1);
     let ask = |what| lab.ok(&["query", "Leguin", what, "--run", "shell"]);
     assert_eq!(ask("emotion_state").trim(), "HAPPY");
     assert_eq!(ask("behavior_state").trim(), "WAIT");
@@ -31,7 +26,7 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
 
     let sent = lab.ok(&["command", "Leguin", "refill", "--run", "shell"]);
     assert!(sent.contains("Leguin receives"), "{sent}");
-    lab.ok(&["ctl", "step", "3", "--run", "shell"]);
+    lab.step("shell", 3);
     assert_eq!(
         ask("behavior_state").trim(),
         "REFILL",
@@ -78,13 +73,8 @@ fn the_log_can_be_followed_to_the_end() {
         ],
     );
 
-    eventually("the run", || {
-        lab.cars(&["ctl", "step", "--run", "follow"])
-            .status()
-            .unwrap()
-            .success()
-            .then_some(())
-    });
+    lab.until_ready("follow");
+    lab.step("follow", 1);
 
     let mut log = lab.start("follow", &["log", "-f"]);
     log.prints("initialized");
@@ -216,13 +206,8 @@ fn a_run_in_progress_is_not_overwritten() {
         "twice",
         &["launch", "launch/hors_doeuvres.toml", "--paused"],
     );
-    eventually("the run", || {
-        lab.cars(&["ctl", "step", "--run", "twice"])
-            .status()
-            .unwrap()
-            .success()
-            .then_some(())
-    });
+    lab.until_ready("twice");
+    lab.step("twice", 1);
 
     for how in ["launch", "run"] {
         let (_, text) = lab.fails(&[how, "launch/hors_doeuvres.toml", "--run", "twice"]);

@@ -7,13 +7,13 @@ use std::time::Duration;
 use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{
-    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, News, Performative, Point,
-    PublicState, Refusal, Report, Status, Welcome,
+    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, News, OnLate, Performative,
+    Point, PublicState, Refusal, Report, Status, Welcome,
 };
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
 use system_tests::processes::Running;
-use system_tests::{Lab, PATIENCE, eventually, programs};
+use system_tests::{Lab, PATIENCE, eventually, free_port, programs};
 
 /// A simulator with robots A and B, and a session of our own.
 struct Wire {
@@ -41,12 +41,7 @@ impl Wire {
     fn with(run: &str, more: &str) -> Self {
         let lab = Lab::new();
         let scenario = lab.write("two.toml", &format!("{more}\n{SCENARIO}"));
-        let port = std::net::TcpListener::bind("127.0.0.1:0")
-            .unwrap()
-            .local_addr()
-            .unwrap()
-            .port();
-        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let endpoint = format!("tcp/127.0.0.1:{}", free_port());
         let mut command = process::Command::new(programs().join("cars-sim"));
         command
             .arg(scenario)
@@ -196,14 +191,14 @@ impl Hand {
         self.clocks.recv_timeout(PATIENCE).expect("a clock")
     }
 
-    /// The next clock of another tick than this one.
-    fn clock_after(&self, tick: u64) -> Clock {
-        loop {
-            let clock = self.clock();
-            if clock.tick > tick {
-                return clock;
-            }
+    /// The clock of a tick. Clocks of ticks before may come first: one that is held for long is repeated.
+    fn clock_of(&self, tick: u64) -> Clock {
+        let mut clock = self.clock();
+        while clock.tick < tick {
+            clock = self.clock();
         }
+        assert_eq!(clock.tick, tick);
+        clock
     }
 
     /// The news that belong to a clock, if the clock says that there are some.
@@ -274,7 +269,7 @@ fn ready_with(run: &str, more: &str) -> (Wire, Hand, Hand) {
     let wire = Wire::with(run, more);
     let (a, b) = (Hand::join(&wire, "A"), Hand::join(&wire, "B"));
     for hand in [&a, &b] {
-        assert_eq!(hand.clock().tick, 0);
+        hand.clock_of(0);
         hand.put(&hand.report(0));
     }
 
@@ -342,7 +337,7 @@ fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
     let (wire, a, b) = ready("wire-malformed");
     wire.start();
     for hand in [&a, &b] {
-        assert_eq!(hand.clock().tick, 1);
+        hand.clock_of(1);
     }
     let report = a.keys.report(&a.name);
     a.bus.put(&report, b"not json".to_vec()).unwrap();
@@ -375,7 +370,7 @@ fn malformed_stale_and_foreign_reports_are_counted_and_change_nothing() {
     // The tick goes on as if nothing had happened.
     a.put(&a.report(1));
     b.put(&b.report(1));
-    assert_eq!(a.clock_after(1).tick, 2);
+    a.clock_of(2);
 }
 
 #[test]
@@ -383,14 +378,14 @@ fn a_second_report_for_the_same_tick_changes_nothing() {
     let (_wire, a, b) = ready("wire-twice");
     let wire = _wire;
     wire.start();
-    a.clock();
+    a.clock_of(1);
     a.put(&a.report(1));
     a.put(&Report {
         proposal: Point::new(2.2, 2.0),
         ..a.report(1)
     });
     b.put(&b.report(1));
-    let news = a.news_of(&a.clock_after(1));
+    let news = a.news_of(&a.clock_of(2));
     assert!(news.is_none_or(|news| news.correction.is_none()));
 
     let lines = eventually("tick 1", || {
@@ -405,7 +400,7 @@ fn malformed_stale_and_foreign_commands_are_counted_and_change_nothing() {
     let (wire, a, b) = ready("wire-commands");
     wire.start();
     for hand in [&a, &b] {
-        assert_eq!(hand.clock().tick, 1);
+        hand.clock_of(1);
     }
     let key = a.keys.command(&b.name, &a.name);
     a.bus.put(&key, b"not json".to_vec()).unwrap();
@@ -446,8 +441,7 @@ fn malformed_stale_and_foreign_commands_are_counted_and_change_nothing() {
 
     a.put(&a.report(1));
     b.put(&b.report(1));
-    let clock = b.clock_after(1);
-    assert_eq!(clock.tick, 2);
+    let clock = b.clock_of(2);
     assert_eq!(b.commands_of(&clock), []);
     assert_eq!(wire.recorded(1, "command_sent"), Vec::<Value>::new());
 }
@@ -456,7 +450,8 @@ fn malformed_stale_and_foreign_commands_are_counted_and_change_nothing() {
 fn a_report_counts_when_all_its_commands_are_here_and_they_count_in_the_order_of_their_numbers() {
     let (wire, a, b) = ready("wire-numbers");
     wire.start();
-    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.clock_of(1);
+    b.clock_of(1);
     b.put(&b.report(1));
     a.put_command("B", &a.command(1, 3, "third"));
     a.put_command("B", &a.command(1, 1, "first"));
@@ -473,7 +468,7 @@ fn a_report_counts_when_all_its_commands_are_here_and_they_count_in_the_order_of
         a.put_command("B", &a.command(1, number, text));
     }
     a.put(&report);
-    let clock = b.clock_after(1);
+    let clock = b.clock_of(2);
     let commands = b.commands_of(&clock);
     assert_eq!(
         commands,
@@ -513,7 +508,7 @@ fn an_operators_put_from_any_client_is_executed_and_recorded() {
         wire.ignored(2).ignored,
         [("malformed".into(), 1), ("unknown robot".into(), 1)].into()
     );
-    let clocks = [a.clock(), b.clock()];
+    let clocks = [a.clock_of(1), b.clock_of(1)];
     let delivery = Delivery {
         from: RobotName::operator(),
         performative: Performative::Achieve,
@@ -544,7 +539,8 @@ fn an_operators_put_from_any_client_is_executed_and_recorded() {
 fn a_command_to_a_robot_outside_the_roster_is_recorded_as_dropped() {
     let (wire, a, b) = ready("wire-unknown-target");
     wire.start();
-    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.clock_of(1);
+    b.clock_of(1);
 
     a.put_command("Zed", &a.command(1, 1, "come"));
     a.put(&Report {
@@ -554,7 +550,7 @@ fn a_command_to_a_robot_outside_the_roster_is_recorded_as_dropped() {
     b.put(&b.report(1));
 
     for hand in [&a, &b] {
-        assert_eq!(hand.clock_after(1).tick, 2);
+        hand.clock_of(2);
         hand.put(&hand.report(2));
     }
 
@@ -571,10 +567,10 @@ fn a_command_to_a_robot_outside_the_roster_is_recorded_as_dropped() {
 
 #[test]
 fn a_command_to_a_robot_that_misses_the_tick_is_recorded_as_dropped() {
-    let more = "on_late = \"continue\"\ndeadline = \"1 s\"\nlose_after = 100";
-    let (wire, a, b) = ready_with("wire-missed", more);
+    let (wire, a, b) = ready_with("wire-missed", "lose_after = 100");
     wire.start();
-    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.clock_of(1);
+    b.clock_of(1);
     a.put_command("B", &a.command(1, 1, "late"));
     a.put(&Report {
         commands: 1,
@@ -583,11 +579,17 @@ fn a_command_to_a_robot_that_misses_the_tick_is_recorded_as_dropped() {
     b.put(&b.report(1));
 
     // B gets it in time, and does not answer.
-    let clock = b.clock_after(1);
+    let clock = b.clock_of(2);
     assert_eq!(b.commands_of(&clock).len(), 1);
-    assert_eq!(a.clock_after(1).tick, 2);
+    let late = Control::Late {
+        robot: Some(b.name.clone()),
+        on_late: Some(OnLate::Continue),
+        deadline_s: Some(1.0),
+    };
+    wire.control(&late).unwrap();
+    a.clock_of(2);
     a.put(&a.report(2));
-    assert_eq!(a.clock_after(2).tick, 3);
+    a.clock_of(3);
     assert_eq!(
         wire.recorded(2, "command_dropped"),
         [
@@ -608,7 +610,8 @@ fn more_commands_than_news_hold_are_recorded_as_dropped_and_the_run_goes_on() {
     const COUNT: u32 = 200;
     let (wire, a, b) = ready("wire-overflow");
     wire.start();
-    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.clock_of(1);
+    b.clock_of(1);
     let long = "c".repeat(4096);
     for number in 1..=COUNT {
         a.put_command("B", &a.command(1, number, &long));
@@ -619,12 +622,12 @@ fn more_commands_than_news_hold_are_recorded_as_dropped_and_the_run_goes_on() {
     });
     b.put(&b.report(1));
 
-    let clock = b.clock_after(1);
+    let clock = b.clock_of(2);
     let arrived = b.commands_of(&clock).len();
     assert!((100..COUNT as usize).contains(&arrived), "{arrived}");
     a.put(&a.report(2));
     b.put(&b.report(2));
-    assert_eq!(b.clock_after(2).tick, 3);
+    b.clock_of(3);
     let dropped = wire.recorded(2, "command_dropped");
     assert_eq!(dropped.len() + arrived, COUNT as usize);
     assert!(
@@ -672,7 +675,8 @@ fn malformed_and_impossible_controls_are_refused_with_a_reason() {
 fn a_lost_report_is_asked_for_again_by_repeating_the_clock() {
     let (wire, a, b) = ready("wire-lost");
     wire.start();
-    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.clock_of(1);
+    b.clock_of(1);
     b.put(&b.report(1));
     // A's report is lost. The same clock comes again, and the tick is done when A repeats.
     assert_eq!(a.clock().tick, 1);
@@ -684,7 +688,8 @@ fn a_lost_report_is_asked_for_again_by_repeating_the_clock() {
 fn a_newcomer_is_told_all_that_others_may_still_ask_for() {
     let (wire, a, b) = ready("wire-return");
     wire.start();
-    assert_eq!((a.clock().tick, b.clock().tick), (1, 1));
+    a.clock_of(1);
+    b.clock_of(1);
 
     // A does tick 1 and is gone; B is still in it, and may ask for what A reported for tick 0.
     a.put(&a.report(1));
@@ -727,18 +732,12 @@ fn queries_answer_with_the_tick_before() {
     )
     .unwrap();
     let keys = Keys::new(&RunName::new("wire-query").unwrap());
-    eventually("the run", || {
-        lab.cars(&["ctl", "step", "7", "--run", "wire-query"])
-            .status()
-            .unwrap()
-            .success()
-            .then_some(())
-    });
+    lab.until_ready("wire-query");
+    lab.step("wire-query", 7);
 
     let ask = |what: &str, parameters: &str| {
-        let answer = bus
-            .get(&keys.query(&name("Leguin"), what), parameters, None)
-            .unwrap();
+        let key = keys.query(&name("Leguin"), what);
+        let answer = bus.get_within(&key, parameters, None, PATIENCE).unwrap();
         answer.expect("Leguin answers").result
     };
     let state = |parameters: &str| {
@@ -790,12 +789,16 @@ fn the_simulator_survives_rubbish_on_its_port() {
 
     for tick in 1..=40 {
         for hand in [&a, &b] {
-            assert_eq!(hand.clock().tick, tick);
+            hand.clock_of(tick);
             hand.put(&hand.report(tick));
         }
     }
 
-    assert_eq!(a.clock().end, Some(protocol::messages::End::Finished));
+    let mut last = a.clock();
+    while last.end.is_none() {
+        last = a.clock();
+    }
+    assert_eq!(last.end, Some(protocol::messages::End::Finished));
 
     drop((a, b));
     wire.simulator.finish();

@@ -18,7 +18,7 @@ use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
 /// How long to wait for anything before a test fails.
-const PATIENCE: Duration = Duration::from_secs(10);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The program under test.
 pub(crate) fn program(args: &[&str]) -> Command {
@@ -328,6 +328,8 @@ impl Page {
                     };
                 }
                 Ok(_) => {}
+                // This process was stopped and goes on.
+                Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => {}
                 Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::WouldBlock => {
                     panic!("received nothing for {PATIENCE:?}")
                 }

@@ -10,7 +10,9 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::client::{Console, Response, program};
+use tungstenite::Message;
+
+use crate::client::{Console, PATIENCE, Response, program};
 
 /// Addresses to serve at: loopback, and all interfaces.
 const BINDS: [&str; 2] = ["127.0.0.1:0", "0.0.0.0:0"];
@@ -281,42 +283,65 @@ fn round_trip(console: &Console) -> Duration {
     let started = Instant::now();
     page.send_text("{");
     page.until("answer");
-    started.elapsed()
+    let took = started.elapsed();
+
+    // The number of browsers is limited, and the console may be late to notice that one is disconnected.
+    page.send(Message::Close(None));
+    page.until_closed();
+    took
 }
+
+/// Sets a flag when it is dropped, also where a test panics.
+struct End<'a>(&'a std::sync::atomic::AtomicBool);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, std::sync::atomic::Ordering::Relaxed);
+    }
+}
+
+/// Wrong tokens, at least, while answers to a page are timed.
+const LEAST_REFUSED: u32 = 100;
 
 #[test]
 fn many_wrong_tokens_do_not_slow_others() {
     let console = Console::live();
     let is_over = std::sync::atomic::AtomicBool::new(false);
+    let refused = std::sync::atomic::AtomicU32::new(0);
     let order = std::sync::atomic::Ordering::Relaxed;
     let wrong_path = format!("/?token={}", "0".repeat(console.token.len()));
-    let mut slowest = Duration::ZERO;
+    let mut round_trips = Vec::new();
 
-    let refused = std::thread::scope(|scope| {
+    std::thread::scope(|scope| {
+        let _ends_guessing = End(&is_over);
         let guess = || {
-            let mut refused = 0;
             while !is_over.load(order) {
                 let answer = console.get_without_cookie(&wrong_path);
                 assert_eq!(answer.status, 403);
-                refused += 1;
+                refused.fetch_add(1, order);
             }
-            refused
         };
-        let guessing = [scope.spawn(guess), scope.spawn(guess), scope.spawn(guess)];
-        let started = Instant::now();
-        while started.elapsed() < Duration::from_secs(2) {
-            slowest = slowest.max(round_trip(&console));
+        for _ in 0..3 {
+            scope.spawn(guess);
         }
-        is_over.store(true, order);
-        guessing
-            .map(|thread| thread.join().unwrap())
-            .iter()
-            .sum::<u32>()
+        let started = Instant::now();
+        let goes_on = || {
+            let is_early = started.elapsed() < Duration::from_secs(2);
+            let has_guessed = refused.load(order) > LEAST_REFUSED;
+            is_early || (!has_guessed && started.elapsed() < PATIENCE)
+        };
+        while goes_on() {
+            round_trips.push(round_trip(&console));
+        }
     });
 
-    println!("{refused} wrong tokens; the slowest answer to a page took {slowest:?}");
-    assert!(refused > 100, "{refused}");
-    assert!(slowest < Duration::from_secs(1), "{slowest:?}");
+    let refused = refused.into_inner();
+    assert!(refused > LEAST_REFUSED, "{refused}");
+    // Not the slowest: the machine may stand still for a moment.
+    round_trips.sort();
+    let median = round_trips[round_trips.len() / 2];
+    println!("{refused} wrong tokens; an answer to a page took {median:?}");
+    assert!(median < Duration::from_millis(500), "{round_trips:?}");
 }
 
 #[test]
@@ -377,7 +402,7 @@ impl Browser {
 fn eventually(is_done: impl Fn() -> bool) {
     let started = Instant::now();
     while !is_done() {
-        assert!(started.elapsed() < Duration::from_secs(10));
+        assert!(started.elapsed() < PATIENCE);
         std::thread::sleep(Duration::from_millis(5));
     }
 }

@@ -201,13 +201,10 @@ fn the_first_required_failure_ends_the_run_in_good_order() {
         "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
     let robot =
         "until [ -e $DIR/up ]; do sleep 0.01; done; echo one >&2; echo two >&2; echo plain; exit 3";
+    let other_robot = "until [ -e $DIR/record ]; do sleep 0.01; done";
     let hall = Hall::new(simulator)
         .with(shell("Butler", robot))
-        .with(shell("Leguin", FOREVER));
-    let hall = Hall {
-        grace: Duration::from_millis(300),
-        ..hall
-    };
+        .with(shell("Leguin", other_robot));
     let failure = hall.run(&[], &[]).failure.unwrap();
     assert_eq!(failure.code, 3);
     assert_eq!(failure.text, "Butler ended with exit status 3");

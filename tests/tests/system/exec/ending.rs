@@ -8,12 +8,15 @@ use system_tests::{eventually, programs};
 
 use super::stage::{Stage, is_gone, says};
 
+/// A run that is still under way when the test strikes.
+const LONG: &[&str] = &["--speed", "10", "--duration", "600 s"];
+
 const PID: &str = "if is init; then echo $$ > pid; fi";
 
 #[test]
 fn sigterm_ends_the_program_in_order() {
     let stage = Stage::each_tick(PID, "");
-    let mut launch = stage.start("exec-term", &["--speed", "10"]);
+    let mut launch = stage.start("exec-term", LONG);
     let program = stage.written("pid");
     send(robot("exec-term"), Signal::SIGTERM);
     launch.wait();
@@ -31,7 +34,7 @@ fn sigterm_ends_the_program_in_order() {
 #[test]
 fn killing_the_launch_leaves_nobody() {
     let stage = Stage::each_tick(PID, "");
-    let mut launch = stage.start("exec-launch-killed", &["--speed", "10"]);
+    let mut launch = stage.start("exec-launch-killed", LONG);
     let program = stage.written("pid");
     launch.signal(Signal::SIGKILL);
     launch.wait();
@@ -45,7 +48,7 @@ fn a_program_that_hears_nothing_is_killed() {
     let hang =
         "if is tick; then trap '' TERM; sleep 600 & echo $! > child; while :; do sleep 1; done; fi";
     let stage = Stage::each_tick(&format!("{PID}\n{hang}"), "");
-    let mut launch = stage.start("exec-deaf", &["--speed", "10"]);
+    let mut launch = stage.start("exec-deaf", LONG);
     let (program, child) = (stage.written("pid"), stage.written("child"));
     send(robot("exec-deaf"), Signal::SIGTERM);
     launch.wait();
@@ -58,7 +61,7 @@ fn a_program_that_hears_nothing_is_killed() {
 #[test]
 fn interrupting_the_launch_leaves_nobody() {
     let stage = Stage::each_tick(PID, "");
-    let mut launch = stage.start("exec-interrupt", &["--speed", "10"]);
+    let mut launch = stage.start("exec-interrupt", LONG);
     let program = stage.written("pid");
     launch.signal(Signal::SIGINT);
     launch.wait();
@@ -121,12 +124,15 @@ fn an_incarnation_that_takes_over_is_told_what_the_last_one_reported() {
         done"#,
         "restart = \"on-failure\"\nbackoff = \"0.1 s\"",
     );
-    let mut launch = stage.start("exec-return", &["--speed", "10"]);
+    let mut launch = stage.start("exec-return", LONG);
     let program = stage.written("pid");
     eventually("a few ticks", || {
         (stage.lab.bytes("exec-return").len() > 2000).then_some(())
     });
     send(program.parse().unwrap(), Signal::SIGKILL);
+    launch.prints("Leguin       is back");
+    let speed = ["ctl", "speed", "max", "--run", "exec-return"];
+    stage.lab.ok(&speed);
     launch.finish();
     let log = stage.log("exec-return");
     assert!(log.contains("its program was ended by SIGKILL"), "{log}");

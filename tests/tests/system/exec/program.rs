@@ -3,7 +3,7 @@
 use system_tests::assert_same;
 use system_tests::processes::nobody_is_left;
 
-use super::stage::{Stage, ready, says};
+use super::stage::{Stage, says};
 
 /// Walks to and fro by chance, asks, looks around, commands and says what it hears.
 const WALKER: &str = r#"
@@ -140,15 +140,11 @@ fn a_slow_program_is_late_and_named_and_changes_nothing() {
 fn init_starts_the_same_process_over() {
     let stage = Stage::each_tick(r#"if is init; then echo "init in $$: $json" >&2; fi"#, "");
     let mut launch = stage.start("exec-again", &["--paused"]);
-    let ctl = |args: &[&str]| {
-        stage
-            .lab
-            .ok(&[&["ctl"], args, &["--run", "exec-again"]].concat())
-    };
-    ready(&stage.lab, "exec-again");
-    ctl(&["step", "3"]);
-    ctl(&["init"]);
-    ctl(&["start"]);
+    let lab = &stage.lab;
+    lab.until_ready("exec-again");
+    lab.step("exec-again", 3);
+    lab.ok(&["ctl", "init", "--run", "exec-again"]);
+    lab.ok(&["ctl", "start", "--run", "exec-again"]);
     launch.finish();
     let log = stage.log("exec-again");
     let inits: Vec<(&str, &str)> = log

@@ -8,8 +8,6 @@ use system_tests::processes::{Running, nobody_is_left};
 use system_tests::tools::lacks_tool;
 use system_tests::{Lab, assert_same, cargo, programs, root};
 
-use super::stage::ready;
-
 /// A new robot in a folder of its own.
 struct Robot {
     lab: Lab,
@@ -138,13 +136,13 @@ impl Robot {
                 .output()
                 .unwrap()
         };
-        ready(&self.lab, &run);
+        self.lab.until_ready(&run);
         for order in ["rest", r#"say "boo" \ backwards"#] {
             assert!(cars(&["command", "Rosie", order]).status.success());
         }
-        assert!(cars(&["ctl", "step", "9"]).status.success());
+        self.lab.step(&run, 9);
         assert!(cars(&["command", "Rosie", "stroll"]).status.success());
-        assert!(cars(&["ctl", "step", "9"]).status.success());
+        self.lab.step(&run, 9);
         let log = self.cars_log(&run);
         for part in [
             "obeys operator: rest",

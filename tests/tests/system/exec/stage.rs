@@ -49,10 +49,13 @@ impl Stage {
         Self::new(&script, more)
     }
 
-    /// Launches it and leaves it running.
+    /// Launches it and leaves it running, for 30 s of simulated time and as fast as it goes unless `more` has other values.
     pub(crate) fn start(&self, run: &str, more: &[&str]) -> Running {
-        let mut args = vec!["launch", &self.file, "--no-console", "--duration", "30 s"];
+        let mut args = vec!["launch", &self.file, "--no-console"];
         args.extend(more);
+        if !more.contains(&"--duration") {
+            args.extend(["--duration", "30 s"]);
+        }
         if !more.contains(&"--speed") {
             args.extend(["--speed", "max"]);
         }
@@ -85,19 +88,6 @@ pub(crate) fn says(launch: &Running, parts: &[&str]) {
         );
         std::thread::sleep(Duration::from_millis(10));
     }
-}
-
-/// Waits until a launch that is paused has gathered its robots.
-pub(crate) fn ready(lab: &Lab, run: &str) {
-    eventually("the launch to be ready", || {
-        let status = lab
-            .cars(&["ctl", "status", "--json", "--run", run])
-            .output()
-            .unwrap();
-        String::from_utf8_lossy(&status.stdout)
-            .contains("\"ready\"")
-            .then_some(())
-    });
 }
 
 /// Waits until there is no process of this number any more.

@@ -9,8 +9,7 @@ use system_tests::programs;
 /// A proxy between one robot and the simulator.
 pub(super) struct Cable {
     proxy: Child,
-    /// The pipe stays open: a program whose standard output is closed ends.
-    _output: BufReader<ChildStdout>,
+    output: BufReader<ChildStdout>,
     /// Where the robot connects.
     pub(super) endpoint: String,
     /// When it is to be whole again.
@@ -39,7 +38,7 @@ impl Cable {
 
         Self {
             proxy,
-            _output: output,
+            output,
             endpoint,
             heals: None,
         }
@@ -75,8 +74,12 @@ impl Cable {
         self.heals.is_some()
     }
 
+    /// Gives the proxy an order, which it has carried out when it prints the shape of its link.
     fn order(&mut self, order: &str) {
         writeln!(self.proxy.stdin.as_mut().unwrap(), "{order}").unwrap();
+        let mut shape = String::new();
+        self.output.read_line(&mut shape).unwrap();
+        assert!(shape.ends_with('\n'), "{order}: the proxy has ended");
     }
 }
 

@@ -31,6 +31,8 @@ const CONNECTIONS: usize = 60;
 const RECORDED: usize = 300;
 /// How long they are recorded at most: a clock that is held is repeated every 2 s.
 const RECORDING: Duration = Duration::from_secs(3);
+/// How long to wait for the first one of them.
+const PATIENCE: Duration = Duration::from_secs(30);
 /// How long to wait for a reply to a query that may get none.
 const REPLY: Duration = Duration::from_millis(300);
 /// An epoch that never begins in these runs.
@@ -179,13 +181,19 @@ impl Intruder<'_> {
             .collect();
 
         let begun = Instant::now();
-        while recorded.lock().expect("no panic").len() < RECORDED && begun.elapsed() < RECORDING {
+        let goes_on = || {
+            let count = recorded.lock().expect("no panic").len();
+            // The machine may stand still as long as the recording lasts.
+            let is_time_over = begun.elapsed() >= RECORDING && count > 0;
+            count < RECORDED && !is_time_over && begun.elapsed() < PATIENCE
+        };
+        while goes_on() {
             std::thread::sleep(Duration::from_millis(10));
         }
         drop(recording);
 
         let recorded = recorded.lock().expect("no panic").clone();
-        assert!(!recorded.is_empty(), "nothing was put for {RECORDING:?}");
+        assert!(!recorded.is_empty(), "nothing was put for {PATIENCE:?}");
         self.burst(chance, |chance| {
             recorded[below(chance, recorded.len())].clone()
         })
