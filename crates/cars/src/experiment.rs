@@ -117,9 +117,13 @@ fn probability(text: &str) -> Result<f64, String> {
 
 /// Runs an experiment and prints its estimates.
 pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
+    let own_options = args.experiment.own_options();
     let (mut experiment, common) = args.experiment.load()?;
     let is_json = common.json;
     let options = common.options(&mut experiment);
+    if let Err(error) = experiment.list_conditions() {
+        return Err(miette!(help = format!("change {own_options}"), "{error}"));
+    }
 
     let style =
         ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?;
@@ -155,6 +159,15 @@ pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
 }
 
 impl Which {
+    /// The options that decide about the conditions, in words.
+    fn own_options(&self) -> &'static str {
+        match self {
+            Self::Deadlock(_) => "--loss",
+            Self::Partition(_) => "--from, --lasting or --duration",
+            Self::Affect(_) | Self::Run(_) => "--duration",
+        }
+    }
+
     /// The experiment with the changes of its own options.
     fn load(self) -> miette::Result<(Experiment, Common)> {
         match self {

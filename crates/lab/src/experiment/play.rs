@@ -205,7 +205,7 @@ impl Experiment {
             seed,
         } = unit;
         let sources = [
-            ("--set".to_owned(), options.set.as_slice()),
+            ("the option --set".to_owned(), options.set.as_slice()),
             (format!("the arm \"{}\"", arm.name), &arm.set),
             (
                 format!("the condition \"{}\"", condition.name),
