@@ -476,7 +476,7 @@ mod tests {
                     "lasts until 240 s",
                 ),
                 ("\"Butler.served\"", "\"served\"", "not a state variable"),
-                ("for = \"60 s\"", "for = \"0 s\"", "more than zero"),
+                ("for = \"120 s\"", "for = \"0 s\"", "more than zero"),
             ],
         );
     }
