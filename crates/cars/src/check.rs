@@ -1,11 +1,14 @@
-//! `cars check`: reads scenario and launch files as a run does, and runs nothing; compares the record of a run with its seals.
+//! `cars check`: reads scenario, launch and experiment files as a run does, and runs nothing; compares the record of a run with
+//! its seals.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use config::{Changes, FileError};
+use lab::experiment::{Experiment, Options, is_experiment_file};
 use launch::{LaunchFile, is_launch_file};
+use miette::IntoDiagnostic;
 use simulator::Scenario;
 use simulator::seal::{self, Checked};
 use terminal::OutputError;
@@ -13,7 +16,7 @@ use terminal::OutputError;
 /// `cars check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// Scenario files, launch files, and folders of runs.
+    /// Scenario files, launch files, experiment files, and folders of runs.
     #[arg(required = true)]
     files: Vec<PathBuf>,
 }
@@ -30,7 +33,7 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
             }
             Err(error) => {
                 are_all_good = false;
-                terminal::note(format_args!("{:?}", miette::Report::new(error)));
+                terminal::note(format_args!("{error:?}"));
             }
         }
     }
@@ -43,9 +46,12 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
 }
 
 /// The content of a file in one line.
-fn describe(path: &Path) -> Result<String, FileError> {
+fn describe(path: &Path) -> miette::Result<String> {
     if path.is_dir() {
-        return describe_run(path);
+        return Ok(describe_run(path)?);
+    }
+    if is_experiment_file(path)? {
+        return describe_experiment(path);
     }
 
     let changes = Changes::default();
@@ -60,6 +66,22 @@ fn describe(path: &Path) -> Result<String, FileError> {
 
     let processes = count(file.processes.len(), "process", "processes");
     Ok(format!("{processes}, {}", content(&scenario)))
+}
+
+/// An experiment, every scenario of which has been read.
+fn describe_experiment(path: &Path) -> miette::Result<String> {
+    let experiment = Experiment::load(path)?;
+    experiment.check(&Options {
+        scenario: experiment.scenario.clone(),
+        seeds: experiment.seeds,
+        jobs: 1,
+        set: Vec::new(),
+    })?;
+
+    let arms = count(experiment.arms.len(), "arm", "arms");
+    let conditions = experiment.list_conditions().into_diagnostic()?;
+    let conditions = count(conditions.len(), "condition", "conditions");
+    Ok(format!("{arms}, {conditions}, {} seeds", experiment.seeds))
 }
 
 /// The record of a run: its events, those of earlier epochs, too.

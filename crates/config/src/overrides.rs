@@ -60,6 +60,10 @@ fn is_key(part: &str) -> bool {
         .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-'))
 }
 
+fn is_index(part: &str) -> bool {
+    part.chars().all(|c| c.is_ascii_digit())
+}
+
 impl std::fmt::Display for Override {
     /// Formats the change so that another process can parse it.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -102,6 +106,20 @@ impl Changes {
 }
 
 impl Override {
+    /// First part of the path: the key at the top of the file.
+    #[must_use]
+    pub fn top(&self) -> &str {
+        self.path.first().map_or("", String::as_str)
+    }
+
+    /// Whether both set the same value, or one sets a part of what the other sets. A list's element that one names and the
+    /// other numbers counts as the same, because only the file decides that.
+    #[must_use]
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let mut parts = self.path.iter().zip(&other.path);
+        parts.all(|(own, others)| own == others || is_index(own) != is_index(others))
+    }
+
     fn apply(&self, table: toml::Table) -> Result<toml::Table, FileError> {
         let mut root = toml::Value::Table(table);
         set(&mut root, &self.path, &self.value)
@@ -148,4 +166,26 @@ fn element<'a>(list: &'a mut [toml::Value], which: &str) -> Result<&'a mut toml:
     let len = list.len();
     let found = index.and_then(|index| list.get_mut(index));
     found.ok_or_else(|| format!("none of the {len} elements is called or numbered {which:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_overlap_where_one_may_set_what_the_other_sets() {
+        for (one, other, overlaps) in [
+            ("guests.count=1", "guests.count=2", true),
+            ("guests={}", "guests.count=2", true),
+            ("guests.count=1", "guests.speed=2", false),
+            ("robot.Butler.params.x=1", "robot.0.params.x=1", true),
+            ("robot.Butler.params.x=1", "robot.Leguin.params.x=1", false),
+            ("robot.1.params.x=1", "robot.0.params.x=1", false),
+        ] {
+            let one: Override = one.parse().unwrap();
+            let other: Override = other.parse().unwrap();
+            assert_eq!(one.overlaps(&other), overlaps, "{one} and {other}");
+            assert_eq!(other.overlaps(&one), overlaps, "{other} and {one}");
+        }
+    }
 }

@@ -1,10 +1,15 @@
 //! Experiments: one scenario in several arms under several conditions over many seeds. An experiment is a file
-//! ([`Experiment::load`]); two ship with the project.
+//! ([`Experiment::load`]); three ship with the project.
 
+mod condition;
+mod contrast;
 mod file;
 mod measure;
 mod play;
+mod script;
 
-pub use file::{Arm, Condition, Experiment, Factor, Value};
-pub use measure::{Measure, MeasureError, Probe, When};
+pub use condition::{Condition, ConditionError, Conditions, Factor, Value};
+pub use contrast::Contrast;
+pub use file::{Arm, Experiment, is_experiment_file};
+pub use measure::{Kind, Measure, MeasureError, Stalled};
 pub use play::{Cell, Options, Outcome};

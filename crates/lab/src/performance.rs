@@ -23,7 +23,7 @@ pub struct Performance {
 /// # Errors
 /// If the scenario cannot be played.
 pub fn performances(
-    scenario: Scenario,
+    mut scenario: Scenario,
     ticks: Tick,
 ) -> miette::Result<Option<BTreeMap<RobotName, Performance>>> {
     let mut performances = BTreeMap::new();
@@ -34,6 +34,8 @@ pub fn performances(
         performances.insert(name.clone(), Performance::default());
     }
 
+    // What robots do while all processes run.
+    scenario.faults.clear();
     let run = RunName::new("conform").into_diagnostic()?;
     play(scenario, &run, |simulation, record| {
         add_commands(&mut performances, record);

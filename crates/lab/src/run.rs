@@ -5,9 +5,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use miette::{IntoDiagnostic, miette};
-use protocol::messages::End;
+use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{RobotName, RunName};
 use robot::{LocalHost, Robot};
+use simulator::scenario::FaultEnd;
 use simulator::{Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
 
 /// Runs a scenario to its end and records it in a folder that [`RunFolder::create`] made. `speed` is in simulated seconds
@@ -46,20 +47,23 @@ fn wait_until(begun: Instant, due_s: f64) {
     std::thread::sleep(due.saturating_sub(begun.elapsed()));
 }
 
-/// Plays a scenario to its end in this process and calls `each` after every tick and after the end of the run.
+/// Plays a scenario to its end in this process and calls `each` after every tick and after the end of the run. Crashes of the
+/// scenario's `[[fault]]` are played; the record is that of a launch.
 ///
 /// # Errors
-/// As [`execute`], and the first error of `each`.
+/// As [`execute`], the first error of `each`, and for a fault that needs a process ([`check_faults`]).
 pub fn play(
     scenario: Scenario,
     run: &RunName,
     mut each: impl FnMut(&Simulation, &TickRecord) -> miette::Result<()>,
 ) -> miette::Result<Simulation> {
+    check_faults(&scenario)?;
     let mut local = Local::new(scenario, run)?;
     let record = local.simulation.init(&mut local.robots).into_diagnostic()?;
     each(&local.simulation, &record)?;
 
     while local.simulation.tick() < local.simulation.scenario().ticks {
+        local.carry_out_faults(run)?;
         let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
         each(&local.simulation, &record)?;
     }
@@ -96,6 +100,56 @@ impl Local {
             robots: LocalHost::new(seats),
         })
     }
+
+    /// Carries out the crashes that the scenario has for the time before the next tick, and their ends.
+    ///
+    /// # Errors
+    /// If a robot that comes back is of a class that cannot run in this process.
+    pub fn carry_out_faults(&mut self, run: &RunName) -> miette::Result<()> {
+        let orders = self.simulation.faults_due();
+        self.simulation.note_faults(&orders);
+
+        for order in orders {
+            let name = &order.robot;
+            if order.begins {
+                self.robots.crash(name);
+                self.simulation.stop(name);
+                continue;
+            }
+
+            let mut robots = make_robots(self.simulation.scenario(), Path::new("the scenario"))?;
+            if let Some(robot) = robots.remove(name) {
+                let simulation = &self.simulation;
+                self.robots.bring_back(name, robot, |generation| {
+                    simulation.welcome(run, name, generation, None)
+                });
+            }
+        }
+
+        Ok(())
+    }
+}
+
+/// Checks that the faults of a scenario can be played without processes: crashes without which the clock goes on, and that
+/// end by simulated time or not at all.
+///
+/// # Errors
+/// If there is another fault.
+pub fn check_faults(scenario: &Scenario) -> miette::Result<()> {
+    for fault in &scenario.faults {
+        let is_simulated = !matches!(fault.end, FaultEnd::After(_));
+        let goes_on = scenario.lateness.of(&fault.robot) == OnLate::Continue;
+        if fault.kind != FaultKind::Crash || !is_simulated || !goes_on {
+            return Err(miette!(
+                help = "a crash with `until`, under on_late = \"continue\", can be played in one process",
+                "the fault of {} at tick {} needs a process",
+                fault.robot,
+                fault.at
+            ));
+        }
+    }
+
+    Ok(())
 }
 
 /// Creates the robots of a scenario by their classes; `file` is named in the error.

@@ -1,4 +1,4 @@
-//! Confidence intervals of means.
+//! Confidence intervals of means, and times to an event that some runs do not reach.
 
 /// A mean with the half width of its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -7,6 +7,30 @@ pub struct Estimate {
     pub mean: f64,
     /// The interval is `mean` ± this (Student's t).
     pub half_width: f64,
+    /// Size of the sample.
+    pub n: usize,
+}
+
+/// Times to an event that does not occur in every run.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Survival {
+    /// Size of the sample.
+    pub n: usize,
+    /// Number of runs with the event.
+    pub events: usize,
+    /// Time by which half of the runs have the event, by Kaplan and Meier, seconds; `None` if that is not reached.
+    pub median_s: Option<f64>,
+    /// Longest time in the sample, seconds: where there is no median, it is more than this.
+    pub until_s: f64,
+}
+
+/// A time, seconds, and whether it ends with the event; otherwise the run ends then, without the event (right-censored).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeTo {
+    /// The time, seconds.
+    pub time_s: f64,
+    /// Whether the event occurs then.
+    pub is_event: bool,
 }
 
 /// Fewest values of a useful interval; with fewer, the quantile below would not be exact to three digits.
@@ -16,13 +40,60 @@ impl Estimate {
     /// Mean and interval of independent values, at least two.
     #[must_use]
     pub fn of(values: &[f64]) -> Self {
-        let n = values.len() as f64;
+        let count = values.len();
+        let n = count as f64;
         let mean = values.iter().sum::<f64>() / n;
         let squares = values.iter().map(|value| (value - mean) * (value - mean));
         let variance = squares.sum::<f64>() / (n - 1.0);
         Self {
             mean,
             half_width: student_975(n - 1.0) * (variance / n).sqrt(),
+            n: count,
+        }
+    }
+}
+
+impl Survival {
+    /// The estimate of Kaplan and Meier (1958).
+    #[must_use]
+    pub fn of(times: &[TimeTo]) -> Self {
+        /// The product below is rounded, also where it is one half.
+        const HALF: f64 = 0.5 + 1e-9;
+
+        let mut sorted = times.to_vec();
+        // An event at the time at which another run is censored comes first.
+        sorted.sort_by(|a, b| {
+            let by_time = a.time_s.total_cmp(&b.time_s);
+            by_time.then(b.is_event.cmp(&a.is_event))
+        });
+
+        let mut at_risk = sorted.len();
+        let mut share = 1.0;
+        let mut median_s = None;
+        for time in &sorted {
+            if time.is_event {
+                share *= 1.0 - 1.0 / at_risk as f64;
+            }
+            if share <= HALF && median_s.is_none() {
+                median_s = Some(time.time_s);
+            }
+            at_risk -= 1;
+        }
+
+        Self {
+            n: sorted.len(),
+            events: sorted.iter().filter(|time| time.is_event).count(),
+            median_s,
+            until_s: sorted.last().map_or(0.0, |time| time.time_s),
+        }
+    }
+}
+
+impl std::fmt::Display for Survival {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.median_s {
+            Some(median_s) => write!(f, "{median_s:.0}"),
+            None => write!(f, "> {:.0}", self.until_s),
         }
     }
 }
@@ -92,8 +163,43 @@ mod tests {
             Estimate::of(&[3.0; 32]),
             Estimate {
                 mean: 3.0,
-                half_width: 0.0
+                half_width: 0.0,
+                n: 32
             }
         );
+    }
+
+    #[test]
+    fn the_median_time_is_that_of_kaplan_and_meier() {
+        fn survival(times: &[(f64, bool)]) -> Survival {
+            let mut sample = Vec::new();
+            for (time_s, is_event) in times {
+                sample.push(TimeTo {
+                    time_s: *time_s,
+                    is_event: *is_event,
+                });
+            }
+            Survival::of(&sample)
+        }
+
+        // The remission times of Freireich et al. (1963), 6-mercaptopurine; their median is 23 weeks.
+        let events = [6.0, 6.0, 6.0, 7.0, 10.0, 13.0, 16.0, 22.0, 23.0];
+        let censored = [
+            6.0, 9.0, 10.0, 11.0, 17.0, 19.0, 20.0, 25.0, 32.0, 32.0, 34.0, 35.0,
+        ];
+        let mut weeks = Vec::new();
+        weeks.extend(events.map(|week| (week, true)));
+        weeks.extend(censored.map(|week| (week, false)));
+        let found = survival(&weeks);
+        assert_eq!((found.n, found.events), (21, 9));
+        assert_eq!(found.median_s, Some(23.0));
+
+        let half = survival(&[(10.0, true), (20.0, true), (600.0, false), (600.0, false)]);
+        assert_eq!(half.median_s, Some(20.0));
+        assert_eq!(half.to_string(), "20");
+
+        let fewer = survival(&[(10.0, true), (600.0, false), (600.0, false)]);
+        assert_eq!(fewer.median_s, None);
+        assert_eq!(fewer.to_string(), "> 600");
     }
 }

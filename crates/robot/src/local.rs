@@ -1,7 +1,7 @@
 //! All robots in one process, without a network: for sweeps, tests and debugging. The two sides of the lock-step, joined by
 //! function calls.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,8 +9,10 @@ use lockstep::{
     Action, Barrier, Exchange, Lateness, Outcome, Output, Participant, Patience, Stamp, StateQuery,
     Timing, Turn,
 };
-use protocol::messages::{CommandText, MAX_ENTRIES, News, OnLate, PublicState, Report, Welcome};
-use protocol::{RobotName, Tick};
+use protocol::messages::{
+    CommandText, FaultKind, MAX_ENTRIES, News, OnLate, PublicState, Report, Welcome,
+};
+use protocol::{Generation, RobotName, Tick};
 
 use crate::cri::Robot;
 use crate::error::RobotError;
@@ -27,6 +29,9 @@ pub struct LocalHost {
     names: Vec<RobotName>,
     seats: Vec<Seat>,
     participants: Vec<LocalParticipant>,
+    /// Indices of the robots that have crashed and are not back.
+    crashed: BTreeSet<usize>,
+    patience: Patience,
 }
 
 /// The other robots of the process, as one of them queries them.
@@ -101,7 +106,65 @@ impl LocalHost {
             names,
             seats,
             participants,
+            crashed: BTreeSet::new(),
+            patience,
         }
+    }
+
+    /// Crashes a robot between two ticks: the clock goes on without it, as without a process that was killed under
+    /// `on_late = "continue"`. Without effect on a robot that is not of the roster.
+    pub fn crash(&mut self, name: &RobotName) {
+        let Some(index) = self.index(name) else {
+            return;
+        };
+
+        let mut lateness = self.barrier.lateness().clone();
+        lateness.own.insert(name.clone(), OnLate::Continue);
+        self.barrier.set_lateness(lateness, &mut self.outputs);
+        self.barrier.fault(name, Some(FaultKind::Crash));
+        self.barrier.token(name, false, &mut self.outputs);
+        self.outputs.clear();
+        self.crashed.insert(index);
+    }
+
+    /// Brings a crashed robot back between two ticks, as a further incarnation that takes over from the state that it reported
+    /// last. `welcome` is called with the number of that incarnation; it returns `None` for a robot that is not of the roster.
+    pub fn bring_back(
+        &mut self,
+        name: &RobotName,
+        robot: Box<dyn Robot>,
+        welcome: impl FnOnce(Generation) -> Option<Welcome>,
+    ) {
+        let Some(index) = self.index(name) else {
+            return;
+        };
+        if !self.crashed.contains(&index) {
+            return;
+        }
+
+        let next = self.barrier.presence(name).0 + 1;
+        let instance = format!("local {next}");
+        self.barrier.fault(name, None);
+        let admission = self
+            .barrier
+            .join(name, &instance, &mut self.outputs)
+            .unwrap_or_else(|refused| unreachable!("its place is free: {refused:?}"));
+        let Some(welcome) = welcome(admission.generation) else {
+            return;
+        };
+
+        let mut actions = Vec::new();
+        let mut participant = Participant::new(self.patience, &mut actions);
+        participant.admitted(admission, [], &mut actions);
+        self.barrier.token(name, true, &mut self.outputs);
+        self.outputs.clear();
+        self.participants[index] = participant;
+        self.seats[index] = Seat::new(robot, welcome);
+        self.crashed.remove(&index);
+    }
+
+    fn index(&self, name: &RobotName) -> Option<usize> {
+        self.names.iter().position(|own| own == name)
     }
 
     /// Hands news and clock of a tick to every robot, and collects the ticks that they are to run.
@@ -114,6 +177,7 @@ impl LocalHost {
             let mut actions: Vec<LocalAction> = Vec::new();
             for (name, naming) in to {
                 let index = self.names.iter().position(|own| *own == name);
+                let index = index.filter(|index| !self.crashed.contains(index));
                 if let Some(index) = index {
                     // Robots that share a flag all get news, also those for which nothing is new.
                     let news = news.remove(&name).unwrap_or_default();
@@ -122,6 +186,9 @@ impl LocalHost {
                 }
             }
             for (index, participant) in self.participants.iter_mut().enumerate() {
+                if self.crashed.contains(&index) {
+                    continue;
+                }
                 participant.clock(clock, &mut actions);
                 for action in actions.drain(..) {
                     if let Action::Run(turn) = action {
@@ -182,7 +249,9 @@ impl Exchange<News, Arc<Report>, CommandText> for LocalHost {
         self.barrier.open(tick, with_news, &mut self.outputs);
         let complete_at_once = self.take_outcome();
         if let Some(outcome) = complete_at_once {
-            return Ok(outcome); // A run without robots.
+            // A run without robots, or all of them have crashed.
+            self.outputs.clear();
+            return Ok(outcome);
         }
 
         for (index, turn) in self.grant(news) {

@@ -541,8 +541,10 @@ fn t20_without_any_command_emotions_keep_the_team_at_work() {
     }
 }
 
+/// The abilities of these teams differ: the one with the timer neither hurries nor intercepts. `docs/experiments.md` compares
+/// teams with the same abilities.
 #[test]
-fn t21_with_a_quarter_of_commands_lost_emotions_do_better_than_a_timer() {
+fn t21_with_a_quarter_of_commands_lost_emotions_do_better_than_repeated_calls_alone() {
     let arms = arms(0.25);
     let empty_s = |arm| mean(&arms[arm].empty_s);
     let (affect, timer) = (empty_s("affect only"), empty_s("timer repeat"));
@@ -685,4 +687,237 @@ fn every_documented_behavior_has_its_test() {
         .collect();
 
     assert_eq!(found, (1..=25).collect());
+}
+
+/// Plays an experiment and returns what it prints as JSON.
+fn experiment(args: &[&str]) -> serde_json::Value {
+    let lab = Lab::new();
+    let args = [&["experiment"], args, &["--json"]].concat();
+    let (code, text) = lab.cars_without_out(&args);
+    assert_eq!(code, 0, "{args:?}: {text}");
+    serde_json::from_str(&text).unwrap()
+}
+
+/// An error without the line breaks of a terminal, and the bars at the beginnings of lines.
+fn unbroken(text: &str) -> String {
+    let words = text.split_whitespace().filter(|word| *word != "│");
+    words.collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn an_experiment_that_would_not_be_played_as_it_says_is_refused() {
+    let lab = Lab::new();
+    let cases: [(&[&str], &str); 7] = [
+        (&["deadlock", "--loss", "0.25,0.25"], "is there twice"),
+        (&["partition", "--lasting", "60 s,1 min"], "is there twice"),
+        (&["partition", "--from", "700 s"], "begins at 700 s"),
+        (&["partition", "--lasting", "600 s"], "lasts until 720 s"),
+        (&["affect", "--duration", "200 s"], "lasts until 240 s"),
+        (
+            &["deadlock", "--set", "network.commands.loss=0.5"],
+            "the condition \"0\"",
+        ),
+        (
+            &["deadlock", "--set", "seed=7"],
+            "the seed of a run is the experiment's",
+        ),
+    ];
+
+    for (args, reason) in cases {
+        let args = [&["experiment"], args].concat();
+        let (code, text) = lab.cars_without_out(&args);
+        assert_eq!(code, 1, "{args:?}: {text}");
+        let text = unbroken(&text);
+        assert!(text.contains(reason), "{args:?}: {text}");
+    }
+}
+
+#[test]
+fn a_change_of_the_command_line_that_an_arm_makes_is_refused() {
+    let lab = Lab::new();
+    for change in [
+        "robot.Butler.params.policy=rules",
+        "robot.0.params.policy=rules",
+    ] {
+        let (code, text) = lab.cars_without_out(&["experiment", "deadlock", "--set", change]);
+        assert_eq!(code, 1, "{text}");
+        let text = unbroken(&text);
+        assert!(text.contains("--set sets robot."), "{text}");
+        assert!(text.contains("\"emotions\" sets"), "{text}");
+    }
+}
+
+/// An experiment in which a team shows the emotions of the next run, with a crash as one condition.
+fn yoked(lab: &Lab) -> String {
+    let scenario = root().join(HALL);
+    let text = format!(
+        r#"
+question = "Are the emotions those of the next seed?"
+procedure = "A crash."
+scenario = {scenario:?}
+seeds = 8
+duration = "120 s"
+baseline = "emotions"
+
+[[condition]]
+name = "none"
+what = "no failure"
+set = []
+
+[[condition]]
+name = "crash"
+what = "Leguin crashes"
+from = "40 s"
+until = "70 s"
+set = [
+    'fault=[{{ robot = "Leguin", do = "crash", at = "{{from}}", until = "{{until}}" }}]',
+    "on_late=continue",
+]
+
+[[arm]]
+name = "emotions"
+what = "own emotions"
+set = []
+
+[[arm]]
+name = "yoked"
+what = "emotions of the next seed"
+yoked_to = "emotions"
+set = []
+
+[[measure]]
+name = "served"
+column = "served"
+contrast = true
+summary = "robots.Butler.state_variables.served"
+
+[[measure]]
+name = "happy_s"
+summary = "robots.*.emotions_s.HAPPY"
+
+[[measure]]
+name = "missed"
+summary = "robots.Leguin.missed"
+
+[[measure]]
+name = "deadlock"
+column = "deadlock"
+contrast = true
+stalled = {{ progress = ["Butler.served", "Leguin.trips"], for = "20 s" }}
+"#
+    );
+    let file = lab.write("yoked.toml", &text);
+    file.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_yoked_team_shows_the_emotions_of_the_next_seed_for_any_number_of_jobs() {
+    let lab = Lab::new();
+    let file = yoked(&lab);
+    let all = experiment(&["run", &file, "--jobs", "1"]);
+    assert!(all == experiment(&["run", &file, "--jobs", "3"]));
+
+    let runs = all["runs"].as_array().unwrap();
+    let run = |condition: &str, arm: &str, seed: u64| {
+        let mut found = runs.iter().filter(|run| {
+            run["condition"] == condition && run["arm"] == arm && run["seed"] == seed
+        });
+        found.next().unwrap()
+    };
+    for condition in ["none", "crash"] {
+        for seed in 1..=8 {
+            let next = seed % 8 + 1;
+            let yoked = run(condition, "yoked", seed);
+            let other = run(condition, "emotions", next);
+            assert_eq!(yoked["yoked_to_seed"], next);
+            assert_eq!(yoked["happy_s"], other["happy_s"], "{condition}, {seed}");
+            assert_ne!(yoked["digest"], other["digest"]);
+        }
+    }
+
+    let missed = |condition| run(condition, "emotions", 1)["missed"].as_f64().unwrap();
+    assert_eq!(missed("none"), 0.0);
+    assert_eq!(missed("crash"), 60.0);
+}
+
+#[test]
+fn every_line_of_an_experiment_has_its_difference_to_the_baseline() {
+    let lab = Lab::new();
+    let all = experiment(&["run", &yoked(&lab), "--seeds", "9"]);
+
+    let mean = |arm: &str| {
+        let cells = all["estimates"].as_array().unwrap().iter();
+        let mut cells = cells.filter(|cell| cell["condition"] == "crash" && cell["arm"] == arm);
+        cells.next().unwrap()["served"]["mean"].as_f64().unwrap()
+    };
+    let contrasts = all["contrasts"].as_array().unwrap();
+    assert_eq!(contrasts.len(), 2);
+    let served = &contrasts[1]["served"];
+    assert_eq!(contrasts[1]["condition"], "crash");
+    assert_eq!(contrasts[1]["arm"], "yoked");
+    assert_eq!(served["n"], 9);
+    let difference = mean("yoked") - mean("emotions");
+    assert!((served["mean"].as_f64().unwrap() - difference).abs() < 1e-9);
+}
+
+/// Where an experiment plays a crash, no process ends: what comes of it must be the same.
+#[test]
+fn a_crash_in_one_process_gives_the_run_of_a_launch() {
+    let lab = Lab::new();
+    let changes = [
+        "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"40 s\", until = \"70 s\" }]",
+        "on_late=continue",
+        "deadline=10 s",
+        "duration=120 s",
+    ];
+    let mut args = vec![
+        "launch",
+        "launch/hors_doeuvres.toml",
+        "--speed",
+        "max",
+        "--no-console",
+    ];
+    for change in changes {
+        args.extend(["--set", change]);
+    }
+    lab.start("crash-twice", &args).finish();
+
+    let run = RunName::new("crash-twice").unwrap();
+    let mut events = Vec::new();
+    lab::run::play(scenario(HALL, 2002, &changes), &run, |_, record| {
+        events.extend(
+            record
+                .lines()
+                .map(|line| serde_json::to_value(line).unwrap()),
+        );
+        Ok(())
+    })
+    .unwrap();
+    let mut launched = lab.events("crash-twice");
+    for event in &mut launched {
+        event.as_object_mut().unwrap().remove("seal");
+    }
+    assert!(events.iter().any(|event| event["event"] == "lost"));
+    assert_eq!(events.len(), launched.len());
+    for (event, launched) in events.iter().zip(&launched) {
+        assert_eq!(event, launched);
+    }
+}
+
+#[test]
+fn cars_check_reads_experiments() {
+    let lab = Lab::new();
+    let (code, text) = lab.cars_without_out(&["check", "configs/experiments/affect.toml"]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("8 arms, 9 conditions, 64 seeds"), "{text}");
+
+    let file = yoked(&lab);
+    let broken = std::fs::read_to_string(&file)
+        .unwrap()
+        .replace("crash\", at", "die\", at");
+    let broken = lab.write("broken.toml", &broken);
+    let (code, text) = lab.cars_without_out(&["check", broken.to_str().unwrap()]);
+    assert_eq!(code, 1, "{text}");
+    let text = unbroken(&text);
+    assert!(text.contains("condition \"crash\""), "{text}");
 }

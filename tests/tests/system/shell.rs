@@ -244,7 +244,7 @@ fn the_deadlock_experiment_gives_the_same_table_for_any_number_of_jobs() {
     assert_eq!(one, experiment("3"));
 
     let all: serde_json::Value = serde_json::from_str(&one).unwrap();
-    assert_eq!(all["runs"].as_array().unwrap().len(), 2 * 4 * 8);
+    assert_eq!(all["runs"].as_array().unwrap().len(), 2 * 5 * 8);
 
     let exchanges = |loss: &str, arm: &str| {
         let cells = all["estimates"].as_array().unwrap().iter();
@@ -254,14 +254,13 @@ fn the_deadlock_experiment_gives_the_same_table_for_any_number_of_jobs() {
         cell[0]["exchanges"]["mean"].as_f64().unwrap()
     };
 
-    // Every command lost: who has no emotions never gets treats, timer or not.
-    assert!(exchanges("1", "affectless") < 1.0 && exchanges("1", "timer repeat") < 1.0);
-    assert!(
-        exchanges("1", "affect only") > 1.5,
-        "{}",
-        exchanges("1", "affect only")
-    );
-    assert!(exchanges("0", "affectless") > 1.5);
+    // Every command lost: a team that only calls never gets treats; one that can intercept does, whatever decides about it.
+    assert!(exchanges("1", "neither") < 1.0);
+    for arm in ["emotions", "rules", "timer"] {
+        let found = exchanges("1", arm);
+        assert!(found > 1.0, "{arm}: {found}");
+    }
+    assert!(exchanges("0", "neither") > 1.5);
 }
 
 #[test]
@@ -287,16 +286,14 @@ fn with_emotions_the_team_works_on_while_it_is_cut_off_and_recovers() {
             .collect::<Vec<_>>();
         cell[0][what]["mean"].as_f64().unwrap()
     };
-    let uncut = mean("0 s", "affectless", "after");
-    let (without, with) = (
-        mean("240 s", "affectless", "after"),
-        mean("240 s", "affect only", "after"),
-    );
+    let uncut = mean("0 s", "neither", "after");
+    let without = mean("240 s", "neither", "after");
+    let with = mean("240 s", "emotions", "after");
     println!(
         "exchanges after 120 s uncut, without emotions: {uncut}; after a cut of 240 s: {without} without, {with} with"
     );
 
-    // One lost call is the end for those who call once; those who feel go on.
+    // One lost call is the end for a team that calls once.
     assert!(with > 2.0 * without && with > 4.0, "{with} {without}");
-    assert!(mean("240 s", "affect only", "during") > mean("240 s", "affectless", "during") + 1.0);
+    assert!(mean("240 s", "emotions", "during") > mean("240 s", "neither", "during") + 1.0);
 }

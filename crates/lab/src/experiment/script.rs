@@ -1,0 +1,53 @@
+//! Yoked control: the emotions of one run, as the parameter `script` of the same robots in another run. So a robot shows and
+//! acts by emotions that are as frequent and as strong, and that have nothing to do with what happens to it.
+
+use std::collections::BTreeMap;
+
+use config::Override;
+use protocol::{Event, RobotName};
+use simulator::{Simulation, TickRecord};
+use toml::{Table, Value};
+
+/// Parameter of a robot that replaces its own emotions.
+const PARAMETER: &str = "script";
+/// State variable with the intensity of the current emotion.
+const INTENSITY: &str = "intensity";
+
+/// The emotions that robots have shown.
+#[derive(Debug, Default)]
+pub(super) struct Script {
+    robots: BTreeMap<RobotName, Vec<Value>>,
+}
+
+impl Script {
+    /// Notes the emotions that begin in a tick, with their intensities.
+    pub(super) fn tick(&mut self, simulation: &Simulation, record: &TickRecord) {
+        for event in &record.events {
+            let Event::Emotion { robot, to, .. } = event else {
+                continue;
+            };
+            let variables = simulation.state_variables(robot);
+            let intensity = variables.and_then(|variables| variables.get(INTENSITY)?.as_f64());
+
+            let mut shown = Table::new();
+            shown.insert("at_s".to_owned(), simulation.time_s(record.tick).into());
+            shown.insert("emotion".to_owned(), to.clone().into());
+            shown.insert("intensity".to_owned(), intensity.unwrap_or(0.0).into());
+            let entries = self.robots.entry(robot.clone()).or_default();
+            entries.push(Value::Table(shown));
+        }
+    }
+
+    /// The changes of a scenario that make its robots show these emotions.
+    ///
+    /// # Errors
+    /// If the name of a robot cannot be part of a path.
+    pub(super) fn changes(&self) -> Result<Vec<Override>, String> {
+        let mut changes = Vec::new();
+        for (robot, shown) in &self.robots {
+            let shown = Value::Array(shown.clone());
+            changes.push(format!("robot.{robot}.params.{PARAMETER}={shown}").parse()?);
+        }
+        Ok(changes)
+    }
+}
