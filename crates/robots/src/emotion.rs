@@ -1,9 +1,13 @@
-//! A robot's emotion: a generator that an experiment can switch off, whose state can be saved and restored.
+//! A robot's emotion: a generator that an experiment can switch off or put a script in the place of, whose state can be
+//! saved and restored.
 
 use affect::{
     DynamicGenerator, EmotionGenerator, EmotionLabel, EmotionState, Feeling, RuleGenerator,
+    StandardEmotion,
 };
+use robot::Cars;
 
+use crate::script::Script;
 use crate::switch::Switch;
 
 /// The emotion that a robot without emotions publishes.
@@ -57,28 +61,47 @@ impl<M, B: PartialEq, E: EmotionLabel> Restore for RuleGenerator<M, B, E> {
 /// A generator and its switch. Switched off, the generator never runs and stays in its initial state.
 pub(crate) struct Emotion<G> {
     switch: Switch,
+    script: Script,
+    /// The feeling of the script at this time.
+    scripted: Option<Feeling<StandardEmotion>>,
     generator: G,
 }
 
-impl<G: Restore> Emotion<G> {
-    pub(crate) fn new(switch: Switch, generator: G) -> Self {
-        Self { switch, generator }
-    }
-
-    /// One step of `dt_s` seconds.
-    pub(crate) fn update(&mut self, measures: &G::Measures, behavior: &G::Behavior, dt_s: f64) {
-        if self.switch.is_on() {
-            self.generator.update(measures, behavior, dt_s);
+impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> Emotion<G> {
+    pub(crate) fn new(switch: Switch, script: Script, generator: G) -> Self {
+        Self {
+            switch,
+            script,
+            scripted: None,
+            generator,
         }
     }
 
+    /// The step of this tick.
+    pub(crate) fn update(
+        &mut self,
+        measures: &G::Measures,
+        behavior: &G::Behavior,
+        cars: &Cars<'_>,
+    ) {
+        if self.switch.is_on() {
+            self.generator.update(measures, behavior, cars.tick_s());
+        }
+
+        let time_s = cars.tick() as f64 * cars.tick_s();
+        self.scripted = self.script.feeling_at(time_s);
+    }
+
     /// The feeling; switched off, the initial one.
-    pub(crate) fn feeling(&self) -> Feeling<G::Emotion> {
-        self.generator.feeling()
+    pub(crate) fn feeling(&self) -> Feeling<StandardEmotion> {
+        match self.scripted {
+            Some(feeling) if self.switch.is_on() => feeling,
+            _ => self.generator.feeling(),
+        }
     }
 
     /// The feeling; `None` if it is switched off.
-    pub(crate) fn shown(&self) -> Option<Feeling<G::Emotion>> {
+    pub(crate) fn shown(&self) -> Option<Feeling<StandardEmotion>> {
         self.switch.is_on().then(|| self.feeling())
     }
 

@@ -16,6 +16,7 @@ mod bounds;
 pub mod butler;
 pub mod chance;
 mod classes;
+pub mod closing;
 mod commands;
 pub mod drive;
 mod emotion;
@@ -23,7 +24,9 @@ mod jokes;
 pub mod leguin;
 mod panel;
 pub mod peer;
+pub mod policy;
 mod published;
+pub mod script;
 pub mod switch;
 mod units;
 

@@ -16,10 +16,12 @@ use serde::{Deserialize, Serialize};
 pub use parameters::{Approach, Parameters, Rate};
 pub use tables::{Act, Behavior, Context, Measures, TABLE, appraise};
 
+use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
 use crate::emotion::Emotion;
 use crate::panel;
+use crate::policy::{Policy, Urge};
 use crate::published::text;
 use state::State;
 
@@ -150,7 +152,7 @@ impl Butler {
             .map_err(|error| error.to_string())?;
         let esg = DynamicGenerator::new(dynamics, appraise);
         Ok(Self {
-            emotion: Emotion::new(parameters.affect, esg),
+            emotion: Emotion::new(parameters.affect, parameters.script.clone(), esg),
             bsg: BehaviorGenerator::new(TABLE, Behavior::Serve),
             state,
             parameters,
@@ -202,7 +204,7 @@ impl Butler {
     /// The emotion state generator.
     fn update_emotion(&mut self, cars: &Cars<'_>) {
         self.emotion
-            .update(&self.state.measures, self.bsg.current(), cars.tick_s());
+            .update(&self.state.measures, self.bsg.current(), cars);
         self.state.record(self.feeling());
     }
 
@@ -238,8 +240,24 @@ impl Butler {
 
     /// Queries and senses the refiller, and estimates how fast she approaches.
     fn observe_refiller(&mut self, cars: &mut Cars<'_>) {
+        let is_exchanging = self.behavior() == Behavior::Exchange;
+        let is_intercepting = self.behavior() == Behavior::Intercept;
         let state = &mut self.state;
         let observation = state.refiller.observe(cars);
+
+        let distance_m = observation
+            .located_after_s
+            .and(state.refiller.location())
+            .map(|location| cars.location().distance_m(location));
+        let progress_m = self.parameters.progress_m;
+        if state.need {
+            state.errand.observe(distance_m, progress_m, cars.tick_s());
+        }
+        if is_intercepting {
+            state.chase.observe(distance_m, progress_m, cars.tick_s());
+        } else {
+            state.chase = Closing::default();
+        }
 
         // While she still prepares at the table, her speed does not show how fast she will come.
         let is_called = state.refiller.behavior(self.parameters.query_stale_s) == Some("REFILL");
@@ -247,6 +265,14 @@ impl Butler {
             .state
             .is_some_and(|refiller| refiller.speed_mps > 0.0);
         state.refiller_left = is_called && (state.refiller_left || moves);
+
+        // She was on her way and is not any more: she has given up, and forgotten his calls.
+        let behavior = state.refiller.behavior(self.parameters.query_stale_s);
+        let has_turned = matches!(behavior, Some("WAIT" | "GO_HOME"));
+        state.refiller_came |= state.called && is_called;
+        if state.refiller_came && has_turned && !is_exchanging {
+            state.forget_calls();
+        }
 
         match (observation.located_after_s, state.refiller.location()) {
             (Some(after_s), Some(location)) => {
@@ -262,7 +288,13 @@ impl Butler {
     fn measure(&mut self, cars: &Cars<'_>) {
         let rate_per_s = self.state.rate.per_second();
         let time_to_empty_s = time_to_empty_s(f64::from(self.state.treats), rate_per_s);
-        let time_to_refill_s = self.time_to_refill_s(cars);
+        // A refiller who has come no nearer for a while is expected to take at least as long again [I].
+        let stalled_s = if self.state.need {
+            self.state.errand.stalled_s()
+        } else {
+            0.0
+        };
+        let time_to_refill_s = self.time_to_refill_s(cars).max(stalled_s);
         let exchange_is_over = self.behavior() == Behavior::Exchange
             && self.bsg.has_lasted(self.parameters.exchange_s);
 
@@ -323,7 +355,6 @@ impl Butler {
     fn context(&self, cars: &Cars<'_>) -> Context {
         let state = &self.state;
         let parameters = &self.parameters;
-        let acts_by_emotion = parameters.acts_by_emotion();
         let stale_s = parameters.query_stale_s;
         let refiller = state.refiller.behavior(stale_s);
 
@@ -334,14 +365,17 @@ impl Butler {
         let repeats_call = self.is_due(state.since_call_s) && state.need;
 
         Context {
-            emotion: acts_by_emotion.then(|| self.feeling().emotion),
-            is_pressed: !acts_by_emotion && self.pressure() >= parameters.dynamics.th_confident,
+            urge: self.urge(),
+            is_happy: self.is_happy(),
             need: state.need,
             called: state.called,
             hurried: state.hurried,
             refiller_is_ready_here: is_here && is_ready,
             refiller_comes: refiller == Some("REFILL"),
+            refiller_is_busy: matches!(refiller, Some("AWAIT_GO_HOME" | "GO_HOME")),
             intercept_any: parameters.intercept_any,
+            is_stuck: state.chase.stalled_s() >= parameters.intercept_patience_s,
+            rests: state.rest_s > 0.0,
             exchange_is_over: state.measures.exchange_is_over,
             is_at_start: cars.location().distance_m(state.start) <= parameters.arrive_m,
             repeats_call: repeats_call && refiller == Some("WAIT"),
@@ -349,6 +383,39 @@ impl Butler {
                 && refiller == Some("AWAIT_GO_HOME"),
             has_joke: state.jokes.are_due(),
         }
+    }
+
+    /// How far he goes to be refilled, by his policy.
+    fn urge(&self) -> Urge {
+        let parameters = &self.parameters;
+        let dynamics = &parameters.dynamics;
+        let is_pressed = self.pressure() >= dynamics.th_confident;
+        let needed_s = self.state.needed_s;
+
+        match parameters.policy() {
+            Policy::Emotion => Urge::of(self.feeling().emotion),
+            Policy::Rules => Urge::at(
+                self.pressure(),
+                [
+                    dynamics.th_confident,
+                    dynamics.th_concerned,
+                    dynamics.th_frustrated,
+                ],
+            ),
+            Policy::Timer if self.state.need && needed_s >= parameters.intercept_after_s => {
+                Urge::Intercept
+            }
+            Policy::Timer if self.state.need && needed_s >= parameters.hurry_after_s => Urge::Hurry,
+            Policy::Timer if self.state.need || is_pressed => Urge::Call,
+            Policy::Neither if is_pressed => Urge::Call,
+            Policy::Timer | Policy::Neither => Urge::None,
+        }
+    }
+
+    fn is_happy(&self) -> bool {
+        let shown = self.emotion.shown();
+        self.parameters.schematic.is_on()
+            && shown.is_some_and(|feeling| feeling.emotion == StandardEmotion::Happy)
     }
 
     /// Whether a message that was sent so long ago is to be repeated.
@@ -367,7 +434,7 @@ impl Butler {
     fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {
         let state = &mut self.state;
         match act {
-            Act::RaiseNeed => state.need = true,
+            Act::RaiseNeed => state.raise_need(),
             Act::CallRefill => {
                 state.called = true;
                 state.since_call_s = 0.0;
@@ -384,6 +451,10 @@ impl Butler {
                 self.send_to_refiller(GO_HOME, cars);
             }
             Act::Replenish => state.replenish(self.parameters.treat_capacity),
+            Act::GiveUp => {
+                state.gave_up = state.gave_up.saturating_add(1);
+                state.rest_s = self.parameters.intercept_again_s;
+            }
             Act::Joke => {
                 state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
             }
@@ -430,15 +501,9 @@ impl Butler {
             return self.wander(cars, parameters.v_intercept_mps);
         };
 
-        // Too near to a refiller on her way home, he would stand in her way.
-        let stop_m = if self.refiller_is_busy() {
-            parameters.leave_room_m
-        } else {
-            parameters.stand_off_m
-        };
         let course = Course {
             goal,
-            stop_m,
+            stop_m: parameters.stand_off_m,
             speed_mps: parameters.v_intercept_mps,
             look_s: parameters.look_s,
         };
@@ -454,12 +519,6 @@ impl Butler {
         } else {
             refiller.location().or(self.table())
         }
-    }
-
-    /// Whether the refiller is known to have something else to do than to come.
-    fn refiller_is_busy(&self) -> bool {
-        let refiller = self.state.refiller.behavior(self.parameters.query_stale_s);
-        matches!(refiller, Some("AWAIT_GO_HOME" | "GO_HOME"))
     }
 
     fn feeling_widgets(&self) -> Vec<Widget> {
@@ -492,7 +551,10 @@ impl Butler {
                 "served, missed",
                 format!("{}, {}", state.served, state.missed),
             ),
-            ("exchanges", state.exchanges.to_string()),
+            (
+                "exchanges, given up",
+                format!("{}, {}", state.exchanges, state.gave_up),
+            ),
         ])
     }
 }

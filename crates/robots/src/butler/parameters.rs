@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::tables::Behavior;
 use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
+use crate::policy::Policy;
+use crate::script::Script;
 use crate::switch::Switch;
 use crate::units::FT_M;
 
@@ -21,9 +23,13 @@ pub struct Parameters {
     pub goods: String,
     /// His goal, as words that follow "I want" in his panel. Default "to serve the guests" \[I\].
     pub goal: String,
-    /// Whether he has emotions. `off` is a baseline that calls by the same measure of progress, and neither asks to
-    /// hurry nor intercepts. Default on \[I\].
+    /// Whether he has emotions. Default on \[I\].
     pub affect: Switch,
+    /// What his actions follow from. Default emotion \[D\].
+    pub policy: Policy,
+    /// Emotions that he shows and acts by in the place of his own, for experiments. Default none \[I\].
+    #[serde(skip_serializing_if = "Script::is_empty")]
+    pub script: Script,
     /// Whether his emotion acts on his behavior: the schematic level \[D: Murphy et al. 2002, abstract\]. With `off` he
     /// has emotions and publishes them, and acts as without. Default on \[I\].
     pub schematic: Switch,
@@ -61,11 +67,18 @@ pub struct Parameters {
     pub arrive_m: f64,
     /// Distance at which he stops before a refiller who could exchange and does not yet, m. Default 3 ft \[I\].
     pub stand_off_m: f64,
-    /// Distance at which he stops before a refiller who has to go home first, m. Default 8 ft \[I\]: if he
-    /// comes nearer, she cannot get past him and the guests.
-    pub leave_room_m: f64,
     /// Whether he intercepts a refiller who is still at the table. Default true \[I\].
     pub intercept_any: bool,
+    /// Time for which he intercepts without coming nearer to the refiller before he gives up, s. Default 15 \[I\].
+    pub intercept_patience_s: f64,
+    /// Time for which he does not intercept again after that, s. Default 30 \[I\].
+    pub intercept_again_s: f64,
+    /// By how much a distance must be smaller than ever before to count as progress, m. Default 0.5 ft \[I\].
+    pub progress_m: f64,
+    /// With the policy `timer`: time since the need arose after which he asks to hurry, s. Default 5 \[I\].
+    pub hurry_after_s: f64,
+    /// With the policy `timer`: time since the need arose after which he intercepts, s. Default 15 \[I\].
+    pub intercept_after_s: f64,
     /// Age at which the last answer of the refiller no longer counts, s. Default 5 \[I\].
     pub query_stale_s: f64,
     /// Mean time from one turn of the random walk to the next, s. Default 5 \[I\].
@@ -127,6 +140,8 @@ impl Default for Parameters {
             goods: "treats".to_owned(),
             goal: "to serve the guests".to_owned(),
             affect: Switch::On,
+            policy: Policy::Emotion,
+            script: Script::default(),
             schematic: Switch::On,
             resend: Switch::Off,
             resend_s: 5.0,
@@ -144,8 +159,12 @@ impl Default for Parameters {
             table: None,
             arrive_m: 1.5 * FT_M,
             stand_off_m: 3.0 * FT_M,
-            leave_room_m: 8.0 * FT_M,
             intercept_any: true,
+            intercept_patience_s: 15.0,
+            intercept_again_s: 30.0,
+            progress_m: 0.5 * FT_M,
+            hurry_after_s: 5.0,
+            intercept_after_s: 15.0,
             query_stale_s: 5.0,
             turn_mean_s: 5.0,
             look_s: LOOK_S,
@@ -182,18 +201,28 @@ impl Parameters {
         not_negative("reload_s", self.reload_s)?;
         not_negative("arrive_m", self.arrive_m)?;
         not_negative("stand_off_m", self.stand_off_m)?;
-        not_negative("leave_room_m", self.leave_room_m)?;
+        positive("intercept_patience_s", self.intercept_patience_s)?;
+        positive("progress_m", self.progress_m)?;
+        not_negative("intercept_again_s", self.intercept_again_s)?;
+        not_negative("hurry_after_s", self.hurry_after_s)?;
+        not_negative("intercept_after_s", self.intercept_after_s)?;
         not_negative("query_stale_s", self.query_stale_s)?;
         not_negative("look_s", self.look_s)?;
+        self.script.check()?;
         if self.treat_capacity == 0 {
             return Err("treat_capacity must be at least 1".to_owned());
         }
         Ok(())
     }
 
-    /// Whether the guards of his behaviors see his emotion.
-    pub(super) fn acts_by_emotion(&self) -> bool {
-        self.affect.is_on() && self.schematic.is_on()
+    /// What his actions follow from, with regard to what is switched off.
+    pub(super) fn policy(&self) -> Policy {
+        let has_emotions = self.affect.is_on() && self.schematic.is_on();
+        if self.policy == Policy::Emotion && !has_emotions {
+            Policy::Neither
+        } else {
+            self.policy
+        }
     }
 
     pub(super) fn rate(&self) -> RateParameters {

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::parameters::Parameters;
 use super::tables::{Behavior, Measures};
 use crate::chance::Chance;
+use crate::closing::Closing;
 use crate::drive::Drive;
 use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
@@ -35,14 +36,26 @@ pub(super) struct State {
     pub(super) messages: u32,
     /// Total time for which the tray was empty.
     pub(super) empty_s: f64,
+    /// How often he gave up an INTERCEPT.
+    pub(super) gave_up: u32,
     pub(super) since_call_s: f64,
     pub(super) since_go_home_s: f64,
+    /// Time since the need arose.
+    pub(super) needed_s: f64,
+    /// Time for which he does not intercept.
+    pub(super) rest_s: f64,
+    /// The distance of the refiller since the need arose.
+    pub(super) errand: Closing,
+    /// The distance of the refiller since he began to intercept.
+    pub(super) chase: Closing,
     pub(super) until_tap_s: f64,
     pub(super) rate: RateEstimator,
     pub(super) approach: ApproachEstimator,
     pub(super) refiller: Peer,
     /// Whether the refiller has left her table on her present errand.
     pub(super) refiller_left: bool,
+    /// Whether the refiller has been seen on her way since he called.
+    pub(super) refiller_came: bool,
     pub(super) measures: Measures,
     pub(super) taps: Chance,
     pub(super) turns: Chance,
@@ -65,13 +78,19 @@ impl State {
             exchanges: 0,
             messages: 0,
             empty_s: 0.0,
+            gave_up: 0,
             since_call_s: 0.0,
             since_go_home_s: 0.0,
+            needed_s: 0.0,
+            rest_s: 0.0,
+            errand: Closing::default(),
+            chase: Closing::default(),
             until_tap_s: parameters.treat_mean_s,
             rate: RateEstimator::new(parameters.rate())?,
             approach: ApproachEstimator::new(parameters.approach())?,
             refiller: Peer::new(&parameters.refiller),
             refiller_left: false,
+            refiller_came: false,
             measures: Measures::default(),
             taps: Chance::new(0),
             turns: Chance::new(1),
@@ -94,10 +113,28 @@ impl State {
     pub(super) fn advance(&mut self, tick_s: f64) {
         self.since_call_s += tick_s;
         self.since_go_home_s += tick_s;
+        self.rest_s = (self.rest_s - tick_s).max(0.0);
+        if self.need {
+            self.needed_s += tick_s;
+        }
         self.jokes.advance(tick_s);
         if self.treats == 0 {
             self.empty_s += tick_s;
         }
+    }
+
+    /// From now on he needs the refiller.
+    pub(super) fn raise_need(&mut self) {
+        self.need = true;
+        self.needed_s = 0.0;
+        self.errand = Closing::default();
+    }
+
+    /// His calls have come to nothing: he may call again.
+    pub(super) fn forget_calls(&mut self) {
+        self.called = false;
+        self.hurried = false;
+        self.refiller_came = false;
     }
 
     /// Completes an exchange.
@@ -105,8 +142,8 @@ impl State {
         self.treats = capacity;
         self.exchanges += 1;
         self.need = false;
-        self.called = false;
-        self.hurried = false;
+        self.rest_s = 0.0;
+        self.forget_calls();
         self.approach.expect_again();
     }
 
@@ -135,6 +172,7 @@ impl State {
             ("missed", self.missed.into()),
             ("exchanges", self.exchanges.into()),
             ("messages", self.messages.into()),
+            ("gave_up", self.gave_up.into()),
             ("empty_s", self.empty_s.into()),
             ("behavior", behavior.name().into()),
             ("start_x_m", self.start.x.into()),
@@ -162,6 +200,7 @@ impl State {
         self.missed = count(last, "missed");
         self.exchanges = count(last, "exchanges");
         self.messages = count(last, "messages");
+        self.gave_up = count(last, "gave_up");
         self.empty_s = number(last, "empty_s").unwrap_or(0.0);
 
         self.start = location(last, "start_x_m", "start_y_m").unwrap_or(self.start);

@@ -4,13 +4,14 @@
 //! motion. Guards see the state as it was before the rows of this tick: a need that is raised in a tick is seen by
 //! Butler in the next one, as it is by the refiller, who receives what he publishes.
 
-use affect::StandardEmotion::{self, Concerned, Confident, Frustrated, Happy};
 use affect::behavior::{
     Row,
     Then::{Go, Stay},
 };
-use affect::{ProgressEvent, Stimulus};
+use affect::{Drive, ProgressEvent, Stimulus};
 use serde::{Deserialize, Serialize};
+
+use crate::policy::Urge;
 
 /// Butler's behaviors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,6 +58,8 @@ pub enum Act {
     SendHome,
     /// Takes the new treats, and resets the need and the calls.
     Replenish,
+    /// Counts an INTERCEPT that came to nothing, and leaves the refiller alone for a while.
+    GiveUp,
     /// Tells a joke.
     Joke,
 }
@@ -64,10 +67,10 @@ pub enum Act {
 /// What the guard of a row sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Context {
-    /// His emotion; `None` if it does not act on behavior.
-    pub emotion: Option<StandardEmotion>,
-    /// If emotion does not act on behavior: whether the need is as great as the one that would make him CONFIDENT.
-    pub is_pressed: bool,
+    /// How far he goes to be refilled.
+    pub urge: Urge,
+    /// Whether he is HAPPY.
+    pub is_happy: bool,
     /// Whether he needs the refiller.
     pub need: bool,
     /// Whether he has called her.
@@ -78,8 +81,14 @@ pub struct Context {
     pub refiller_is_ready_here: bool,
     /// Whether she is on her way to him.
     pub refiller_comes: bool,
+    /// Whether she has something else to do first: to go home.
+    pub refiller_is_busy: bool,
     /// Whether he intercepts her even at the table.
     pub intercept_any: bool,
+    /// Whether he has intercepted for a while and comes no nearer.
+    pub is_stuck: bool,
+    /// Whether he gave up not long ago.
+    pub rests: bool,
     /// Whether an exchange has lasted as long as it takes.
     pub exchange_is_over: bool,
     /// Whether he is back at the start.
@@ -93,13 +102,9 @@ pub struct Context {
 }
 
 impl Context {
-    fn feels(&self, least: StandardEmotion) -> bool {
-        self.emotion.is_some_and(|emotion| emotion.reaches(least))
-    }
-
-    /// CONFIDENT or worse; if emotion does not act on behavior, the same measure of progress \[I\].
-    fn wants_refill(&self) -> bool {
-        self.feels(Confident) || self.is_pressed
+    /// Whether there is a point in driving to the refiller.
+    fn may_intercept(&self) -> bool {
+        !self.refiller_is_busy && !self.rests && (self.intercept_any || self.refiller_comes)
     }
 }
 
@@ -109,17 +114,19 @@ const AFOOT: &[Behavior] = &[Serve, Intercept, GoBack];
 /// The behavior state generator: the waiter's column of the paper's Table 2 and its experiment section as rows.
 #[rustfmt::skip]
 pub const TABLE: &[Row<Behavior, Context, Act>] = &[
-    Row { from: AFOOT, when: |c| c.wants_refill() && !c.need, act: &[Act::RaiseNeed], then: Stay },
+    Row { from: AFOOT, when: |c| c.urge >= Urge::Call && !c.need, act: &[Act::RaiseNeed], then: Stay },
     Row { from: AFOOT, when: |c| c.need && c.refiller_is_ready_here, act: &[], then: Go(Exchange) },
-    // An emotion that has no CONFIDENT below it (akr4) asks to hurry at once, which calls as well.
-    Row { from: AFOOT, when: |c| c.wants_refill() && !c.feels(Concerned) && !c.called, act: &[Act::CallRefill], then: Stay },
-    Row { from: AFOOT, when: |c| c.feels(Concerned) && !c.hurried, act: &[Act::CallHurry], then: Stay },
-    Row { from: AFOOT, when: |c| c.repeats_call && c.feels(Concerned), act: &[Act::CallHurry], then: Stay },
-    Row { from: AFOOT, when: |c| c.repeats_call && !c.feels(Concerned), act: &[Act::CallRefill], then: Stay },
+    // "hurry" calls as well: an emotion that has no CONFIDENT below it (akr4) begins with it.
+    Row { from: AFOOT, when: |c| c.urge == Urge::Call && !c.called, act: &[Act::CallRefill], then: Stay },
+    Row { from: AFOOT, when: |c| c.urge >= Urge::Hurry && !c.hurried, act: &[Act::CallHurry], then: Stay },
+    Row { from: AFOOT, when: |c| c.repeats_call && c.urge >= Urge::Hurry, act: &[Act::CallHurry], then: Stay },
+    Row { from: AFOOT, when: |c| c.repeats_call && c.urge < Urge::Hurry, act: &[Act::CallRefill], then: Stay },
     Row { from: AFOOT, when: |c| c.repeats_go_home, act: &[Act::SendHome], then: Stay },
-    Row { from: &[Serve], when: |c| c.feels(Frustrated) && (c.intercept_any || c.refiller_comes), act: &[], then: Go(Intercept) },
-    Row { from: &[Serve], when: |c| c.emotion == Some(Happy) && c.has_joke, act: &[Act::Joke], then: Stay },
-    // INTERCEPT has no row of its own: he goes on until he meets her, even if he calms down on the way [I].
+    Row { from: &[Serve], when: |c| c.urge >= Urge::Intercept && c.may_intercept(), act: &[], then: Go(Intercept) },
+    Row { from: &[Serve], when: |c| c.is_happy && c.has_joke, act: &[Act::Joke], then: Stay },
+    // He serves again when what made him leave has ended [D], when she has to go home first, or when he comes no nearer [I].
+    Row { from: &[Intercept], when: |c| c.urge < Urge::Intercept || c.refiller_is_busy, act: &[], then: Go(Serve) },
+    Row { from: &[Intercept], when: |c| c.is_stuck, act: &[Act::GiveUp], then: Go(Serve) },
     Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[Act::Replenish, Act::SendHome], then: Go(GoBack) },
     Row { from: &[GoBack], when: |c| c.is_at_start, act: &[], then: Go(Serve) },
 ];
@@ -132,7 +139,7 @@ pub struct Measures {
     pub rate_per_s: f64,
     /// Time until the tray is empty, s.
     pub time_to_empty_s: f64,
-    /// Time until the refiller can be here, s.
+    /// Time until the refiller can be here, s; not less than the time for which she has come no nearer.
     pub time_to_refill_s: f64,
     /// The ratio of the two: above 1 she comes too late.
     pub need_ratio: f64,
@@ -140,17 +147,17 @@ pub struct Measures {
     pub exchange_is_over: bool,
 }
 
-/// Appraises the measures for the emotion state generator: the need counts, unless an exchange is under way; that one is
-/// completed is the most important positive input.
+/// Appraises the measures for the emotion state generator. While an exchange is under way what he feels stays: nothing is
+/// achieved yet. That it is completed is the most important positive input, which leads from FRUSTRATED to HAPPY \[D\].
 pub fn appraise(measures: &Measures, behavior: &Behavior) -> Stimulus {
-    let need = if *behavior == Exchange {
-        0.0
+    let drive = if *behavior == Exchange {
+        Drive::Hold
     } else {
-        measures.need_ratio
+        Drive::Need(measures.need_ratio)
     };
     let event = measures
         .exchange_is_over
         .then_some(ProgressEvent::GoalAchieved);
     // He blames the refiller for an empty tray [D: FRUSTRATED at the assistant].
-    Stimulus::need(need).with_event(event).with_blame(true)
+    Stimulus::new(drive).with_event(event).with_blame(true)
 }

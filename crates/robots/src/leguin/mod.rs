@@ -16,10 +16,12 @@ use serde::{Deserialize, Serialize};
 pub use parameters::{Feelings, Parameters};
 pub use tables::{Act, Behavior, Context, EMOTIONS, Errand, Measures, TABLE, intensity};
 
+use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
 use crate::emotion::Emotion;
 use crate::panel;
+use crate::policy::Policy;
 use crate::published::{flag, text};
 use state::State;
 
@@ -131,18 +133,17 @@ impl Leguin {
         parameters.check()?;
         let esg = RuleGenerator::new(EMOTIONS, intensity, StandardEmotion::Happy);
 
-        // The sensory-motor level: concern speeds her up at once, nothing else changes her speed.
-        let onset = parameters.dynamics.th_concerned;
+        // The sensory-motor level: the stronger her concern, the faster she is; nothing else changes her speed.
         let haste = SensoryMotor::new(SensoryMotorParameters {
             negative_gain: parameters.hurry_mult,
             positive_gain: 1.0,
-            onset,
-            full: onset,
+            onset: parameters.dynamics.haste_onset,
+            full: parameters.dynamics.haste_full,
         })
         .map_err(|error| error.to_string())?;
 
         Ok(Self {
-            emotion: Emotion::new(parameters.affect, esg),
+            emotion: Emotion::new(parameters.affect, parameters.script.clone(), esg),
             bsg: BehaviorGenerator::new(TABLE, Behavior::Wait),
             haste,
             state: State::new(&parameters),
@@ -204,30 +205,54 @@ impl Leguin {
 
     fn update_progress(&mut self, cars: &mut Cars<'_>) {
         let behavior = self.behavior();
-        let parameters = &self.parameters;
-        self.bsg.advance(cars.tick_s());
-        self.state
-            .advance(behavior, parameters.progress_share, cars.tick_s());
+        let tick_s = cars.tick_s();
+        self.bsg.advance(tick_s);
+        self.state.advance(behavior, tick_s);
+        self.observe_waiter(cars);
+        self.observe_way(tick_s);
 
+        let parameters = &self.parameters;
         let gain = parameters.gain();
         let blocked = if behavior == Behavior::Refill {
-            self.state.blocked_s * gain / parameters.block_patience_s
+            self.state.way.stalled_s() * gain / parameters.block_patience_s
+        } else {
+            0.0
+        };
+        let hurry = if self.state.hurried {
+            parameters.dynamics.hurry * gain
         } else {
             0.0
         };
         self.state.measures = Measures {
             hurried: self.state.hurried,
+            hurry,
             blocked,
             waiting: self.state.waiting_s * gain / parameters.await_patience_s,
             th_concerned: parameters.dynamics.th_concerned,
         };
-        self.observe_waiter(cars);
+    }
+
+    /// Measures progress on the way: whether she is nearer to its goal than ever before.
+    fn observe_way(&mut self, tick_s: f64) {
+        let distance_m = self.goal().map(|goal| self.state.at.distance_m(goal));
+        let is_on_the_way = match self.behavior() {
+            Behavior::Refill => self.bsg.has_lasted(self.parameters.prep_s),
+            Behavior::GoHome => true,
+            Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => false,
+        };
+
+        if is_on_the_way {
+            let progress_m = self.parameters.progress_m;
+            self.state.way.observe(distance_m, progress_m, tick_s);
+        } else {
+            self.state.way = Closing::default();
+        }
     }
 
     /// The emotion state generator.
     fn update_emotion(&mut self, cars: &Cars<'_>) {
         self.emotion
-            .update(&self.state.measures, self.bsg.current(), cars.tick_s());
+            .update(&self.state.measures, self.bsg.current(), cars);
     }
 
     /// The behavior state generator.
@@ -263,7 +288,7 @@ impl Leguin {
         let state = &self.state;
         let parameters = &self.parameters;
         let distance_m = state.at.distance_m(state.home);
-        let is_kept_away = state.blocked_s >= parameters.settle_s;
+        let is_kept_away = state.way.stalled_s() >= parameters.settle_s;
         distance_m <= parameters.arrive_m || (distance_m <= parameters.settle_m && is_kept_away)
     }
 
@@ -272,7 +297,8 @@ impl Leguin {
         let parameters = &self.parameters;
         let waiter_is_here = state.waiter.is_within(parameters.exchange_radius_m, cars);
         Context {
-            emotion: parameters.acts_by_emotion().then(|| self.feeling().emotion),
+            gives_up: self.gives_up(),
+            is_happy: self.is_happy(),
             pending: state.pending,
             waiter_is_needy_here: self.is_needed(cars) && waiter_is_here,
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
@@ -280,6 +306,22 @@ impl Leguin {
             is_home: self.is_home(),
             has_joke: state.jokes.are_due(),
         }
+    }
+
+    /// Whether she turns back, by her policy.
+    fn gives_up(&self) -> bool {
+        let measures = &self.state.measures;
+        match self.parameters.policy() {
+            Policy::Emotion => self.feeling().emotion == StandardEmotion::Frustrated,
+            Policy::Rules | Policy::Timer => measures.blocked >= 1.0 || measures.waiting >= 1.0,
+            Policy::Neither => false,
+        }
+    }
+
+    fn is_happy(&self) -> bool {
+        let shown = self.emotion.shown();
+        self.parameters.schematic.is_on()
+            && shown.is_some_and(|feeling| feeling.emotion == StandardEmotion::Happy)
     }
 
     fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {
@@ -302,7 +344,7 @@ impl Leguin {
             Act::GiveUp => {
                 state.given_up += 1;
                 state.hurried = false;
-                state.begin_way();
+                state.way = Closing::default();
             }
             Act::Joke => {
                 state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
@@ -323,15 +365,19 @@ impl Leguin {
 
     /// The motion that her behavior wants.
     fn drive(&mut self, cars: &mut Cars<'_>) -> Action {
-        self.state.before = self.state.at;
-        self.state.aim = None;
         match self.behavior() {
             Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => {
                 self.state.drive.stay(cars)
             }
             Behavior::Refill => self.refill(cars),
             Behavior::GoHome => {
-                self.approach(cars, self.state.home, 0.0, self.parameters.v_refill_mps)
+                let course = Course {
+                    goal: self.state.home,
+                    stop_m: 0.0,
+                    speed_mps: self.parameters.v_refill_mps,
+                    look_s: self.parameters.look_s,
+                };
+                self.state.drive.follow(cars, course)
             }
         }
     }
@@ -344,45 +390,32 @@ impl Leguin {
 
         let speed_mps = self.parameters.v_refill_mps * self.haste();
         if let Some(goal) = self.goal() {
-            return self.approach(cars, goal, self.parameters.stand_off_m, speed_mps);
+            let course = Course {
+                goal,
+                stop_m: self.parameters.stand_off_m,
+                speed_mps,
+                look_s: self.parameters.look_s,
+            };
+            return self.state.drive.follow(cars, course);
         }
 
-        // A search has no goal: no step of it is progress.
         let turn_mean_s = self.parameters.turn_mean_s;
         let state = &mut self.state;
-        state.aim = Some((state.at, speed_mps * cars.tick_s()));
         state
             .drive
             .wander(cars, speed_mps, turn_mean_s, &mut state.turns)
     }
 
-    /// The factor of her emotion on her speed.
+    /// The factor on her speed, by her policy.
     fn haste(&self) -> f64 {
-        if self.parameters.sensory_motor.is_on() {
-            self.haste.gain(self.feeling().affect())
-        } else {
-            1.0
+        let parameters = &self.parameters;
+        match parameters.policy {
+            Policy::Emotion if parameters.sensory_motor.is_on() => {
+                self.haste.gain(self.feeling().affect())
+            }
+            Policy::Rules | Policy::Timer if self.state.hurried => parameters.hurry_mult,
+            Policy::Emotion | Policy::Rules | Policy::Timer | Policy::Neither => 1.0,
         }
-    }
-
-    /// A step toward a goal, which is remembered to measure progress.
-    fn approach(
-        &mut self,
-        cars: &mut Cars<'_>,
-        goal: Point,
-        stop_m: f64,
-        speed_mps: f64,
-    ) -> Action {
-        let state = &mut self.state;
-        let step_m = (speed_mps * cars.tick_s()).min(state.at.distance_m(goal) - stop_m);
-        state.aim = (step_m > 0.0).then_some((goal, step_m));
-        let course = Course {
-            goal,
-            stop_m,
-            speed_mps,
-            look_s: self.parameters.look_s,
-        };
-        state.drive.follow(cars, course)
     }
 
     fn feeling_widgets(&self) -> Vec<Widget> {
@@ -412,7 +445,7 @@ impl Leguin {
             ("waiter", self.parameters.waiter.clone()),
             ("way to go", distance),
             ("hurried", panel::yes(state.hurried).to_owned()),
-            ("blocked for", panel::seconds(state.blocked_s)),
+            ("blocked for", panel::seconds(state.way.stalled_s())),
             ("kept waiting for", panel::seconds(state.waiting_s)),
             (
                 "trips, given up",

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
+use crate::policy::Policy;
+use crate::script::Script;
 use crate::switch::Switch;
 use crate::units::FT_M;
 
@@ -17,8 +19,13 @@ pub struct Parameters {
     pub waiter: String,
     /// The name of what she brings, for her panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
     pub goods: String,
-    /// Whether she has emotions. `off` is a baseline that never hurries and never gives up. Default on \[I\].
+    /// Whether she has emotions. Default on \[I\].
     pub affect: Switch,
+    /// What her speed and her giving up follow from; `rules` and `timer` are the same for her. Default emotion \[D\].
+    pub policy: Policy,
+    /// Emotions that she shows and acts by in the place of her own, for experiments. Default none \[I\].
+    #[serde(skip_serializing_if = "Script::is_empty")]
+    pub script: Script,
     /// Whether her emotion acts on her speed: the sensory-motor level \[D: Murphy et al. 2002, abstract\]. With `off`,
     /// "hurry" changes her emotion and not her speed. Default on \[I\].
     pub sensory_motor: Switch,
@@ -33,19 +40,20 @@ pub struct Parameters {
     pub exchange_s: f64,
     /// Speed on the way to the waiter and home, m/s. Default 3 ft/s \[I\].
     pub v_refill_mps: f64,
-    /// Factor on it (dimensionless) while she is CONCERNED on the way to the waiter. Default 1.5 \[I\]; that she
+    /// Factor on it (dimensionless) while she is fully CONCERNED on the way to the waiter. Default 1.5 \[I\]; that she
     /// increases her speed \[D\].
     pub hurry_mult: f64,
     /// Time from a call until she leaves the table, s. Default 1 \[I\].
     pub prep_s: f64,
-    /// Time without progress after which she is FRUSTRATED with the way, s; divided by her gain. Default 60 \[I\]: well
-    /// above the time after which the waiter is FRUSTRATED, or she turns back before he can come to meet her.
+    /// Time without coming nearer to the waiter after which she is FRUSTRATED with the way, s; divided by her gain.
+    /// Default 30 \[I\]: above the time after which the waiter is FRUSTRATED, or she turns back before he can come to meet
+    /// her.
     pub block_patience_s: f64,
     /// Time without being sent home after which she is FRUSTRATED with the waiter, s; divided by her gain. Default
     /// 20 \[I\].
     pub await_patience_s: f64,
-    /// Share of a step that counts as progress. Default 0.1 \[I\].
-    pub progress_share: f64,
+    /// By how much a distance must be smaller than ever before on this way to count as progress, m. Default 0.5 ft \[I\].
+    pub progress_m: f64,
     /// Distance from her place at the table within which she has come home, m. Default 1.5 ft \[I\].
     pub arrive_m: f64,
     /// Time without progress after which a place near her own is home as well, s. Default 5 \[I\].
@@ -74,8 +82,14 @@ pub struct Feelings {
     pub caution_gain_base: f64,
     /// What full caution adds to the gain (dimensionless). Default 1 \[I\].
     pub caution_gain_slope: f64,
-    /// Intensity of her concern if she was commanded to hurry. Default 0.45 \[I\], where Butler's begins.
+    /// Share of her patience with the way at which she is CONCERNED about it. Default 0.45 \[I\], as Butler's.
     pub th_concerned: f64,
+    /// Intensity of her concern if she was commanded to hurry, multiplied by her gain. Default 0.6 \[I\].
+    pub hurry: f64,
+    /// Intensity of concern from which she moves faster. Default 0.25 \[I\].
+    pub haste_onset: f64,
+    /// Intensity of concern from which she moves as fast as she can. Default 0.6 \[I\].
+    pub haste_full: f64,
     /// Intensities at which low, medium, high and very high begin. Default 0.2, 0.4, 0.6, 0.8 \[I\].
     pub label_cuts: [f64; 4],
 }
@@ -86,6 +100,9 @@ impl Default for Feelings {
             caution_gain_base: 0.5,
             caution_gain_slope: 1.0,
             th_concerned: 0.45,
+            hurry: 0.6,
+            haste_onset: 0.25,
+            haste_full: 0.6,
             label_cuts: IntensityLabel::CUTS,
         }
     }
@@ -97,6 +114,8 @@ impl Default for Parameters {
             waiter: "Butler".to_owned(),
             goods: "treats".to_owned(),
             affect: Switch::On,
+            policy: Policy::Emotion,
+            script: Script::default(),
             sensory_motor: Switch::On,
             schematic: Switch::On,
             caution: Caution::default(),
@@ -105,9 +124,9 @@ impl Default for Parameters {
             v_refill_mps: 3.0 * FT_M,
             hurry_mult: 1.5,
             prep_s: 1.0,
-            block_patience_s: 60.0,
+            block_patience_s: 30.0,
             await_patience_s: 20.0,
-            progress_share: 0.1,
+            progress_m: 0.5 * FT_M,
             arrive_m: 1.5 * FT_M,
             settle_s: 5.0,
             settle_m: 6.0 * FT_M,
@@ -122,9 +141,14 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Whether the guards of her behaviors see what she feels.
-    pub(super) fn acts_by_emotion(&self) -> bool {
-        self.affect.is_on() && self.schematic.is_on()
+    /// What she gives up by, with regard to what is switched off.
+    pub(super) fn policy(&self) -> Policy {
+        let has_emotions = self.affect.is_on() && self.schematic.is_on();
+        if self.policy == Policy::Emotion && !has_emotions {
+            Policy::Neither
+        } else {
+            self.policy
+        }
     }
 
     /// How strongly she reacts: 1 with the defaults.
@@ -132,7 +156,7 @@ impl Parameters {
         self.dynamics.caution_gain_base + self.dynamics.caution_gain_slope * self.caution.value()
     }
 
-    /// Checks the values, except `hurry_mult` and `th_concerned`, which are checked where they are used.
+    /// Checks the values, except `hurry_mult` and those of her haste, which are checked where they are used.
     ///
     /// # Errors
     /// The first value that is wrong.
@@ -153,7 +177,10 @@ impl Parameters {
         not_negative("exchange_s", self.exchange_s)?;
         not_negative("v_refill_mps", self.v_refill_mps)?;
         not_negative("prep_s", self.prep_s)?;
-        not_negative("progress_share", self.progress_share)?;
+        positive("progress_m", self.progress_m)?;
+        not_negative("dynamics.th_concerned", self.dynamics.th_concerned)?;
+        not_negative("dynamics.hurry", self.dynamics.hurry)?;
+        self.script.check()?;
         not_negative("arrive_m", self.arrive_m)?;
         not_negative("settle_s", self.settle_s)?;
         not_negative("settle_m", self.settle_m)?;

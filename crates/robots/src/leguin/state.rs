@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::parameters::Parameters;
 use super::tables::{Behavior, Errand, Measures};
 use crate::chance::Chance;
+use crate::closing::Closing;
 use crate::commands::{HURRY, REFILL};
 use crate::drive::Drive;
 use crate::jokes::Jokes;
@@ -19,22 +20,14 @@ use crate::published::{count, flag, location, text};
 pub(super) struct State {
     /// Where she stands.
     pub(super) at: Point,
-    /// Where she stood before the last move.
-    pub(super) before: Point,
-    /// The goal of that move, and the length of its step.
-    pub(super) aim: Option<(Point, f64)>,
     /// Her place at the table.
     pub(super) home: Point,
     pub(super) drive: Drive,
     pub(super) hurried: bool,
     pub(super) sent_home: bool,
     pub(super) pending: Option<Errand>,
-    /// How far she has come on this way, measured toward its goal at each moment.
-    pub(super) way_m: f64,
-    /// The maximum of `way_m` on this way.
-    pub(super) best_way_m: f64,
-    /// Time since the last progress.
-    pub(super) blocked_s: f64,
+    /// The distance of her goal on this way.
+    pub(super) way: Closing,
     /// Time for which she has waited to be sent home.
     pub(super) waiting_s: f64,
     pub(super) trips: u32,
@@ -54,16 +47,12 @@ impl State {
     pub(super) fn new(parameters: &Parameters) -> Self {
         Self {
             at: Point::default(),
-            before: Point::default(),
-            aim: None,
             home: Point::default(),
             drive: Drive::default(),
             hurried: false,
             sent_home: false,
             pending: None,
-            way_m: 0.0,
-            best_way_m: 0.0,
-            blocked_s: 0.0,
+            way: Closing::default(),
             waiting_s: 0.0,
             trips: 0,
             given_up: 0,
@@ -80,7 +69,6 @@ impl State {
     pub(super) fn begin(&mut self, parameters: &Parameters, cars: &mut Cars<'_>) {
         let start = cars.welcome().location;
         self.at = start;
-        self.before = start;
         self.home = start;
 
         self.turns = Chance::split(cars.random());
@@ -88,37 +76,13 @@ impl State {
     }
 
     /// Advances the timers by one tick that she spent in this behavior.
-    pub(super) fn advance(&mut self, behavior: Behavior, progress_share: f64, tick_s: f64) {
+    pub(super) fn advance(&mut self, behavior: Behavior, tick_s: f64) {
         self.jokes.advance(tick_s);
         self.waiting_s = if behavior == Behavior::AwaitGoHome {
             self.waiting_s + tick_s
         } else {
             0.0
         };
-
-        let is_on_the_way = matches!(behavior, Behavior::Refill | Behavior::GoHome);
-        if !is_on_the_way {
-            self.begin_way();
-            return;
-        }
-        if let Some((goal, step_m)) = self.aim {
-            // Only her own motion toward the goal counts: the waiter's is not hers. To and fro is no progress.
-            self.way_m += self.before.distance_m(goal) - self.at.distance_m(goal);
-            let is_progress = self.way_m >= self.best_way_m + progress_share * step_m;
-            self.best_way_m = self.best_way_m.max(self.way_m);
-            self.blocked_s = if is_progress {
-                0.0
-            } else {
-                self.blocked_s + tick_s
-            };
-        }
-    }
-
-    /// Begins to measure progress anew.
-    pub(super) fn begin_way(&mut self) {
-        self.blocked_s = 0.0;
-        self.way_m = 0.0;
-        self.best_way_m = 0.0;
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
@@ -136,7 +100,7 @@ impl State {
         };
         [
             ("hurried", self.hurried.into()),
-            ("blocked_s", self.blocked_s.into()),
+            ("blocked_s", self.way.stalled_s().into()),
             ("waiting_s", self.waiting_s.into()),
             ("distance_m", distance_m.into()),
             ("intensity", intensity.value().into()),

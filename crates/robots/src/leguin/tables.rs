@@ -63,11 +63,13 @@ pub enum Errand {
 pub struct Measures {
     /// Whether she was commanded to hurry.
     pub hurried: bool,
+    /// How strongly that concerns her, 0 to 1.
+    pub hurry: f64,
     /// Time without progress on the way, as a share of the time after which she is FRUSTRATED with it.
     pub blocked: f64,
     /// Time for which she has waited to be sent home, as a share of the time after which she is FRUSTRATED with it.
     pub waiting: f64,
-    /// Intensity of her concern if she was commanded to hurry.
+    /// The share at which she is CONCERNED about the way.
     pub th_concerned: f64,
 }
 
@@ -76,7 +78,7 @@ pub struct Measures {
 pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
     EmotionRow { during: &[Wait, Exchange, GoHome], when: |_| true, feel: Happy },
     EmotionRow { during: &[Refill], when: |m| m.blocked >= 1.0, feel: Frustrated },
-    EmotionRow { during: &[Refill], when: |m| m.hurried, feel: Concerned },
+    EmotionRow { during: &[Refill], when: |m| m.hurried || m.blocked >= m.th_concerned, feel: Concerned },
     EmotionRow { during: &[Refill], when: |_| true, feel: Confident },
     EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= 1.0, feel: Frustrated },
     EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= 0.5, feel: Concerned },
@@ -85,12 +87,7 @@ pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
 
 /// The intensity of her emotion \[I\].
 pub fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
-    let hurry = if measures.hurried {
-        measures.th_concerned
-    } else {
-        0.0
-    };
-    Intensity::saturating(hurry.max(measures.blocked).max(measures.waiting))
+    Intensity::saturating(measures.hurry.max(measures.blocked).max(measures.waiting))
 }
 
 /// What a row of the behavior table makes Leguin do.
@@ -113,8 +110,10 @@ pub enum Act {
 /// What the guard of a row sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Context {
-    /// Her emotion; `None` if it does not act on behavior.
-    pub emotion: Option<StandardEmotion>,
+    /// Whether what she goes by makes her turn back.
+    pub gives_up: bool,
+    /// Whether she is HAPPY.
+    pub is_happy: bool,
     /// What she was commanded to do and has not begun.
     pub pending: Option<Errand>,
     /// Whether the waiter needs her, as far as is known, and is within the exchange radius.
@@ -137,7 +136,9 @@ pub const TABLE: &[Row<Behavior, Context, Act>] = &[
     Row { from: &[Refill], when: |c| c.pending == Some(Errand::Hurry), act: &[Act::Hurry], then: Stay },
     Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[], then: Go(AwaitGoHome) },
     Row { from: &[AwaitGoHome], when: |c| c.sent_home, act: &[Act::TurnHome], then: Go(GoHome) },
-    Row { from: &[AwaitGoHome, Refill], when: |c| c.emotion == Some(Frustrated), act: &[Act::GiveUp], then: Go(GoHome) },
+    Row { from: &[AwaitGoHome, Refill], when: |c| c.gives_up, act: &[Act::GiveUp], then: Go(GoHome) },
+    // With a call that came on the way she sets out again at once: in WAIT she would look as if she had not received it.
+    Row { from: &[GoHome], when: |c| c.is_home && c.pending.is_some(), act: &[Act::TakeErrand], then: Go(Refill) },
     Row { from: &[GoHome], when: |c| c.is_home, act: &[], then: Go(Wait) },
-    Row { from: &[Wait, GoHome], when: |c| c.emotion == Some(Happy) && c.has_joke, act: &[Act::Joke], then: Stay },
+    Row { from: &[Wait, GoHome], when: |c| c.is_happy && c.has_joke, act: &[Act::Joke], then: Stay },
 ];
