@@ -197,7 +197,12 @@ mod tests {
             (0.8, "very high"),
             (1.0, "very high"),
         ] {
-            assert_eq!(Intensity::saturating(value).label(&IntensityLabel::CUTS).name(), label);
+            assert_eq!(
+                Intensity::saturating(value)
+                    .label(&IntensityLabel::CUTS)
+                    .name(),
+                label
+            );
         }
     }
 }

@@ -9,8 +9,8 @@ use affect::StandardEmotion::{
     Angry, Concerned, Confident, Discouraged, Frustrated, Happy, Hopeful,
 };
 use affect::{
-    Belief, Caution, Drive, Dynamics, DynamicsParameters, EmotionState, Urgency, Ladder,
-    ProgressEvent, StandardEmotion, StateSet, Stimulus,
+    Belief, Caution, Drive, Dynamics, DynamicsParameters, EmotionState, Ladder, ProgressEvent,
+    StandardEmotion, StateSet, Stimulus, Urgency,
 };
 use proptest::prelude::*;
 

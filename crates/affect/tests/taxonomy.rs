@@ -7,9 +7,7 @@
 
 use affect::akr::{Agency, Appraisal, Personality, Preference, TABLE_2, Valence};
 use affect::frame::{AGENCY, CERTAINTY, CONTROLLABILITY, GOAL_CONGRUENCE, INTENSITY, VALENCE};
-use affect::{
-    Circumstances, EmotionLabel, Frame, SchemaError, Schemata, StandardEmotion, Urgency,
-};
+use affect::{Circumstances, EmotionLabel, Frame, SchemaError, Schemata, StandardEmotion, Urgency};
 
 fn frame(name: &str, urgency: f64, appraisal: Appraisal) -> Frame<'_> {
     let urgency = Urgency::new(urgency).unwrap();
@@ -57,7 +55,13 @@ fn two_episodes_of_an_emotion_differ_in_their_appraisals() {
     assert_eq!(first_agency, (AGENCY, "Leguin"));
     assert_eq!(second_agency, (AGENCY, "self"));
 
-    let names = [VALENCE, INTENSITY, GOAL_CONGRUENCE, CONTROLLABILITY, CERTAINTY];
+    let names = [
+        VALENCE,
+        INTENSITY,
+        GOAL_CONGRUENCE,
+        CONTROLLABILITY,
+        CERTAINTY,
+    ];
     for name in names {
         let value = |frame: &Frame<'_>| {
             let all = frame.numbers();

@@ -49,7 +49,11 @@ mod tests {
 
         closing.observe(Some(8.7), 0.5, 1.0);
         closing.observe(None, 0.5, 1.0);
-        assert_eq!(closing.stalled_s(), 5.0, "0.3 m is less than the least progress");
+        assert_eq!(
+            closing.stalled_s(),
+            5.0,
+            "0.3 m is less than the least progress"
+        );
 
         closing.observe(Some(8.5), 0.5, 1.0);
         assert_eq!(closing.stalled_s(), 0.0, "slow progress adds up");

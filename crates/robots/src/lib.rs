@@ -20,6 +20,7 @@ pub mod closing;
 mod commands;
 pub mod drive;
 mod emotion;
+pub mod frame;
 mod jokes;
 pub mod leguin;
 mod panel;

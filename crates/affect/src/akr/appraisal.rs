@@ -54,12 +54,7 @@ impl Default for Appraisal {
 
 impl Appraisal {
     /// Creates an appraisal. Numbers out of range are clamped, and NaN becomes 0.
-    pub fn new(
-        goal_congruence: f64,
-        controllability: f64,
-        certainty: f64,
-        agency: Agency,
-    ) -> Self {
+    pub fn new(goal_congruence: f64, controllability: f64, certainty: f64, agency: Agency) -> Self {
         Self {
             goal_congruence: clamped(goal_congruence, -1.0),
             controllability: clamped(controllability, 0.0),

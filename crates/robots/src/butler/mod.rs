@@ -1,6 +1,7 @@
 //! Butler, the waiter: wanders among the guests, offers treats, and, depending on his emotion, calls the refiller in
 //! time, asks her to hurry, or drives to meet her.
 
+mod appraisal;
 mod parameters;
 mod state;
 mod tables;
@@ -8,7 +9,8 @@ mod tables;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::progress::{need_ratio, time_to_arrive_by_depot_s, time_to_arrive_s, time_to_empty_s};
 use affect::{
-    Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, Intensity, StandardEmotion,
+    Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, Frame, StandardEmotion,
+    Urgency,
 };
 use robot::{Action, BadParameters, Cars, Panel, Point, Robot, StateVariables, Widget};
 use serde::{Deserialize, Serialize};
@@ -20,6 +22,7 @@ use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
 use crate::emotion::Emotion;
+use crate::frame;
 use crate::panel;
 use crate::policy::{Policy, Urge};
 use crate::published::text;
@@ -91,11 +94,10 @@ impl Robot for Butler {
         }
 
         let motion = self.drive(cars);
-        let intensity = self.feeling().intensity;
         Action {
             emotion_state: self.emotion.name().to_owned(),
             behavior_state: self.behavior().name().to_owned(),
-            state_variables: self.state.published(intensity, self.behavior()),
+            state_variables: self.state.published(self.frame().as_ref(), self.behavior()),
             ..motion
         }
     }
@@ -132,8 +134,8 @@ impl Robot for Butler {
             max: f64::from(self.parameters.treat_capacity),
         });
         widgets.push(Widget::Sparkline {
-            label: "intensity".to_owned(),
-            values: self.state.intensities.iter().copied().collect(),
+            label: "valence".to_owned(),
+            values: self.state.valences.iter().copied().collect(),
         });
         widgets.push(self.progress_table());
         Panel { widgets }
@@ -159,10 +161,16 @@ impl Butler {
         })
     }
 
-    /// His feeling; without emotions a steady one of intensity 0.
+    /// His feeling; without emotions a steady one.
     #[must_use]
     pub fn feeling(&self) -> Feeling<StandardEmotion> {
         self.emotion.feeling()
+    }
+
+    /// What he feels and why, as he publishes it; `None` without emotions.
+    #[must_use]
+    pub fn frame(&self) -> Option<Frame<'static>> {
+        frame::of(self.emotion.shown(), &self.state.appraisal)
     }
 
     /// His behavior.
@@ -205,6 +213,7 @@ impl Butler {
     fn update_emotion(&mut self, cars: &Cars<'_>) {
         self.emotion
             .update(&self.state.measures, self.bsg.current(), cars);
+        self.state.appraisal = self.appraisal(cars);
         self.state.record(self.feeling());
     }
 
@@ -428,7 +437,7 @@ impl Butler {
         let dynamics = &self.parameters.dynamics;
         let need = self.state.measures.need_ratio;
         let gain = dynamics.gain(self.parameters.caution);
-        Intensity::saturating(gain * need / dynamics.rho_max).value()
+        Urgency::saturating(gain * need / dynamics.rho_max).value()
     }
 
     fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {
@@ -527,10 +536,9 @@ impl Butler {
             other: Some(&self.parameters.refiller),
             goal: Some(&self.parameters.goal),
             amount: Some(&amount),
-            valence: None,
         };
-        panel::feeling(
-            self.emotion.shown(),
+        panel::affect(
+            self.frame().as_ref(),
             &self.parameters.dynamics.label_cuts,
             &circumstances,
         )

@@ -2,8 +2,9 @@
 
 use std::collections::VecDeque;
 
+use affect::akr::Appraisal;
 use affect::progress::{ApproachEstimator, RateEstimator};
-use affect::{Feeling, Intensity, ParameterError, StandardEmotion};
+use affect::{Feeling, Frame, ParameterError, StandardEmotion};
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +13,7 @@ use super::tables::{Behavior, Measures};
 use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::drive::Drive;
+use crate::frame;
 use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
@@ -60,7 +62,9 @@ pub(super) struct State {
     pub(super) taps: Chance,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
-    pub(super) intensities: VecDeque<f64>,
+    pub(super) appraisal: Appraisal,
+    /// The curve of the panel.
+    pub(super) valences: VecDeque<f64>,
 }
 
 impl State {
@@ -95,7 +99,8 @@ impl State {
             taps: Chance::new(0),
             turns: Chance::new(1),
             jokes: Jokes::new(Chance::new(2), parameters.joke_mean_s),
-            intensities: VecDeque::new(),
+            appraisal: Appraisal::default(),
+            valences: VecDeque::new(),
         })
     }
 
@@ -147,23 +152,26 @@ impl State {
         self.approach.expect_again();
     }
 
-    /// Appends the intensity to the curve of the panel.
+    /// Appends the signed valence to the curve of the panel.
     pub(super) fn record(&mut self, feeling: Feeling<StandardEmotion>) {
-        if self.intensities.len() == SPARKLINE_LEN {
-            self.intensities.pop_front();
+        if self.valences.len() == SPARKLINE_LEN {
+            self.valences.pop_front();
         }
-        self.intensities.push_back(feeling.intensity.value());
+        self.valences.push_back(feeling.affect().signed());
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
-    pub(super) fn published(&self, intensity: Intensity, behavior: Behavior) -> StateVariables {
+    pub(super) fn published(
+        &self,
+        frame: Option<&Frame<'_>>,
+        behavior: Behavior,
+    ) -> StateVariables {
         let mut variables: StateVariables = [
             ("treats", self.treats.into()),
             ("rate_per_s", self.measures.rate_per_s.into()),
             ("time_to_empty_s", self.measures.time_to_empty_s.into()),
             ("time_to_refill_s", self.measures.time_to_refill_s.into()),
             ("need_ratio", self.measures.need_ratio.into()),
-            ("intensity", intensity.value().into()),
             ("refiller", self.refiller.name().into()),
             ("need", self.need.into()),
             ("called", self.called.into()),
@@ -183,6 +191,9 @@ impl State {
         if let Some(table) = self.table.or(self.refiller.first_location()) {
             variables.insert("table_x_m".to_owned(), table.x.into());
             variables.insert("table_y_m".to_owned(), table.y.into());
+        }
+        if let Some(frame) = frame {
+            frame::publish(frame, &mut variables);
         }
         variables
     }

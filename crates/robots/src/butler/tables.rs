@@ -103,7 +103,7 @@ pub struct Context {
 
 impl Context {
     /// Whether there is a point in driving to the refiller.
-    fn may_intercept(&self) -> bool {
+    pub(super) fn may_intercept(&self) -> bool {
         !self.refiller_is_busy && !self.rests && (self.intercept_any || self.refiller_comes)
     }
 }

@@ -1,6 +1,7 @@
 //! What Leguin remembers from tick to tick besides emotion and behavior, and what she publishes of it.
 
-use affect::Intensity;
+use affect::Frame;
+use affect::akr::Appraisal;
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,7 @@ use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::commands::{HURRY, REFILL};
 use crate::drive::Drive;
+use crate::frame;
 use crate::jokes::Jokes;
 use crate::peer::Peer;
 use crate::published::{count, flag, location, text};
@@ -39,6 +41,7 @@ pub(super) struct State {
     /// Whom he called for.
     pub(super) waiter_calls: Option<String>,
     pub(super) measures: Measures,
+    pub(super) appraisal: Appraisal,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
 }
@@ -60,6 +63,7 @@ impl State {
             waiter_needs: false,
             waiter_calls: None,
             measures: Measures::default(),
+            appraisal: Appraisal::default(),
             turns: Chance::new(0),
             jokes: Jokes::new(Chance::new(1), parameters.joke_mean_s),
         }
@@ -88,7 +92,7 @@ impl State {
     /// The state variables: what other robots may query, and what a later incarnation needs.
     pub(super) fn published(
         &self,
-        intensity: Intensity,
+        frame: Option<&Frame<'_>>,
         behavior: Behavior,
         goal: Option<Point>,
     ) -> StateVariables {
@@ -98,12 +102,11 @@ impl State {
             Some(Errand::Hurry) => HURRY,
             None => "",
         };
-        [
+        let mut variables: StateVariables = [
             ("hurried", self.hurried.into()),
             ("blocked_s", self.way.stalled_s().into()),
             ("waiting_s", self.waiting_s.into()),
             ("distance_m", distance_m.into()),
-            ("intensity", intensity.value().into()),
             ("pending", pending.into()),
             ("trips", self.trips.into()),
             ("given_up", self.given_up.into()),
@@ -113,7 +116,11 @@ impl State {
             ("home_y_m", self.home.y.into()),
         ]
         .map(|(name, value)| (name.to_owned(), value))
-        .into()
+        .into();
+        if let Some(frame) = frame {
+            frame::publish(frame, &mut variables);
+        }
+        variables
     }
 
     /// Continues from what a lost incarnation published.
