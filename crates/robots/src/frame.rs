@@ -2,7 +2,7 @@
 
 use affect::akr::Appraisal;
 use affect::{EmotionLabel, Feeling, Frame, Schemata, StandardEmotion};
-use robot::StateVariables;
+use robot::Action;
 
 /// The frame of a feeling; `None` for a robot without emotions.
 pub(crate) fn of(
@@ -15,13 +15,20 @@ pub(crate) fn of(
     Schemata::standard().frame(name, feeling.urgency, appraisal.clone())
 }
 
-/// Adds a frame to the state variables of a robot, under the names of `affect::frame`, so that peers can query it and
-/// `cars emotionml` finds it.
-pub fn publish(frame: &Frame<'_>, variables: &mut StateVariables) {
+/// The action of a robot with this frame: its emotion, and state variables under the names of `affect::frame`, so that
+/// peers can query them and `cars emotionml` finds them.
+#[must_use]
+pub fn publish(frame: Option<Frame<'_>>, action: Action) -> Action {
+    let Some(frame) = frame else {
+        return action;
+    };
+
+    let mut action = action.emotion(frame.name());
     for (name, number) in frame.numbers() {
-        variables.insert(name.to_owned(), number.into());
+        action = action.variable(name, number);
     }
     for (name, text) in frame.texts() {
-        variables.insert(name.to_owned(), text.into());
+        action = action.variable(name, text);
     }
+    action
 }

@@ -22,7 +22,7 @@ use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
 use crate::emotion::Emotion;
-use crate::frame;
+use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::{Policy, Urge};
 use crate::published::text;
@@ -94,12 +94,13 @@ impl Robot for Butler {
         }
 
         let motion = self.drive(cars);
-        Action {
+        let action = Action {
             emotion_state: self.emotion.name().to_owned(),
             behavior_state: self.behavior().name().to_owned(),
-            state_variables: self.state.published(self.frame().as_ref(), self.behavior()),
+            state_variables: self.state.published(self.behavior()),
             ..motion
-        }
+        };
+        publish(self.frame(), action)
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {

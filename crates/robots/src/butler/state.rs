@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use affect::akr::Appraisal;
 use affect::progress::{ApproachEstimator, RateEstimator};
-use affect::{Feeling, Frame, ParameterError, StandardEmotion};
+use affect::{Feeling, ParameterError, StandardEmotion};
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,6 @@ use super::tables::{Behavior, Measures};
 use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::drive::Drive;
-use crate::frame;
 use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
@@ -161,11 +160,7 @@ impl State {
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
-    pub(super) fn published(
-        &self,
-        frame: Option<&Frame<'_>>,
-        behavior: Behavior,
-    ) -> StateVariables {
+    pub(super) fn published(&self, behavior: Behavior) -> StateVariables {
         let mut variables: StateVariables = [
             ("treats", self.treats.into()),
             ("rate_per_s", self.measures.rate_per_s.into()),
@@ -191,9 +186,6 @@ impl State {
         if let Some(table) = self.table.or(self.refiller.first_location()) {
             variables.insert("table_x_m".to_owned(), table.x.into());
             variables.insert("table_y_m".to_owned(), table.y.into());
-        }
-        if let Some(frame) = frame {
-            frame::publish(frame, &mut variables);
         }
         variables
     }

@@ -22,7 +22,7 @@ use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
 use crate::emotion::Emotion;
-use crate::frame;
+use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::Policy;
 use crate::published::{flag, text};
@@ -87,14 +87,13 @@ impl Robot for Leguin {
 
         let motion = self.drive(cars);
         let behavior = self.behavior();
-        Action {
+        let action = Action {
             emotion_state: self.emotion.name().to_owned(),
             behavior_state: behavior.name().to_owned(),
-            state_variables: self
-                .state
-                .published(self.frame().as_ref(), behavior, self.goal()),
+            state_variables: self.state.published(behavior, self.goal()),
             ..motion
-        }
+        };
+        publish(self.frame(), action)
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {

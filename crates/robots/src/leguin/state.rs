@@ -1,6 +1,5 @@
 //! What Leguin remembers from tick to tick besides emotion and behavior, and what she publishes of it.
 
-use affect::Frame;
 use affect::akr::Appraisal;
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
@@ -11,7 +10,6 @@ use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::commands::{HURRY, REFILL};
 use crate::drive::Drive;
-use crate::frame;
 use crate::jokes::Jokes;
 use crate::peer::Peer;
 use crate::published::{count, flag, location, text};
@@ -90,19 +88,14 @@ impl State {
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
-    pub(super) fn published(
-        &self,
-        frame: Option<&Frame<'_>>,
-        behavior: Behavior,
-        goal: Option<Point>,
-    ) -> StateVariables {
+    pub(super) fn published(&self, behavior: Behavior, goal: Option<Point>) -> StateVariables {
         let distance_m = goal.map_or(0.0, |goal| self.at.distance_m(goal));
         let pending = match self.pending {
             Some(Errand::Refill) => REFILL,
             Some(Errand::Hurry) => HURRY,
             None => "",
         };
-        let mut variables: StateVariables = [
+        [
             ("hurried", self.hurried.into()),
             ("blocked_s", self.way.stalled_s().into()),
             ("waiting_s", self.waiting_s.into()),
@@ -116,11 +109,7 @@ impl State {
             ("home_y_m", self.home.y.into()),
         ]
         .map(|(name, value)| (name.to_owned(), value))
-        .into();
-        if let Some(frame) = frame {
-            frame::publish(frame, &mut variables);
-        }
-        variables
+        .into()
     }
 
     /// Continues from what a lost incarnation published.
