@@ -8,6 +8,7 @@ use affect::{Feeling, ParameterError, StandardEmotion};
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
+use super::deliberation::Mind;
 use super::parameters::Parameters;
 use super::tables::{Behavior, Measures};
 use crate::chance::Chance;
@@ -62,6 +63,7 @@ pub(super) struct State {
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
     pub(super) appraisal: Appraisal,
+    pub(super) mind: Mind,
     /// The curve of the panel.
     pub(super) valences: VecDeque<f64>,
 }
@@ -99,6 +101,7 @@ impl State {
             turns: Chance::new(1),
             jokes: Jokes::new(Chance::new(2), parameters.joke_mean_s),
             appraisal: Appraisal::default(),
+            mind: Mind::default(),
             valences: VecDeque::new(),
         })
     }
@@ -146,6 +149,7 @@ impl State {
         self.treats = capacity;
         self.exchanges += 1;
         self.need = false;
+        self.mind.succeed();
         self.rest_s = 0.0;
         self.forget_calls();
         self.approach.expect_again();
@@ -186,6 +190,9 @@ impl State {
         if let Some(table) = self.table.or(self.refiller.first_location()) {
             variables.insert("table_x_m".to_owned(), table.x.into());
             variables.insert("table_y_m".to_owned(), table.y.into());
+        }
+        if let Some(plan) = self.mind.plan() {
+            variables.insert("plan".to_owned(), plan.name().into());
         }
         variables
     }
