@@ -169,6 +169,12 @@ impl ApproachEstimator {
         self.distance_m = Some(distance_m);
     }
 
+    /// Tells the estimator how far away the peer was at the last observation, as seen from where the robot is now. The next
+    /// observation then measures the peer's own approach, and not that of the robot.
+    pub fn measure_from(&mut self, distance_m: f64) {
+        self.distance_m = Some(distance_m);
+    }
+
     /// Records that nothing is known of the peer for the last `dt_s` seconds.
     ///
     /// The distance stays the same, and the speed decays to the floor, so that missing information raises concern.

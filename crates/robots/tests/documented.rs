@@ -6,6 +6,7 @@ mod stage;
 
 use robots::butler::{self, Act};
 use robots::leguin;
+use robots::policy::Urge;
 use stage::{FT_M, Role, Stage, feet, name};
 
 /// Loses every command.
@@ -207,10 +208,8 @@ fn t10_intercepting_brings_them_nearer_and_serves_no_guest() {
     for seed in 0..16 {
         let mut stage = deaf(seed, "");
         assert!(stage.step_until(120.0, |stage| stage.behavior("Butler") == "INTERCEPT"));
-        let (mut apart_ft, treats) = (
-            stage.apart_ft("Butler", "Leguin"),
-            stage.number("Butler", "treats"),
-        );
+        let mut apart_ft = stage.apart_ft("Butler", "Leguin");
+        let treats = stage.number("Butler", "treats");
         let met = stage.step_until(60.0, |stage| {
             let now_ft = stage.apart_ft("Butler", "Leguin");
             assert!(now_ft <= apart_ft, "seed {seed}, tick {}", stage.tick);
@@ -324,22 +323,21 @@ fn t14_a_third_robot_changes_nothing_for_the_other_two() {
 
 #[test]
 fn t16_whatever_is_felt_behavior_takes_only_the_ways_of_the_table() {
-    use affect::StandardEmotion;
-    let emotions = StandardEmotion::ALL.into_iter().map(Some).chain([None]);
     let legal = [
         ("SERVE", "INTERCEPT"),
         ("SERVE", "EXCHANGE"),
         ("INTERCEPT", "EXCHANGE"),
+        ("INTERCEPT", "SERVE"),
         ("GO_BACK", "EXCHANGE"),
         ("EXCHANGE", "GO_BACK"),
         ("GO_BACK", "SERVE"),
     ];
-    for emotion in emotions {
-        for bits in 0..4096_u32 {
+    for urge in Urge::ALL {
+        for bits in 0..32_768_u32 {
             let bit = |index: u32| bits >> index & 1 == 1;
             let context = butler::Context {
-                emotion,
-                is_pressed: bit(0),
+                urge,
+                is_happy: bit(0),
                 need: bit(1),
                 called: bit(2),
                 hurried: bit(3),
@@ -351,6 +349,9 @@ fn t16_whatever_is_felt_behavior_takes_only_the_ways_of_the_table() {
                 repeats_call: bit(9),
                 repeats_go_home: bit(10),
                 has_joke: bit(11),
+                refiller_is_busy: bit(12),
+                is_stuck: bit(13),
+                rests: bit(14),
             };
             for state in butler::Behavior::ALL {
                 let decision = affect::behavior::decide(butler::TABLE, &state, &context);
@@ -368,7 +369,9 @@ fn t16_whatever_is_felt_behavior_takes_only_the_ways_of_the_table() {
                     .actions
                     .iter()
                     .filter(|act| matches!(act, Act::CallRefill | Act::CallHurry));
-                assert!(emotion.is_some() || !decision.actions.contains(&Act::CallHurry));
+                assert!(urge >= Urge::Hurry || !decision.actions.contains(&Act::CallHurry));
+                let begins = decision.next == Some(butler::Behavior::Intercept);
+                assert!(!begins || (urge == Urge::Intercept && !context.refiller_is_busy));
                 assert!(calls.count() <= 2);
             }
         }

@@ -80,7 +80,7 @@ fn without_the_schematic_level_leguin_is_frustrated_and_goes_on() {
         if level == "off" {
             // What she feels still follows her progress.
             stage.obstacles.clear();
-            assert!(stage.step_until(2.0, |stage| stage.emotion("Leguin") == "CONCERNED"));
+            assert!(stage.step_until(20.0, |stage| stage.emotion("Leguin") == "CONCERNED"));
             assert_eq!(stage.behavior("Leguin"), "REFILL");
         }
     }

@@ -266,18 +266,27 @@ impl Butler {
         let is_exchanging = self.behavior() == Behavior::Exchange;
         let is_intercepting = self.behavior() == Behavior::Intercept;
         let state = &mut self.state;
+        let here = cars.location();
+        let before = state.refiller.location();
         let observation = state.refiller.observe(cars);
-
-        let distance_m = observation
+        let located = observation
             .located_after_s
             .and(state.refiller.location())
-            .map(|location| cars.location().distance_m(location));
+            .map(|location| here.distance_m(location));
+
+        // Whether she comes is a matter of her motion, not of his.
+        if let (Some(before), Some(distance_m)) = (before, located) {
+            let distance_before_m = here.distance_m(before);
+            state.approach.measure_from(distance_before_m);
+            state.come_m += distance_before_m - distance_m;
+        }
         let progress_m = self.parameters.progress_m;
         if state.need {
-            state.errand.observe(distance_m, progress_m, cars.tick_s());
+            let way_to_go_m = located.map(|_| -state.come_m);
+            state.errand.observe(way_to_go_m, progress_m, cars.tick_s());
         }
         if is_intercepting {
-            state.chase.observe(distance_m, progress_m, cars.tick_s());
+            state.chase.observe(located, progress_m, cars.tick_s());
         } else {
             state.chase = Closing::default();
         }
@@ -297,9 +306,8 @@ impl Butler {
             state.forget_calls();
         }
 
-        match (observation.located_after_s, state.refiller.location()) {
-            (Some(after_s), Some(location)) => {
-                let distance_m = cars.location().distance_m(location);
+        match (observation.located_after_s, located) {
+            (Some(after_s), Some(distance_m)) => {
                 state
                     .approach
                     .observe(distance_m, state.refiller_left, after_s);

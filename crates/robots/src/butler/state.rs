@@ -46,7 +46,9 @@ pub(super) struct State {
     pub(super) needed_s: f64,
     /// Time for which he does not intercept.
     pub(super) rest_s: f64,
-    /// The distance of the refiller since the need arose.
+    /// How far the refiller has come by herself since the need arose, m.
+    pub(super) come_m: f64,
+    /// Whether she comes nearer by herself.
     pub(super) errand: Closing,
     /// The distance of the refiller since he began to intercept.
     pub(super) chase: Closing,
@@ -88,6 +90,7 @@ impl State {
             since_go_home_s: 0.0,
             needed_s: 0.0,
             rest_s: 0.0,
+            come_m: 0.0,
             errand: Closing::default(),
             chase: Closing::default(),
             until_tap_s: parameters.treat_mean_s,
@@ -134,6 +137,7 @@ impl State {
     pub(super) fn raise_need(&mut self) {
         self.need = true;
         self.needed_s = 0.0;
+        self.come_m = 0.0;
         self.errand = Closing::default();
     }
 
