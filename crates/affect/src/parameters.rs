@@ -124,6 +124,18 @@ pub enum ParameterError {
         /// The value that comes after it.
         upper: f64,
     },
+    /// A threshold that is not above the one before it, or not within (0, 1].
+    #[error("{name} must be above {lower_name}, {lower}, and at most 1, but is {value}")]
+    Threshold {
+        /// The threshold.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The threshold before it.
+        lower_name: &'static str,
+        /// Its value.
+        lower: f64,
+    },
     /// A ladder without rungs, on which no robot could start.
     #[error("a ladder of emotions needs at least one rung")]
     NoRungs,
@@ -172,12 +184,36 @@ impl DynamicsParameters {
         not_negative("hope_s", self.hope_s)?;
 
         ascending(&self.label_cuts)?;
-        ascending(&[
-            self.th_confident,
-            self.th_concerned,
-            self.th_frustrated,
-            self.th_angry,
-        ])
+        self.check_thresholds()
+    }
+
+    /// Checks the thresholds of the state set; the other ones are not in use.
+    fn check_thresholds(&self) -> Result<(), ParameterError> {
+        let confident = ("th_confident", self.th_confident);
+        let concerned = ("th_concerned", self.th_concerned);
+        let frustrated = ("th_frustrated", self.th_frustrated);
+        let angry = ("th_angry", self.th_angry);
+        let in_use = match self.state_set {
+            StateSet::Murphy4 => [confident, concerned, frustrated],
+            StateSet::Akr4 => [concerned, frustrated, angry],
+        };
+
+        let mut lower_name = "the start";
+        let mut lower = 0.0;
+        for (name, value) in in_use {
+            let ascends = value > lower && value <= 1.0;
+            if !ascends {
+                return Err(ParameterError::Threshold {
+                    name,
+                    value,
+                    lower_name,
+                    lower,
+                });
+            }
+            lower_name = name;
+            lower = value;
+        }
+        Ok(())
     }
 }
 
@@ -237,9 +273,23 @@ mod tests {
         );
         assert_eq!(refusal("rho_max = nan"), "rho_max must be above 0, not NaN");
 
-        assert!(refusal("th_confident = 0.5").contains("0.5 is followed by 0.45"));
-        assert!(refusal("th_angry = 1.5").contains("ascending order"));
+        assert_eq!(
+            refusal("th_confident = 0.5"),
+            "th_concerned must be above th_confident, 0.5, and at most 1, but is 0.45"
+        );
+        assert_eq!(
+            refusal("state_set = 'akr4'\nth_angry = 1.5"),
+            "th_angry must be above th_frustrated, 0.75, and at most 1, but is 1.5"
+        );
         assert!(refusal("caution = 0.5").contains("unknown field"));
+    }
+
+    #[test]
+    fn only_thresholds_in_use_are_checked() {
+        assert!(DynamicsParameters::from_toml("th_frustrated = 1.0").is_ok());
+        assert!(DynamicsParameters::from_toml("th_angry = 0.1").is_ok());
+        assert!(DynamicsParameters::from_toml("state_set = 'akr4'\nth_confident = 0.9").is_ok());
+        assert!(DynamicsParameters::from_toml("state_set = 'akr4'\nth_frustrated = 1.0").is_err());
     }
 
     #[test]

@@ -79,7 +79,7 @@ fn leguin_goes_on_with_what_she_was_doing() {
             "REFILL" => ["REFILL", "EXCHANGE", "REFILL"],
             "EXCHANGE" => ["EXCHANGE", "AWAIT_GO_HOME", "EXCHANGE"],
             "AWAIT_GO_HOME" => ["AWAIT_GO_HOME", "GO_HOME", "AWAIT_GO_HOME"],
-            _ => ["GO_HOME", "WAIT", "REFILL"],
+            _ => ["GO_HOME", "WAIT", "GO_HOME"],
         };
         assert!(
             next.contains(&stage.behavior("Leguin")),

@@ -295,14 +295,20 @@ impl Butler {
         let is_called = state.refiller.behavior(self.parameters.query_stale_s) == Some("REFILL");
         let moves = observation
             .state
+            .as_ref()
             .is_some_and(|refiller| refiller.speed_mps > 0.0);
         state.refiller_left = is_called && (state.refiller_left || moves);
+
+        if let Some(refiller) = &observation.state {
+            let pending = text(&refiller.state_variables, "pending");
+            state.refiller_is_called = pending.is_some_and(|errand| !errand.is_empty());
+        }
 
         // She was on her way and is not any more: she has given up, and forgotten his calls.
         let behavior = state.refiller.behavior(self.parameters.query_stale_s);
         let has_turned = matches!(behavior, Some("WAIT" | "GO_HOME"));
         state.refiller_came |= state.called && is_called;
-        if state.refiller_came && has_turned && !is_exchanging {
+        if state.refiller_came && has_turned && !state.refiller_is_called && !is_exchanging {
             state.forget_calls();
         }
 
@@ -465,7 +471,7 @@ impl Butler {
             rests: state.rest_s > 0.0,
             exchange_is_over: state.measures.exchange_is_over,
             is_at_start: cars.location().distance_m(state.start) <= parameters.arrive_m,
-            repeats_call: repeats_call && refiller == Some("WAIT"),
+            repeats_call: repeats_call && refiller == Some("WAIT") && !state.refiller_is_called,
             repeats_go_home: self.is_due(state.since_go_home_s)
                 && refiller == Some("AWAIT_GO_HOME"),
             has_joke: state.jokes.are_due(),

@@ -60,6 +60,8 @@ pub(super) struct State {
     pub(super) refiller_left: bool,
     /// Whether the refiller has been seen on her way since he called.
     pub(super) refiller_came: bool,
+    /// Whether the refiller has an errand that she has not begun yet, by her last answer.
+    pub(super) refiller_is_called: bool,
     pub(super) measures: Measures,
     pub(super) taps: Chance,
     pub(super) turns: Chance,
@@ -99,6 +101,7 @@ impl State {
             refiller: Peer::new(&parameters.refiller),
             refiller_left: false,
             refiller_came: false,
+            refiller_is_called: false,
             measures: Measures::default(),
             taps: Chance::new(0),
             turns: Chance::new(1),

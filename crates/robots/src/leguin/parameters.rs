@@ -46,7 +46,7 @@ pub struct Parameters {
     /// Time from a call until she leaves the table, s. Default 1 \[I\].
     pub prep_s: f64,
     /// Time without coming nearer to the waiter after which she is FRUSTRATED with the way, s; divided by her gain.
-    /// Default 30 \[I\]: above the time after which the waiter is FRUSTRATED, or she turns back before he can come to meet
+    /// Default 25 \[I\]: above the time after which the waiter is FRUSTRATED, or she turns back before he can come to meet
     /// her.
     pub block_patience_s: f64,
     /// Time without being sent home after which she is FRUSTRATED with the waiter, s; divided by her gain. Default
@@ -124,7 +124,7 @@ impl Default for Parameters {
             v_refill_mps: 3.0 * FT_M,
             hurry_mult: 1.5,
             prep_s: 1.0,
-            block_patience_s: 30.0,
+            block_patience_s: 25.0,
             await_patience_s: 20.0,
             progress_m: 0.5 * FT_M,
             arrive_m: 1.5 * FT_M,

@@ -136,8 +136,6 @@ pub const TABLE: &[Row<Behavior, Context, Act>] = &[
     Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[], then: Go(AwaitGoHome) },
     Row { from: &[AwaitGoHome], when: |c| c.sent_home, act: &[Act::TurnHome], then: Go(GoHome) },
     Row { from: &[AwaitGoHome, Refill], when: |c| c.gives_up, act: &[Act::GiveUp], then: Go(GoHome) },
-    // With a call that came on the way she sets out again at once: in WAIT she would look as if she had not received it.
-    Row { from: &[GoHome], when: |c| c.is_home && c.pending.is_some(), act: &[Act::TakeErrand], then: Go(Refill) },
     Row { from: &[GoHome], when: |c| c.is_home, act: &[], then: Go(Wait) },
     Row { from: &[Wait, GoHome], when: |c| c.is_happy && c.has_joke, act: &[Act::Joke], then: Stay },
 ];
