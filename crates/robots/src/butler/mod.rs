@@ -345,8 +345,8 @@ impl Butler {
         };
     }
 
-    /// What he believes of himself: the refiller within sensing range encourages him, and so does one who comes nearer
-    /// faster than he walks.
+    /// What he believes of himself: the refiller within sensing range encourages him, and so does one who comes nearer at
+    /// more than his own pace.
     fn believe(&mut self, cars: &Cars<'_>) {
         let state = &mut self.state;
         let is_near = state
