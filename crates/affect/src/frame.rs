@@ -2,7 +2,7 @@
 
 use crate::akr::{Affect, Appraisal};
 use crate::scalar::{Intensity, Urgency};
-use crate::schema::{Circumstances, Schema};
+use crate::schema::{Circumstances, Schema, Schemata};
 
 /// State variable with the signed valence, -1 to 1.
 pub const VALENCE: &str = "valence";
@@ -48,21 +48,21 @@ pub struct Frame<'a> {
     schema: &'a Schema,
 }
 
-impl<'a> Frame<'a> {
-    pub(crate) fn new(
-        name: &'a str,
-        schema: &'a Schema,
-        urgency: Urgency,
-        appraisal: Appraisal,
-    ) -> Self {
-        Self {
+impl Schemata {
+    /// The emotion with this name in the present situation; `None` if there is no schema for it.
+    pub fn frame(&self, name: &str, urgency: Urgency, appraisal: Appraisal) -> Option<Frame<'_>> {
+        let (name, schema) = self.entry(name)?;
+
+        Some(Frame {
             name,
             urgency,
             appraisal,
             schema,
-        }
+        })
     }
+}
 
+impl Frame<'_> {
     /// Name of the emotion.
     pub fn name(&self) -> &str {
         self.name

@@ -1,14 +1,12 @@
 //! Emotion schemata: the components that all instances of an emotion share, as data.
 //!
-//! Together with an urgency and an appraisal, which depend on the situation, a schema makes a [`Frame`]. The schemata of
+//! Together with an urgency and an appraisal, which depend on the situation, a schema makes a [`Frame`](crate::Frame). The schemata of
 //! [`StandardEmotion`] are in a TOML file of this crate, which marks each value as documented or chosen. A robot with
 //! an emotion of its own defines a table for it and loads it with [`Schemata::from_toml`].
 //!
 //! [`StandardEmotion`]: crate::StandardEmotion
 
-use crate::akr::{ActionTendency, Appraisal, FacialExpression, Valence};
-use crate::frame::Frame;
-use crate::scalar::Urgency;
+use crate::akr::{ActionTendency, FacialExpression, Valence};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -258,10 +256,10 @@ impl Schemata {
         self.by_name.keys().map(String::as_str)
     }
 
-    /// The emotion with this name in the present situation; `None` if there is no schema for it.
-    pub fn frame(&self, name: &str, urgency: Urgency, appraisal: Appraisal) -> Option<Frame<'_>> {
+    /// The schema with this name, and the name as these schemata hold it.
+    pub(crate) fn entry(&self, name: &str) -> Option<(&str, &Schema)> {
         let (name, schema) = self.by_name.get_key_value(name)?;
 
-        Some(Frame::new(name, schema, urgency, appraisal))
+        Some((name, schema))
     }
 }

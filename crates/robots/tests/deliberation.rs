@@ -96,7 +96,7 @@ fn without_deliberation_he_has_no_beliefs_and_no_plans() {
 }
 
 #[test]
-fn who_believes_that_he_cannot_is_discouraged_and_stops_calling_and_intercepting() {
+fn a_butler_who_believes_that_he_cannot_is_discouraged_and_stops_calling_and_intercepting() {
     let reactive = arm("");
     let believing = arm(BELIEFS);
 
@@ -161,7 +161,7 @@ fn the_conceptual_level_finds_other_strategies_than_the_action_tendency() {
     assert!(plans.len() >= 2, "{plans:?}");
     assert!(differing(&planning, &reactive) >= 6);
 
-    // Who has learned that it leads nowhere intercepts less.
+    // He learns that it leads nowhere, and intercepts less.
     let intercept_ticks = |deeds: &Deeds| deeds.intercept_ticks;
     assert!(sum(&planning, intercept_ticks) < sum(&reactive, intercept_ticks));
 }
@@ -193,6 +193,23 @@ fn saved_and_restored_he_deliberates_identically() {
         let saved = deeds(walled(3, butler, BOTH));
         assert!(saved == straight, "saved at tick {at_tick}");
     }
+}
+
+#[test]
+fn a_later_incarnation_believes_what_the_lost_one_did() {
+    let lost_at = 1000;
+    let lost = Box::new(reborn::Butler::lost(lost_at));
+    let mut stage = walled(3, lost, BELIEFS);
+    while stage.tick + 1 < lost_at {
+        stage.step();
+    }
+    assert_eq!(stage.emotion("Butler"), "DISCOURAGED");
+    let gave_up = stage.number("Butler", "gave_up");
+
+    stage.step();
+    assert_eq!(stage.emotion("Butler"), "HAPPY");
+    assert!(stage.step_until(120.0, |stage| stage.emotion("Butler") == "DISCOURAGED"));
+    assert_eq!(stage.number("Butler", "gave_up"), gave_up);
 }
 
 #[test]

@@ -157,11 +157,13 @@ impl<W: Write> Document<W> {
             *self.left_out.entry(emotion.clone()).or_default() += 1;
             return Ok(());
         }
+
         if !self.is_standard {
             self.emotions.insert(emotion.clone());
             self.tendencies
                 .extend(tendency(episode, schema).map(str::to_owned));
         }
+
         let explanation = schema.map(|schema| explanation(schema, episode, &self.facts));
         let other = episode.other.as_deref();
         let targeted_at = other.and_then(|other| self.target(other));

@@ -17,6 +17,10 @@ use crate::bounds::positive;
 use crate::policy::Urge;
 use crate::switch::Switch;
 
+/// Beliefs, as they are published.
+const CAN: &str = "can";
+const CANNOT: &str = "cannot";
+
 /// What he deliberates about.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -121,6 +125,24 @@ impl Mind {
         if self.belief == Belief::Cannot {
             self.belief = Belief::Can;
         }
+    }
+
+    /// What he believes of himself, as it is published; `None` if he has formed no belief.
+    pub(super) fn belief(&self) -> Option<&'static str> {
+        match self.belief {
+            Belief::Unstated => None,
+            Belief::Can => Some(CAN),
+            Belief::Cannot => Some(CANNOT),
+        }
+    }
+
+    /// Continues with the belief that a lost incarnation published.
+    pub(super) fn take_over(&mut self, belief: Option<&str>) {
+        self.belief = match belief {
+            Some(CAN) => Belief::Can,
+            Some(CANNOT) => Belief::Cannot,
+            _ => Belief::Unstated,
+        };
     }
 
     /// The plan that he follows, if any.
@@ -231,7 +253,7 @@ impl Deliberator {
     ) -> Option<Planned> {
         let mut candidates = Vec::new();
         if let Some(intercept_s) = prospects.intercept_s {
-            // Nobody takes treats meanwhile. The more often he tried in vain, the less he expects of it.
+            // Guests take no treats meanwhile. The more often he tried in vain, the less he expects of it.
             let met = self.anticipated(prospects.treats, intercept_s, prospects);
             let in_vain = feeling.affect();
             let probability = 1.0 / (1.0 + f64::from(abandoned));

@@ -17,7 +17,7 @@ use crate::drive::Drive;
 use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
-use crate::published::{count, flag, location, number, saturated};
+use crate::published::{count, flag, location, number, saturated, text};
 
 /// Butler's memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -198,6 +198,9 @@ impl State {
             variables.insert("table_x_m".to_owned(), table.x.into());
             variables.insert("table_y_m".to_owned(), table.y.into());
         }
+        if let Some(belief) = self.mind.belief() {
+            variables.insert("belief".to_owned(), belief.into());
+        }
         if let Some(plan) = self.mind.plan() {
             variables.insert("plan".to_owned(), plan.name().into());
         }
@@ -222,5 +225,6 @@ impl State {
 
         self.start = location(last, "start_x_m", "start_y_m").unwrap_or(self.start);
         self.table = location(last, "table_x_m", "table_y_m");
+        self.mind.take_over(text(last, "belief"));
     }
 }
