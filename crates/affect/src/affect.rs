@@ -1,6 +1,6 @@
-//! Affect, the coarse state that moods and emotions refine, and the attributes that distinguish the levels.
+//! Affect, the coarse state that emotions refine.
 
-use crate::scalar::Intensity;
+use crate::scalar::{Intensity, Urgency};
 use serde::{Deserialize, Serialize};
 
 /// Pleasant or unpleasant [D: S].
@@ -21,43 +21,23 @@ impl Valence {
             Self::Negative => -1.0,
         }
     }
-}
 
-/// How long an affective phenomenon lasts [D: S].
-///
-/// The paper contradicts itself: it calls moods shorter than emotions in one place, and in the description of this
-/// attribute moods last days and emotions minutes. This crate implements the attribute.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Duration {
-    /// An emotion.
-    Minutes,
-    /// A mood.
-    Days,
-    /// A personality.
-    Lifetime,
-}
-
-/// What an affective phenomenon is about.
-///
-/// That this attribute separates moods from emotions is documented [D: S]. The values other than `Global` are
-/// chosen here \[I\].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Focality {
-    /// Nothing in particular.
-    Global,
-    /// Something that happens.
-    Event,
-    /// A thing or an agent.
-    Object,
+    /// How strongly an emotion of this valence is felt while the need is as urgent as this \[I\].
+    ///
+    /// Good feelings are strongest when nothing presses, bad ones when everything does: `1 - urgency` for a positive
+    /// emotion, `urgency` for a negative one. So the signed intensity falls as the urgency rises, and HAPPY, CONFIDENT,
+    /// CONCERNED and FRUSTRATED are in this order.
+    pub fn felt(self, urgency: Urgency) -> Intensity {
+        match self {
+            Self::Positive => Intensity::saturating(1.0 - urgency.value()),
+            Self::Negative => Intensity::saturating(urgency.value()),
+        }
+    }
 }
 
 /// A coarse affective state with two dimensions [D: S].
 ///
-/// Every mood and every emotion contains one, and it is all that the sensory-motor level can see. The figure of the
-/// taxonomy also lists duration and focality here [D: F2]. Those only have values for moods and emotions, which
-/// provide them.
+/// It is all that the sensory-motor level can see.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Affect {
@@ -68,6 +48,14 @@ pub struct Affect {
 }
 
 impl Affect {
+    /// The affect of an emotion of this valence at this urgency.
+    pub fn new(valence: Valence, urgency: Urgency) -> Self {
+        Self {
+            valence,
+            intensity: valence.felt(urgency),
+        }
+    }
+
     /// Intensity with the sign of the valence, in `[-1, 1]` \[I\].
     pub fn signed(&self) -> f64 {
         self.valence.sign() * self.intensity.value()

@@ -1,4 +1,4 @@
-//! How an emotion changes over time: the intensity filter and the state machine over a [`Ladder`].
+//! How an emotion changes over time: the filter of the urgency and the state machine over a [`Ladder`].
 //!
 //! The general behavior is documented [D: S]: positive progress keeps a robot HAPPY, negative progress worries it
 //! more and more until it is FRUSTRATED, and a positive input then leads back by as much as the input is important.
@@ -10,7 +10,7 @@
 use crate::label::{EmotionLabel, Feeling, StandardEmotion};
 use crate::ladder::{Ladder, Place};
 use crate::parameters::{DynamicsParameters, ParameterError};
-use crate::scalar::{Caution, Intensity, has_elapsed};
+use crate::scalar::{Caution, Urgency, has_elapsed};
 use serde::{Deserialize, Serialize};
 
 /// The continuous input to the dynamics during one step.
@@ -19,24 +19,24 @@ use serde::{Deserialize, Serialize};
 pub enum Drive {
     /// The time until help arrives divided by the time until it is needed; dimensionless, 0 or more.
     Need(f64),
-    /// No need: the intensity falls.
+    /// No need: the urgency falls.
     Rest,
-    /// No measure is available: the intensity stays the same. A need of NaN is treated the same way.
+    /// No measure is available: the urgency stays the same. A need of NaN is treated the same way.
     Hold,
 }
 
 /// A discrete event that affects a goal.
 ///
 /// The two classes are documented [D: S], and so is that the effect of a positive input depends on its importance.
-/// How much each event changes the intensity is chosen here \[I\].
+/// How much each event changes the urgency is chosen here \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProgressEvent {
-    /// A step toward the goal; its importance is subtracted from the intensity.
-    Positive(Intensity),
-    /// A setback; its importance, multiplied by the gain, is added to the intensity.
-    Negative(Intensity),
-    /// The goal is achieved, the most important positive input: returns to the initial emotion with intensity 0.
+    /// A step toward the goal; its importance is subtracted from the urgency.
+    Positive(Urgency),
+    /// A setback; its importance, multiplied by the gain, is added to the urgency.
+    Negative(Urgency),
+    /// The goal is achieved, the most important positive input: returns to the initial emotion with urgency 0.
     GoalAchieved,
 }
 
@@ -51,17 +51,6 @@ pub enum Belief {
     Can,
     /// The robot believes that it cannot achieve its goal.
     Cannot,
-}
-
-/// Direction in which the current input moves the intensity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trend {
-    /// Positive progress: the intensity falls.
-    Positive,
-    /// Negative progress: the intensity rises.
-    Negative,
-    /// The intensity stays the same.
-    Level,
 }
 
 /// Everything that acts on the emotion during one step.
@@ -128,7 +117,7 @@ impl Stimulus {
 #[serde(deny_unknown_fields)]
 pub struct EmotionState<E> {
     emotion: E,
-    intensity: Intensity,
+    urgency: Urgency,
     /// Time since the emotion last changed, or since the start, in seconds.
     unchanged_s: f64,
     /// Time for which the condition of the next rung has held without interruption, in seconds.
@@ -141,7 +130,7 @@ impl<E: EmotionLabel> EmotionState<E> {
     pub fn feeling(&self) -> Feeling<E> {
         Feeling {
             emotion: self.emotion,
-            intensity: self.intensity,
+            urgency: self.urgency,
         }
     }
 
@@ -219,11 +208,11 @@ impl<E: EmotionLabel> Dynamics<E> {
         self.gain
     }
 
-    /// The initial state: the lowest emotion, intensity 0, no belief.
+    /// The initial state: the lowest emotion, urgency 0, no belief.
     pub fn start(&self) -> EmotionState<E> {
         EmotionState {
             emotion: self.ladder.start(),
-            intensity: Intensity::MIN,
+            urgency: Urgency::MIN,
             unchanged_s: 0.0,
             pressing_s: 0.0,
             belief: Belief::Unstated,
@@ -234,67 +223,58 @@ impl<E: EmotionLabel> Dynamics<E> {
     /// negative.
     ///
     /// Use it to validate a state that was read from a file. [`Dynamics::step`] accepts any state, and moves an
-    /// emotion that is not on the ladder to the rung for its intensity.
+    /// emotion that is not on the ladder to the rung for its urgency.
     pub fn accepts(&self, state: &EmotionState<E>) -> bool {
         let is_on_ladder = self.ladder.place(state.emotion) != Place::Elsewhere;
 
         is_on_ladder && is_duration(state.unchanged_s) && is_duration(state.pressing_s)
     }
 
-    /// The intensity that `drive` moves toward: `min(1, g * need / rho_max)`.
+    /// The urgency that `drive` moves toward: `min(1, g * need / rho_max)`.
     ///
-    /// `None` if the drive leaves the intensity unchanged.
-    pub fn target(&self, drive: Drive) -> Option<Intensity> {
+    /// `None` if the drive leaves the urgency unchanged.
+    pub fn target(&self, drive: Drive) -> Option<Urgency> {
         match drive {
             Drive::Need(ratio) if ratio.is_nan() => None,
             Drive::Need(ratio) => {
                 let target = self.gain * ratio / self.parameters.rho_max;
-                Some(Intensity::saturating(target))
+                Some(Urgency::saturating(target))
             }
-            Drive::Rest => Some(Intensity::MIN),
+            Drive::Rest => Some(Urgency::MIN),
             Drive::Hold => None,
         }
     }
 
-    /// Whether `drive` is positive or negative progress for a robot in this state.
-    pub fn trend(&self, state: &EmotionState<E>, drive: Drive) -> Trend {
-        match self.target(drive) {
-            Some(target) if target > state.intensity => Trend::Negative,
-            Some(target) if target < state.intensity => Trend::Positive,
-            _ => Trend::Level,
-        }
-    }
-
-    /// Advances the state by `dt_s` seconds: updates the belief, then the intensity, then the emotion at most once.
+    /// Advances the state by `dt_s` seconds: updates the belief, then the urgency, then the emotion at most once.
     pub fn step(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
         state.belief = stimulus.belief.unwrap_or(state.belief);
         state.unchanged_s += dt_s;
 
         let place = self.ladder.place(state.emotion);
         if stimulus.event == Some(ProgressEvent::GoalAchieved) && place != Place::Discouraged {
-            state.intensity = Intensity::MIN;
+            state.urgency = Urgency::MIN;
             state.pressing_s = 0.0;
             state.change_to(self.ladder.start());
             return;
         }
 
-        self.update_intensity(state, stimulus, dt_s);
+        self.update_urgency(state, stimulus, dt_s);
 
         let next = match place {
             Place::Rung(index) => self.next_from_rung(index, state, stimulus, dt_s),
             Place::Discouraged => self.next_from_discouraged(state),
             Place::Hopeful => self.next_from_hopeful(state),
-            Place::Elsewhere => self.rung_by_intensity(state, usize::MAX),
+            Place::Elsewhere => self.rung_by_urgency(state, usize::MAX),
         };
         state.change_to(next);
     }
 
-    /// Filters the drive into the intensity, then adds the effect of the event.
-    fn update_intensity(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
-        let mut intensity = state.intensity.value();
+    /// Filters the drive into the urgency, then adds the effect of the event.
+    fn update_urgency(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
+        let mut urgency = state.urgency.value();
 
         if let Some(target) = self.target(stimulus.drive) {
-            intensity = self.filter(intensity, target.value(), dt_s);
+            urgency = self.filter(urgency, target.value(), dt_s);
         }
 
         let jump = match stimulus.event {
@@ -303,22 +283,22 @@ impl<E: EmotionLabel> Dynamics<E> {
             Some(ProgressEvent::GoalAchieved) | None => 0.0,
         };
 
-        state.intensity = Intensity::saturating(intensity + jump);
+        state.urgency = Urgency::saturating(urgency + jump);
     }
 
     /// First-order filter with time constant `tau_up_s / g` when rising and `tau_down_s` when falling.
-    fn filter(&self, intensity: f64, target: f64, dt_s: f64) -> f64 {
-        let tau_s = if target > intensity {
+    fn filter(&self, urgency: f64, target: f64, dt_s: f64) -> f64 {
+        let tau_s = if target > urgency {
             self.parameters.tau_up_s / self.gain
         } else {
             self.parameters.tau_down_s
         };
         let share = 1.0 - libm::exp(-dt_s / tau_s);
 
-        intensity + (target - intensity) * share
+        urgency + (target - urgency) * share
     }
 
-    /// Climbs by at most one rung, or falls by as many rungs as the intensity requires, but not before the dwell
+    /// Climbs by at most one rung, or falls by as many rungs as the urgency requires, but not before the dwell
     /// time is over.
     fn next_from_rung(
         &self,
@@ -341,7 +321,7 @@ impl<E: EmotionLabel> Dynamics<E> {
         let reached = if may_climb {
             index + 1
         } else {
-            self.fall_from(index, state.intensity.value())
+            self.fall_from(index, state.urgency.value())
         };
         self.ladder.rungs()[reached].emotion
     }
@@ -354,12 +334,12 @@ impl<E: EmotionLabel> Dynamics<E> {
         (belief == Belief::Cannot && index >= from).then_some(beliefs.discouraged)
     }
 
-    /// The highest rung, not above `index`, that is not left at this intensity.
-    fn fall_from(&self, index: usize, intensity: f64) -> usize {
+    /// The highest rung, not above `index`, that is not left at this urgency.
+    fn fall_from(&self, index: usize, urgency: f64) -> usize {
         let rungs = self.ladder.rungs();
 
         let mut lower = index;
-        while lower > 0 && intensity < rungs[lower].enter - self.parameters.hysteresis {
+        while lower > 0 && urgency < rungs[lower].enter - self.parameters.hysteresis {
             lower -= 1;
         }
 
@@ -380,13 +360,13 @@ impl<E: EmotionLabel> Dynamics<E> {
             return false;
         };
 
-        let intensity = state.intensity.value();
+        let urgency = state.urgency.value();
         let is_blamed = stimulus.blames_other || !next.needs_blame;
         if next.hold_s == 0.0 {
-            return is_blamed && intensity >= next.enter;
+            return is_blamed && urgency >= next.enter;
         }
 
-        let is_pressing = is_blamed && intensity > next.enter;
+        let is_pressing = is_blamed && urgency > next.enter;
         state.pressing_s = if is_pressing {
             state.pressing_s + dt_s
         } else {
@@ -406,7 +386,7 @@ impl<E: EmotionLabel> Dynamics<E> {
 
     /// Hope ends when the belief changes or after `hope_s`.
     ///
-    /// After `hope_s`, the emotion follows from the intensity, up to the rung below the discouraging one \[I\].
+    /// After `hope_s`, the emotion follows from the urgency, up to the rung below the discouraging one \[I\].
     fn next_from_hopeful(&self, state: &EmotionState<E>) -> E {
         let Some(beliefs) = self.ladder.beliefs() else {
             return state.emotion;
@@ -424,11 +404,11 @@ impl<E: EmotionLabel> Dynamics<E> {
 
         let from = self.ladder.discouraging_rung().unwrap_or(0);
         let limit = from.saturating_sub(1);
-        self.rung_by_intensity(state, limit)
+        self.rung_by_urgency(state, limit)
     }
 
-    fn rung_by_intensity(&self, state: &EmotionState<E>, limit: usize) -> E {
-        let index = self.ladder.rung_for(state.intensity.value(), limit);
+    fn rung_by_urgency(&self, state: &EmotionState<E>, limit: usize) -> E {
+        let index = self.ladder.rung_for(state.urgency.value(), limit);
 
         self.ladder.rungs()[index].emotion
     }

@@ -5,11 +5,11 @@
 //! The types enforce this. An [`EmotionGenerator`] has shared references to measures and behavior, owns only its
 //! emotion, and returns a [`Feeling`], which is a copy.
 //!
-//! There are three generators: [`DynamicGenerator`] for continuous measures, [`RuleGenerator`] for a table of
-//! conditions, and [`SteadyGenerator`] as a baseline without emotions.
+//! There are two generators: [`DynamicGenerator`] for continuous measures, and [`RuleGenerator`] for a table of
+//! conditions.
 //!
 //! ```compile_fail,E0594
-//! use affect::{EmotionGenerator, Feeling, Intensity, StandardEmotion};
+//! use affect::{EmotionGenerator, Feeling, Urgency, StandardEmotion};
 //! enum Behavior { Serve, Rest }
 //! struct Meddler;
 //! impl EmotionGenerator for Meddler {
@@ -21,14 +21,14 @@
 //!         self.feeling()
 //!     }
 //!     fn feeling(&self) -> Feeling<StandardEmotion> {
-//!         Feeling { emotion: StandardEmotion::Happy, intensity: Intensity::MIN }
+//!         Feeling { emotion: StandardEmotion::Happy, urgency: Urgency::MIN }
 //!     }
 //! }
 //! ```
 
 use crate::dynamics::{Dynamics, EmotionState, Stimulus};
 use crate::label::{EmotionLabel, Feeling};
-use crate::scalar::Intensity;
+use crate::scalar::Urgency;
 use std::fmt;
 
 /// Turns progress measures into a feeling.
@@ -136,28 +136,28 @@ pub struct EmotionRow<M: 'static, B: 'static, E> {
     pub feel: E,
 }
 
-/// A generator that takes the emotion from the first matching row of a table, and the intensity from a function.
+/// A generator that takes the emotion from the first matching row of a table, and the urgency from a function.
 ///
 /// The emotion does not change if no row matches. The feeling is the only state.
 pub struct RuleGenerator<M: 'static, B: 'static, E: 'static> {
     rows: &'static [EmotionRow<M, B, E>],
-    intensity: fn(&M, &B) -> Intensity,
+    urgency: fn(&M, &B) -> Urgency,
     feeling: Feeling<E>,
 }
 
 impl<M, B: PartialEq, E: EmotionLabel> RuleGenerator<M, B, E> {
-    /// Creates a generator that starts with the emotion `start` at intensity 0.
+    /// Creates a generator that starts with the emotion `start` at urgency 0.
     pub fn new(
         rows: &'static [EmotionRow<M, B, E>],
-        intensity: fn(&M, &B) -> Intensity,
+        urgency: fn(&M, &B) -> Urgency,
         start: E,
     ) -> Self {
         Self {
             rows,
-            intensity,
+            urgency,
             feeling: Feeling {
                 emotion: start,
-                intensity: Intensity::MIN,
+                urgency: Urgency::MIN,
             },
         }
     }
@@ -182,44 +182,8 @@ impl<M, B: PartialEq, E: EmotionLabel> EmotionGenerator for RuleGenerator<M, B, 
         if let Some(row) = row {
             self.feeling.emotion = row.feel;
         }
-        self.feeling.intensity = (self.intensity)(measures, behavior);
+        self.feeling.urgency = (self.urgency)(measures, behavior);
 
-        self.feeling
-    }
-
-    fn feeling(&self) -> Feeling<E> {
-        self.feeling
-    }
-}
-
-/// A generator whose feeling never changes, as a baseline without emotions.
-pub struct SteadyGenerator<M, B, E> {
-    feeling: Feeling<E>,
-    // Ties the generator to the types of the robot that it is used in.
-    stands_in: std::marker::PhantomData<fn(&M, &B)>,
-}
-
-impl<M, B, E: EmotionLabel> SteadyGenerator<M, B, E> {
-    /// Creates a generator that feels `emotion` at intensity 0.
-    pub fn new(emotion: E) -> Self {
-        let feeling = Feeling {
-            emotion,
-            intensity: Intensity::MIN,
-        };
-
-        Self {
-            feeling,
-            stands_in: std::marker::PhantomData,
-        }
-    }
-}
-
-impl<M, B, E: EmotionLabel> EmotionGenerator for SteadyGenerator<M, B, E> {
-    type Measures = M;
-    type Behavior = B;
-    type Emotion = E;
-
-    fn update(&mut self, _measures: &M, _behavior: &B, _dt_s: f64) -> Feeling<E> {
         self.feeling
     }
 
@@ -252,7 +216,7 @@ impl<M, B, E: Clone> Clone for RuleGenerator<M, B, E> {
     fn clone(&self) -> Self {
         Self {
             rows: self.rows,
-            intensity: self.intensity,
+            urgency: self.urgency,
             feeling: self.feeling.clone(),
         }
     }
@@ -263,23 +227,6 @@ impl<M, B, E: fmt::Debug> fmt::Debug for RuleGenerator<M, B, E> {
         f.debug_struct("RuleGenerator")
             .field("feeling", &self.feeling)
             .finish_non_exhaustive()
-    }
-}
-
-impl<M, B, E: Clone> Clone for SteadyGenerator<M, B, E> {
-    fn clone(&self) -> Self {
-        Self {
-            feeling: self.feeling.clone(),
-            stands_in: std::marker::PhantomData,
-        }
-    }
-}
-
-impl<M, B, E: fmt::Debug> fmt::Debug for SteadyGenerator<M, B, E> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SteadyGenerator")
-            .field("feeling", &self.feeling)
-            .finish()
     }
 }
 
@@ -323,13 +270,13 @@ mod tests {
         },
     ];
 
-    fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
-        Intensity::saturating(measures.blocked)
+    fn urgency(measures: &Measures, _: &Behavior) -> Urgency {
+        Urgency::saturating(measures.blocked)
     }
 
     #[test]
     fn the_first_matching_row_determines_the_emotion() {
-        let mut esg = RuleGenerator::new(ROWS, intensity, Happy);
+        let mut esg = RuleGenerator::new(ROWS, urgency, Happy);
 
         for (is_hurried, blocked, behavior, expected) in [
             (true, 0.5, Behavior::Wait, (Happy, 0.5)),
@@ -344,21 +291,7 @@ mod tests {
             };
             let feeling = esg.update(&measures, &behavior, 0.5);
 
-            assert_eq!((feeling.emotion, feeling.intensity.value()), expected);
+            assert_eq!((feeling.emotion, feeling.urgency.value()), expected);
         }
-    }
-
-    #[test]
-    fn the_feeling_of_the_baseline_never_changes() {
-        let mut esg = SteadyGenerator::<Measures, Behavior, _>::new(Happy);
-        let measures = Measures {
-            is_hurried: true,
-            blocked: 9.0,
-        };
-
-        let feeling = esg.update(&measures, &Behavior::Go, 0.5);
-
-        assert_eq!(feeling.emotion, Happy);
-        assert_eq!(feeling.intensity, Intensity::MIN);
     }
 }

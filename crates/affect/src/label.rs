@@ -4,7 +4,7 @@
 //! implements [`EmotionLabel`]; other robots use [`StandardEmotion`].
 
 use crate::affect::{Affect, Valence};
-use crate::scalar::Intensity;
+use crate::scalar::{Intensity, Urgency};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
@@ -16,7 +16,7 @@ pub trait EmotionLabel: Copy + Eq + Debug {
     /// The name under which the emotion is published and its schema is looked up.
     fn name(self) -> &'static str;
 
-    /// Whether the emotion is pleasant. The sensory-motor level sees only this and the intensity.
+    /// Whether the emotion is pleasant. The sensory-motor level sees only this and the felt intensity.
     fn valence(self) -> Valence;
 }
 
@@ -103,7 +103,7 @@ impl EmotionLabel for StandardEmotion {
     }
 }
 
-/// An emotion, experienced with an intensity.
+/// An emotion, and how urgent the need is with which it comes; the intensity follows from both.
 ///
 /// The published taxonomy has a node of this name, the experience of an emotion [D: F2]. A feeling is a copy, so
 /// code that receives one cannot change what the robot feels.
@@ -111,17 +111,19 @@ impl EmotionLabel for StandardEmotion {
 pub struct Feeling<E> {
     /// The emotion.
     pub emotion: E,
-    /// How strongly it is felt.
-    pub intensity: Intensity,
+    /// How pressing the need is.
+    pub urgency: Urgency,
 }
 
 impl<E: EmotionLabel> Feeling<E> {
     /// Valence and intensity, without the particular emotion.
     pub fn affect(&self) -> Affect {
-        Affect {
-            valence: self.emotion.valence(),
-            intensity: self.intensity,
-        }
+        Affect::new(self.emotion.valence(), self.urgency)
+    }
+
+    /// How strongly the emotion is felt.
+    pub fn intensity(&self) -> Intensity {
+        self.affect().intensity
     }
 }
 
@@ -142,6 +144,22 @@ mod tests {
         assert!(!Discouraged.reaches(Happy));
         assert!(!Hopeful.reaches(Happy));
         assert!(!Angry.reaches(Hopeful));
+    }
+
+    #[test]
+    fn happy_is_better_than_confident_and_frustrated_worse_than_concerned() {
+        let felt = |emotion: StandardEmotion, urgency| {
+            let urgency = Urgency::saturating(urgency);
+            Feeling { emotion, urgency }.affect().signed()
+        };
+
+        assert_eq!(felt(Happy, 0.0), 1.0);
+        // The urgencies at which the standard ladder changes the emotion.
+        assert!(felt(Happy, 0.24) > felt(Confident, 0.25));
+        assert!(felt(Confident, 0.44) > 0.0);
+        assert!(felt(Concerned, 0.45) < 0.0);
+        assert!(felt(Concerned, 0.74) > felt(Frustrated, 0.75));
+        assert_eq!(felt(Frustrated, 1.0), -1.0);
     }
 
     #[test]

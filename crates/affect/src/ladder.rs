@@ -1,6 +1,6 @@
-//! Ladders, which order emotions by the intensity that leads to them.
+//! Ladders, which order emotions by the urgency that leads to them.
 //!
-//! A ladder maps intensity to emotions. It consists of rungs in ascending order, each with the intensity that enters
+//! A ladder maps urgency to emotions. It consists of rungs in ascending order, each with the urgency that enters
 //! it, and optionally of two emotions that come from beliefs.
 
 use crate::label::{EmotionLabel, StandardEmotion};
@@ -12,17 +12,17 @@ use StandardEmotion::{Angry, Concerned, Confident, Discouraged, Frustrated, Happ
 pub struct Rung<E> {
     /// The emotion.
     pub emotion: E,
-    /// Intensity at which the rung is entered; unused for the lowest rung.
+    /// Urgency at which the rung is entered; unused for the lowest rung.
     pub enter: f64,
-    /// How long, in seconds, the intensity must exceed `enter` before the rung is entered. With 0, the rung is entered
-    /// as soon as the intensity reaches `enter`.
+    /// How long, in seconds, the urgency must exceed `enter` before the rung is entered. With 0, the rung is entered
+    /// as soon as the urgency reaches `enter`.
     pub hold_s: f64,
     /// Whether the rung is only entered while another agent is to blame.
     pub needs_blame: bool,
 }
 
 impl<E> Rung<E> {
-    /// A rung that is entered as soon as the intensity reaches `enter`.
+    /// A rung that is entered as soon as the urgency reaches `enter`.
     pub fn new(emotion: E, enter: f64) -> Self {
         Self {
             emotion,
@@ -33,7 +33,7 @@ impl<E> Rung<E> {
     }
 }
 
-/// The two emotions that follow from beliefs rather than from intensity [D: S].
+/// The two emotions that follow from beliefs rather than from urgency [D: S].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeliefEmotions<E> {
     /// Entered, and kept, while the robot believes that it cannot achieve its goal [D: S].
@@ -116,11 +116,11 @@ impl<E: EmotionLabel> Ladder<E> {
         self.rungs[0].emotion
     }
 
-    /// Index of the highest rung, at most `limit`, that is reached by intensity alone.
-    pub(crate) fn rung_for(&self, intensity: f64, limit: usize) -> usize {
+    /// Index of the highest rung, at most `limit`, that is reached by urgency alone.
+    pub(crate) fn rung_for(&self, urgency: f64, limit: usize) -> usize {
         let above = self.rungs.iter().skip(1);
         let reached = above
-            .take_while(|rung| intensity >= rung.enter && rung.hold_s == 0.0 && !rung.needs_blame);
+            .take_while(|rung| urgency >= rung.enter && rung.hold_s == 0.0 && !rung.needs_blame);
 
         reached.count().min(limit)
     }
@@ -163,7 +163,7 @@ impl Ladder<StandardEmotion> {
     /// The ladder of the documented robots, with the state set that the parameters select.
     ///
     /// `murphy4` follows the order of the paper's Table 2 [D: S]. `akr4` has no CONFIDENT, and ANGRY follows
-    /// FRUSTRATED after the intensity has been extreme for a long time and another agent is to blame. The paper shows
+    /// FRUSTRATED after the urgency has been extreme for a long time and another agent is to blame. The paper shows
     /// that state but not how it is entered \[I\].
     ///
     /// # Errors

@@ -7,8 +7,8 @@
 //!
 //! | Task | Item |
 //! | --- | --- |
-//! | Describe and validate a personality, a mood or an emotion | [`akr`] |
-//! | Look up the components of an emotion and explain it in words | [`Schemata`] |
+//! | Describe a personality, appraise a situation | [`akr`] |
+//! | Describe an emotion with all its components, explain it in words, publish it | [`Frame`], [`Schemata`] |
 //! | Measure progress | [`progress`] |
 //! | Change a feeling over time with progress, events and beliefs | [`Dynamics`], [`Ladder`] |
 //! | Generate emotion from progress (ESG) | [`EmotionGenerator`] and its implementations |
@@ -36,7 +36,7 @@
 //! process of a simulation.
 //!
 //! ```
-//! use affect::akr::Valence;
+//! use affect::akr::{Agency, Appraisal, Valence};
 //! use affect::behavior::{BehaviorGenerator, Row, Then::{Go, Stay}};
 //! use affect::{Caution, Circumstances, Dynamics, DynamicGenerator, DynamicsParameters};
 //! use affect::{EmotionGenerator, EmotionLabel, Feeling, Ladder, ProgressEvent, Rung, Schemata, Stimulus};
@@ -83,20 +83,11 @@
 //!     [BORED]
 //!     facial_expression = "sad"
 //!     valence = "negative"
-//!     agency = "other"
-//!     focality = "event"
-//!     novelty = "match"
-//!     controllability = "low"
-//!     modifiability = "medium"
-//!     certainty = "certain"
-//!     external_norms = "compatible"
-//!     internal_standards = "incompatible"
 //!     action_tendency = "change-current-strategy"
-//!     goal = "blocked"
 //!     causal_chain = [
-//!         { kind = "goal", text = "I want {g}" },
-//!         { kind = "event", text = "{a} did not come" },
-//!         { kind = "feeling", text = "because of this I want to be somewhere else" },
+//!         "I want {g}",
+//!         "{a} did not come",
+//!         "because of this I want to be somewhere else",
 //!     ]
 //! "#;
 //!
@@ -130,16 +121,21 @@
 //! assert_eq!(esg.feeling().emotion, Mind::Bored);
 //! assert_eq!(acts, [Act::Sigh]);
 //!
+//! let feeling = esg.feeling();
+//! let alone = (measures.alone_s / measures.bearable_s).min(1.0);
+//! let group = Agency::Other("the group".to_owned());
+//! let appraisal = Appraisal::new(1.0 - 2.0 * alone, 0.0, 1.0, group);
+//!
+//! let schemata = Schemata::from_toml(SCHEMA)?;
+//! let bored = schemata.frame(feeling.emotion.name(), feeling.urgency, appraisal).ok_or("no schema")?;
 //! let circumstances = Circumstances {
 //!     other: Some("the group"),
 //!     goal: Some("to show the exhibits"),
 //!     ..Default::default()
 //! };
-//! let feeling = esg.feeling();
-//! let schemata = Schemata::from_toml(SCHEMA)?;
-//! let bored = schemata.emotion(feeling.emotion.name(), feeling.intensity, &circumstances)?;
+//! assert!(bored.valence() < -0.7);
 //! assert_eq!(
-//!     bored.components().causal_chain.spoken(),
+//!     bored.why(&circumstances),
 //!     "I want to show the exhibits; the group did not come; because of this I want to be somewhere else."
 //! );
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -149,6 +145,7 @@ mod affect;
 pub mod akr;
 pub mod behavior;
 mod dynamics;
+pub mod frame;
 mod generator;
 mod label;
 mod ladder;
@@ -158,12 +155,11 @@ pub mod progress;
 mod scalar;
 mod schema;
 
-pub use dynamics::{Belief, Drive, Dynamics, EmotionState, ProgressEvent, Stimulus, Trend};
-pub use generator::{
-    DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator, SteadyGenerator,
-};
+pub use dynamics::{Belief, Drive, Dynamics, EmotionState, ProgressEvent, Stimulus};
+pub use frame::Frame;
+pub use generator::{DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator};
 pub use label::{EmotionLabel, Feeling, StandardEmotion};
 pub use ladder::{BeliefEmotions, Ladder, Rung};
 pub use parameters::{DynamicsParameters, ParameterError, StateSet};
-pub use scalar::{Caution, Intensity, IntensityLabel, OutOfRange};
-pub use schema::{AgencyRole, Circumstances, Schema, SchemaError, SchemaValence, Schemata};
+pub use scalar::{Caution, Intensity, IntensityLabel, OutOfRange, Urgency};
+pub use schema::{Circumstances, Schema, SchemaError, Schemata};

@@ -34,7 +34,7 @@ pub enum StateSet {
 pub struct DynamicsParameters {
     /// The set of emotions. Default `murphy4`; both sets [D: S].
     pub state_set: StateSet,
-    /// Need ratio (dimensionless) at which the intensity saturates with a gain of 1. Default 2 \[I\].
+    /// Need ratio (dimensionless) at which the urgency saturates with a gain of 1. Default 2 \[I\].
     pub rho_max: f64,
     /// Gain (dimensionless) of a robot without caution. Default 0.5 \[I\].
     pub caution_gain_base: f64,
@@ -42,21 +42,21 @@ pub struct DynamicsParameters {
     ///
     /// It must not be negative, because the emotions of a more cautious robot rise faster [D: S].
     pub caution_gain_slope: f64,
-    /// Time constant of rising intensity, in seconds, which is divided by the gain. Default 1.5 \[I\].
+    /// Time constant of rising urgency, in seconds, which is divided by the gain. Default 1.5 \[I\].
     pub tau_up_s: f64,
-    /// Time constant of falling intensity, in seconds. Default 3 \[I\].
+    /// Time constant of falling urgency, in seconds. Default 3 \[I\].
     pub tau_down_s: f64,
-    /// Intensity at which CONFIDENT is entered. Default 0.25 \[I\].
+    /// Urgency at which CONFIDENT is entered. Default 0.25 \[I\].
     pub th_confident: f64,
-    /// Intensity at which CONCERNED is entered. Default 0.45 \[I\].
+    /// Urgency at which CONCERNED is entered. Default 0.45 \[I\].
     pub th_concerned: f64,
-    /// Intensity at which FRUSTRATED is entered. Default 0.75 \[I\].
+    /// Urgency at which FRUSTRATED is entered. Default 0.75 \[I\].
     pub th_frustrated: f64,
-    /// Intensity that must be exceeded for `anger_s` to enter ANGRY. Default 0.95 \[I\].
+    /// Urgency that must be exceeded for `anger_s` to enter ANGRY. Default 0.95 \[I\].
     pub th_angry: f64,
-    /// How long, in seconds, the intensity must exceed `th_angry` while another agent is to blame. Default 15 \[I\].
+    /// How long, in seconds, the urgency must exceed `th_angry` while another agent is to blame. Default 15 \[I\].
     pub anger_s: f64,
-    /// How far the intensity must fall below the threshold of an emotion to leave it. Default 0.08 \[I\].
+    /// How far the urgency must fall below the threshold of an emotion to leave it. Default 0.08 \[I\].
     ///
     /// The use of separate thresholds to enter and to leave an emotion is documented [D: N].
     pub hysteresis: f64,

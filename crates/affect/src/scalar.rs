@@ -1,4 +1,4 @@
-//! Intensity and caution, the types for numbers in `[0, 1]`.
+//! Urgency, intensity and caution, the types for numbers in `[0, 1]`.
 //!
 //! Separate types prevent mixing up these quantities with others, such as distances. Their values are never NaN or
 //! outside the interval.
@@ -77,6 +77,15 @@ macro_rules! unit_interval {
 }
 
 unit_interval! {
+    /// How pressing a need is, from 0 (not at all) to 1: the variable of the dynamics, from which the emotion and its
+    /// intensity follow.
+    ///
+    /// The paper says that the intensity of an emotion "is relevant to the importance, relevance and urgency of the
+    /// message that the state carries" [D: S]. That it is a variable of its own is chosen here \[I\].
+    Urgency, "urgency"
+}
+
+unit_interval! {
     /// How strongly something is felt, from 0 (not at all) to 1 (as strongly as possible).
     ///
     /// It is documented that intensity can be a scalar internally and one of five labels externally [D: S]. The
@@ -85,26 +94,21 @@ unit_interval! {
 }
 
 unit_interval! {
-    /// The only personality trait of the documented robots: how fast the intensity of their emotions rises.
+    /// The only personality trait of the documented robots: how fast the urgency of their emotions rises.
     ///
     /// The name and the direction (more caution, faster rise) are documented [D: S]. The interval is chosen here \[I\].
     Caution, "caution"
 }
 
 impl Intensity {
-    /// The label for this intensity, using the cut points [`IntensityLabel::CUTS`].
-    pub fn label(self) -> IntensityLabel {
-        self.label_by(&IntensityLabel::CUTS)
-    }
-
-    /// The label for this intensity, using custom cut points in ascending order.
-    pub fn label_by(self, cuts: &[f64; 4]) -> IntensityLabel {
+    /// The label for this intensity, by cut points in ascending order.
+    pub fn label(self, cuts: &[f64; 4]) -> IntensityLabel {
         let reached = cuts.iter().filter(|cut| self.0 >= **cut).count();
         IntensityLabel::ALL[reached]
     }
 }
 
-impl Default for Intensity {
+impl Default for Urgency {
     fn default() -> Self {
         Self::MIN
     }
@@ -193,7 +197,12 @@ mod tests {
             (0.8, "very high"),
             (1.0, "very high"),
         ] {
-            assert_eq!(Intensity::saturating(value).label().name(), label);
+            assert_eq!(
+                Intensity::saturating(value)
+                    .label(&IntensityLabel::CUTS)
+                    .name(),
+                label
+            );
         }
     }
 }

@@ -1,17 +1,12 @@
 //! Emotion schemata: the components that all instances of an emotion share, as data.
 //!
-//! A schema contains all components of an emotion except those that depend on the situation: the intensity, the
-//! other agent, and the description of the goal. Together with these it produces an [`Emotion`]. The schemata of
+//! Together with an urgency and an appraisal, which depend on the situation, a schema makes a [`Frame`](crate::Frame). The schemata of
 //! [`StandardEmotion`] are in a TOML file of this crate, which marks each value as documented or chosen. A robot with
 //! an emotion of its own defines a table for it and loads it with [`Schemata::from_toml`].
 //!
 //! [`StandardEmotion`]: crate::StandardEmotion
 
-use crate::akr::{
-    Account, ActionTendency, Agency, Certainty, Clause, Compatibility, Components, Degree,
-    Duration, Emotion, FacialExpression, Focality, GoalStatus, Novelty, Refusal, Valence,
-};
-use crate::scalar::Intensity;
+use crate::akr::{ActionTendency, FacialExpression, Valence};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -21,7 +16,7 @@ const STANDARD: &str = include_str!("schemata.toml");
 /// Placeholders that a causal chain can contain: the goal, the other agent, and the amount left.
 const SLOTS: [&str; 3] = ["g", "a", "n"];
 
-/// Why schemata are invalid, or an emotion cannot be created from one.
+/// Why schemata are invalid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SchemaError {
     /// The text is not valid TOML, or not a table of schemata.
@@ -45,35 +40,21 @@ pub enum SchemaError {
         /// The text of the clause.
         text: String,
     },
-    /// There is no schema with this name.
-    #[error("no schema for {0}")]
-    Unknown(String),
-    /// The components contradict each other.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
-}
-
-/// The agent responsible, by role; the name is known only to an instance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum AgencyRole {
-    /// The agent that feels the emotion.
-    #[serde(rename = "self")]
-    Oneself,
-    /// Another agent.
-    Other,
-}
-
-/// The valence of all instances of an emotion, unless it depends on the situation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SchemaValence {
-    /// Always pleasant.
-    Positive,
-    /// Always unpleasant.
-    Negative,
-    /// Depends on the circumstances; only valid for surprise [D: S].
-    Either,
+    /// An emotion without a name.
+    #[error("an emotion must have a name")]
+    Unnamed,
+    /// A facial expression that contradicts the valence.
+    ///
+    /// Surprise goes with either valence [D: S], and so does a neutral face.
+    #[error("{name} has {valence:?} valence, which contradicts its {face:?} face")]
+    FaceContradictsValence {
+        /// Name of the emotion.
+        name: String,
+        /// Its valence.
+        valence: Valence,
+        /// Its facial expression.
+        face: FacialExpression,
+    },
 }
 
 /// The components that all instances of one emotion share.
@@ -82,50 +63,28 @@ pub enum SchemaValence {
 pub struct Schema {
     /// Facial expression.
     pub facial_expression: FacialExpression,
-    /// Valence, or that it can be either.
-    pub valence: SchemaValence,
-    /// How long the emotion lasts; minutes by default [D: S].
-    #[serde(default = "minutes")]
-    pub duration: Duration,
-    /// The agent responsible for the eliciting event.
-    pub agency: AgencyRole,
-    /// What the emotion is about.
-    pub focality: Focality,
-    /// Whether the eliciting event was expected.
-    pub novelty: Novelty,
-    /// How much control the agent has over what happens.
-    pub controllability: Degree,
-    /// How much of what happens can be changed at all.
-    pub modifiability: Degree,
-    /// Whether the agent is certain of what happens.
-    pub certainty: Certainty,
-    /// Whether what happens agrees with the norms of others.
-    pub external_norms: Compatibility,
-    /// Whether what happens agrees with the agent's own standards.
-    pub internal_standards: Compatibility,
+    /// Whether the emotion is pleasant.
+    pub valence: Valence,
     /// What the emotion inclines the agent to do.
     pub action_tendency: ActionTendency,
-    /// Status of the goal.
-    pub goal: GoalStatus,
-    /// The clauses of the causal chain, with the placeholders `{g}` (goal), `{a}` (other agent) and `{n}` (amount).
-    pub causal_chain: Vec<Clause>,
+    /// The clauses of the causal chain, in order, with the placeholders `{g}` (goal), `{a}` (other agent) and `{n}`
+    /// (amount).
+    ///
+    /// That causal chains mention beliefs, goals and whether goals are achieved is documented, and that they can be
+    /// spoken [D: S]; so is their form, short scripts of simple words, following Wierzbicka. The published scripts were
+    /// not readable; those of this crate are newly written \[I\].
+    pub causal_chain: Vec<String>,
 }
 
-fn minutes() -> Duration {
-    Duration::Minutes
-}
-
-/// The situation in which an emotion is felt. Every field may be unknown.
+/// The words that fill the placeholders of a causal chain. Every field may be unknown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Circumstances<'a> {
-    /// The other agent, `{a}` in the causal chain. Required if the schema holds another agent responsible.
+    /// The other agent, `{a}` in the causal chain.
     pub other: Option<&'a str>,
     /// The goal, `{g}` in the causal chain, in words that follow "I want", such as "to serve the guests".
     pub goal: Option<&'a str>,
     /// The amount left, `{n}` in the causal chain, such as "7 treats".
     pub amount: Option<&'a str>,
-    /// The valence, for a schema that allows either.
-    pub valence: Option<Valence>,
 }
 
 impl Circumstances<'_> {
@@ -140,104 +99,44 @@ impl Circumstances<'_> {
 }
 
 impl Schema {
-    /// Creates an instance of this emotion with the given name.
+    /// The causal chain as one sentence, for speech output or a panel.
     ///
-    /// # Errors
-    ///
-    /// Returns a [`Refusal`] if the components contradict each other, or if the schema needs circumstances that are
-    /// not given.
-    pub fn emotion(
-        &self,
-        name: &str,
-        intensity: Intensity,
-        circumstances: &Circumstances<'_>,
-    ) -> Result<Emotion, Refusal> {
-        let agency = self.agency_in(circumstances);
-        let agency = agency.ok_or_else(|| Refusal::AgentUnnamed {
-            name: name.to_owned(),
-        })?;
-
-        let valence = self.valence_in(circumstances);
-        let valence = valence.ok_or_else(|| Refusal::ValenceOpen {
-            name: name.to_owned(),
-        })?;
-
-        Emotion::new(Components {
-            name: name.to_owned(),
-            facial_expression: self.facial_expression,
-            valence,
-            intensity,
-            duration: self.duration,
-            agency,
-            focality: self.focality,
-            novelty: self.novelty,
-            controllability: self.controllability,
-            modifiability: self.modifiability,
-            certainty: self.certainty,
-            external_norms: self.external_norms,
-            internal_standards: self.internal_standards,
-            action_tendency: self.action_tendency,
-            causal_chain: self.account(circumstances),
-        })
-    }
-
-    fn agency_in(&self, circumstances: &Circumstances<'_>) -> Option<Agency> {
-        match self.agency {
-            AgencyRole::Oneself => Some(Agency::Oneself),
-            AgencyRole::Other => {
-                let other = circumstances.other?;
-                Some(Agency::Other(other.to_owned()))
-            }
-        }
-    }
-
-    fn valence_in(&self, circumstances: &Circumstances<'_>) -> Option<Valence> {
-        match self.valence {
-            SchemaValence::Positive => Some(Valence::Positive),
-            SchemaValence::Negative => Some(Valence::Negative),
-            SchemaValence::Either => circumstances.valence,
-        }
-    }
-
-    /// The causal chain in words. Clauses that mention unknown circumstances are left out.
-    pub fn account(&self, circumstances: &Circumstances<'_>) -> Account {
-        let mut clauses = Vec::new();
-
+    /// Clauses that mention unknown circumstances are left out.
+    pub fn spoken(&self, circumstances: &Circumstances<'_>) -> String {
+        let mut texts = Vec::new();
         for clause in &self.causal_chain {
-            if let Some(text) = fill(&clause.text, circumstances) {
-                clauses.push(Clause {
-                    kind: clause.kind,
-                    text,
-                });
-            }
+            texts.extend(fill(clause, circumstances));
+        }
+        let mut sentence = texts.join("; ");
+
+        if let Some(first) = sentence.chars().next() {
+            let capital: String = first.to_uppercase().collect();
+            sentence.replace_range(..first.len_utf8(), &capital);
+            sentence.push('.');
         }
 
-        Account {
-            goal: self.goal,
-            clauses,
-        }
+        sentence
     }
 
-    /// Rejects schemata without any valid instance, so that errors are reported when a file is loaded.
+    /// Rejects contradictory schemata, so that errors are reported when a file is loaded.
     fn check(&self, name: &str) -> Result<(), SchemaError> {
+        if name.is_empty() {
+            return Err(SchemaError::Unnamed);
+        }
+
         for clause in &self.causal_chain {
-            check_slots(name, &clause.text)?;
+            check_slots(name, clause)?;
         }
 
-        let is_surprise = self.facial_expression == FacialExpression::Surprised;
-        if self.valence == SchemaValence::Either && !is_surprise {
-            let name = name.to_owned();
-            return Err(Refusal::ValenceOpen { name }.into());
+        let face = self.facial_expression;
+        match face.valence() {
+            Some(shown) if shown != self.valence => Err(SchemaError::FaceContradictsValence {
+                name: name.to_owned(),
+                valence: self.valence,
+                face,
+            }),
+            _ => Ok(()),
         }
-
-        let example = Circumstances {
-            other: Some("-"),
-            valence: Some(Valence::Positive),
-            ..Default::default()
-        };
-        self.emotion(name, Intensity::MIN, &example)?;
-
-        Ok(())
     }
 }
 
@@ -300,16 +199,15 @@ fn slots(text: &str) -> Vec<Option<&str>> {
 /// A set of schemata, indexed by the name of the emotion.
 ///
 /// ```
-/// use affect::{Circumstances, Intensity, Schemata};
+/// use affect::{Circumstances, Schemata};
 /// let circumstances = Circumstances {
 ///     other: Some("Leguin"),
 ///     goal: Some("to serve the guests"),
 ///     amount: Some("7 treats"),
-///     ..Default::default()
 /// };
-/// let concerned = Schemata::standard().emotion("CONCERNED", Intensity::new(0.5)?, &circumstances)?;
+/// let concerned = Schemata::standard().get("CONCERNED").ok_or("no schema")?;
 /// assert_eq!(
-///     concerned.components().causal_chain.spoken(),
+///     concerned.spoken(&circumstances),
 ///     "I want to serve the guests; 7 treats are left; Leguin is not here; something bad can happen soon; \
 ///      I do not want it; I do not know if it will happen; because of this I feel bad."
 /// );
@@ -336,7 +234,7 @@ impl Schemata {
     ///
     /// # Errors
     ///
-    /// Returns an error if the text cannot be parsed or if a schema has no valid instance.
+    /// Returns an error if the text cannot be parsed or if a schema contradicts itself.
     pub fn from_toml(text: &str) -> Result<Self, SchemaError> {
         let by_name: BTreeMap<String, Schema> =
             toml::from_str(text).map_err(|error| SchemaError::Syntax(error.to_string()))?;
@@ -346,13 +244,6 @@ impl Schemata {
         }
 
         Ok(Self { by_name })
-    }
-
-    /// Adds the schemata of `other`, which replace those with the same name.
-    #[must_use]
-    pub fn with(mut self, other: Self) -> Self {
-        self.by_name.extend(other.by_name);
-        self
     }
 
     /// The schema with this name.
@@ -365,22 +256,10 @@ impl Schemata {
         self.by_name.keys().map(String::as_str)
     }
 
-    /// Creates an instance of the emotion with this name.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if there is no such schema, or if it does not fit the circumstances.
-    pub fn emotion(
-        &self,
-        name: &str,
-        intensity: Intensity,
-        circumstances: &Circumstances<'_>,
-    ) -> Result<Emotion, SchemaError> {
-        let schema = self
-            .get(name)
-            .ok_or_else(|| SchemaError::Unknown(name.to_owned()))?;
-        let emotion = schema.emotion(name, intensity, circumstances)?;
+    /// The schema with this name, and the name as these schemata hold it.
+    pub(crate) fn entry(&self, name: &str) -> Option<(&str, &Schema)> {
+        let (name, schema) = self.by_name.get_key_value(name)?;
 
-        Ok(emotion)
+        Some((name, schema))
     }
 }

@@ -9,8 +9,8 @@ use affect::StandardEmotion::{
     Angry, Concerned, Confident, Discouraged, Frustrated, Happy, Hopeful,
 };
 use affect::{
-    Belief, Caution, Drive, Dynamics, DynamicsParameters, EmotionState, Intensity, Ladder,
-    ProgressEvent, StandardEmotion, StateSet, Stimulus, Trend,
+    Belief, Caution, Drive, Dynamics, DynamicsParameters, EmotionState, Ladder, ProgressEvent,
+    StandardEmotion, StateSet, Stimulus, Urgency,
 };
 use proptest::prelude::*;
 
@@ -67,13 +67,13 @@ impl Robot {
         entered
     }
 
-    fn intensity(&self) -> f64 {
-        self.state.feeling().intensity.value()
+    fn urgency(&self) -> f64 {
+        self.state.feeling().urgency.value()
     }
 }
 
-fn importance(value: f64) -> Intensity {
-    Intensity::new(value).unwrap()
+fn importance(value: f64) -> Urgency {
+    Urgency::new(value).unwrap()
 }
 
 #[test]
@@ -100,11 +100,11 @@ fn the_filter_rises_with_the_gain_and_falls_without_it() {
 
         dynamics.step(&mut state, &Stimulus::need(1.0), DT_S);
         let risen = gain * 0.5 * filter_share(1.5 / gain);
-        assert_eq!(state.feeling().intensity.value(), risen);
+        assert_eq!(state.feeling().urgency.value(), risen);
 
         dynamics.step(&mut state, &Stimulus::rest(), DT_S);
         let fallen = risen * (1.0 - filter_share(3.0));
-        assert!((state.feeling().intensity.value() - fallen).abs() < 1e-15);
+        assert!((state.feeling().urgency.value() - fallen).abs() < 1e-15);
     }
 }
 
@@ -114,7 +114,7 @@ fn filter_share(tau_s: f64) -> f64 {
 }
 
 #[test]
-fn intensity_does_not_change_without_a_measure() {
+fn urgency_does_not_change_without_a_measure() {
     let mut robot = Robot::new(StateSet::Murphy4);
     robot.entered(Stimulus::need(1.0), 5.0);
     let before = robot.state.feeling();
@@ -125,7 +125,7 @@ fn intensity_does_not_change_without_a_measure() {
     }
 
     robot.entered(Stimulus::need(f64::INFINITY), 60.0);
-    assert!(robot.intensity() > 0.999);
+    assert!(robot.urgency() > 0.999);
 }
 
 #[test]
@@ -145,8 +145,8 @@ fn t18_a_positive_input_leads_back_by_its_importance() {
         assert_eq!(
             emotion,
             expected,
-            "importance {value}, intensity {}",
-            robot.intensity()
+            "importance {value}, urgency {}",
+            robot.urgency()
         );
     }
 }
@@ -156,7 +156,7 @@ fn a_setback_is_multiplied_by_the_gain() {
     let mut robot = Robot::new(StateSet::Murphy4);
     let event = ProgressEvent::Negative(importance(0.3));
     robot.step(Stimulus::new(Drive::Hold).with_event(Some(event)));
-    assert_eq!(robot.intensity(), 0.3);
+    assert_eq!(robot.urgency(), 0.3);
 }
 
 #[test]
@@ -166,12 +166,12 @@ fn an_achieved_goal_leads_to_happy_immediately() {
 
     // The dwell time does not delay it.
     let emotion = robot.step(Stimulus::need(9.0).with_event(Some(ProgressEvent::GoalAchieved)));
-    assert_eq!((emotion, robot.intensity()), (Happy, 0.0));
+    assert_eq!((emotion, robot.urgency()), (Happy, 0.0));
     assert_eq!(robot.step(Stimulus::need(9.0)), Happy);
 }
 
 #[test]
-fn anger_needs_lasting_extreme_intensity_and_an_agent_to_blame() {
+fn anger_needs_lasting_extreme_urgency_and_an_agent_to_blame() {
     let blaming = Stimulus::need(9.0).with_blame(true);
     let mut robot = Robot::new(StateSet::Akr4);
     assert_eq!(
@@ -285,36 +285,13 @@ fn a_state_of_another_ladder_moves_to_a_rung() {
     robot.state = other.state;
     robot.entered(Stimulus::need(9.0), 2.0);
 
-    let json = r#"{"emotion":"CONFIDENT","intensity":0.5,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
+    let json = r#"{"emotion":"CONFIDENT","urgency":0.5,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
     robot.state = serde_json::from_str(json).unwrap();
     assert!(!robot.dynamics.accepts(&robot.state));
     assert_eq!(robot.step(Stimulus::new(Drive::Hold)), Concerned);
 
     let wrong = json.replace("0.5", "1.5");
     assert!(serde_json::from_str::<EmotionState<StandardEmotion>>(&wrong).is_err());
-}
-
-#[test]
-fn progress_is_positive_or_negative_relative_to_the_feeling() {
-    let mut robot = Robot::new(StateSet::Murphy4);
-    assert_eq!(
-        robot.dynamics.trend(&robot.state, Drive::Need(1.0)),
-        Trend::Negative
-    );
-    assert_eq!(
-        robot.dynamics.trend(&robot.state, Drive::Rest),
-        Trend::Level
-    );
-
-    robot.entered(Stimulus::need(1.0), 5.0);
-    assert_eq!(
-        robot.dynamics.trend(&robot.state, Drive::Need(0.1)),
-        Trend::Positive
-    );
-    assert_eq!(
-        robot.dynamics.trend(&robot.state, Drive::Hold),
-        Trend::Level
-    );
 }
 
 fn rung(ladder: &Ladder<StandardEmotion>, emotion: StandardEmotion) -> usize {
@@ -329,8 +306,8 @@ fn rung(ladder: &Ladder<StandardEmotion>, emotion: StandardEmotion) -> usize {
 fn any_course() -> impl Strategy<Value = Vec<Stimulus>> {
     let event = prop_oneof![
         8 => Just(None),
-        1 => (0.0..=1.0).prop_map(|value| Some(ProgressEvent::Positive(Intensity::saturating(value)))),
-        1 => (0.0..=1.0).prop_map(|value| Some(ProgressEvent::Negative(Intensity::saturating(value)))),
+        1 => (0.0..=1.0).prop_map(|value| Some(ProgressEvent::Positive(Urgency::saturating(value)))),
+        1 => (0.0..=1.0).prop_map(|value| Some(ProgressEvent::Negative(Urgency::saturating(value)))),
         1 => Just(Some(ProgressEvent::GoalAchieved)),
     ];
     let stimulus = (0.0..8.0, event, any::<bool>())
@@ -363,11 +340,11 @@ proptest! {
             let before = state.clone();
             dynamics.step(&mut state, &stimulus, dt_s);
 
-            let intensity = state.feeling().intensity.value();
+            let urgency = state.feeling().urgency.value();
             let from = rung(ladder, before.feeling().emotion);
             let to = rung(ladder, state.feeling().emotion);
             if stimulus.event == Some(ProgressEvent::GoalAchieved) {
-                prop_assert_eq!((to, intensity), (0, 0.0));
+                prop_assert_eq!((to, urgency), (0, 0.0));
                 continue;
             }
             if from == to {
@@ -377,14 +354,14 @@ proptest! {
             prop_assert!(before.unchanged_s() + dt_s + 1e-9 >= parameters.dwell_s);
             prop_assert!(to <= from + 1, "skipped from {} to {}", from, to);
             if to > from {
-                prop_assert!(intensity >= ladder.rungs()[to].enter);
+                prop_assert!(urgency >= ladder.rungs()[to].enter);
             } else {
-                prop_assert!(intensity < ladder.rungs()[to + 1].enter - parameters.hysteresis);
+                prop_assert!(urgency < ladder.rungs()[to + 1].enter - parameters.hysteresis);
             }
         }
     }
 
-    /// An intensity that oscillates around a threshold by less than the hysteresis changes the emotion once.
+    /// An urgency that oscillates around a threshold by less than the hysteresis changes the emotion once.
     #[test]
     fn small_oscillations_do_not_change_the_emotion(
         swings in prop::collection::vec(-1.0_f64..1.0, 1..200),
@@ -394,7 +371,7 @@ proptest! {
         let enter = dynamics.ladder().rungs()[index].enter;
         let mut state = dynamics.start();
 
-        // Settle slightly above the threshold. The gain is 1, so the need is the intensity times rho_max.
+        // Settle slightly above the threshold. The gain is 1, so the need is the urgency times rho_max.
         for _ in 0..200 {
             dynamics.step(&mut state, &Stimulus::need((enter + 0.01) * 2.0), DT_S);
         }
@@ -406,7 +383,7 @@ proptest! {
         }
     }
 
-    /// While the same need grows, the intensity of a more cautious robot is never lower.
+    /// While the same need grows, the urgency of a more cautious robot is never lower.
     #[test]
     fn t04_caution_never_slows_the_rise(low in 0.0..1.0, high in 0.0..1.0, slope in 0.01..1.0) {
         let mut calm = Robot::with_caution(f64::min(low, high));
@@ -417,7 +394,7 @@ proptest! {
             calm.step(stimulus);
             anxious.step(stimulus);
 
-            prop_assert!(anxious.intensity() >= calm.intensity() - 1e-12);
+            prop_assert!(anxious.urgency() >= calm.urgency() - 1e-12);
         }
     }
 

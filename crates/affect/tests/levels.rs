@@ -1,4 +1,4 @@
-//! The three levels: each alone, all together, and in every combination.
+//! The sensory-motor and the conceptual level.
 
 #![expect(
     clippy::unwrap_used,
@@ -8,10 +8,10 @@
 use affect::StandardEmotion::{self, Concerned, Frustrated, Happy};
 use affect::akr::{ActionTendency, Affect, Personality, Preference, Valence};
 use affect::levels::{
-    Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Levels, Memory,
-    MultilevelProcess, Outcome, Schematic, SensoryMotor, SensoryMotorParameters,
+    Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Memory, Outcome,
+    SensoryMotor, SensoryMotorParameters,
 };
-use affect::{Feeling, Intensity};
+use affect::{EmotionLabel, Feeling, Intensity, Urgency};
 use std::collections::BTreeSet;
 
 type Behavior = &'static str;
@@ -30,9 +30,14 @@ fn affect(signed: f64) -> Affect {
 }
 
 fn feeling(emotion: StandardEmotion, intensity: f64) -> Feeling<StandardEmotion> {
+    let urgency = match emotion.valence() {
+        Valence::Positive => 1.0 - intensity,
+        Valence::Negative => intensity,
+    };
+
     Feeling {
         emotion,
-        intensity: Intensity::new(intensity).unwrap(),
+        urgency: Urgency::new(urgency).unwrap(),
     }
 }
 
@@ -221,72 +226,6 @@ fn a_candidate_with_impossible_outcomes_is_rejected() {
     }
 
     assert!(Candidate::new("x", None, vec![outcome(0.1, 0.0, 0.0); 10]).is_ok());
-}
-
-#[test]
-fn each_level_works_alone_and_together() {
-    let candidates = [
-        candidate("serve", &[outcome(1.0, 1.0, 0.9)]),
-        candidate("call", &[outcome(1.0, 1.0, 0.1)]),
-        candidate("intercept", &[outcome(1.0, 1.0, 0.5)]),
-    ];
-    let mut seen = Vec::new();
-
-    for number in 0..8_u8 {
-        let [sensory_motor, schematic, conceptual] = [1, 2, 4].map(|bit| number & bit != 0);
-        let levels = Levels {
-            sensory_motor,
-            schematic,
-            conceptual,
-        };
-
-        let influence = process(levels).influence(
-            feeling(Frustrated, 0.9),
-            None,
-            &candidates,
-            &Memory::default(),
-        );
-
-        let motor_gain = if sensory_motor { 1.5 } else { 1.0 };
-        assert_eq!(influence.motor_gain, motor_gain);
-
-        let (active, best) = if schematic {
-            (["call", "intercept"], "intercept")
-        } else {
-            (["serve", "call"], "serve")
-        };
-        assert_eq!(influence.active, active);
-
-        let action = influence.choice.as_ref().map(|choice| choice.action);
-        assert_eq!(action, conceptual.then_some(best));
-
-        assert!(!seen.contains(&influence));
-        seen.push(influence);
-    }
-}
-
-fn process(levels: Levels) -> MultilevelProcess<StandardEmotion, Behavior> {
-    let schematic = Schematic::new(vec!["serve", "call"]);
-
-    MultilevelProcess {
-        sensory_motor: SensoryMotor::new(SensoryMotorParameters::default()).unwrap(),
-        schematic: schematic.with(Frustrated, vec!["call", "intercept"]),
-        conceptual: level(),
-        levels,
-    }
-}
-
-#[test]
-fn levels_can_be_disabled_in_a_file() {
-    let levels: Levels = toml::from_str("conceptual = false").unwrap();
-    assert_eq!(
-        levels,
-        Levels {
-            conceptual: false,
-            ..Default::default()
-        }
-    );
-    assert!(toml::from_str::<Levels>("conceptal = false").is_err());
 }
 
 #[test]

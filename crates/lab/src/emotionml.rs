@@ -6,7 +6,7 @@
 //! the same episodes under the same ids. [`View::Own`] uses the robots' own names, which the document declares together
 //! with the nearest terms of W3C; [`View::Standard`] uses W3C's vocabularies only.
 //!
-//! The run is read tick by tick and written episode by episode. Only the episodes in progress are in memory, two numbers a
+//! The run is read tick by tick and written episode by episode. Only the episodes in progress are in memory, seven numbers a
 //! tick of each.
 
 mod document;

@@ -1,6 +1,7 @@
 //! Vera likes parties and is shy: if too many bodies are around her, she returns to her start until she is calm.
 
-use affect::{Circumstances, Schemata};
+use affect::akr::{Agency, Appraisal};
+use affect::{Circumstances, Frame, Schemata, Urgency};
 use robot::{Action, BadParameters, Cars, Panel, Point, Robot, Widget};
 use robots::drive::{Course, Drive};
 
@@ -14,22 +15,16 @@ struct Parameters {
 
 const CALM: &str = "CALM";
 const SHY: &str = "SHY";
-
 const MINGLE: &str = "MINGLE";
 const HIDE: &str = "HIDE";
 
 /// The emotion state generator. Progress is one number: bodies around her, as a share of those that are too many.
-fn feel(emotion: &'static str, behavior: &str, crowding: f64) -> &'static str {
-    match behavior {
-        MINGLE if crowding >= 1.0 => SHY,
-        HIDE if crowding < 0.25 => CALM,
+fn feel(emotion: &'static str, crowding: f64) -> &'static str {
+    match emotion {
+        CALM if crowding >= 1.0 => SHY,
+        SHY if crowding < 0.25 => CALM,
         _ => emotion,
     }
-}
-
-/// The behavior state generator.
-fn behave(emotion: &str) -> &'static str {
-    if emotion == SHY { HIDE } else { MINGLE }
 }
 
 #[derive(Default)]
@@ -39,7 +34,6 @@ pub(crate) struct Vera {
     drive: Drive,
     near: f64, // bodies around her
     emotion: &'static str,
-    behavior: &'static str,
 }
 
 impl Robot for Vera {
@@ -49,7 +43,6 @@ impl Robot for Vera {
             parameters: cars.parameters()?,
             schemata: schemata.map_err(|error| cars.bad_parameters(error))?,
             emotion: CALM,
-            behavior: MINGLE,
             ..Self::default()
         };
         Ok(())
@@ -58,19 +51,16 @@ impl Robot for Vera {
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
         self.near = cars.bodies().len() as f64;
         let crowding = self.near / self.parameters.bearable;
-        self.emotion = feel(self.emotion, self.behavior, crowding);
-        self.behavior = behave(self.emotion);
+        self.emotion = feel(self.emotion, crowding);
 
-        let goal = if self.behavior == HIDE {
-            cars.welcome().location
-        } else {
-            self.parameters.party_m
+        // The behavior state generator.
+        let (behavior, goal) = match self.emotion {
+            SHY => (HIDE, cars.welcome().location),
+            _ => (MINGLE, self.parameters.party_m),
         };
-        self.drive
-            .follow(cars, Course::to(goal, self.parameters.speed_mps))
-            .emotion(self.emotion)
-            .behavior(self.behavior)
-            .variable("near", self.near)
+        let course = Course::to(goal, self.parameters.speed_mps);
+        let action = self.drive.follow(cars, course);
+        robots::frame::publish(self.frame(), action).behavior(behavior)
     }
 
     fn senses_bodies(&self) -> bool {
@@ -79,18 +69,27 @@ impl Robot for Vera {
 
     fn panel(&self) -> Panel {
         let near = self.near.to_string();
-        let circumstances = Circumstances {
+        let words = Circumstances {
             amount: Some(&near),
             ..Circumstances::default()
         };
-        let schema = self.schemata.get(self.emotion);
-        let why = schema.map(|schema| schema.account(&circumstances).spoken());
-        Panel {
-            widgets: vec![Widget::Text {
-                label: "why".into(),
-                text: why.unwrap_or_default(),
-            }],
-        }
+        let text = self.frame().map(|frame| frame.why(&words));
+        let widgets = vec![Widget::Text {
+            label: "why".into(),
+            text: text.unwrap_or_default(),
+        }];
+        Panel { widgets }
+    }
+}
+
+impl Vera {
+    /// What she feels, and how she judges it: the crowd is to blame, and she can always leave.
+    fn frame(&self) -> Option<Frame<'_>> {
+        let crowding = self.near / self.parameters.bearable;
+        let crowd = Agency::Other("the crowd".into());
+        let appraisal = Appraisal::new(1.0 - 2.0 * crowding, 1.0, 1.0, crowd);
+        self.schemata
+            .frame(self.emotion, Urgency::saturating(crowding), appraisal)
     }
 }
 

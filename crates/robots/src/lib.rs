@@ -5,8 +5,9 @@
 //! move ([`drive`]), what they know of one another ([`peer`]), the random streams ([`chance`]), and the emotion that an
 //! experiment can switch off.
 //!
-//! An emotion acts at two of the three levels of `affect::levels`: sensory-motor (Leguin's speed) and schematic (the
-//! behavior of both). Each level has a switch, and so has the emotion as a whole, for experiments without.
+//! An emotion acts at the three levels of `affect::levels`: sensory-motor (Leguin's speed), schematic (the behavior of
+//! both) and conceptual (Butler's plans, off by default). Each level has a switch, and so has the emotion as a whole, for
+//! experiments without. What a robot feels and why is published with its state ([`frame`]).
 //!
 //! Much of the original robots was never published in a readable form. As in `affect`, a number or a rule is
 //! **\[D\]** documented in a readable source (the paper, unless another is named), or **\[I\]** inferred or chosen here;
@@ -20,6 +21,7 @@ pub mod closing;
 mod commands;
 pub mod drive;
 mod emotion;
+pub mod frame;
 mod jokes;
 pub mod leguin;
 mod panel;

@@ -1,7 +1,7 @@
 //! Widgets that the panels of the robots share.
 
 use affect::akr::{FacialExpression, Valence};
-use affect::{Circumstances, EmotionLabel, Feeling, Schemata, StandardEmotion};
+use affect::{Circumstances, Frame};
 use robot::{Face, Tone, Widget};
 
 use crate::emotion::NEUTRAL;
@@ -9,13 +9,13 @@ use crate::emotion::NEUTRAL;
 /// Values in a panel's curve: two minutes of ticks of half a second.
 pub(crate) const SPARKLINE_LEN: usize = 240;
 
-/// Face, name and intensity of a feeling, and its cause in words.
-pub(crate) fn feeling(
-    feeling: Option<Feeling<StandardEmotion>>,
+/// Face, name, intensity and cause of an emotion, and the appraisal that comes with it; `None` without emotions.
+pub(crate) fn affect(
+    frame: Option<&Frame<'_>>,
     label_cuts: &[f64; 4],
     circumstances: &Circumstances<'_>,
 ) -> Vec<Widget> {
-    let Some(feeling) = feeling else {
+    let Some(frame) = frame else {
         return vec![
             Widget::Face {
                 face: Face::Neutral,
@@ -24,31 +24,38 @@ pub(crate) fn feeling(
             emotion(NEUTRAL, Tone::Neutral),
         ];
     };
-    let name = feeling.emotion.name();
-    let intensity = feeling.intensity;
-    let instance = Schemata::standard().emotion(name, intensity, circumstances);
 
-    let mut widgets = Vec::new();
-    if let Ok(instance) = &instance {
-        widgets.push(Widget::Face {
-            face: face(instance.components().facial_expression),
+    let intensity = frame.intensity();
+    let appraisal = frame.appraisal();
+    vec![
+        Widget::Face {
+            face: face(frame.schema().facial_expression),
             intensity: intensity.value(),
-        });
-    }
-    widgets.push(emotion(name, tone(feeling.emotion)));
-    widgets.push(Widget::Bar {
-        label: format!("intensity ({})", intensity.label_by(label_cuts).name()),
-        value: intensity.value(),
-        min: 0.0,
-        max: 1.0,
-    });
-    if let Ok(instance) = &instance {
-        widgets.push(Widget::Text {
+        },
+        emotion(frame.name(), tone(frame)),
+        Widget::Bar {
+            label: format!("intensity ({})", intensity.label(label_cuts).name()),
+            value: intensity.value(),
+            min: 0.0,
+            max: 1.0,
+        },
+        Widget::Text {
             label: "why".to_owned(),
-            text: instance.components().causal_chain.spoken(),
-        });
-    }
-    widgets
+            text: frame.why(circumstances),
+        },
+        table(&[
+            (
+                "goal congruence",
+                format!("{:.2}", appraisal.goal_congruence()),
+            ),
+            (
+                "controllability",
+                format!("{:.2}", appraisal.controllability()),
+            ),
+            ("certainty", format!("{:.2}", appraisal.certainty())),
+            ("agency", appraisal.agency().name().to_owned()),
+        ]),
+    ]
 }
 
 /// The badge of a behavior.
@@ -88,11 +95,12 @@ pub(crate) fn yes(flag: bool) -> &'static str {
     if flag { "yes" } else { "no" }
 }
 
-fn tone(emotion: StandardEmotion) -> Tone {
-    match (emotion.valence(), emotion) {
-        (Valence::Positive, StandardEmotion::Happy) => Tone::Good,
+/// Color of the badge.
+fn tone(frame: &Frame<'_>) -> Tone {
+    match (frame.affect().valence, frame.name()) {
+        (Valence::Positive, "HAPPY") => Tone::Good,
         (Valence::Positive, _) => Tone::Neutral,
-        (Valence::Negative, StandardEmotion::Concerned) => Tone::Warning,
+        (Valence::Negative, "CONCERNED") => Tone::Warning,
         (Valence::Negative, _) => Tone::Bad,
     }
 }

@@ -132,9 +132,36 @@ impl Peer {
             .filter(|_| !self.is_unknown(stale_s))
     }
 
+    /// How recent its last answer is: from 1 (of this tick) to 0 (older than `stale_s`, or none).
+    #[must_use]
+    pub fn certainty(&self, stale_s: f64) -> f64 {
+        match self.behavior {
+            Some(_) => recency(self.unanswered_s, stale_s),
+            None => 0.0,
+        }
+    }
+
+    /// How recent its last known location is, on the same scale.
+    #[must_use]
+    pub fn location_certainty(&self, stale_s: f64) -> f64 {
+        match self.last {
+            Some(_) => recency(self.unlocated_s, stale_s),
+            None => 0.0,
+        }
+    }
+
     /// Whether its behavior is unknown: it never answered, or not for longer than `stale_s`.
     #[must_use]
     pub fn is_unknown(&self, stale_s: f64) -> bool {
         self.behavior.is_none() || self.unanswered_s > stale_s
+    }
+}
+
+/// From 1 for an age of 0 to 0 for `stale_s`.
+fn recency(age_s: f64, stale_s: f64) -> f64 {
+    if age_s == 0.0 {
+        1.0
+    } else {
+        1.0 - (age_s / stale_s).min(1.0)
     }
 }

@@ -1,7 +1,7 @@
 //! Emotions that are given instead of generated: the yoked control of an experiment, in which a robot has the emotions of
 //! another run, and not their causes.
 
-use affect::{Feeling, Intensity, StandardEmotion};
+use affect::{Feeling, StandardEmotion, Urgency};
 use serde::{Deserialize, Serialize};
 
 /// A feeling from a time on.
@@ -12,9 +12,9 @@ pub struct Scripted {
     pub at_s: f64,
     /// The emotion.
     pub emotion: StandardEmotion,
-    /// How strongly it is felt.
+    /// How pressing the need is, from which follows how strongly the emotion is felt.
     #[serde(default)]
-    pub intensity: Intensity,
+    pub urgency: Urgency,
 }
 
 /// Feelings in the order in which they begin. An empty script leaves a robot its own emotions.
@@ -62,7 +62,7 @@ impl Script {
         let scripted = self.0.get(begun.checked_sub(1)?)?;
         Some(Feeling {
             emotion: scripted.emotion,
-            intensity: scripted.intensity,
+            urgency: scripted.urgency,
         })
     }
 }
@@ -78,7 +78,7 @@ mod tests {
         Scripted {
             at_s,
             emotion,
-            intensity: Intensity::MAX,
+            urgency: Urgency::MAX,
         }
     }
 

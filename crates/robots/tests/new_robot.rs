@@ -115,6 +115,20 @@ fn vera_becomes_shy_where_too_many_stand_and_hides_until_she_is_calm() {
 }
 
 #[test]
+fn vera_publishes_what_she_feels_and_why() {
+    let mut stage = party("bearable = 4");
+    assert!(stage.step_until(60.0, |stage| stage.emotion("Vera") == "SHY"));
+
+    assert_eq!(stage.number("Vera", "valence"), -1.0);
+    assert_eq!(stage.number("Vera", "goal_congruence"), -1.0);
+    let agency = stage.report("Vera").state_variables.get("agency").cloned();
+    assert_eq!(agency, Some("the crowd".into()));
+
+    assert!(stage.step_until(60.0, |stage| stage.emotion("Vera") == "CALM"));
+    assert!(stage.number("Vera", "valence") > 0.7);
+}
+
+#[test]
 fn vera_who_can_bear_more_stays() {
     let minute = minute(party("bearable = 50"));
     assert!(

@@ -1,93 +1,94 @@
-//! The appraisal components that distinguish one emotion from another.
+//! Appraisal: how a robot judges what it perceives.
 
-use crate::affect::Valence;
 use serde::{Deserialize, Serialize};
 
-/// The facial expression of an emotion [D: S].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FacialExpression {
-    /// A smile.
-    Happy,
-    /// Corners of the mouth down.
-    Sad,
-    /// Eyes and mouth open.
-    Surprised,
-    /// Nose wrinkled.
-    Disgusted,
-    /// Brows drawn together.
-    Angry,
-    /// Brows raised and drawn together.
-    Fearful,
-    /// No particular expression.
-    Neutral,
-}
-
-impl FacialExpression {
-    /// The valence that this expression shows.
-    ///
-    /// `None` for surprise, which may be either [D: S], and for a neutral face, which shows nothing \[I\].
-    pub fn valence(self) -> Option<Valence> {
-        match self {
-            Self::Happy => Some(Valence::Positive),
-            Self::Sad | Self::Disgusted | Self::Angry | Self::Fearful => Some(Valence::Negative),
-            Self::Surprised | Self::Neutral => None,
-        }
-    }
-}
-
 /// The agent responsible for what elicited an emotion [D: S].
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Agency {
     /// The agent that feels the emotion.
+    #[default]
     #[serde(rename = "self")]
     Oneself,
     /// Another agent or a thing, identified by name.
     Other(String),
 }
 
-/// Whether the eliciting event was expected. The dimension is documented [D: S], its values are not \[I\].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Novelty {
-    /// The event was expected.
-    Match,
-    /// The event was not expected.
-    Mismatch,
+impl Agency {
+    /// The name under which it is published: `self`, or the name of the other.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Oneself => "self",
+            Self::Other(name) => name,
+        }
+    }
 }
 
-/// Degree of controllability or modifiability \[I\].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Degree {
-    /// Not at all.
-    None,
-    /// A little.
-    Low,
-    /// In part.
-    Medium,
-    /// Fully.
-    High,
+/// A robot's judgment of its present situation.
+///
+/// That emotions have controllability, certainty and agency is documented, and that valence follows from progress
+/// toward the goal [D: S]. No values or formulas have been published; the scales are chosen here \[I\]. A robot computes
+/// each value from what it perceives, so two episodes of the same emotion can differ in all of them.
+///
+/// ```
+/// use affect::akr::{Agency, Appraisal};
+/// let appraisal = Appraisal::new(-3.0, 0.5, f64::NAN, Agency::Other("Leguin".to_owned()));
+/// assert_eq!(appraisal.goal_congruence(), -1.0);
+/// assert_eq!(appraisal.certainty(), 0.0);
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Appraisal {
+    goal_congruence: f64,
+    controllability: f64,
+    certainty: f64,
+    agency: Agency,
 }
 
-/// Whether the agent is certain of what happens. The dimension is documented [D: S], its values are not \[I\].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Certainty {
-    /// The agent is certain.
-    Certain,
-    /// The agent is not certain.
-    Uncertain,
+impl Default for Appraisal {
+    /// The appraisal of a robot that has perceived nothing yet: nothing is in its way, and nothing is certain.
+    fn default() -> Self {
+        Self::new(1.0, 1.0, 0.0, Agency::Oneself)
+    }
 }
 
-/// Whether what happens agrees with a norm or standard. The dimensions are documented [D: S], their values are
-/// not \[I\].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Compatibility {
-    /// Agrees.
-    Compatible,
-    /// Conflicts.
-    Incompatible,
+impl Appraisal {
+    /// Creates an appraisal. Numbers out of range are clamped, and NaN becomes 0.
+    pub fn new(goal_congruence: f64, controllability: f64, certainty: f64, agency: Agency) -> Self {
+        Self {
+            goal_congruence: clamped(goal_congruence, -1.0),
+            controllability: clamped(controllability, 0.0),
+            certainty: clamped(certainty, 0.0),
+            agency,
+        }
+    }
+
+    /// How well the situation fits the goal: from -1 (it prevents the goal) to 1 (nothing is in the way).
+    pub fn goal_congruence(&self) -> f64 {
+        self.goal_congruence
+    }
+
+    /// How much the robot can do about the situation, from 0 (nothing) to 1 (all that it ever could).
+    pub fn controllability(&self) -> f64 {
+        self.controllability
+    }
+
+    /// How certain the robot is of the situation, from 0 (it knows nothing) to 1 (its knowledge is of this moment).
+    pub fn certainty(&self) -> f64 {
+        self.certainty
+    }
+
+    /// The agent responsible for the situation.
+    pub fn agency(&self) -> &Agency {
+        &self.agency
+    }
+}
+
+/// The value between `least` and 1; 0 for NaN.
+fn clamped(value: f64, least: f64) -> f64 {
+    if value.is_nan() {
+        0.0
+    } else {
+        value.clamp(least, 1.0)
+    }
 }

@@ -33,6 +33,28 @@ pub enum ActionTendency {
 }
 
 impl ActionTendency {
+    /// Every tendency.
+    pub const ALL: [Self; 11] = [
+        Self::Avoid,
+        Self::Approach,
+        Self::Agonistic,
+        Self::Reject,
+        Self::Prepare,
+        Self::Inactivity,
+        Self::FreeActivate,
+        Self::ContinueNormalActivity,
+        Self::MonitorProgressClosely,
+        Self::ChangeCurrentStrategy,
+        Self::Disengage,
+    ];
+
+    /// The tendency with this name, if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|tendency| tendency.name() == name)
+    }
+
     /// The function of the tendency according to Table 1, or `None` if it is not in that table.
     pub fn function(self) -> Option<&'static str> {
         TABLE_1
@@ -178,12 +200,10 @@ mod tests {
 
     #[test]
     fn the_name_is_the_serialized_form() {
-        let of_table_1 = TABLE_1.iter().map(|row| row.tendency);
-        let of_table_2 = TABLE_2.iter().map(|row| row.tendency);
-
-        for tendency in of_table_1.chain(of_table_2) {
+        for tendency in ActionTendency::ALL {
             let json = serde_json::to_string(&tendency).unwrap();
             assert_eq!(json, format!("\"{}\"", tendency.name()));
+            assert_eq!(ActionTendency::named(tendency.name()), Some(tendency));
         }
     }
 

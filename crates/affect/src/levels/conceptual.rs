@@ -305,7 +305,7 @@ impl Conceptual {
         let experience = memory.recall(condition.feeling.emotion, &candidate.action);
         let follows = condition.tendency.is_some() && candidate.tendency == condition.tendency;
         let readiness = if follows {
-            self.parameters.readiness * condition.feeling.intensity.value()
+            self.parameters.readiness * condition.feeling.intensity().value()
         } else {
             0.0
         };

@@ -288,11 +288,7 @@ fn says_what_the_record_says(lab: &Lab, run: &str, emotions: &[Emotion]) {
 #[test]
 fn an_emotion_carries_its_components() {
     let lab = Lab::new();
-    lab.run(
-        "hors_doeuvres.toml",
-        "hall",
-        &["robot.Butler.params.dynamics.rho_max=4.0"],
-    );
+    lab.run("hors_doeuvres.toml", "hall", &[]);
     let all = emotions(&lab.export(&["hall"]).0);
     let standard = emotions(&lab.export(&["hall", "--standard"]).0);
 
@@ -317,17 +313,6 @@ fn an_emotion_carries_its_components() {
     let close = |a: f64, b: f64| (a - b).abs() < 2e-6;
     let valence = 0.5 - 0.5 * mean(concerned.trace.as_ref().unwrap());
     assert!(close(concerned.values["valence"], valence), "{concerned:?}");
-    let constant = [
-        "agency",
-        "unexpectedness",
-        "unpredictability",
-        "controllability",
-        "changeability",
-    ];
-    assert_eq!(
-        constant.map(|name| concerned.values[name]),
-        [0.0, 1.0, 1.0, 0.666667, 1.0]
-    );
     assert_eq!(concerned.target.as_deref(), Some("Leguin"));
     assert!(
         concerned
@@ -345,58 +330,134 @@ fn an_emotion_carries_its_components() {
         category(&all, "Butler", "FRUSTRATED").len()
     );
 
-    // The need, on the scale of this run's own parameter.
+    // Every number is the mean of what he published.
     let span = concerned.offset_ms / 500..(concerned.offset_ms + concerned.duration_ms) / 500;
     let ticks = &lab.lines("hall", "recording.jsonl")[1..];
-    let urgency = |tick: u64| {
-        let butler = &ticks[usize::try_from(tick).unwrap()]["robots"][0];
-        (butler["state_variables"]["need_ratio"].as_f64().unwrap() / 4.0).min(1.0)
+    let published = |name: &str| -> Vec<f64> {
+        let variable = |tick: u64| {
+            let butler = &ticks[usize::try_from(tick).unwrap()]["robots"][0];
+            match &butler["state_variables"][name] {
+                Value::String(agency) => f64::from(agency == "self"),
+                value => value.as_f64().unwrap(),
+            }
+        };
+        span.clone().map(variable).collect()
     };
-    let urgency = mean(&span.map(urgency).collect::<Vec<_>>());
-    assert!(
-        close(concerned.values["urgency"], urgency),
-        "{concerned:?}, {urgency}"
-    );
-    assert!(close(concerned.values["desirability"], 1.0 - urgency));
-    assert!(
-        !category(&all, "Leguin", "CONCERNED")[0]
-            .values
-            .contains_key("urgency"),
-        "she publishes no need"
-    );
+    for (exported, expected) in [
+        ("urgency", mean(&published("urgency"))),
+        ("controllability", mean(&published("controllability"))),
+        ("agency", mean(&published("agency"))),
+        ("unpredictability", 1.0 - mean(&published("certainty"))),
+        (
+            "desirability",
+            0.5 + 0.5 * mean(&published("goal_congruence")),
+        ),
+        ("valence", 0.5 + 0.5 * mean(&published("valence"))),
+    ] {
+        let value = concerned.values[exported];
+        assert!(close(value, expected), "{exported}: {value}, {expected}");
+    }
+}
+
+/// Mean of a number over the episodes of an emotion, weighted by their durations.
+fn mean_of(emotions: &[&Emotion], name: &str) -> f64 {
+    let mut sum = 0.0;
+    let mut duration_ms = 0.0;
+    for one in emotions {
+        sum += one.values[name] * one.duration_ms as f64;
+        duration_ms += one.duration_ms as f64;
+    }
+    sum / duration_ms
 }
 
 #[test]
-fn a_refiller_blames_the_crowd_for_the_way_and_the_waiter_for_the_wait() {
-    let robots = |behavior: &str, emotion: &str, hurried: bool| {
-        let leguin = json!({"intensity": 1.0, "waiter": "Butler", "hurried": hurried});
+fn valence_orders_the_emotions_and_appraisals_differ_between_episodes() {
+    let lab = Lab::new();
+    lab.run("hors_doeuvres.toml", "hall", &[]);
+    let all = emotions(&lab.export(&["hall"]).0);
+
+    let names = ["HAPPY", "CONFIDENT", "CONCERNED", "FRUSTRATED"];
+    let episodes = names.map(|name| category(&all, "Butler", name));
+    let valences = episodes.each_ref().map(|one| mean_of(one, "valence"));
+    assert!(
+        valences.is_sorted_by(|better, worse| better > worse),
+        "{valences:?}"
+    );
+    assert!(valences[1] > 0.5 && valences[2] < 0.5, "{valences:?}");
+
+    for (name, episodes) in names.iter().zip(&episodes) {
+        for appraisal in ["desirability", "controllability", "agency"] {
+            let mut values: Vec<f64> = episodes.iter().map(|one| one.values[appraisal]).collect();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            // The paper's example: a HAPPY robot holds itself responsible.
+            let is_constant = (*name, appraisal) == ("HAPPY", "agency");
+            assert_eq!(
+                values.len() == 1,
+                is_constant,
+                "{name}, {appraisal}: {values:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_emotion_is_targeted_at_the_robot_that_is_held_responsible() {
+    let robots = |emotion: &str, agency: &str| {
+        let leguin = json!({"intensity": 1.0, "waiter": "Butler", "agency": agency});
         json!([
             robot("Butler", "HAPPY", "SERVE", &json!({})),
-            robot("Leguin", emotion, behavior, &leguin)
+            robot("Leguin", emotion, "REFILL", &leguin)
         ])
     };
 
-    // She turns back in the tick in which she is frustrated: what she did before counts.
-    for (during, hurried, target) in [
-        ("REFILL", false, None),
-        ("REFILL", true, Some("Butler")),
-        ("AWAIT_GO_HOME", false, Some("Butler")),
+    for (agency, target, blamed) in [
+        ("the crowd", None, "the crowd"),
+        ("Butler", Some("Butler"), "Butler"),
+        ("self", None, "Butler"),
     ] {
         let lab = Lab::new();
-        let ticks = [
-            robots(during, "CONFIDENT", hurried),
-            robots("GO_HOME", "FRUSTRATED", false),
-        ];
+        let ticks = [robots("CONFIDENT", "self"), robots("FRUSTRATED", agency)];
         lab.record("way", &recording(&ticks));
         let all = emotions(&lab.export(&["way"]).0);
+
         let frustrated = category(&all, "Leguin", "FRUSTRATED")[0];
-        assert_eq!(frustrated.target.as_deref(), target, "{during}");
-        let who = target.unwrap_or("the crowd");
+        assert_eq!(frustrated.target.as_deref(), target, "{agency}");
+        let own_doing = f64::from(agency == "self");
+        assert_eq!(frustrated.values["agency"], own_doing, "{agency}");
         assert!(
-            frustrated.info.contains(&format!("{who} is not here")),
+            frustrated.info.contains(&format!("{blamed} is not here")),
             "{}",
             frustrated.info
         );
+    }
+}
+
+#[test]
+fn a_robot_of_ones_own_is_exported_with_the_frame_that_it_publishes() {
+    let lab = Lab::new();
+    let variables = json!({"intensity": 0.75, "valence": -0.75, "urgency": 0.75, "goal_congruence": -0.5,
+        "controllability": 0.25, "certainty": 1.0, "agency": "Butler", "action_tendency": "avoid",
+        "face": "fearful"});
+    let robots = json!([
+        robot("Butler", "HAPPY", "SERVE", &json!({})),
+        robot("Vera", "SHY", "HIDE", &variables)
+    ]);
+    lab.record("party", &recording(&[robots]));
+
+    for view in [&["party"][..], &["party", "--standard"]] {
+        let all = emotions(&lab.export(view).0);
+        let vera = all.iter().find(|one| one.robot == "Vera").unwrap();
+        let is_standard = view.len() > 1;
+
+        let appraisals = ["urgency", "desirability", "controllability", "agency"];
+        let values = appraisals.map(|name| vera.values[name]);
+        assert_eq!(values, [0.75, 0.25, 0.25, 0.0]);
+        assert_eq!(vera.values.get("valence").is_some(), !is_standard);
+        assert_eq!(vera.target.as_deref(), Some("Butler"));
+        let tendency = if is_standard { "avoidance" } else { "avoid" };
+        assert_eq!(vera.tendency.as_deref(), Some(tendency));
+        assert!(vera.face);
     }
 }
 
@@ -558,7 +619,7 @@ fn emotions_of_foreign_robots_are_told_whatever_their_names() {
     );
     assert_eq!(all[4].category, all[0].category);
     assert!(
-        all[0].values.is_empty()
+        all[0].values.contains_key("valence")
             && all[0].trace.as_ref().unwrap().len() == 10
             && all[0].info.is_empty()
     );

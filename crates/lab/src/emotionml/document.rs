@@ -3,15 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
-use affect::akr::{ActionTendency, FacialExpression, Valence};
-use affect::{AgencyRole, Circumstances, DynamicsParameters, Schema, SchemaValence, Schemata};
+use affect::akr::ActionTendency;
+use affect::frame::{
+    ACTION_TENDENCY, CERTAINTY, CONTROLLABILITY, FACE, GOAL_CONGRUENCE, URGENCY, VALENCE,
+};
+use affect::{Circumstances, Schema, Schemata};
 use protocol::RobotName;
 use protocol::keys::Keys;
 use protocol::messages::Parameters;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 
-use super::episode::{Episode, RobotState};
+use super::episode::Episode;
 use super::reader::Facts;
 use super::terms::{self, Term};
 
@@ -22,8 +25,8 @@ const ROOT: &str = "emotionml";
 const EMOTIONS: &str = "cars-emotions";
 const TENDENCIES: &str = "cars-action-tendencies";
 
-/// What blocks the refiller's way, in words [I: as on her panel].
-const CROWD: &str = "the crowd";
+/// The face that expresses nothing.
+const NEUTRAL_FACE: &str = "neutral";
 
 /// A document that is being written.
 pub(super) struct Document<W: Write> {
@@ -37,7 +40,7 @@ pub(super) struct Document<W: Write> {
     /// Emotions written so far, for the vocabulary.
     emotions: BTreeSet<String>,
     /// Action tendencies written so far, for the vocabulary.
-    tendencies: BTreeSet<ActionTendency>,
+    tendencies: BTreeSet<String>,
     /// Number of episodes left out, by emotion: this view has no term for it.
     left_out: BTreeMap<String, u64>,
 }
@@ -154,26 +157,28 @@ impl<W: Write> Document<W> {
             *self.left_out.entry(emotion.clone()).or_default() += 1;
             return Ok(());
         }
+
         if !self.is_standard {
             self.emotions.insert(emotion.clone());
             self.tendencies
-                .extend(schema.map(|schema| schema.action_tendency));
+                .extend(tendency(episode, schema).map(str::to_owned));
         }
-        let explanation = schema.map(|schema| Explanation::new(schema, episode, &self.facts));
-        let other = explanation.as_ref().and_then(|own| own.other.as_deref());
+
+        let explanation = schema.map(|schema| explanation(schema, episode, &self.facts));
+        let other = episode.other.as_deref();
         let targeted_at = other.and_then(|other| self.target(other));
         let experienced_by = self.robot_uri(&episode.begun.name);
-        let trace = episode.intensity.values().map(samples);
+        let trace = episode.intensity().map(samples);
         let frequency = format!("{}Hz", 1.0 / self.facts.tick_s);
         let time = self.time_attributes(episode);
 
         let element = self.xml.create_element("emotion");
         let element = element.with_attributes(time.iter().map(|(key, value)| (*key, &**value)));
         let element = element.with_attributes(sets(&descriptors));
-        let element = element.with_attributes(expressed_through(schema));
+        let element = element.with_attributes(expressed_through(episode, schema));
         element.write_inner_content(|xml| {
             if let Some(explanation) = &explanation {
-                write_info(xml, &explanation.text)?;
+                write_info(xml, explanation)?;
             }
             for descriptor in &descriptors {
                 write_descriptor(xml, descriptor, trace.as_deref(), &frequency)?;
@@ -210,7 +215,7 @@ impl<W: Write> Document<W> {
 
         let mut tendencies = Vec::new();
         for tendency in &self.tendencies {
-            tendencies.push((tendency.name().to_owned(), describe_tendency(*tendency)));
+            tendencies.push((terms::token(tendency), describe_tendency(tendency)));
         }
         write_vocabulary(&mut self.xml, "action-tendency", TENDENCIES, tendencies)?;
 
@@ -231,30 +236,25 @@ impl<W: Write> Document<W> {
 
     /// The descriptors of an episode, ordered by kind.
     fn descriptors(&self, episode: &Episode, schema: Option<&Schema>) -> Vec<Descriptor> {
-        let mean_intensity = episode.intensity.values().and_then(mean);
+        let category = self.category(episode);
+        let dimensions = if self.is_standard && category.is_none() {
+            intensity(episode)
+        } else {
+            dimensions(episode)
+        };
+
         let mut descriptors = Vec::new();
-        descriptors.extend(self.category(episode));
-
-        if let Some(schema) = schema {
-            descriptors.extend(dimensions(schema, mean_intensity));
-            descriptors.extend(components(schema));
-        } else if self.is_standard && mean_intensity.is_some() {
-            let intensity = Descriptor::of_w3c(Kind::Dimension, terms::INTENSITY, Scale::Trace);
-            descriptors.push(intensity);
-        }
-        if let Some(urgency) = self.urgency(episode) {
-            descriptors.push(Descriptor::appraisal(terms::URGENCY, urgency));
-            descriptors.push(Descriptor::appraisal(terms::DESIRABILITY, 1.0 - urgency));
-        }
-
-        descriptors.extend(schema.and_then(|schema| self.tendency(schema.action_tendency)));
+        descriptors.extend(category);
+        descriptors.extend(dimensions);
+        descriptors.extend(appraisals(episode));
+        descriptors.extend(tendency(episode, schema).and_then(|name| self.tendency(name)));
 
         descriptors
     }
 
     fn category(&self, episode: &Episode) -> Option<Descriptor> {
         let emotion = &episode.begun.emotion;
-        let scale = if episode.intensity.values().is_some() {
+        let scale = if episode.intensity().is_some() {
             Scale::Trace
         } else {
             Scale::Unknown
@@ -270,35 +270,16 @@ impl<W: Write> Document<W> {
         Some(Descriptor::own(kind, EMOTIONS, name, scale))
     }
 
-    fn tendency(&self, tendency: ActionTendency) -> Option<Descriptor> {
+    fn tendency(&self, name: &str) -> Option<Descriptor> {
         let kind = Kind::ActionTendency;
         if self.is_standard {
+            let tendency = ActionTendency::named(name)?;
             let term = terms::nearest_tendency(tendency)?;
             return Some(Descriptor::of_w3c(kind, term, Scale::Unknown));
         }
 
-        let name = tendency.name().to_owned();
+        let name = terms::token(name);
         Some(Descriptor::own(kind, TENDENCIES, name, Scale::Unknown))
-    }
-
-    /// Mean urgency of the need, 0 to 1; 1 is the need that saturates the robot's emotion.
-    fn urgency(&self, episode: &Episode) -> Option<f64> {
-        let rho_max = self.rho_max(&episode.begun.name);
-        let mut urgencies = Vec::new();
-        for rho in episode.need_ratio.values()? {
-            urgencies.push((rho / rho_max).min(1.0));
-        }
-
-        mean(&urgencies)
-    }
-
-    /// The need ratio that saturates the emotion of a robot: from its parameters, or the default.
-    fn rho_max(&self, name: &RobotName) -> f64 {
-        let parameters = self.facts.parameters.get(name);
-        let rho_max = parameters.and_then(|own| own.get("dynamics")?.get("rho_max")?.as_f64());
-        rho_max
-            .filter(|rho| *rho > 0.0)
-            .unwrap_or_else(|| DynamicsParameters::default().rho_max)
     }
 
     fn robot_uri(&self, name: &RobotName) -> String {
@@ -311,43 +292,30 @@ impl<W: Write> Document<W> {
     }
 }
 
-/// The cause of an emotion as its robot states it.
-struct Explanation {
-    text: String,
-    /// The agent responsible, if it is not the robot itself.
-    other: Option<String>,
-}
+/// The cause of an emotion in words.
+///
+/// Reads state variables of the shipped robots: `refiller` and `treats` of a waiter, `waiter` of a refiller. The
+/// explanation of a robot without these variables has fewer details.
+fn explanation(schema: &Schema, episode: &Episode, facts: &Facts) -> String {
+    let begun = &episode.begun;
+    let parameters = facts.parameters.get(&begun.name);
+    let goods = text_of(parameters, "goods").unwrap_or("treats");
+    let treats = begun.number("treats");
+    let amount = treats.map(|treats| format!("{treats} {goods}"));
 
-impl Explanation {
-    /// Reads the state variables of the shipped robots: `refiller` and `treats` of a waiter, `waiter` and `hurried` of a
-    /// refiller. The explanation of a robot without these variables has fewer details.
-    fn new(schema: &Schema, episode: &Episode, facts: &Facts) -> Self {
-        let begun = &episode.begun;
-        let parameters = facts.parameters.get(&begun.name);
-        let goods = text_of(parameters, "goods").unwrap_or("treats");
-        let treats = begun.number("treats");
-        let amount = treats.map(|treats| format!("{treats} {goods}"));
+    let refiller = begun.text("refiller");
+    let waiter = begun.text("waiter");
+    let other = refiller.or(episode.other.as_deref()).or(waiter);
 
-        let waiter = begun.text("waiter");
-        let mut other = begun.text("refiller");
-        let mut goal = text_of(parameters, "goal").map(str::to_owned);
-        if let Some(waiter) = waiter {
-            other = other.or(Some(blamed(&episode.before, waiter)));
-            goal = goal.or(Some(format!("to bring {goods} to {waiter}")));
-        }
+    let own_goal = text_of(parameters, "goal").map(str::to_owned);
+    let goal = own_goal.or(waiter.map(|waiter| format!("to bring {goods} to {waiter}")));
 
-        let circumstances = Circumstances {
-            other,
-            goal: goal.as_deref(),
-            amount: amount.as_deref(),
-            valence: None,
-        };
-        let is_by_other = schema.agency == AgencyRole::Other;
-        Self {
-            text: schema.account(&circumstances).spoken(),
-            other: other.filter(|_| is_by_other).map(str::to_owned),
-        }
-    }
+    let circumstances = Circumstances {
+        other,
+        goal: goal.as_deref(),
+        amount: amount.as_deref(),
+    };
+    schema.spoken(&circumstances)
 }
 
 /// A parameter of a robot that is a text.
@@ -355,62 +323,75 @@ fn text_of<'a>(parameters: Option<&'a Parameters>, name: &str) -> Option<&'a str
     parameters?.get(name)?.as_str()
 }
 
-/// The agent that a refiller blames: the crowd while she is on her way, unless the waiter has hurried her.
-fn blamed<'a>(before: &RobotState, waiter: &'a str) -> &'a str {
-    let is_crowd = before.behavior == "REFILL" && !before.flag("hurried");
-    if is_crowd { CROWD } else { waiter }
+/// The action tendency that a robot publishes, or that of the standard emotion.
+fn tendency<'a>(episode: &'a Episode, schema: Option<&Schema>) -> Option<&'a str> {
+    let published = episode.begun.text(ACTION_TENDENCY);
+    let published = published.filter(|name| !name.is_empty());
+
+    published.or(schema.map(|schema| schema.action_tendency.name()))
 }
 
 /// The `expressed-through` attribute; a neutral face expresses nothing.
-fn expressed_through(schema: Option<&Schema>) -> Option<(&'static str, &'static str)> {
-    let is_expressed = schema?.facial_expression != FacialExpression::Neutral;
-    is_expressed.then_some(("expressed-through", "face"))
+fn expressed_through(
+    episode: &Episode,
+    schema: Option<&Schema>,
+) -> Option<(&'static str, &'static str)> {
+    let of_schema = schema.map(|schema| schema.facial_expression.name());
+    let face = episode.begun.text(FACE).or(of_schema)?;
+
+    (face != NEUTRAL_FACE).then_some(("expressed-through", "face"))
 }
 
-/// Valence and unpredictability. Valence needs a mean intensity and a schema with a sign.
-fn dimensions(schema: &Schema, mean_intensity: Option<f64>) -> Vec<Descriptor> {
+/// Valence and unpredictability, as far as they are published.
+fn dimensions(episode: &Episode) -> Vec<Descriptor> {
     let mut dimensions = Vec::new();
-    if let (Some(mean), Some(sign)) = (mean_intensity, sign(schema.valence)) {
-        let valence = 0.5 + 0.5 * sign * mean;
-        dimensions.push(Descriptor::dimension(terms::VALENCE, valence));
+    if let Some(valence) = episode.mean(VALENCE) {
+        dimensions.push(Descriptor::dimension(terms::VALENCE, halved(valence)));
+    }
+    if let Some(certainty) = episode.mean(CERTAINTY) {
+        let unpredictability = 1.0 - certainty;
+        dimensions.push(Descriptor::dimension(
+            terms::UNPREDICTABILITY,
+            unpredictability,
+        ));
     }
 
-    let unpredictability = terms::unpredictability(schema.certainty);
-    dimensions.push(Descriptor::dimension(
-        terms::UNPREDICTABILITY,
-        unpredictability,
-    ));
     dimensions
 }
 
-/// The appraisals that all episodes of an emotion share.
-fn components(schema: &Schema) -> [Descriptor; 4] {
-    let agency = match schema.agency {
-        AgencyRole::Oneself => 1.0,
-        AgencyRole::Other => 0.0,
-    };
-    let unexpectedness = terms::unexpectedness(schema.novelty);
-    let controllability = terms::degree(schema.controllability);
-    let changeability = terms::degree(schema.modifiability);
-
-    [
-        Descriptor::appraisal(terms::AGENCY, agency),
-        Descriptor::appraisal(terms::UNEXPECTEDNESS, unexpectedness),
-        Descriptor::appraisal(terms::CONTROLLABILITY, controllability),
-        Descriptor::appraisal(terms::CHANGEABILITY, changeability),
-    ]
-}
-
-fn sign(valence: SchemaValence) -> Option<f64> {
-    match valence {
-        SchemaValence::Positive => Some(Valence::Positive.sign()),
-        SchemaValence::Negative => Some(Valence::Negative.sign()),
-        SchemaValence::Either => None,
+/// The intensity as a dimension, for an emotion without a category. Its vocabulary has no other dimension.
+fn intensity(episode: &Episode) -> Vec<Descriptor> {
+    let mut dimensions = Vec::new();
+    if episode.intensity().is_some() {
+        let intensity = Descriptor::of_w3c(Kind::Dimension, terms::INTENSITY, Scale::Trace);
+        dimensions.push(intensity);
     }
+
+    dimensions
 }
 
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+/// The robot's appraisals, as far as they are published.
+fn appraisals(episode: &Episode) -> Vec<Descriptor> {
+    let values = [
+        (terms::AGENCY, episode.own_doing()),
+        (terms::CONTROLLABILITY, episode.mean(CONTROLLABILITY)),
+        (terms::URGENCY, episode.mean(URGENCY)),
+        (
+            terms::DESIRABILITY,
+            episode.mean(GOAL_CONGRUENCE).map(halved),
+        ),
+    ];
+
+    let mut appraisals = Vec::new();
+    for (term, value) in values {
+        appraisals.extend(value.map(|value| Descriptor::appraisal(term, value)));
+    }
+    appraisals
+}
+
+/// A number between -1 and 1 on the scale of EmotionML, 0 to 1.
+fn halved(value: f64) -> f64 {
+    0.5 + 0.5 * value
 }
 
 fn samples(values: &[f64]) -> String {
@@ -454,8 +435,8 @@ fn about(facts: &Facts, keys: &Keys) -> String {
     format!(
         "Emotions of robots in the simulated run {run}{epoch}, seed {seed}, from its {file}, by cars {}. \
          Times are simulated milliseconds since tick 0 of {}; a tick lasts {tick_s} s and a trace has one sample a tick. \
-         Robots are named by their addresses on the network. A category is as intense as its trace; valence, urgency and \
-         desirability are means over the episode.",
+         Robots are named by their addresses on the network. A category is as intense as its trace; dimensions and \
+         appraisals are means over the episode of what the robot published.",
         env!("CARGO_PKG_VERSION"),
         keys.clock()
     )
@@ -467,18 +448,18 @@ fn describe_emotion(name: &str) -> String {
         parts.push(format!("nearest: {}", term.in_words()));
     }
     if let Some(schema) = Schemata::standard().get(name) {
-        let face = format!("{:?}", schema.facial_expression);
-        parts.push(format!("face: {}", face.to_lowercase()));
+        parts.push(format!("face: {}", schema.facial_expression.name()));
     }
     parts.join("; ")
 }
 
-fn describe_tendency(tendency: ActionTendency) -> String {
-    let mut parts = vec![format!("action tendency {}", tendency.name())];
-    if let Some(function) = tendency.function() {
+fn describe_tendency(name: &str) -> String {
+    let mut parts = vec![format!("action tendency {name}")];
+    let known = ActionTendency::named(name);
+    if let Some(function) = known.and_then(ActionTendency::function) {
         parts.push(format!("function: {function}"));
     }
-    if let Some(term) = terms::nearest_tendency(tendency) {
+    if let Some(term) = known.and_then(terms::nearest_tendency) {
         parts.push(format!("nearest: {}", term.in_words()));
     }
     parts.join("; ")

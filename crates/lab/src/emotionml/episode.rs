@@ -1,13 +1,27 @@
 //! Episodes: the longest spans of ticks in which a robot is in one emotion state.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 
+use affect::frame::{
+    AGENCY, CERTAINTY, CONTROLLABILITY, GOAL_CONGRUENCE, INTENSITY, URGENCY, VALENCE,
+};
 use protocol::messages::StateVariables;
 use protocol::{RobotName, Tick};
 
-/// State variables with the intensity of a robot's emotion, and with the ratio of its need to what can be done.
-const INTENSITY: &str = "intensity";
-const NEED_RATIO: &str = "need_ratio";
+/// Names and ranges of the state variables that are exported as numbers: the convention of `affect::frame`. A number out
+/// of its range has another meaning.
+const NUMBERS: [(&str, RangeInclusive<f64>); 6] = [
+    (INTENSITY, 0.0..=1.0),
+    (VALENCE, -1.0..=1.0),
+    (URGENCY, 0.0..=1.0),
+    (GOAL_CONGRUENCE, -1.0..=1.0),
+    (CONTROLLABILITY, 0.0..=1.0),
+    (CERTAINTY, 0.0..=1.0),
+];
+
+/// The agency of a robot that holds itself responsible.
+const ONESELF: &str = "self";
 
 /// Emotion state of a robot without emotions.
 const NEUTRAL: &str = "NEUTRAL";
@@ -35,23 +49,19 @@ impl RobotState {
         self.variables.as_ref()?.get(name)?.as_str()
     }
 
-    /// A state variable that is `true`.
-    pub(super) fn flag(&self, name: &str) -> bool {
-        self.variables
-            .as_ref()
-            .and_then(|variables| variables.get(name)?.as_bool())
-            .unwrap_or(false)
+    /// A state variable of the affect frame, if it is within its range.
+    fn published(&self, name: &str, range: &RangeInclusive<f64>) -> Option<f64> {
+        self.number(name).filter(|value| range.contains(value))
     }
 
-    /// Intensity, if it is between 0 and 1; outside of this range the number has another meaning.
-    fn intensity(&self) -> Option<f64> {
-        self.number(INTENSITY)
-            .filter(|value| (0.0..=1.0).contains(value))
+    /// The agent that is responsible for its emotion, as it publishes it: itself, or another one.
+    fn agency(&self) -> Option<&str> {
+        self.text(AGENCY).filter(|name| !name.is_empty())
     }
 
-    /// Ratio of the need to what can be done, if it is not negative.
-    fn need_ratio(&self) -> Option<f64> {
-        self.number(NEED_RATIO).filter(|value| *value >= 0.0)
+    /// The agent that is responsible, if it is not the robot itself.
+    fn other(&self) -> Option<&str> {
+        self.agency().filter(|name| *name != ONESELF)
     }
 
     fn has_emotion(&self) -> bool {
@@ -97,48 +107,83 @@ impl Trace {
 pub(super) struct Episode {
     /// The robot in the first tick.
     pub(super) begun: RobotState,
-    /// The robot in the tick before the first, in which the cause of the emotion lies.
-    pub(super) before: RobotState,
     /// First tick.
     pub(super) first: Tick,
     /// Last tick with a report of the robot.
     pub(super) last: Tick,
-    /// Intensity, 0 to 1.
-    pub(super) intensity: Trace,
-    /// Ratio of the robot's need to what could be done.
-    pub(super) need_ratio: Trace,
+    /// The agent other than itself that the robot held responsible last.
+    pub(super) other: Option<String>,
+    /// The published numbers, in the order of [`NUMBERS`].
+    numbers: [Trace; NUMBERS.len()],
+    /// 1 for each tick in which the robot held itself responsible, 0 for others.
+    own_doing: Trace,
 }
 
 impl Episode {
-    fn begin(tick: Tick, before: RobotState, begun: RobotState) -> Self {
-        let intensity = Trace::begin(begun.intensity());
-        let need_ratio = Trace::begin(begun.need_ratio());
+    fn begin(tick: Tick, begun: RobotState) -> Self {
+        let numbers = NUMBERS.map(|(name, range)| Trace::begin(begun.published(name, &range)));
+        let own_doing = Trace::begin(begun.agency().map(own_doing));
         Self {
+            other: begun.other().map(str::to_owned),
             begun,
-            before,
             first: tick,
             last: tick,
-            intensity,
-            need_ratio,
+            numbers,
+            own_doing,
         }
     }
 
     fn extend(&mut self, tick: Tick, robot: &RobotState) {
         let missed = tick.saturating_sub(self.last + 1);
-        self.intensity.hold(missed);
-        self.need_ratio.hold(missed);
 
-        self.intensity.push(robot.intensity());
-        self.need_ratio.push(robot.need_ratio());
+        for (trace, (name, range)) in self.numbers.iter_mut().zip(NUMBERS) {
+            trace.hold(missed);
+            trace.push(robot.published(name, &range));
+        }
+        self.own_doing.hold(missed);
+        self.own_doing.push(robot.agency().map(own_doing));
+
+        if let Some(other) = robot.other() {
+            self.other = Some(other.to_owned());
+        }
         self.last = tick;
     }
+
+    /// Intensity, tick by tick, if it was published in every tick.
+    pub(super) fn intensity(&self) -> Option<&[f64]> {
+        self.values(INTENSITY)
+    }
+
+    /// Mean of a published number, if it was published in every tick.
+    pub(super) fn mean(&self, name: &str) -> Option<f64> {
+        self.values(name).map(mean)
+    }
+
+    /// Share of the episode in which the robot held itself responsible.
+    pub(super) fn own_doing(&self) -> Option<f64> {
+        self.own_doing.values().map(mean)
+    }
+
+    fn values(&self, name: &str) -> Option<&[f64]> {
+        let index = NUMBERS.iter().position(|(own, _)| *own == name)?;
+        self.numbers[index].values()
+    }
+}
+
+fn own_doing(agency: &str) -> f64 {
+    if agency == ONESELF { 1.0 } else { 0.0 }
+}
+
+/// Mean of the numbers of a trace, of which there is at least one.
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// The episodes in progress.
 #[derive(Debug, Default)]
 pub(super) struct Episodes {
-    /// Latest state and episode in progress of each robot.
-    robots: BTreeMap<RobotName, (RobotState, Option<Episode>)>,
+    /// The episode in progress of each robot.
+    robots: BTreeMap<RobotName, Option<Episode>>,
     /// Robots with a note; each has at most one.
     noted: BTreeSet<RobotName>,
     /// What the document cannot express, for people.
@@ -156,32 +201,26 @@ impl Episodes {
         }
         self.note(&robot);
 
-        let Some((before, episode)) = self.robots.get_mut(&robot.name) else {
-            let begun = begin(tick, &robot, &robot);
-            self.robots.insert(robot.name.clone(), (robot, begun));
-            return None;
-        };
-
-        let mut ended = None;
+        let episode = self.robots.entry(robot.name.clone()).or_default();
         match episode {
             Some(episode) if episode.begun.emotion == robot.emotion => {
                 episode.extend(tick, &robot);
+                None
             }
-            episode => ended = std::mem::replace(episode, begin(tick, before, &robot)),
+            episode => std::mem::replace(episode, begin(tick, robot)),
         }
-        *before = robot;
-        ended
     }
 
     /// The episodes in progress at the end of the run, by robot.
     pub(super) fn end(self) -> impl Iterator<Item = Episode> {
-        self.robots.into_values().filter_map(|(_, episode)| episode)
+        self.robots.into_values().flatten()
     }
 
     /// Notes what is missing of a robot, once.
     fn note(&mut self, robot: &RobotState) {
         let lacks_emotion = !robot.has_emotion();
-        let lacks_intensity = robot.variables.is_some() && robot.intensity().is_none();
+        let lacks_intensity =
+            robot.variables.is_some() && robot.published(INTENSITY, &(0.0..=1.0)).is_none();
         if !(lacks_emotion || lacks_intensity) || !self.noted.insert(robot.name.clone()) {
             return;
         }
@@ -199,9 +238,9 @@ impl Episodes {
 }
 
 /// The episode that begins with a state, if the robot has an emotion.
-fn begin(tick: Tick, before: &RobotState, robot: &RobotState) -> Option<Episode> {
+fn begin(tick: Tick, robot: RobotState) -> Option<Episode> {
     let has_emotion = robot.has_emotion();
-    has_emotion.then(|| Episode::begin(tick, before.clone(), robot.clone()))
+    has_emotion.then(|| Episode::begin(tick, robot))
 }
 
 #[cfg(test)]
@@ -241,7 +280,7 @@ mod tests {
     }
 
     fn short(episode: Episode) -> Short {
-        let intensity = episode.intensity.values().map(<[f64]>::to_vec);
+        let intensity = episode.intensity().map(<[f64]>::to_vec);
         (
             episode.begun.emotion,
             episode.first,

@@ -285,9 +285,7 @@ fn parameters(folder: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<RobotName
         }
         Err(error) => {
             let reason = error.in_words();
-            notes.push(format!(
-                "{reason}: goals and the scale of needs are not known"
-            ));
+            notes.push(format!("{reason}: goals are not known"));
         }
     }
     parameters

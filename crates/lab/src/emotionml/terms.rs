@@ -1,11 +1,11 @@
 //! Maps terms of this project to EmotionML: the nearest terms of W3C's vocabularies (Working Group Note, 1 April 2014),
-//! degrees as numbers, and names and texts in characters that XML allows.
+//! and names and texts in characters that XML allows.
 //!
-//! The choice of the nearest terms and all numbers are ours \[I\].
+//! The choice of the nearest terms is ours \[I\].
 
 use std::fmt::Write;
 
-use affect::akr::{ActionTendency, Certainty, Degree, Novelty};
+use affect::akr::ActionTendency;
 
 /// URI of W3C's vocabularies, to which the id of one is appended.
 const W3C: &str = "http://www.w3.org/TR/emotion-voc/xml#";
@@ -38,9 +38,7 @@ pub(super) const VALENCE: Term = term("fsre-dimensions", "valence");
 pub(super) const UNPREDICTABILITY: Term = term("fsre-dimensions", "unpredictability");
 pub(super) const INTENSITY: Term = term("intensity-dimension", "intensity");
 pub(super) const AGENCY: Term = term("ema-appraisals", "agency");
-pub(super) const UNEXPECTEDNESS: Term = term("ema-appraisals", "unexpectedness");
 pub(super) const CONTROLLABILITY: Term = term("ema-appraisals", "controllability");
-pub(super) const CHANGEABILITY: Term = term("ema-appraisals", "changeability");
 pub(super) const URGENCY: Term = term("ema-appraisals", "urgency");
 pub(super) const DESIRABILITY: Term = term("ema-appraisals", "desirability");
 
@@ -63,32 +61,6 @@ pub(super) fn nearest_tendency(tendency: ActionTendency) -> Option<Term> {
     tendency
         .emotionml()
         .map(|name| term("frijda-action-tendencies", name))
-}
-
-/// A degree on the scale of EmotionML, 0 to 1 in equal steps.
-pub(super) fn degree(degree: Degree) -> f64 {
-    match degree {
-        Degree::None => 0.0,
-        Degree::Low => 1.0 / 3.0,
-        Degree::Medium => 2.0 / 3.0,
-        Degree::High => 1.0,
-    }
-}
-
-/// Unpredictability, 0 to 1: the opposite of certainty.
-pub(super) fn unpredictability(certainty: Certainty) -> f64 {
-    match certainty {
-        Certainty::Certain => 0.0,
-        Certainty::Uncertain => 1.0,
-    }
-}
-
-/// Unexpectedness, 0 to 1: whether an event differs from what was expected.
-pub(super) fn unexpectedness(novelty: Novelty) -> f64 {
-    match novelty {
-        Novelty::Match => 0.0,
-        Novelty::Mismatch => 1.0,
-    }
 }
 
 /// Formats a number between 0 and 1 with the seven digits of the schema's single precision.

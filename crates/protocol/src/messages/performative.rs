@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a message between robots is meant to do: the part of KQML that the robots of the paper need (Finin et al. 1994;
-/// the paper's robots spoke KQML, Murphy et al. 2002, abstract). A query of the common robot interface is an `ask-one`
-/// by being a query, and its answer says that it is a `tell`.
+/// the paper's robots spoke KQML, Murphy et al. 2002, abstract). A command is an `achieve`, and an answer to a query a
+/// `tell`. KQML's `ask-one` is not among them: zenoh's queries have no payload, and the key states what is asked for.
 #[derive(
     Debug,
     Clone,
@@ -25,8 +25,6 @@ pub enum Performative {
     /// The sender wants the receiver to make something true of its environment: every `setRobotCommand`.
     #[default]
     Achieve,
-    /// The sender wants one answer from what the receiver knows: every `getRobot...`.
-    AskOne,
     /// The content is true as far as the sender knows: every answer to a query.
     Tell,
 }
@@ -37,7 +35,6 @@ impl Performative {
     pub fn name(self) -> &'static str {
         match self {
             Self::Achieve => "achieve",
-            Self::AskOne => "ask-one",
             Self::Tell => "tell",
         }
     }

@@ -1,6 +1,8 @@
 //! Butler, the waiter: wanders among the guests, offers treats, and, depending on his emotion, calls the refiller in
 //! time, asks her to hurry, or drives to meet her.
 
+mod appraisal;
+mod deliberation;
 mod parameters;
 mod state;
 mod tables;
@@ -8,11 +10,13 @@ mod tables;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::progress::{need_ratio, time_to_arrive_by_depot_s, time_to_arrive_s, time_to_empty_s};
 use affect::{
-    Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, Intensity, StandardEmotion,
+    Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, Frame, StandardEmotion,
+    Urgency,
 };
 use robot::{Action, BadParameters, Cars, Panel, Point, Robot, StateVariables, Widget};
 use serde::{Deserialize, Serialize};
 
+pub use deliberation::Deliberation;
 pub use parameters::{Approach, Parameters, Rate};
 pub use tables::{Act, Behavior, Context, Measures, TABLE, appraise};
 
@@ -20,9 +24,11 @@ use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
 use crate::emotion::Emotion;
+use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::{Policy, Urge};
 use crate::published::text;
+use deliberation::{Deliberator, Plan, Prospects};
 use state::State;
 
 const JOKES: &[&str] = &[
@@ -37,6 +43,7 @@ pub struct Butler {
     parameters: Parameters,
     emotion: Emotion<DynamicGenerator<Measures, Behavior, StandardEmotion>>,
     bsg: BehaviorGenerator<Behavior, Context, Act>,
+    deliberator: Deliberator,
     state: State,
 }
 
@@ -91,13 +98,13 @@ impl Robot for Butler {
         }
 
         let motion = self.drive(cars);
-        let intensity = self.feeling().intensity;
-        Action {
+        let action = Action {
             emotion_state: self.emotion.name().to_owned(),
             behavior_state: self.behavior().name().to_owned(),
-            state_variables: self.state.published(intensity, self.behavior()),
+            state_variables: self.state.published(self.behavior()),
             ..motion
-        }
+        };
+        publish(self.frame(), action)
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
@@ -132,8 +139,8 @@ impl Robot for Butler {
             max: f64::from(self.parameters.treat_capacity),
         });
         widgets.push(Widget::Sparkline {
-            label: "intensity".to_owned(),
-            values: self.state.intensities.iter().copied().collect(),
+            label: "valence".to_owned(),
+            values: self.state.valences.iter().copied().collect(),
         });
         widgets.push(self.progress_table());
         Panel { widgets }
@@ -150,19 +157,32 @@ impl Butler {
         let state = State::new(&parameters).map_err(|error| error.to_string())?;
         let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution)
             .map_err(|error| error.to_string())?;
+        let deliberator = Deliberator::new(
+            parameters.deliberation.clone(),
+            parameters.caution,
+            dynamics.gain(),
+            parameters.dynamics.rho_max,
+        )?;
         let esg = DynamicGenerator::new(dynamics, appraise);
         Ok(Self {
             emotion: Emotion::new(parameters.affect, parameters.script.clone(), esg),
             bsg: BehaviorGenerator::new(TABLE, Behavior::Serve),
+            deliberator,
             state,
             parameters,
         })
     }
 
-    /// His feeling; without emotions a steady one of intensity 0.
+    /// His feeling; without emotions a steady one.
     #[must_use]
     pub fn feeling(&self) -> Feeling<StandardEmotion> {
         self.emotion.feeling()
+    }
+
+    /// What he feels and why, as he publishes it; `None` without emotions.
+    #[must_use]
+    pub fn frame(&self) -> Option<Frame<'static>> {
+        frame::of(self.emotion.shown(), &self.state.appraisal)
     }
 
     /// His behavior.
@@ -199,12 +219,15 @@ impl Butler {
         self.serve(tick_s);
         self.observe_refiller(cars);
         self.measure(cars);
+        self.believe(cars);
     }
 
     /// The emotion state generator.
     fn update_emotion(&mut self, cars: &Cars<'_>) {
         self.emotion
             .update(&self.state.measures, self.bsg.current(), cars);
+        self.state.appraisal = self.appraisal(cars);
+        self.plan(cars);
         self.state.record(self.feeling());
     }
 
@@ -322,7 +345,63 @@ impl Butler {
             time_to_refill_s,
             need_ratio: need_ratio(time_to_refill_s, time_to_empty_s, rate_per_s),
             exchange_is_over,
+            belief: None,
         };
+    }
+
+    /// What he believes of himself: the refiller within sensing range encourages him, and so does one who comes nearer at
+    /// more than his own pace.
+    fn believe(&mut self, cars: &Cars<'_>) {
+        let state = &mut self.state;
+        let is_near = state
+            .refiller
+            .is_within(cars.welcome().sensing_range_m, cars);
+        let comes_nearer =
+            state.refiller_left && state.approach.speed_mps() > self.parameters.v_serve_mps;
+
+        let is_encouraging = is_near || comes_nearer;
+        state.measures.belief = self.deliberator.believe(&mut state.mind, is_encouraging);
+    }
+
+    /// What he plans while he is FRUSTRATED.
+    fn plan(&mut self, cars: &Cars<'_>) {
+        let feeling = self.feeling();
+        let prospects = self.prospects(cars);
+        let mind = &mut self.state.mind;
+        self.deliberator
+            .plan(mind, feeling, &prospects, cars.tick_s());
+    }
+
+    /// When he can be refilled, by what he may do.
+    fn prospects(&self, cars: &Cars<'_>) -> Prospects {
+        let state = &self.state;
+        let parameters = &self.parameters;
+        let refiller = state.refiller.location();
+        let reach_m = parameters.exchange_radius_m;
+        let distance_m = refiller.map(|refiller| cars.location().distance_m(refiller));
+        let start_m = refiller.map(|refiller| state.start.distance_m(refiller));
+
+        // She needs as much longer to his start as it is farther away.
+        let serve_on_s = state.measures.time_to_refill_s;
+        let wait_at_start_s = match (start_m, distance_m) {
+            (Some(start_m), Some(distance_m)) => {
+                serve_on_s * (start_m / distance_m.max(reach_m)).max(0.0)
+            }
+            _ => serve_on_s,
+        };
+
+        let speed_mps = parameters
+            .v_intercept_mps
+            .max(parameters.approach.floor_mps);
+        let straight_s =
+            distance_m.map(|distance_m| time_to_arrive_s(distance_m - reach_m, speed_mps));
+        Prospects {
+            treats: f64::from(state.treats),
+            rate_per_s: state.measures.rate_per_s,
+            serve_on_s,
+            wait_at_start_s,
+            intercept_s: straight_s.filter(|_| self.context(cars).may_intercept()),
+        }
     }
 
     /// Time until the refiller can be here: straight, or by way of her table if she has to go home first.
@@ -411,7 +490,11 @@ impl Butler {
         let needed_s = self.state.needed_s;
 
         match parameters.policy() {
-            Policy::Emotion => Urge::of(self.feeling().emotion),
+            Policy::Emotion => {
+                let emotion = self.feeling().emotion;
+                self.deliberator
+                    .urge(emotion, &self.state.mind, self.state.need)
+            }
             Policy::Rules => Urge::at(
                 self.pressure(),
                 [
@@ -446,7 +529,7 @@ impl Butler {
         let dynamics = &self.parameters.dynamics;
         let need = self.state.measures.need_ratio;
         let gain = dynamics.gain(self.parameters.caution);
-        Intensity::saturating(gain * need / dynamics.rho_max).value()
+        Urgency::saturating(gain * need / dynamics.rho_max).value()
     }
 
     fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {
@@ -472,6 +555,7 @@ impl Butler {
             Act::GiveUp => {
                 state.gave_up = state.gave_up.saturating_add(1);
                 state.rest_s = self.parameters.intercept_again_s;
+                state.mind.abandon();
             }
             Act::Joke => {
                 state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
@@ -490,19 +574,24 @@ impl Butler {
     /// The motion that his behavior wants.
     fn drive(&mut self, cars: &mut Cars<'_>) -> Action {
         match self.behavior() {
+            Behavior::Serve if self.state.mind.plan() == Some(Plan::WaitAtStart) => {
+                self.go_to_start(cars, self.parameters.v_serve_mps)
+            }
             Behavior::Serve => self.wander(cars, self.parameters.v_serve_mps),
             Behavior::Intercept => self.intercept(cars),
             Behavior::Exchange => self.state.drive.stay(cars),
-            Behavior::GoBack => {
-                let course = Course {
-                    goal: self.state.start,
-                    stop_m: 0.0,
-                    speed_mps: self.parameters.v_goback_mps,
-                    look_s: self.parameters.look_s,
-                };
-                self.state.drive.follow(cars, course)
-            }
+            Behavior::GoBack => self.go_to_start(cars, self.parameters.v_goback_mps),
         }
+    }
+
+    fn go_to_start(&mut self, cars: &mut Cars<'_>, speed_mps: f64) -> Action {
+        let course = Course {
+            goal: self.state.start,
+            stop_m: 0.0,
+            speed_mps,
+            look_s: self.parameters.look_s,
+        };
+        self.state.drive.follow(cars, course)
     }
 
     fn wander(&mut self, cars: &Cars<'_>, speed_mps: f64) -> Action {
@@ -545,10 +634,9 @@ impl Butler {
             other: Some(&self.parameters.refiller),
             goal: Some(&self.parameters.goal),
             amount: Some(&amount),
-            valence: None,
         };
-        panel::feeling(
-            self.emotion.shown(),
+        panel::affect(
+            self.frame().as_ref(),
             &self.parameters.dynamics.label_cuts,
             &circumstances,
         )

@@ -4,6 +4,7 @@ use affect::progress::{ApproachParameters, RateParameters};
 use affect::{Caution, DynamicsParameters};
 use serde::{Deserialize, Serialize};
 
+use super::deliberation::Deliberation;
 use super::tables::Behavior;
 use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
@@ -91,6 +92,8 @@ pub struct Parameters {
     pub rate: Rate,
     /// Estimate of the speed at which the refiller approaches; it starts at `v_refill_mps`.
     pub approach: Approach,
+    /// What he deliberates about: beliefs and plans. Default nothing.
+    pub deliberation: Deliberation,
     /// Constants of his emotions.
     pub dynamics: DynamicsParameters,
 }
@@ -171,6 +174,7 @@ impl Default for Parameters {
             joke_mean_s: 60.0,
             rate: Rate::default(),
             approach: Approach::default(),
+            deliberation: Deliberation::default(),
             dynamics: DynamicsParameters::default(),
         }
     }

@@ -2,11 +2,13 @@
 
 use std::collections::VecDeque;
 
+use affect::akr::Appraisal;
 use affect::progress::{ApproachEstimator, RateEstimator};
-use affect::{Feeling, Intensity, ParameterError, StandardEmotion};
+use affect::{Feeling, ParameterError, StandardEmotion};
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
+use super::deliberation::Mind;
 use super::parameters::Parameters;
 use super::tables::{Behavior, Measures};
 use crate::chance::Chance;
@@ -15,7 +17,7 @@ use crate::drive::Drive;
 use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
-use crate::published::{count, flag, location, number, saturated};
+use crate::published::{count, flag, location, number, saturated, text};
 
 /// Butler's memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -64,7 +66,10 @@ pub(super) struct State {
     pub(super) taps: Chance,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
-    pub(super) intensities: VecDeque<f64>,
+    pub(super) appraisal: Appraisal,
+    pub(super) mind: Mind,
+    /// The curve of the panel.
+    pub(super) valences: VecDeque<f64>,
 }
 
 impl State {
@@ -101,7 +106,9 @@ impl State {
             taps: Chance::new(0),
             turns: Chance::new(1),
             jokes: Jokes::new(Chance::new(2), parameters.joke_mean_s),
-            intensities: VecDeque::new(),
+            appraisal: Appraisal::default(),
+            mind: Mind::default(),
+            valences: VecDeque::new(),
         })
     }
 
@@ -149,28 +156,28 @@ impl State {
         self.treats = capacity;
         self.exchanges += 1;
         self.need = false;
+        self.mind.succeed();
         self.rest_s = 0.0;
         self.forget_calls();
         self.approach.expect_again();
     }
 
-    /// Appends the intensity to the curve of the panel.
+    /// Appends the signed valence to the curve of the panel.
     pub(super) fn record(&mut self, feeling: Feeling<StandardEmotion>) {
-        if self.intensities.len() == SPARKLINE_LEN {
-            self.intensities.pop_front();
+        if self.valences.len() == SPARKLINE_LEN {
+            self.valences.pop_front();
         }
-        self.intensities.push_back(feeling.intensity.value());
+        self.valences.push_back(feeling.affect().signed());
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
-    pub(super) fn published(&self, intensity: Intensity, behavior: Behavior) -> StateVariables {
+    pub(super) fn published(&self, behavior: Behavior) -> StateVariables {
         let mut variables: StateVariables = [
             ("treats", self.treats.into()),
             ("rate_per_s", self.measures.rate_per_s.into()),
             ("time_to_empty_s", self.measures.time_to_empty_s.into()),
             ("time_to_refill_s", self.measures.time_to_refill_s.into()),
             ("need_ratio", self.measures.need_ratio.into()),
-            ("intensity", intensity.value().into()),
             ("refiller", self.refiller.name().into()),
             ("need", self.need.into()),
             ("called", self.called.into()),
@@ -190,6 +197,12 @@ impl State {
         if let Some(table) = self.table.or(self.refiller.first_location()) {
             variables.insert("table_x_m".to_owned(), table.x.into());
             variables.insert("table_y_m".to_owned(), table.y.into());
+        }
+        if let Some(belief) = self.mind.belief() {
+            variables.insert("belief".to_owned(), belief.into());
+        }
+        if let Some(plan) = self.mind.plan() {
+            variables.insert("plan".to_owned(), plan.name().into());
         }
         variables
     }
@@ -212,5 +225,6 @@ impl State {
 
         self.start = location(last, "start_x_m", "start_y_m").unwrap_or(self.start);
         self.table = location(last, "table_x_m", "table_y_m");
+        self.mind.take_over(text(last, "belief"));
     }
 }

@@ -8,7 +8,7 @@ use affect::behavior::{
     Row,
     Then::{Go, Stay},
 };
-use affect::{Drive, ProgressEvent, Stimulus};
+use affect::{Belief, Drive, ProgressEvent, Stimulus};
 use serde::{Deserialize, Serialize};
 
 use crate::policy::Urge;
@@ -103,7 +103,7 @@ pub struct Context {
 
 impl Context {
     /// Whether there is a point in driving to the refiller.
-    fn may_intercept(&self) -> bool {
+    pub(super) fn may_intercept(&self) -> bool {
         !self.refiller_is_busy && !self.rests && (self.intercept_any || self.refiller_comes)
     }
 }
@@ -145,6 +145,8 @@ pub struct Measures {
     pub need_ratio: f64,
     /// Whether an exchange has just been completed.
     pub exchange_is_over: bool,
+    /// What he believes of himself; `None` if he does not deliberate.
+    pub belief: Option<Belief>,
 }
 
 /// Appraises the measures for the emotion state generator. While an exchange is under way what he feels stays: nothing is
@@ -159,5 +161,9 @@ pub fn appraise(measures: &Measures, behavior: &Behavior) -> Stimulus {
         .exchange_is_over
         .then_some(ProgressEvent::GoalAchieved);
     // He blames the refiller for an empty tray [D: FRUSTRATED at the assistant].
-    Stimulus::new(drive).with_event(event).with_blame(true)
+    let stimulus = Stimulus::new(drive).with_event(event).with_blame(true);
+    Stimulus {
+        belief: measures.belief,
+        ..stimulus
+    }
 }

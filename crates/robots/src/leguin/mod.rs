@@ -1,25 +1,28 @@
 //! Leguin, the refiller: waits at the table until she is called, brings treats, hurries when she is asked to, and goes home
 //! when she is sent home or is frustrated.
 
+mod appraisal;
 mod parameters;
 mod state;
 mod tables;
 
+use affect::akr::Agency;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
-use affect::{Circumstances, Feeling, RuleGenerator, StandardEmotion};
+use affect::{Circumstances, Feeling, Frame, RuleGenerator, StandardEmotion};
 use robot::{
     Action, BadParameters, Cars, Panel, Point, ReceivedCommand, Robot, StateVariables, Widget,
 };
 use serde::{Deserialize, Serialize};
 
 pub use parameters::{Feelings, Parameters};
-pub use tables::{Act, Behavior, Context, EMOTIONS, Errand, Measures, TABLE, intensity};
+pub use tables::{Act, Behavior, Context, EMOTIONS, Errand, Measures, TABLE, urgency};
 
 use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::Course;
 use crate::emotion::Emotion;
+use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::Policy;
 use crate::published::{flag, text};
@@ -83,14 +86,14 @@ impl Robot for Leguin {
         }
 
         let motion = self.drive(cars);
-        let intensity = self.feeling().intensity;
         let behavior = self.behavior();
-        Action {
+        let action = Action {
             emotion_state: self.emotion.name().to_owned(),
             behavior_state: behavior.name().to_owned(),
-            state_variables: self.state.published(intensity, behavior, self.goal()),
+            state_variables: self.state.published(behavior, self.goal()),
             ..motion
-        }
+        };
+        publish(self.frame(), action)
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
@@ -131,7 +134,7 @@ impl Leguin {
     /// What is wrong with the parameters.
     pub fn new(parameters: Parameters) -> Result<Self, String> {
         parameters.check()?;
-        let esg = RuleGenerator::new(EMOTIONS, intensity, StandardEmotion::Happy);
+        let esg = RuleGenerator::new(EMOTIONS, urgency, StandardEmotion::Happy);
 
         // The sensory-motor level: the stronger her concern, the faster she is; nothing else changes her speed.
         let haste = SensoryMotor::new(SensoryMotorParameters {
@@ -151,10 +154,16 @@ impl Leguin {
         })
     }
 
-    /// Her feeling; without emotions a steady one of intensity 0.
+    /// Her feeling; without emotions a steady one.
     #[must_use]
     pub fn feeling(&self) -> Feeling<StandardEmotion> {
         self.emotion.feeling()
+    }
+
+    /// What she feels and why, as she publishes it; `None` without emotions.
+    #[must_use]
+    pub fn frame(&self) -> Option<Frame<'static>> {
+        frame::of(self.emotion.shown(), &self.state.appraisal)
     }
 
     /// Her behavior.
@@ -253,6 +262,7 @@ impl Leguin {
     fn update_emotion(&mut self, cars: &Cars<'_>) {
         self.emotion
             .update(&self.state.measures, self.bsg.current(), cars);
+        self.state.appraisal = self.appraisal();
     }
 
     /// The behavior state generator.
@@ -419,17 +429,19 @@ impl Leguin {
     }
 
     fn feeling_widgets(&self) -> Vec<Widget> {
-        // On the way the crowd blocks her, unless the waiter has told her to hurry.
-        let is_crowd = self.behavior() == Behavior::Refill && !self.state.hurried;
         let waiter = self.parameters.waiter.as_str();
+        let other = match self.state.appraisal.agency() {
+            Agency::Oneself => waiter,
+            Agency::Other(name) => name.as_str(),
+        };
         let goal = format!("to bring {} to {waiter}", self.parameters.goods);
         let circumstances = Circumstances {
-            other: Some(if is_crowd { "the crowd" } else { waiter }),
+            other: Some(other),
             goal: Some(&goal),
             ..Circumstances::default()
         };
-        panel::feeling(
-            self.emotion.shown(),
+        panel::affect(
+            self.frame().as_ref(),
             &self.parameters.dynamics.label_cuts,
             &circumstances,
         )

@@ -1,6 +1,6 @@
 //! What Leguin remembers from tick to tick besides emotion and behavior, and what she publishes of it.
 
-use affect::Intensity;
+use affect::akr::Appraisal;
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,7 @@ pub(super) struct State {
     /// Whom he called for.
     pub(super) waiter_calls: Option<String>,
     pub(super) measures: Measures,
+    pub(super) appraisal: Appraisal,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
 }
@@ -60,6 +61,7 @@ impl State {
             waiter_needs: false,
             waiter_calls: None,
             measures: Measures::default(),
+            appraisal: Appraisal::default(),
             turns: Chance::new(0),
             jokes: Jokes::new(Chance::new(1), parameters.joke_mean_s),
         }
@@ -86,12 +88,7 @@ impl State {
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
-    pub(super) fn published(
-        &self,
-        intensity: Intensity,
-        behavior: Behavior,
-        goal: Option<Point>,
-    ) -> StateVariables {
+    pub(super) fn published(&self, behavior: Behavior, goal: Option<Point>) -> StateVariables {
         let distance_m = goal.map_or(0.0, |goal| self.at.distance_m(goal));
         let pending = match self.pending {
             Some(Errand::Refill) => REFILL,
@@ -103,7 +100,6 @@ impl State {
             ("blocked_s", self.way.stalled_s().into()),
             ("waiting_s", self.waiting_s.into()),
             ("distance_m", distance_m.into()),
-            ("intensity", intensity.value().into()),
             ("pending", pending.into()),
             ("trips", self.trips.into()),
             ("given_up", self.given_up.into()),

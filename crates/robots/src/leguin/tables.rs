@@ -3,13 +3,12 @@
 //! One tick is: state variables, then emotion (from them), then behavior (from them and the emotion), then the next
 //! motion. So "hurry" on the way acts on the behavior table in the tick in which it arrives, and on emotion in the next.
 
-use affect::EmotionRow;
-use affect::Intensity;
 use affect::StandardEmotion::{self, Concerned, Confident, Frustrated, Happy};
 use affect::behavior::{
     Row,
     Then::{Go, Stay},
 };
+use affect::{EmotionRow, Urgency};
 use serde::{Deserialize, Serialize};
 
 /// Leguin's behaviors.
@@ -85,9 +84,9 @@ pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
     EmotionRow { during: &[AwaitGoHome], when: |_| true, feel: Confident },
 ];
 
-/// The intensity of her emotion \[I\].
-pub fn intensity(measures: &Measures, _: &Behavior) -> Intensity {
-    Intensity::saturating(measures.hurry.max(measures.blocked).max(measures.waiting))
+/// The urgency of her emotion \[I\].
+pub fn urgency(measures: &Measures, _: &Behavior) -> Urgency {
+    Urgency::saturating(measures.hurry.max(measures.blocked).max(measures.waiting))
 }
 
 /// What a row of the behavior table makes Leguin do.

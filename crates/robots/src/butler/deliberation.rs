@@ -1,0 +1,335 @@
+//! How Butler deliberates, if an experiment switches it on: what he believes of himself, and what he plans while he is
+//! FRUSTRATED.
+//!
+//! The paper documents both and gives no numbers: the belief "I can't do this" keeps an agent DISCOURAGED until it believes
+//! that it can, and the conceptual level projects the outcomes of actions and compares anticipated emotions \[D\]. What
+//! makes Butler believe, what he chooses from, and how he projects is chosen here \[I\]. The paper's hall runs without.
+
+use std::collections::BTreeSet;
+
+use affect::akr::{ActionTendency, Affect, Personality, Preference, Valence};
+use affect::levels::{Candidate, Conceptual, ConceptualParameters, Memory, Outcome};
+use affect::progress::{need_ratio, time_to_empty_s};
+use affect::{Belief, Caution, Feeling, StandardEmotion, Urgency};
+use serde::{Deserialize, Serialize};
+
+use crate::bounds::positive;
+use crate::policy::Urge;
+use crate::switch::Switch;
+
+/// Beliefs, as they are published.
+const CAN: &str = "can";
+const CANNOT: &str = "cannot";
+
+/// What he deliberates about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Deliberation {
+    /// Whether he has beliefs about himself. With `off` he is neither DISCOURAGED nor HOPEFUL. Default off \[I\].
+    pub beliefs: Switch,
+    /// After how many INTERCEPTs in a row that came to nothing he believes that he cannot be refilled. Default 2 \[I\].
+    pub discouraged_after: u32,
+    /// Whether he plans while he is FRUSTRATED: the conceptual level. With `off` he follows his action tendency and
+    /// intercepts. Default off \[I\].
+    pub conceptual: Switch,
+    /// Time for which he follows a plan before he compares again, s; also how far he projects. Default 5 \[I\].
+    pub plan_s: f64,
+    /// Which anticipated affect counts in his plans. Default both \[D\].
+    pub preferences: BTreeSet<Preference>,
+    /// Constants of the conceptual level.
+    pub level: ConceptualParameters,
+}
+
+impl Default for Deliberation {
+    fn default() -> Self {
+        Self {
+            beliefs: Switch::Off,
+            discouraged_after: 2,
+            conceptual: Switch::Off,
+            plan_s: 5.0,
+            preferences: Personality::default().preferences,
+            level: ConceptualParameters::default(),
+        }
+    }
+}
+
+/// What he can do while he is FRUSTRATED.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Plan {
+    /// To meet the refiller.
+    Intercept,
+    /// To serve what is left, wherever that leads him.
+    ServeOn,
+    /// To serve near his start, where he does not walk away from the refiller.
+    WaitAtStart,
+}
+
+impl Plan {
+    /// The name under which it is published.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Intercept => "intercept",
+            Self::ServeOn => "serve on",
+            Self::WaitAtStart => "wait at start",
+        }
+    }
+}
+
+/// What he knows when he plans.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prospects {
+    pub(super) treats: f64,
+    pub(super) rate_per_s: f64,
+    /// Time until the refiller can be here.
+    pub(super) serve_on_s: f64,
+    /// Time until she can be at his start.
+    pub(super) wait_at_start_s: f64,
+    /// Time until he can meet her on her way; `None` if he cannot drive to her now.
+    pub(super) intercept_s: Option<f64>,
+}
+
+/// What he remembers from tick to tick of what he believes and plans.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Mind {
+    belief: Belief,
+    /// INTERCEPTs in a row that came to nothing.
+    abandoned: u32,
+    /// Whether the refiller was near or came nearer in the last tick.
+    was_encouraged: bool,
+    plan: Option<Planned>,
+    memory: Memory<StandardEmotion, Plan>,
+}
+
+/// A plan that he follows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Planned {
+    plan: Plan,
+    /// His emotion when he chose it.
+    emotion: StandardEmotion,
+    /// Time for which he has followed it.
+    lasted_s: f64,
+}
+
+impl Mind {
+    /// An INTERCEPT came to nothing.
+    pub(super) fn abandon(&mut self) {
+        self.abandoned = self.abandoned.saturating_add(1);
+    }
+
+    /// An exchange took place.
+    pub(super) fn succeed(&mut self) {
+        self.abandoned = 0;
+        if self.belief == Belief::Cannot {
+            self.belief = Belief::Can;
+        }
+    }
+
+    /// What he believes of himself, as it is published; `None` if he has formed no belief.
+    pub(super) fn belief(&self) -> Option<&'static str> {
+        match self.belief {
+            Belief::Unstated => None,
+            Belief::Can => Some(CAN),
+            Belief::Cannot => Some(CANNOT),
+        }
+    }
+
+    /// Continues with the belief that a lost incarnation published.
+    pub(super) fn take_over(&mut self, belief: Option<&str>) {
+        self.belief = match belief {
+            Some(CAN) => Belief::Can,
+            Some(CANNOT) => Belief::Cannot,
+            _ => Belief::Unstated,
+        };
+    }
+
+    /// The plan that he follows, if any.
+    pub(super) fn plan(&self) -> Option<Plan> {
+        self.plan.map(|planned| planned.plan)
+    }
+}
+
+/// The rule by which he deliberates.
+#[derive(Debug, Clone)]
+pub(super) struct Deliberator {
+    parameters: Deliberation,
+    level: Conceptual,
+    gain: f64,
+    rho_max: f64,
+}
+
+impl Deliberator {
+    /// `gain` and `rho_max` are those of his emotions: he anticipates what he would feel.
+    ///
+    /// # Errors
+    /// What is wrong with the parameters.
+    pub(super) fn new(
+        parameters: Deliberation,
+        caution: Caution,
+        gain: f64,
+        rho_max: f64,
+    ) -> Result<Self, String> {
+        positive("deliberation.plan_s", parameters.plan_s)?;
+        if parameters.discouraged_after == 0 {
+            return Err("deliberation.discouraged_after must be at least 1".to_owned());
+        }
+
+        let personality = Personality {
+            caution,
+            preferences: parameters.preferences.clone(),
+        };
+        let level = Conceptual::new(parameters.level, &personality)
+            .map_err(|error| format!("deliberation.level: {error}"))?;
+
+        Ok(Self {
+            parameters,
+            level,
+            gain,
+            rho_max,
+        })
+    }
+
+    /// Updates what he believes. `is_encouraging`: whether the refiller is near or comes nearer.
+    ///
+    /// Only a change encourages him: one whom he could not reach although she was near does not.
+    pub(super) fn believe(&self, mind: &mut Mind, is_encouraging: bool) -> Option<Belief> {
+        if !self.parameters.beliefs.is_on() {
+            return None;
+        }
+
+        let is_news = is_encouraging && !mind.was_encouraged;
+        mind.was_encouraged = is_encouraging;
+
+        if mind.belief == Belief::Cannot {
+            if is_news {
+                mind.belief = Belief::Can;
+                mind.abandoned = 0;
+            }
+        } else if mind.abandoned >= self.parameters.discouraged_after {
+            mind.belief = Belief::Cannot;
+        }
+
+        Some(mind.belief)
+    }
+
+    /// Chooses a plan when he is FRUSTRATED and has none or has followed it for long enough; learns from the one before.
+    pub(super) fn plan(
+        &self,
+        mind: &mut Mind,
+        feeling: Feeling<StandardEmotion>,
+        prospects: &Prospects,
+        dt_s: f64,
+    ) {
+        if !self.parameters.conceptual.is_on() {
+            return;
+        }
+
+        let is_frustrated = feeling.emotion == StandardEmotion::Frustrated;
+        if let Some(planned) = &mut mind.plan {
+            planned.lasted_s += dt_s;
+            let is_possible = planned.plan != Plan::Intercept || prospects.intercept_s.is_some();
+            if is_frustrated && is_possible && planned.lasted_s < self.parameters.plan_s {
+                return;
+            }
+        }
+
+        if let Some(planned) = mind.plan.take() {
+            mind.memory
+                .remember(planned.emotion, &planned.plan, feeling.affect());
+        }
+        if is_frustrated {
+            mind.plan = self.choose(&mind.memory, mind.abandoned, feeling, prospects);
+        }
+    }
+
+    fn choose(
+        &self,
+        memory: &Memory<StandardEmotion, Plan>,
+        abandoned: u32,
+        feeling: Feeling<StandardEmotion>,
+        prospects: &Prospects,
+    ) -> Option<Planned> {
+        let mut candidates = Vec::new();
+        if let Some(intercept_s) = prospects.intercept_s {
+            // Guests take no treats meanwhile. The more often he tried in vain, the less he expects of it.
+            let met = self.anticipated(prospects.treats, intercept_s, prospects);
+            let in_vain = feeling.affect();
+            let probability = 1.0 / (1.0 + f64::from(abandoned));
+            let outcomes = vec![
+                self.outcome(probability, met),
+                self.outcome(1.0 - probability, in_vain),
+            ];
+            let tendency = Some(ActionTendency::ChangeCurrentStrategy);
+            candidates.push(candidate(Plan::Intercept, tendency, outcomes));
+        }
+
+        let taken = prospects.rate_per_s * self.parameters.plan_s;
+        let treats = (prospects.treats - taken).max(0.0);
+        let serving = [
+            (Plan::ServeOn, prospects.serve_on_s),
+            (Plan::WaitAtStart, prospects.wait_at_start_s),
+        ];
+        for (plan, arrival_s) in serving {
+            let felt = self.anticipated(treats, arrival_s, prospects);
+            candidates.push(candidate(plan, None, vec![self.outcome(1.0, felt)]));
+        }
+
+        let tendency = Some(ActionTendency::ChangeCurrentStrategy);
+        let choice = self
+            .level
+            .deliberate(feeling, tendency, &candidates, memory)?;
+        Some(Planned {
+            plan: choice.action,
+            emotion: feeling.emotion,
+            lasted_s: 0.0,
+        })
+    }
+
+    fn outcome(&self, probability: f64, anticipated: Affect) -> Outcome {
+        Outcome {
+            probability,
+            after_s: self.parameters.plan_s,
+            anticipated,
+        }
+    }
+
+    /// What he would feel with so many treats and the refiller still so far: the need of that moment, as he appraises it.
+    /// Below half of the need that saturates his emotion it is pleasant.
+    fn anticipated(&self, treats: f64, arrival_s: f64, prospects: &Prospects) -> Affect {
+        let left_s = (arrival_s - self.parameters.plan_s).max(0.0);
+        let empty_s = time_to_empty_s(treats, prospects.rate_per_s);
+        let need = need_ratio(left_s, empty_s, prospects.rate_per_s);
+        let urgency = Urgency::saturating(self.gain * need / self.rho_max);
+
+        let valence = if urgency.value() < 0.5 {
+            Valence::Positive
+        } else {
+            Valence::Negative
+        };
+        Affect::new(valence, urgency)
+    }
+
+    /// How far he goes to be refilled.
+    ///
+    /// A plan takes the place of the action tendency of FRUSTRATED. HOPEFUL inclines him to approach.
+    pub(super) fn urge(&self, emotion: StandardEmotion, mind: &Mind, need: bool) -> Urge {
+        match (emotion, mind.plan()) {
+            (StandardEmotion::Frustrated, Some(Plan::ServeOn | Plan::WaitAtStart)) => Urge::Hurry,
+            (StandardEmotion::Hopeful, _) if need => Urge::Intercept,
+            _ => Urge::of(emotion),
+        }
+    }
+}
+
+fn candidate(
+    plan: Plan,
+    tendency: Option<ActionTendency>,
+    outcomes: Vec<Outcome>,
+) -> Candidate<Plan> {
+    match Candidate::new(plan, tendency, outcomes) {
+        Ok(candidate) => candidate,
+        Err(error) => unreachable!("the probabilities of {plan:?} add up to 1: {error}"),
+    }
+}

@@ -1,0 +1,34 @@
+//! The affect frame of a robot with the standard emotions, and how a frame is published.
+
+use affect::akr::Appraisal;
+use affect::{EmotionLabel, Feeling, Frame, Schemata, StandardEmotion};
+use robot::Action;
+
+/// The frame of a feeling; `None` for a robot without emotions.
+pub(crate) fn of(
+    feeling: Option<Feeling<StandardEmotion>>,
+    appraisal: &Appraisal,
+) -> Option<Frame<'static>> {
+    let feeling = feeling?;
+    let name = feeling.emotion.name();
+
+    Schemata::standard().frame(name, feeling.urgency, appraisal.clone())
+}
+
+/// The action of a robot with this frame: its emotion, and state variables under the names of `affect::frame`, so that
+/// peers can query them and `cars emotionml` finds them.
+#[must_use]
+pub fn publish(frame: Option<Frame<'_>>, action: Action) -> Action {
+    let Some(frame) = frame else {
+        return action;
+    };
+
+    let mut action = action.emotion(frame.name());
+    for (name, number) in frame.numbers() {
+        action = action.variable(name, number);
+    }
+    for (name, text) in frame.texts() {
+        action = action.variable(name, text);
+    }
+    action
+}
