@@ -747,6 +747,36 @@ mod tests {
     }
 
     #[test]
+    fn links_that_can_bound_handshakes_do() {
+        for (connect, endpoint, open_timeout) in [
+            (
+                "tcp/[::1]:7447",
+                "tcp/[::1]:7447#handshake_ms=1000",
+                "31000",
+            ),
+            (
+                "unixsock-stream/hall.sock",
+                "unixsock-stream/hall.sock",
+                "1000",
+            ),
+        ] {
+            let role = Role::Client {
+                connect: connect.to_owned(),
+                patience: QUERY_TIMEOUT,
+            };
+            let config = configuration(&role, None).unwrap();
+            assert_eq!(
+                config.get_json("connect/endpoints").unwrap(),
+                format!("[{endpoint:?}]")
+            );
+            assert_eq!(
+                config.get_json("transport/unicast/open_timeout").unwrap(),
+                open_timeout
+            );
+        }
+    }
+
+    #[test]
     fn a_listener_for_strangers_needs_certificates_and_access_control_or_a_word() {
         let folder = std::env::temp_dir().join(format!("cars-exposure-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
