@@ -2,6 +2,8 @@
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
+use serde_json::Value;
+
 /// Beginning of the endpoints that are encrypted and ask for certificates.
 pub const TLS: &str = "tls";
 
@@ -24,6 +26,51 @@ fn host_and_port(address: &str) -> Option<(&str, &str)> {
 #[must_use]
 pub fn is_tls(endpoint: &str) -> bool {
     parts(endpoint).is_some_and(|(protocol, _)| protocol == TLS)
+}
+
+/// The same endpoint with one more setting.
+#[must_use]
+pub(crate) fn with_setting(endpoint: &str, setting: &str) -> String {
+    let separator = if endpoint.contains('#') { ';' } else { '#' };
+    format!("{endpoint}{separator}{setting}")
+}
+
+/// Setting of an endpoint whose links bound their handshakes: the limit in milliseconds.
+const HANDSHAKE_LIMIT: &str = "handshake_ms=";
+
+/// Whether the links of an endpoint can bound their handshakes: those of this project's changed crates in `vendor`.
+fn bounds_handshakes(endpoint: &str) -> bool {
+    parts(endpoint).is_some_and(|(protocol, _)| protocol == "tcp" || protocol == TLS)
+}
+
+/// Lets the links of all endpoints in a value bound their handshakes, unless there is one whose links cannot, and returns
+/// whether they do. An endpoint that sets the limit itself keeps it.
+pub(crate) fn bound_handshakes(endpoints: &mut Value, limit_ms: u64) -> bool {
+    let mut all = Vec::new();
+    texts(endpoints, &mut all);
+    let can_bound = all.iter().all(|endpoint| bounds_handshakes(endpoint));
+    if can_bound {
+        for endpoint in all {
+            let is_set = endpoint
+                .split(['#', ';'])
+                .any(|setting| setting.starts_with(HANDSHAKE_LIMIT));
+            if !is_set {
+                *endpoint = with_setting(endpoint, &format!("{HANDSHAKE_LIMIT}{limit_ms}"));
+            }
+        }
+    }
+
+    can_bound
+}
+
+/// All endpoints in a value: they may be listed for all modes or for each.
+pub(crate) fn texts<'a>(value: &'a mut Value, found: &mut Vec<&'a mut String>) {
+    match value {
+        Value::String(text) => found.push(text),
+        Value::Array(items) => items.iter_mut().for_each(|item| texts(item, found)),
+        Value::Object(fields) => fields.values_mut().for_each(|field| texts(field, found)),
+        _ => {}
+    }
 }
 
 /// Whether nobody but this machine reaches a listener there. What cannot be read counts as reachable.
@@ -71,6 +118,8 @@ pub fn connectable(endpoint: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -100,6 +149,30 @@ mod tests {
         ] {
             assert!(!is_local(reachable), "{reachable}");
         }
+    }
+
+    #[test]
+    fn endpoints_bound_handshakes_unless_one_cannot() {
+        let bounded = |mut endpoints: Value| {
+            let is_bounded = bound_handshakes(&mut endpoints, 1000);
+            (is_bounded, endpoints)
+        };
+        let listed = json!({
+            "router": ["tcp/[::]:7447", "tls/hall.example:7447#so_sndbuf=65000"],
+            "client": ["tcp/hall.example:7447#handshake_ms=3000"],
+        });
+        let expected = json!({
+            "router": [
+                "tcp/[::]:7447#handshake_ms=1000",
+                "tls/hall.example:7447#so_sndbuf=65000;handshake_ms=1000",
+            ],
+            "client": ["tcp/hall.example:7447#handshake_ms=3000"],
+        });
+        assert_eq!(bounded(listed), (true, expected));
+
+        let mixed = json!(["tcp/[::]:7447", "unixsock-stream/hall.sock"]);
+        assert_eq!(bounded(mixed.clone()), (false, mixed));
+        assert_eq!(bounded(Value::Null), (true, Value::Null));
     }
 
     #[test]

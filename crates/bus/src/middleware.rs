@@ -14,7 +14,7 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
 
 use crate::declared::Declared;
-use crate::endpoint::{is_local, is_tls};
+use crate::endpoint::{bound_handshakes, is_local, is_tls, texts, with_setting};
 use crate::error::BusError;
 use crate::qos::Qos;
 use crate::reason::reason;
@@ -559,7 +559,55 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
     for Setting { key, value, .. } in [&mode].into_iter().chain(common) {
         set(key, value)?;
     }
+
+    let handshakes = [
+        ("connect/endpoints", "transport/unicast/open_timeout"),
+        ("listen/endpoints", "transport/unicast/accept_timeout"),
+    ];
+    for (endpoints, timeout) in handshakes {
+        leave_timeout_to_links(&mut config, endpoints, timeout)?;
+    }
+
     Ok(config)
+}
+
+/// How much longer the middleware waits than its links, milliseconds.
+const BACKSTOP_MS: u64 = 30_000;
+
+/// Makes the links bound their handshakes by one of the middleware's timeouts, and the middleware itself wait for longer. When
+/// its own timeout is over it drops an attempt in whatever state it is: one that has just succeeded leaves a session that
+/// sends and never reads, and the other side refuses all others of this process as long as that one is connected.
+fn leave_timeout_to_links(
+    config: &mut Config,
+    endpoints: &str,
+    timeout: &str,
+) -> Result<(), String> {
+    let limit_ms = read(config, timeout)?;
+    let limit_ms = limit_ms
+        .as_u64()
+        .ok_or_else(|| format!("{timeout} is no number: {limit_ms}"))?;
+    let mut listed = read(config, endpoints)?;
+
+    if bound_handshakes(&mut listed, limit_ms) {
+        let waits_ms = limit_ms.saturating_add(BACKSTOP_MS);
+        for (key, value) in [
+            (endpoints, listed.to_string()),
+            (timeout, waits_ms.to_string()),
+        ] {
+            config
+                .insert_json5(key, &value)
+                .map_err(|error| format!("setting {key} = {value}: {}", reason(&error)))?;
+        }
+    }
+
+    Ok(())
+}
+
+/// A setting, as JSON.
+fn read(config: &Config, key: &str) -> Result<serde_json::Value, String> {
+    let text = config.get_json(key).map_err(|error| error.to_string())?;
+
+    serde_json::from_str(&text).map_err(|error| format!("{key}: {error}"))
 }
 
 fn from_file(file: &Path) -> Result<Config, String> {
@@ -568,9 +616,8 @@ fn from_file(file: &Path) -> Result<Config, String> {
 
 /// An endpoint to listen at, with what an encrypted one needs in addition.
 fn listener(endpoint: &str) -> String {
-    let separator = if endpoint.contains('#') { ';' } else { '#' };
     if is_tls(endpoint) {
-        format!("{endpoint}{separator}{HANDSHAKE_TIMEOUT}")
+        with_setting(endpoint, HANDSHAKE_TIMEOUT)
     } else {
         endpoint.to_owned()
     }
@@ -581,23 +628,10 @@ fn relay_listens(listen: &[String], overrides: Option<&PathBuf>) -> Result<Vec<S
     let Some(file) = overrides.filter(|_| listen.is_empty()) else {
         return Ok(listen.to_vec());
     };
-    let said = from_file(file)?
-        .get_json("listen/endpoints")
-        .map_err(|error| error.to_string())?;
-    let said = serde_json::from_str(&said).map_err(|error| error.to_string())?;
+    let mut said = read(&from_file(file)?, "listen/endpoints")?;
     let mut endpoints = Vec::new();
-    texts(&said, &mut endpoints);
-    Ok(endpoints)
-}
-
-/// All texts in a value: endpoints may be listed for all modes or for each.
-fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
-    match value {
-        serde_json::Value::String(text) => found.push(text.clone()),
-        serde_json::Value::Array(items) => items.iter().for_each(|item| texts(item, found)),
-        serde_json::Value::Object(fields) => fields.values().for_each(|field| texts(field, found)),
-        _ => {}
-    }
+    texts(&mut said, &mut endpoints);
+    Ok(endpoints.into_iter().map(std::mem::take).collect())
 }
 
 /// Refuses to listen where strangers could connect, unless they need certificates, or `trusts_network`.
@@ -708,6 +742,36 @@ mod tests {
             assert!(
                 subjects.contains(&format!("\"cert_common_names\":[\"{name}\"]")),
                 "{subjects}"
+            );
+        }
+    }
+
+    #[test]
+    fn links_that_can_bound_handshakes_do() {
+        for (connect, endpoint, open_timeout) in [
+            (
+                "tcp/[::1]:7447",
+                "tcp/[::1]:7447#handshake_ms=1000",
+                "31000",
+            ),
+            (
+                "unixsock-stream/hall.sock",
+                "unixsock-stream/hall.sock",
+                "1000",
+            ),
+        ] {
+            let role = Role::Client {
+                connect: connect.to_owned(),
+                patience: QUERY_TIMEOUT,
+            };
+            let config = configuration(&role, None).unwrap();
+            assert_eq!(
+                config.get_json("connect/endpoints").unwrap(),
+                format!("[{endpoint:?}]")
+            );
+            assert_eq!(
+                config.get_json("transport/unicast/open_timeout").unwrap(),
+                open_timeout
             );
         }
     }

@@ -239,6 +239,8 @@ impl Template<'_> {
     fn fill(&self, text: &str) -> String {
         let package = self.name.to_lowercase().replace('.', "-");
         let robot_crate = self.cars.join("crates/robot").display().to_string();
+        let tcp_crate = self.cars.join("vendor/zenoh-link-tcp");
+        let tcp_crate = tcp_crate.display().to_string();
         let tls_crate = self.cars.join("vendor/zenoh-link-tls");
         let tls_crate = tls_crate.display().to_string();
         let mut text = text
@@ -254,6 +256,7 @@ impl Template<'_> {
             .replace("@FOLDER@", &self.folder)
             .replace("@PACKAGE@", &format!("cars-{package}"))
             .replace("@ROBOT_CRATE@", &format!("{robot_crate:?}"))
+            .replace("@TCP_CRATE@", &format!("{tcp_crate:?}"))
             .replace("@TLS_CRATE@", &format!("{tls_crate:?}"))
             .replace("@CARS@", &self.cars.display().to_string())
             .replace("@NAME@", self.name)

@@ -57,7 +57,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "terminal",
         ],
     ),
-    ("zenoh-link-tls", &[]),
+    ("zenoh-link-tcp", &[]),
+    ("zenoh-link-tls", &["zenoh-link-tcp"]),
     (
         "system-tests",
         &[

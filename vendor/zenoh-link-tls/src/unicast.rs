@@ -39,6 +39,7 @@ use zenoh_link_commons::{
     LinkAuthId, LinkManagerUnicastTrait, LinkUnicast, LinkUnicastTrait, ListenersUnicastIP,
     NewLinkChannelSender, BIND_INTERFACE, BIND_SOCKET,
 };
+use zenoh_link_tcp::{handshake_limit, Handshake};
 use zenoh_protocol::{
     core::{EndPoint, Locator, Priority},
     transport::BatchSize,
@@ -61,6 +62,8 @@ pub struct LinkUnicastTls {
     writer: AsyncMutex<WriteHalf<TlsStream<TcpStream>>>,
     // CARS: what is awaited from a peer that connected here, until its session id has been compared with its certificate.
     opening: Option<Opening>,
+    // CARS: what is read and written until the session is open.
+    handshake: Handshake,
     // The source socket address of this link (address used on the local host)
     src_addr: SocketAddr,
     src_locator: Locator,
@@ -80,6 +83,7 @@ impl LinkUnicastTls {
         auth_identifier: LinkAuthId,
         expiration_manager: Option<LinkCertExpirationManager>,
         opening: Option<Opening>,
+        handshake: Handshake,
     ) -> LinkUnicastTls {
         let (tcp_stream, _) = socket.get_ref();
         // Set the TLS nodelay option
@@ -134,6 +138,7 @@ impl LinkUnicastTls {
             reader: AsyncMutex::new(reader),
             writer: AsyncMutex::new(writer),
             opening,
+            handshake,
             src_addr,
             src_locator: Locator::new(TLS_LOCATOR_PREFIX, src_addr.to_string(), "").unwrap(),
             dst_addr,
@@ -172,6 +177,7 @@ impl LinkUnicastTrait for LinkUnicastTls {
     }
 
     async fn write(&self, buffer: &[u8], _priority: Option<Priority>) -> ZResult<usize> {
+        self.handshake.check_write()?;
         let mut writer = zasynclock!(self.writer);
         writer.write(buffer).await.map_err(|e| {
             tracing::trace!("Write error on TLS link {}: {}", self, e);
@@ -180,6 +186,7 @@ impl LinkUnicastTrait for LinkUnicastTls {
     }
 
     async fn write_all(&self, buffer: &[u8], _priority: Option<Priority>) -> ZResult<()> {
+        self.handshake.check_write()?;
         let mut writer = zasynclock!(self.writer);
         writer.write_all(buffer).await.map_err(|e| {
             tracing::trace!("Write error on TLS link {}: {}", self, e);
@@ -197,10 +204,14 @@ impl LinkUnicastTrait for LinkUnicastTls {
 
     async fn read_exact(&self, buffer: &mut [u8], _priority: Option<Priority>) -> ZResult<()> {
         let mut reader = zasynclock!(self.reader);
-        let _ = reader.read_exact(buffer).await.map_err(|e| {
-            tracing::trace!("Read error on TLS link {}: {}", self, e);
-            zerror!(e)
-        })?;
+        let read = async {
+            let _ = reader.read_exact(buffer).await.map_err(|e| {
+                tracing::trace!("Read error on TLS link {}: {}", self, e);
+                zerror!(e)
+            })?;
+            Ok(())
+        };
+        self.handshake.read(read).await?;
         drop(reader);
         if let Some(opening) = &self.opening {
             opening.check(buffer, &self.auth_identifier)?;
@@ -309,8 +320,10 @@ impl LinkManagerUnicastTrait for LinkManagerUnicastTls {
         let epaddr = endpoint.address();
         let epconf = endpoint.config();
 
+        // CARS: finding the address and connecting are steps of the handshake.
+        let handshake = Handshake::begin(handshake_limit(&epconf)?);
         let server_name = get_tls_server_name(&epaddr)?;
-        let addrs = get_tcp_addrs(endpoint.address()).await?;
+        let addrs = handshake.step(get_tcp_addrs(endpoint.address())).await??;
 
         // if both `iface`, and `bind` are present, return error
         if let (Some(_), Some(_)) = (epconf.get(BIND_INTERFACE), epconf.get(BIND_SOCKET)) {
@@ -329,10 +342,13 @@ impl LinkManagerUnicastTrait for LinkManagerUnicastTls {
         let connector = TlsConnector::from(config);
 
         // Initialize the TcpStream
-        let (tcp_stream, src_addr, dst_addr) = client_config
+        let connect = client_config
             .tcp_socket_config
-            .new_link_first_reachable(addrs)
+            .new_link_first_reachable(addrs);
+        let (tcp_stream, src_addr, dst_addr) = handshake
+            .step(connect)
             .await
+            .and_then(|connected| connected)
             .map_err(|e| {
                 zerror!(
                     "Can not create a new TLS link bound to {:?}: {}",
@@ -342,9 +358,11 @@ impl LinkManagerUnicastTrait for LinkManagerUnicastTls {
             })?;
 
         // Initialize the TlsStream
-        let tls_stream = connector
-            .connect(server_name.to_owned(), tcp_stream)
+        let connect = connector.connect(server_name.to_owned(), tcp_stream);
+        let tls_stream = handshake
+            .step(connect)
             .await
+            .and_then(|connected| connected.map_err(Into::into))
             .map_err(|e| {
                 zerror!(
                     "Can not create a new TLS link bound to {:?}: {}",
@@ -379,6 +397,7 @@ impl LinkManagerUnicastTrait for LinkManagerUnicastTls {
                 auth_identifier.into(),
                 expiration_manager,
                 None,
+                handshake,
             )
         });
 
@@ -391,6 +410,7 @@ impl LinkManagerUnicastTrait for LinkManagerUnicastTls {
 
         let addr = get_tls_addr(&epaddr).await?;
         let host = get_tls_host(&epaddr)?;
+        let handshake_limit = handshake_limit(&epconf)?;
 
         // Initialize TlsConfig
         let tls_server_config = TlsServerConfig::new(&epconf)
@@ -421,6 +441,7 @@ impl LinkManagerUnicastTrait for LinkManagerUnicastTls {
                     manager,
                     tls_server_config.tls_handshake_timeout,
                     tls_server_config.tls_close_link_on_expiration,
+                    handshake_limit,
                 )
                 .await
             }
@@ -473,6 +494,7 @@ async fn accept_task(
     manager: NewLinkChannelSender,
     tls_handshake_timeout: Duration,
     tls_close_link_on_expiration: bool,
+    handshake_limit: Option<Duration>,
 ) -> ZResult<()> {
     let src_addr = socket.local_addr().map_err(|e| {
         let e = zerror!("Can not accept TLS connections: {}", e);
@@ -549,6 +571,7 @@ async fn accept_task(
                                 auth_identifier.into(),
                                 expiration_manager,
                                 Some(Opening::default()),
+                                Handshake::begin(handshake_limit),
                             )
                         });
 

@@ -210,7 +210,7 @@ fn rust() -> Robot {
         std::fs::remove_dir_all(&out).unwrap();
     }
     let robot = Robot::new_in(&out, Lab::new(), "rust");
-    has_the_link_of_the_project(&robot.folder);
+    has_the_links_of_the_project(&robot.folder);
     join_a_twin_of_the_workspace(&out);
 
     let target = programs().parent().unwrap();
@@ -242,8 +242,8 @@ fn rust() -> Robot {
     robot
 }
 
-/// By itself, as it was made, a robot is built with the TLS link of the project, and not with the published one.
-fn has_the_link_of_the_project(robot: &Path) {
+/// By itself, as it was made, a robot is built with the links of the project, and not with the published ones.
+fn has_the_links_of_the_project(robot: &Path) {
     let output = cargo()
         .current_dir(robot)
         .args(["metadata", "--offline", "--format-version", "1"])
@@ -256,15 +256,17 @@ fn has_the_link_of_the_project(robot: &Path) {
     );
 
     let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let links: Vec<&str> = metadata["packages"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|package| package["name"] == "zenoh-link-tls")
-        .map(|package| package["manifest_path"].as_str().unwrap())
-        .collect();
-    let own = root().join("vendor/zenoh-link-tls/Cargo.toml");
-    assert_eq!(links, [own.to_str().unwrap()]);
+    for name in ["zenoh-link-tcp", "zenoh-link-tls"] {
+        let links: Vec<&str> = metadata["packages"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|package| package["name"] == name)
+            .map(|package| package["manifest_path"].as_str().unwrap())
+            .collect();
+        let own = root().join("vendor").join(name).join("Cargo.toml");
+        assert_eq!(links, [own.to_str().unwrap()]);
+    }
 }
 
 /// Makes a folder the twin of the project's workspace: the same crates at the same places, and the robot beside them. To
