@@ -75,6 +75,13 @@ impl Hall {
         report.map_or_else(String::new, |report| report.emotion_state.clone())
     }
 
+    /// Speed of a robot as it reports it, m/s; 0 before its first report.
+    #[must_use]
+    pub fn speed_mps(&self, robot: &str) -> f64 {
+        let report = self.simulation.report(&name(robot));
+        report.map_or(0.0, |report| report.speed_mps)
+    }
+
     /// Behavior of a robot; empty before its first report.
     #[must_use]
     pub fn behavior(&self, robot: &str) -> String {
@@ -89,6 +96,15 @@ impl Hall {
         let value = variables.expect("it has reported").get(variable);
         let number = value.and_then(protocol::messages::Variable::as_f64);
         number.unwrap_or_else(|| panic!("{robot} does not publish a number {variable}"))
+    }
+
+    /// Flag among the state variables of a robot.
+    #[must_use]
+    pub fn flag(&self, robot: &str, variable: &str) -> bool {
+        let variables = self.simulation.state_variables(&name(robot));
+        let value = variables.expect("it has reported").get(variable);
+        let flag = value.and_then(protocol::messages::Variable::as_bool);
+        flag.unwrap_or_else(|| panic!("{robot} does not publish a flag {variable}"))
     }
 }
 

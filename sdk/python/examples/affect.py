@@ -113,9 +113,18 @@ class BehaviorGenerator(Generic[B, C, A]):
         return actions
 
 
-def motor_gain(feeling: Feeling, negative_gain: float, onset: float) -> float:
-    """The sensory-motor level: a factor on motor output under negative affect from ``onset`` on, else 1."""
-    return negative_gain if feeling.emotion.is_negative and feeling.intensity >= onset else 1.0
+def motor_gain(feeling: Feeling, negative_gain: float, onset: float, full: float) -> float:
+    """The sensory-motor level: a factor on motor output under negative affect, 1 up to the intensity ``onset`` and
+    ``negative_gain`` from ``full`` on."""
+    if not feeling.emotion.is_negative:
+        share = 0.0
+    elif feeling.intensity >= full:
+        share = 1.0
+    elif feeling.intensity <= onset:
+        share = 0.0
+    else:
+        share = (feeling.intensity - onset) / (full - onset)
+    return 1.0 + (negative_gain - 1.0) * share
 
 
 LABELS = ("very low", "low", "medium", "high", "very high")

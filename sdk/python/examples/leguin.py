@@ -26,6 +26,7 @@ from affect import (
     motor_gain,
 )
 from chance import Chance
+from closing import Closing
 from drive import Course, Legs
 from peer import Peer
 
@@ -43,6 +44,7 @@ JOKES = (
 )
 
 Switch = Literal["on", "off"]
+Policy = Literal["emotion", "rules", "timer", "neither"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,9 @@ class Feelings:
     caution_gain_base: float = 0.5
     caution_gain_slope: float = 1.0
     th_concerned: float = 0.45
+    hurry: float = 0.6
+    haste_onset: float = 0.25
+    haste_full: float = 0.6
     label_cuts: tuple[float, float, float, float] = (0.2, 0.4, 0.6, 0.8)
 
 
@@ -62,6 +67,7 @@ class Parameters:
     waiter: str = "Butler"
     goods: str = "treats"
     affect: Switch = "on"
+    policy: Policy = "emotion"
     sensory_motor: Switch = "on"
     schematic: Switch = "on"
     caution: float = 0.5
@@ -70,9 +76,9 @@ class Parameters:
     v_refill_mps: float = 3.0 * FT_M
     hurry_mult: float = 1.5
     prep_s: float = 1.0
-    block_patience_s: float = 60.0
+    block_patience_s: float = 25.0
     await_patience_s: float = 20.0
-    progress_share: float = 0.1
+    progress_m: float = 0.5 * FT_M
     arrive_m: float = 1.5 * FT_M
     settle_s: float = 5.0
     settle_m: float = 6.0 * FT_M
@@ -83,7 +89,14 @@ class Parameters:
     joke_mean_s: float = 60.0
     dynamics: Feelings = field(default_factory=Feelings)
 
-    POSITIVE = ("exchange_radius_m", "block_patience_s", "await_patience_s", "turn_mean_s", "joke_mean_s")
+    POSITIVE = (
+        "exchange_radius_m",
+        "block_patience_s",
+        "await_patience_s",
+        "progress_m",
+        "turn_mean_s",
+        "joke_mean_s",
+    )
 
     def check(self) -> None:
         """:raises ValueError: what is wrong with the values, if anything is."""
@@ -98,9 +111,21 @@ class Parameters:
             raise ValueError(
                 f"dynamics.caution_gain_slope must be at least 0, not {self.dynamics.caution_gain_slope:g}"
             )
-        for name, share in (("caution", self.caution), ("dynamics.th_concerned", self.dynamics.th_concerned)):
-            if not 0.0 <= share <= 1.0:
-                raise ValueError(f"{name} must lie in [0, 1], not {share:g}")
+        for name in ("th_concerned", "hurry", "haste_onset", "haste_full"):
+            value = getattr(self.dynamics, name)
+            if value < 0.0:
+                raise ValueError(f"dynamics.{name} must be at least 0, not {value:g}")
+        if not self.dynamics.haste_onset <= self.dynamics.haste_full <= 1.0:
+            onset, full = self.dynamics.haste_onset, self.dynamics.haste_full
+            raise ValueError(f"dynamics.haste_onset, {onset:g}, and dynamics.haste_full, {full:g}, must ascend up to 1")
+        if not 0.0 <= self.caution <= 1.0:
+            raise ValueError(f"caution must lie in [0, 1], not {self.caution:g}")
+
+    @property
+    def acts_by(self) -> Policy:
+        """What she gives up by, with regard to what is switched off."""
+        has_emotions = self.affect == "on" and self.schematic == "on"
+        return "neither" if self.policy == "emotion" and not has_emotions else self.policy
 
     @property
     def gain(self) -> float:
@@ -134,20 +159,22 @@ class Measures:
     """The progress measures."""
 
     hurried: bool = False
+    hurry: float = 0.0
+    """How strongly that concerns her."""
     blocked: float = 0.0
     """Time without progress on the way, as a share of her patience with that."""
     waiting: float = 0.0
     """Time for which she has waited to be sent home, as a share of her patience with that."""
     th_concerned: float = 0.45
-    """Intensity of the concern of one who is told to hurry."""
+    """The share at which she is concerned about the way."""
 
 
 @dataclass(frozen=True)
 class Context:
     """What a row's guard can see."""
 
-    emotion: Emotion | None
-    """What she feels; ``None`` if that has no say."""
+    gives_up: bool
+    is_happy: bool
     pending: str
     """What she was told to do and has not begun: "refill", "hurry", or nothing."""
     waiter_is_needy_here: bool
@@ -165,7 +192,7 @@ EMOTIONS: tuple[EmotionRow[Measures, Behavior], ...] = (
     # Emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts.
     EmotionRow((WAIT, EXCHANGE, HOME), lambda m: True,             HAPPY),
     EmotionRow((DRIVE,),               lambda m: m.blocked >= 1.0, FRUSTRATED),
-    EmotionRow((DRIVE,),               lambda m: m.hurried,        CONCERNED),
+    EmotionRow((DRIVE,),               lambda m: m.hurried or m.blocked >= m.th_concerned, CONCERNED),
     EmotionRow((DRIVE,),               lambda m: True,             CONFIDENT),
     EmotionRow((AWAIT,),               lambda m: m.waiting >= 1.0, FRUSTRATED),
     EmotionRow((AWAIT,),               lambda m: m.waiting >= 0.5, CONCERNED),
@@ -179,9 +206,9 @@ TABLE: tuple[Row[Behavior, Context, Act], ...] = (
     Row((DRIVE,),       lambda c: c.pending == HURRY,                 (Act.HURRY,),         None),
     Row((EXCHANGE,),    lambda c: c.exchange_is_over,                 (),                   AWAIT),
     Row((AWAIT,),       lambda c: c.sent_home,                        (Act.TURN_HOME,),     HOME),
-    Row((AWAIT, DRIVE), lambda c: c.emotion is FRUSTRATED,            (Act.GIVE_UP,),       HOME),
+    Row((AWAIT, DRIVE), lambda c: c.gives_up,                         (Act.GIVE_UP,),       HOME),
     Row((HOME,),        lambda c: c.is_home,                          (),                   WAIT),
-    Row((WAIT, HOME),   lambda c: c.emotion is HAPPY and c.has_joke,  (Act.JOKE,),          None),
+    Row((WAIT, HOME),   lambda c: c.is_happy and c.has_joke,          (Act.JOKE,),          None),
 )
 
 EXPRESSIONS: dict[Emotion, tuple[FaceName, Tone, str]] = {
@@ -196,7 +223,7 @@ EXPRESSIONS: dict[Emotion, tuple[FaceName, Tone, str]] = {
 
 def intensity(measures: Measures) -> float:
     """How strongly she feels it."""
-    return max(measures.th_concerned if measures.hurried else 0.0, measures.blocked, measures.waiting)
+    return max(measures.hurry, measures.blocked, measures.waiting)
 
 
 class Leguin(cars_robot.Robot):
@@ -211,12 +238,11 @@ class Leguin(cars_robot.Robot):
         self.esg = RuleGenerator(EMOTIONS, intensity, HAPPY)
         self.bsg = BehaviorGenerator(TABLE, WAIT)
         self.measures = Measures()
-        self.at = self.before = self.home = cars.welcome.location
-        self.aim: tuple[Point, float] | None = None  # Where she was driving, and how far she meant to get.
+        self.at = self.home = cars.welcome.location
         self.legs = Legs()
         self.hurried = self.sent_home = False
         self.pending = ""
-        self.begin_way()
+        self.way = Closing()  # How near she has come to her goal on this way.
         self.waiting_s = 0.0  # How long she has waited to be sent home.
         self.trips = self.given_up = 0
         self.waiter = Peer(self.parameters.waiter)
@@ -224,10 +250,6 @@ class Leguin(cars_robot.Robot):
         self.waiter_calls: str | None = None
         self.turns, self.jokes = Chance.split(cars.random), Chance.split(cars.random)
         self.until_joke_s = self.jokes.exponential(self.parameters.joke_mean_s)
-
-    def begin_way(self) -> None:
-        """What she did before counts no more: time without progress, how far she has come, and how far at best."""
-        self.blocked_s = self.way_m = self.best_way_m = 0.0
 
     @property
     def feeling(self) -> Feeling:
@@ -258,32 +280,35 @@ class Leguin(cars_robot.Robot):
     def update_state_variables(self, cars: Cars) -> None:
         behavior, parameters = self.bsg.current, self.parameters
         self.bsg.advance(cars.tick_s)
-        self.measure_progress(behavior, cars.tick_s)
+        self.until_joke_s -= cars.tick_s
+        self.waiting_s = self.waiting_s + cars.tick_s if behavior is AWAIT else 0.0
+        self.observe_waiter(cars)
+        self.observe_way(behavior, cars.tick_s)
         self.measures = Measures(
             hurried=self.hurried,
-            blocked=self.blocked_s * parameters.gain / parameters.block_patience_s if behavior is DRIVE else 0.0,
+            hurry=parameters.dynamics.hurry * parameters.gain if self.hurried else 0.0,
+            blocked=self.way.stalled_s * parameters.gain / parameters.block_patience_s if behavior is DRIVE else 0.0,
             waiting=self.waiting_s * parameters.gain / parameters.await_patience_s,
             th_concerned=parameters.dynamics.th_concerned,
         )
+
+    def observe_waiter(self, cars: Cars) -> None:
+        """What his answer says of what he needs, and of whom."""
         state = self.waiter.look(cars, self.at)
         if state is not None:
             needs, calls = state.state_variables.get("need"), state.state_variables.get("refiller")
             self.waiter_needs = needs is True
             self.waiter_calls = calls if isinstance(calls, str) else None
 
-    def measure_progress(self, behavior: Behavior, tick_s: float) -> None:
-        """A tick went by in this behavior: was there progress, how long has she waited?"""
-        self.until_joke_s -= tick_s
-        self.waiting_s = self.waiting_s + tick_s if behavior is AWAIT else 0.0
-        if behavior not in (DRIVE, HOME):
-            self.begin_way()
-        elif self.aim is not None:
-            # Her own share of what brings them together: the waiter's motion is not hers. To and fro is no progress.
-            goal, step_m = self.aim
-            self.way_m += self.before.distance_m(goal) - self.at.distance_m(goal)
-            is_progress = self.way_m >= self.best_way_m + self.parameters.progress_share * step_m
-            self.best_way_m = max(self.best_way_m, self.way_m)
-            self.blocked_s = 0.0 if is_progress else self.blocked_s + tick_s
+    def observe_way(self, behavior: Behavior, tick_s: float) -> None:
+        """Measures progress on the way: whether she is nearer to its goal than ever before."""
+        goal = self.goal()
+        distance_m = None if goal is None else self.at.distance_m(goal)
+        has_left = behavior is DRIVE and self.bsg.has_lasted(self.parameters.prep_s)
+        if has_left or behavior is HOME:
+            self.way.observe(distance_m, self.parameters.progress_m, tick_s)
+        else:
+            self.way = Closing()
 
     # Emotion.
 
@@ -306,10 +331,10 @@ class Leguin(cars_robot.Robot):
     def context(self, cars: Cars) -> Context:
         """What the rows of her table see in this tick."""
         parameters = self.parameters
-        acts_by_emotion = parameters.affect == "on" and parameters.schematic == "on"
         is_here = self.waiter.is_within(parameters.exchange_radius_m, self.at, cars.welcome.sensing_range_m)
         return Context(
-            emotion=self.feeling.emotion if acts_by_emotion else None,
+            gives_up=self.gives_up(),
+            is_happy=parameters.affect == "on" and parameters.schematic == "on" and self.feeling.emotion is HAPPY,
             pending=self.pending,
             waiter_is_needy_here=self.is_needed(cars) and is_here,
             exchange_is_over=self.bsg.has_lasted(parameters.exchange_s),
@@ -317,6 +342,13 @@ class Leguin(cars_robot.Robot):
             is_home=self.is_home(),
             has_joke=self.until_joke_s <= 0.0,
         )
+
+    def gives_up(self) -> bool:
+        """Whether she turns back, by her policy."""
+        if self.parameters.acts_by == "emotion":
+            return self.feeling.emotion is FRUSTRATED
+        is_over = self.measures.blocked >= 1.0 or self.measures.waiting >= 1.0
+        return self.parameters.acts_by != "neither" and is_over
 
     def is_needed(self, cars: Cars) -> bool:
         """Whether the waiter wants treats of her. Where he cannot be asked she takes it that he does, unless he is known
@@ -328,7 +360,7 @@ class Leguin(cars_robot.Robot):
     def is_home(self) -> bool:
         """Whether she is back at the table: at her place, or near it if somebody stands there and does not go."""
         away_m = self.at.distance_m(self.home)
-        is_kept_away = self.blocked_s >= self.parameters.settle_s
+        is_kept_away = self.way.stalled_s >= self.parameters.settle_s
         return away_m <= self.parameters.arrive_m or (away_m <= self.parameters.settle_m and is_kept_away)
 
     def perform(self, act: Act, cars: Cars) -> None:
@@ -344,7 +376,7 @@ class Leguin(cars_robot.Robot):
                 self.trips, self.sent_home = self.trips + 1, False
             case Act.GIVE_UP:
                 self.given_up, self.hurried = self.given_up + 1, False
-                self.begin_way()
+                self.way = Closing()
             case Act.JOKE:
                 cars.log(f"jokes: {JOKES[self.jokes.one_of(len(JOKES))]}")
                 self.until_joke_s = self.jokes.exponential(self.parameters.joke_mean_s)
@@ -352,12 +384,12 @@ class Leguin(cars_robot.Robot):
     # Motion.
 
     def project_location(self, cars: Cars) -> Point:
-        self.before, self.aim = self.at, None
         match self.bsg.current:
             case Behavior.REFILL:
                 return self.refill(cars)
             case Behavior.GO_HOME:
-                return self.approach(cars, self.home, 0.0, self.parameters.v_refill_mps)
+                home = Course(self.home, 0.0, self.parameters.v_refill_mps, self.parameters.look_s)
+                return self.legs.drive(cars, self.at, home)
             case _:
                 return self.legs.stay(self.at)
 
@@ -374,23 +406,22 @@ class Leguin(cars_robot.Robot):
     def refill(self, cars: Cars) -> Point:
         """On the way to the waiter; if he is not where he was last known to be, in search of him."""
         parameters, goal = self.parameters, self.goal()
-        speed_mps = parameters.v_refill_mps
-        if parameters.sensory_motor == "on":
-            # The sensory-motor level: concern speeds her up at once, nothing else changes her speed.
-            speed_mps *= motor_gain(self.feeling, parameters.hurry_mult, parameters.dynamics.th_concerned)
+        speed_mps = parameters.v_refill_mps * self.haste()
         if not self.bsg.has_lasted(parameters.prep_s):
             return self.legs.stay(self.at)
         if goal is None:
-            # Toward nowhere: whatever she does now is no progress.
-            self.aim = (self.at, speed_mps * cars.tick_s)
             return self.legs.walk(cars, self.at, speed_mps, parameters.turn_mean_s, self.turns)
-        return self.approach(cars, goal, parameters.stand_off_m, speed_mps)
+        course = Course(goal, parameters.stand_off_m, speed_mps, parameters.look_s)
+        return self.legs.drive(cars, self.at, course)
 
-    def approach(self, cars: Cars, goal: Point, stop_m: float, speed_mps: float) -> Point:
-        """A step of the way, remembering what would be progress."""
-        step_m = min(speed_mps * cars.tick_s, self.at.distance_m(goal) - stop_m)
-        self.aim = (goal, step_m) if step_m > 0.0 else None
-        return self.legs.drive(cars, self.at, Course(goal, stop_m, speed_mps, self.parameters.look_s))
+    def haste(self) -> float:
+        """The factor on her speed, by her policy. By emotion it is the sensory-motor level: the stronger her concern, the
+        faster she is; nothing else changes her speed."""
+        parameters, dynamics = self.parameters, self.parameters.dynamics
+        if parameters.policy == "emotion" and parameters.sensory_motor == "on":
+            return motor_gain(self.feeling, parameters.hurry_mult, dynamics.haste_onset, dynamics.haste_full)
+        hurries = parameters.policy in ("rules", "timer") and self.hurried
+        return parameters.hurry_mult if hurries else 1.0
 
     # What others see.
 
@@ -407,7 +438,7 @@ class Leguin(cars_robot.Robot):
         goal = self.goal()
         return {
             "hurried": self.hurried,
-            "blocked_s": self.blocked_s,
+            "blocked_s": self.way.stalled_s,
             "waiting_s": self.waiting_s,
             "distance_m": 0.0 if goal is None else self.at.distance_m(goal),
             "intensity": self.feeling.intensity,
@@ -456,7 +487,7 @@ class Leguin(cars_robot.Robot):
             ("waiter", self.parameters.waiter),
             ("way to go", way),
             ("hurried", "yes" if self.hurried else "no"),
-            ("blocked for", f"{self.blocked_s:.1f} s"),
+            ("blocked for", f"{self.way.stalled_s:.1f} s"),
             ("kept waiting for", f"{self.waiting_s:.1f} s"),
             ("trips, given up", f"{self.trips}, {self.given_up}"),
         ]

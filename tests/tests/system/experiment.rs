@@ -13,18 +13,18 @@ use simulator::{Event, Simulation};
 use system_tests::hall::{Hall, scenario};
 use system_tests::{Lab, programs, root};
 
-const HALL: &str = "configs/hors_doeuvres.toml";
+pub(super) const HALL: &str = "configs/hors_doeuvres.toml";
 const THREE: &str = "configs/three_robots.toml";
-const FT_M: f64 = 0.3048;
-const SEEDS: u64 = 32;
+pub(super) const FT_M: f64 = 0.3048;
+pub(super) const SEEDS: u64 = 32;
 
 /// Behavior of the two robots in two ticks in a row.
-struct Change<'a> {
-    hall: &'a Hall,
-    events: &'a [Event],
-    seed: u64,
-    butler: (&'a str, &'a str),
-    leguin: (&'a str, &'a str),
+pub(super) struct Change<'a> {
+    pub(super) hall: &'a Hall,
+    pub(super) events: &'a [Event],
+    pub(super) seed: u64,
+    pub(super) butler: (&'a str, &'a str),
+    pub(super) leguin: (&'a str, &'a str),
 }
 
 impl Change<'_> {
@@ -35,7 +35,7 @@ impl Change<'_> {
 }
 
 /// Plays one hall to its end and shows every tick to `look`, which keeps its notes.
-fn play<N: Default>(
+pub(super) fn play<N: Default>(
     file: &str,
     seed: u64,
     set: &[&str],
@@ -60,7 +60,7 @@ fn play<N: Default>(
 }
 
 /// Does something for every seed, on all processors, and returns what came of it in the order of the seeds.
-fn for_each_seed<T: Send>(one: impl Fn(u64) -> T + Sync) -> Vec<T> {
+pub(super) fn for_each_seed<T: Send>(one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let next = AtomicU64::new(1);
     let work = || {
         let seeds = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
@@ -86,7 +86,7 @@ fn for_each_seed<T: Send>(one: impl Fn(u64) -> T + Sync) -> Vec<T> {
 }
 
 /// Plays the hall over all seeds; returns the notes that `look` made of each.
-fn watch<N: Default + Send>(
+pub(super) fn watch<N: Default + Send>(
     file: &str,
     set: &[&str],
     look: impl Fn(&mut N, &Change<'_>) + Sync,
@@ -101,7 +101,7 @@ fn sent(events: &[Event], what: &str) -> usize {
         .count()
 }
 
-fn mean(values: &[f64]) -> f64 {
+pub(super) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
@@ -336,22 +336,22 @@ fn share_intercepted(set: &[&str]) -> f64 {
     f64::from(from_intercept) / f64::from(exchanges)
 }
 
+/// Obstacles side by side, from wall to wall around the table's corner.
+pub(super) fn walled_in() -> String {
+    let mut around = vec!["{ at = [\"2 ft\", \"2 ft\"] }".to_owned()];
+    for y in [1, 3, 5, 7, 9] {
+        around.push(format!("{{ at = [\"9 ft\", \"{y} ft\"] }}"));
+    }
+    for x in [1, 3, 5, 7] {
+        around.push(format!("{{ at = [\"{x} ft\", \"9 ft\"] }}"));
+    }
+    format!("obstacle=[{}]", around.join(", "))
+}
+
 /// Item 21.
 #[test]
 fn t12_who_blocks_leguin_frustrates_butler_who_intercepts_and_else_he_does_not() {
-    // Obstacles side by side, from wall to wall around the table's corner.
-    let around = (1..=9)
-        .step_by(2)
-        .map(|y| (9, y))
-        .chain((1..=7).step_by(2).map(|x| (x, 9)));
-    let around = around
-        .map(|(x, y)| format!("{{ at = [\"{x} ft\", \"{y} ft\"] }}"))
-        .collect::<Vec<_>>();
-    let wall = format!(
-        "obstacle=[{{ at = [\"2 ft\", \"2 ft\"] }}, {}]",
-        around.join(", ")
-    );
-
+    let wall = walled_in();
     for (what, set) in [
         ("a wall", vec![wall.as_str(), "guests.count=0"]),
         ("a wall and guests", vec![wall.as_str()]),

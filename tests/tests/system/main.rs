@@ -7,6 +7,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+mod affect;
 mod bench;
 mod boundaries;
 mod browser;

@@ -281,9 +281,13 @@ impl Butler {
             state.come_m += distance_before_m - distance_m;
         }
         let progress_m = self.parameters.progress_m;
-        if state.need {
+        let behavior = state.refiller.behavior(self.parameters.query_stale_s);
+        if state.need && !is_busy(behavior) {
             let way_to_go_m = located.map(|_| -state.come_m);
             state.errand.observe(way_to_go_m, progress_m, cars.tick_s());
+        } else {
+            state.come_m = 0.0;
+            state.errand = Closing::default();
         }
         if is_intercepting {
             state.chase.observe(located, progress_m, cars.tick_s());
@@ -407,8 +411,8 @@ impl Butler {
         let here = cars.location();
 
         let refiller = state.refiller.behavior(parameters.query_stale_s);
-        let is_busy = matches!(refiller, Some("EXCHANGE" | "AWAIT_GO_HOME" | "GO_HOME"));
-        if is_busy && let (Some(location), Some(table)) = (state.refiller.location(), self.table())
+        if is_busy(refiller)
+            && let (Some(location), Some(table)) = (state.refiller.location(), self.table())
         {
             return time_to_arrive_by_depot_s(
                 location.distance_m(table),
@@ -659,4 +663,9 @@ impl Butler {
             ),
         ])
     }
+}
+
+/// Whether a refiller with this behavior has something else to do before she can come.
+fn is_busy(refiller: Option<&str>) -> bool {
+    matches!(refiller, Some("EXCHANGE" | "AWAIT_GO_HOME" | "GO_HOME"))
 }
