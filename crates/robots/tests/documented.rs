@@ -426,7 +426,7 @@ fn t18_a_completed_exchange_makes_butler_happy_at_once() {
     assert!(stage.step_until(200.0, |stage| stage.behavior("Butler") == "EXCHANGE"));
     assert!(stage.step_until(2.0, |stage| stage.behavior("Butler") == "GO_BACK"));
     assert_eq!(
-        (stage.emotion("Butler"), stage.number("Butler", "intensity")),
+        (stage.emotion("Butler"), stage.number("Butler", "urgency")),
         ("HAPPY", 0.0)
     );
 }

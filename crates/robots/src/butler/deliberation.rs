@@ -136,8 +136,9 @@ impl Mind {
         }
     }
 
-    /// Continues with the belief that a lost incarnation published.
+    /// Continues with the belief that a lost incarnation published. What encourages him must be news to this one, too.
     pub(super) fn take_over(&mut self, belief: Option<&str>) {
+        self.was_encouraged = true;
         self.belief = match belief {
             Some(CAN) => Belief::Can,
             Some(CANNOT) => Belief::Cannot,
