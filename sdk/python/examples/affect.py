@@ -31,10 +31,34 @@ class Emotion(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Feeling:
-    """What is felt now: an emotion, and how strongly, 0 to 1."""
+    """What is felt now: an emotion, and how pressing its cause is, 0 to 1."""
 
     emotion: Emotion
-    intensity: float
+    urgency: float
+
+    @property
+    def intensity(self) -> float:
+        """How strongly it is felt, 0 to 1: a pleasant emotion the more, the less presses."""
+        return self.urgency if self.emotion.is_negative else 1.0 - self.urgency
+
+    @property
+    def valence(self) -> float:
+        """The intensity with the sign of the emotion, -1 to 1."""
+        return -self.intensity if self.emotion.is_negative else self.intensity
+
+
+@dataclass(frozen=True, slots=True)
+class Appraisal:
+    """How the situation is judged; the defaults are those before anything is perceived."""
+
+    goal_congruence: float = 1.0
+    """From -1, it prevents the goal, to 1, nothing is in the way."""
+    controllability: float = 1.0
+    """How much can be done about it, 0 to 1."""
+    certainty: float = 0.0
+    """How much is known of it, 0 to 1."""
+    agency: str = "self"
+    """Who is responsible: oneself, or another one by name."""
 
 
 M = TypeVar("M")
@@ -53,11 +77,11 @@ class EmotionRow(Generic[M, B]):
 
 
 class RuleGenerator(Generic[M, B]):
-    """An ESG: the first matching row says what is felt, a formula how strongly. Without a row the emotion stays."""
+    """An ESG: the emotion is that of the first matching row, the urgency that of a formula. Without a row the emotion stays."""
 
-    def __init__(self, rows: Sequence[EmotionRow[M, B]], intensity: Callable[[M], float], start: Emotion) -> None:
+    def __init__(self, rows: Sequence[EmotionRow[M, B]], urgency: Callable[[M], float], start: Emotion) -> None:
         self._rows = rows
-        self._intensity = intensity
+        self._urgency = urgency
         self.feeling = Feeling(start, 0.0)
 
     def update(self, measures: M, behavior: B) -> None:
@@ -67,7 +91,7 @@ class RuleGenerator(Generic[M, B]):
             if behavior in row.during and row.when(measures):
                 emotion = row.feel
                 break
-        self.feeling = Feeling(emotion, min(max(self._intensity(measures), 0.0), 1.0))
+        self.feeling = Feeling(emotion, min(max(self._urgency(measures), 0.0), 1.0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from enum import Enum, auto
 from typing import Literal
 
 from affect import (
+    Appraisal,
     BehaviorGenerator,
     Emotion,
     EmotionRow,
@@ -221,8 +222,20 @@ EXPRESSIONS: dict[Emotion, tuple[FaceName, Tone, str]] = {
 # fmt: on
 
 
-def intensity(measures: Measures) -> float:
-    """How strongly she feels it."""
+TENDENCIES = {
+    HAPPY: "free-activate",
+    CONFIDENT: "continue-normal-activity",
+    CONCERNED: "monitor-progress-closely",
+    FRUSTRATED: "change-current-strategy",
+}
+"""What an emotion inclines her to (Table 2 of the paper)."""
+
+CROWD = "the crowd"
+"""The name of what blocks her way."""
+
+
+def urgency(measures: Measures) -> float:
+    """How pressing her errand is."""
     return max(measures.hurry, measures.blocked, measures.waiting)
 
 
@@ -235,9 +248,10 @@ class Leguin(cars_robot.Robot):
             self.parameters.check()
         except ValueError as error:
             raise BadParameters(cars.name, str(error)) from None
-        self.esg = RuleGenerator(EMOTIONS, intensity, HAPPY)
+        self.esg = RuleGenerator(EMOTIONS, urgency, HAPPY)
         self.bsg = BehaviorGenerator(TABLE, WAIT)
         self.measures = Measures()
+        self.appraisal = Appraisal()
         self.at = self.home = cars.welcome.location
         self.legs = Legs()
         self.hurried = self.sent_home = False
@@ -290,6 +304,24 @@ class Leguin(cars_robot.Robot):
             blocked=self.way.stalled_s * parameters.gain / parameters.block_patience_s if behavior is DRIVE else 0.0,
             waiting=self.waiting_s * parameters.gain / parameters.await_patience_s,
             th_concerned=parameters.dynamics.th_concerned,
+        )
+
+        self.appraisal = self.appraise()
+
+    def appraise(self) -> Appraisal:
+        """Her judgment of this moment. The waiter is responsible if he told her to hurry or keeps her waiting, and the crowd
+        if it blocks her."""
+        measures = self.measures
+        agency = "self"
+        if measures.hurried or measures.waiting >= 0.5:
+            agency = self.waiter.name
+        elif measures.blocked >= measures.th_concerned:
+            agency = CROWD
+        return Appraisal(
+            goal_congruence=1.0 - 2.0 * min(urgency(measures), 1.0),
+            controllability=1.0 - min(measures.blocked, 1.0),
+            certainty=self.waiter.location_certainty(self.parameters.query_stale_s),
+            agency=agency,
         )
 
     def observe_waiter(self, cars: Cars) -> None:
@@ -436,12 +468,11 @@ class Leguin(cars_robot.Robot):
 
     def state_variables(self) -> StateVariables:
         goal = self.goal()
-        return {
+        variables: StateVariables = {
             "hurried": self.hurried,
             "blocked_s": self.way.stalled_s,
             "waiting_s": self.waiting_s,
             "distance_m": 0.0 if goal is None else self.at.distance_m(goal),
-            "intensity": self.feeling.intensity,
             "pending": self.pending,
             "trips": self.trips,
             "given_up": self.given_up,
@@ -449,6 +480,22 @@ class Leguin(cars_robot.Robot):
             "behavior": self.bsg.current.value,
             "home_x_m": self.home.x,
             "home_y_m": self.home.y,
+        }
+        return {**variables, **self.frame()} if self.parameters.affect == "on" else variables
+
+    def frame(self) -> StateVariables:
+        """What she feels and how she appraises it, under the names that robots with emotions share."""
+        emotion, appraisal = self.feeling.emotion, self.appraisal
+        return {
+            "valence": self.feeling.valence,
+            "intensity": self.feeling.intensity,
+            "urgency": self.feeling.urgency,
+            "goal_congruence": appraisal.goal_congruence,
+            "controllability": appraisal.controllability,
+            "certainty": appraisal.certainty,
+            "agency": appraisal.agency,
+            "action_tendency": TENDENCIES[emotion],
+            "face": EXPRESSIONS[emotion][0],
         }
 
     def resume(self, cars: Cars, last: StateVariables) -> None:
@@ -467,18 +514,26 @@ class Leguin(cars_robot.Robot):
         cars.log("is back, and takes over where the last one was lost")
 
     def panel(self) -> Panel:
-        # On the way it is the crowd that blocks her, unless it is the waiter who presses.
-        is_crowd = self.bsg.current is DRIVE and not self.hurried
+        appraisal = self.appraisal
         goal = f"to bring {self.parameters.goods} to {self.parameters.waiter}"
         face, tone, account = EXPRESSIONS[self.feeling.emotion]
         strength = self.feeling.intensity
-        account = account.format(g=goal, a="the crowd" if is_crowd else self.parameters.waiter)
+        other = self.parameters.waiter if appraisal.agency == "self" else appraisal.agency
+        account = account.format(g=goal, a=other)
         label = intensity_label(strength, self.parameters.dynamics.label_cuts)
         feeling: list[Widget] = [
             Face(face, strength),
             Badge("emotion", self.emotion_state(), tone),
             Bar(f"intensity ({label})", strength),
             Text("why", account[0].upper() + account[1:] + "."),
+            Table(
+                [
+                    ("goal congruence", f"{appraisal.goal_congruence:.2f}"),
+                    ("controllability", f"{appraisal.controllability:.2f}"),
+                    ("certainty", f"{appraisal.certainty:.2f}"),
+                    ("agency", appraisal.agency),
+                ]
+            ),
         ]
         if self.parameters.affect != "on":
             feeling = [Face("neutral", 0.0), Badge("emotion", self.emotion_state())]

@@ -56,3 +56,9 @@ class Peer:
     def is_unknown(self, stale_s: float) -> bool:
         """Whether what goes on inside it cannot be known: it never answered, or not for longer than ``stale_s``."""
         return not self._has_answered or self._unheard_s > stale_s
+
+    def location_certainty(self, stale_s: float) -> float:
+        """How recent its last known place is: from 1, of this tick, to 0, older than ``stale_s`` or none."""
+        if self.place is None:
+            return 0.0
+        return 1.0 if self._unseen_s == 0.0 else 1.0 - min(self._unseen_s / stale_s, 1.0)
