@@ -505,9 +505,9 @@ static void put(const char *format, ...)
     va_end(arguments);
 }
 
-static void put_bytes(const char *bytes, size_t length)
+/* A piece of a string, without quotes. */
+static void put_piece(const char *bytes, size_t length)
 {
-    putchar('"');
     for (size_t i = 0; i < length; i++) {
         unsigned char c = (unsigned char)bytes[i];
         if (c == '"' || c == '\\') {
@@ -518,6 +518,12 @@ static void put_bytes(const char *bytes, size_t length)
             putchar(c);
         }
     }
+}
+
+static void put_bytes(const char *bytes, size_t length)
+{
+    putchar('"');
+    put_piece(bytes, length);
     putchar('"');
 }
 
@@ -614,15 +620,20 @@ static void say(const char *bytes, size_t length)
 
 #define FT_M 0.3048
 
+/* What her speed and her giving up follow from. RULES and TIMER are the same for her. */
+enum policy { BY_EMOTION, BY_RULES, BY_TIMER, BY_NEITHER };
+static const char *const POLICY_NAMES[] = {"emotion", "rules", "timer", "neither"};
+
 /* Names are those of configs/robots/leguin.toml, which says what each is for. */
 struct parameters {
     struct text waiter, goods;
     bool affect, sensory_motor, schematic;
+    enum policy policy;
     double caution, exchange_radius_m, exchange_s, v_refill_mps, hurry_mult, prep_s, block_patience_s;
-    double await_patience_s, progress_share, arrive_m, settle_s, settle_m, stand_off_m, query_stale_s;
+    double await_patience_s, progress_m, arrive_m, settle_s, settle_m, stand_off_m, query_stale_s;
     double turn_mean_s, look_s, joke_mean_s;
     /* Of her dynamics. */
-    double caution_gain_base, caution_gain_slope, th_concerned, label_cuts[4];
+    double caution_gain_base, caution_gain_slope, th_concerned, hurry, haste_onset, haste_full, label_cuts[4];
 };
 
 enum bound { ABOVE_0, AT_LEAST_0, FROM_0_TO_1 };
@@ -643,9 +654,9 @@ static const struct number_parameter NUMBERS[] = {
     NUMBER(v_refill_mps, AT_LEAST_0, 3.0 * FT_M),
     NUMBER(hurry_mult, AT_LEAST_0, 1.5),
     NUMBER(prep_s, AT_LEAST_0, 1.0),
-    NUMBER(block_patience_s, ABOVE_0, 60.0),
+    NUMBER(block_patience_s, ABOVE_0, 25.0),
     NUMBER(await_patience_s, ABOVE_0, 20.0),
-    NUMBER(progress_share, AT_LEAST_0, 0.1),
+    NUMBER(progress_m, ABOVE_0, 0.5 * FT_M),
     NUMBER(arrive_m, AT_LEAST_0, 1.5 * FT_M),
     NUMBER(settle_s, AT_LEAST_0, 5.0),
     NUMBER(settle_m, AT_LEAST_0, 6.0 * FT_M),
@@ -659,7 +670,10 @@ static const struct number_parameter NUMBERS[] = {
 static const struct number_parameter DYNAMICS[] = {
     NUMBER(caution_gain_base, ABOVE_0, 0.5),
     NUMBER(caution_gain_slope, AT_LEAST_0, 1.0),
-    NUMBER(th_concerned, FROM_0_TO_1, 0.45),
+    NUMBER(th_concerned, AT_LEAST_0, 0.45),
+    NUMBER(hurry, AT_LEAST_0, 0.6),
+    NUMBER(haste_onset, AT_LEAST_0, 0.25),
+    NUMBER(haste_full, AT_LEAST_0, 0.6),
 };
 
 static const struct {
@@ -717,6 +731,17 @@ static bool read_switch(struct parameters *parameters, const struct walk *given)
     return false;
 }
 
+static void read_policy(struct parameters *parameters, value given)
+{
+    for (size_t i = 0; i < COUNT(POLICY_NAMES); i++) {
+        if (is_text(given, POLICY_NAMES[i])) {
+            parameters->policy = (enum policy)i;
+            return;
+        }
+    }
+    fail("parameter policy must be \"emotion\", \"rules\", \"timer\" or \"neither\"");
+}
+
 /* A name that she does not know is refused: a misspelled one would silently run another experiment. */
 static _Noreturn void refuse(const struct walk *given)
 {
@@ -758,6 +783,7 @@ static void read_parameters(struct parameters *parameters, value given)
     set_text(&parameters->waiter, "Butler"); /* [D] */
     set_text(&parameters->goods, "treats");  /* [D] */
     parameters->affect = parameters->sensory_motor = parameters->schematic = true;
+    parameters->policy = BY_EMOTION;
     memcpy(parameters->label_cuts, CUTS, sizeof CUTS);
     for (size_t i = 0; i < COUNT(NUMBERS); i++) {
         *number_at(parameters, &NUMBERS[i]) = NUMBERS[i].unless_given;
@@ -772,11 +798,17 @@ static void read_parameters(struct parameters *parameters, value given)
             if (!read_text(walk.value, is_waiter ? &parameters->waiter : &parameters->goods)) {
                 fail("parameters waiter and goods must be text");
             }
+        } else if (is_text(walk.name, "policy")) {
+            read_policy(parameters, walk.value);
         } else if (is_text(walk.name, "dynamics")) {
             read_dynamics(parameters, walk.value);
         } else if (!read_switch(parameters, &walk) && !read_known(parameters, NUMBERS, COUNT(NUMBERS), &walk)) {
             refuse(&walk);
         }
+    }
+    double onset = parameters->haste_onset, full = parameters->haste_full;
+    if (!(onset <= full && full <= 1.0)) {
+        fail("thresholds must be in ascending order within [0, 1], but %g is followed by %g", onset, full);
     }
 }
 
@@ -789,12 +821,37 @@ enum emotion { HAPPY, CONFIDENT, CONCERNED, FRUSTRATED };
 static const struct {
     const char *name;
     bool is_negative;
-    const char *tone, *face;
+    /* What she is inclined to do, and how she accounts for it: {g} is her goal, {a} who is in its way. */
+    const char *tone, *face, *tendency, *account;
 } FEELINGS[] = {
-    [HAPPY] = {"HAPPY", false, "good", "happy"},
-    [CONFIDENT] = {"CONFIDENT", false, "neutral", "neutral"},
-    [CONCERNED] = {"CONCERNED", true, "warning", "fearful"},
-    [FRUSTRATED] = {"FRUSTRATED", true, "bad", "angry"},
+    [HAPPY] = {"HAPPY", false, "good", "happy", "free-activate",
+               "Something good is happening; I wanted this: {g}; because of this I feel good."},
+    [CONFIDENT] = {"CONFIDENT", false, "neutral", "neutral", "continue-normal-activity",
+                   "I want {g}; I think this will happen; I know what to do; because of this I feel good."},
+    [CONCERNED] = {"CONCERNED", true, "warning", "fearful", "monitor-progress-closely",
+                   "I want {g}; {a} is not here; something bad can happen soon; I do not want it; "
+                   "I do not know if it will happen; because of this I feel bad."},
+    [FRUSTRATED] = {"FRUSTRATED", true, "bad", "angry", "change-current-strategy",
+                    "I want {g}; I cannot do this now; {a} is not here; I tried; "
+                    "because of this I feel bad and want to do something else."},
+};
+
+/* Who is responsible for how things are: she herself, the waiter, or the crowd. */
+enum agency { ONESELF, THE_WAITER, THE_CROWD };
+
+/* Her judgment of the moment. */
+struct appraisal {
+    /* From -1, which prevents her goal, to 1, nothing is in the way of it. */
+    double goal_congruence;
+    /* How much she can do about it, and how recent what she knows is, 0 to 1. */
+    double controllability, certainty;
+    enum agency agency;
+};
+
+/* How near she has come to her goal on this way, and how long ago she last came nearer, s. */
+struct closing {
+    bool has_nearest;
+    double nearest_m, stalled_s;
 };
 
 /* What she was told to do and has not begun yet. */
@@ -804,9 +861,11 @@ static const char *const ERRAND_NAMES[] = {"", "refill", "hurry"};
 struct measures {
     /* Whether she was told to hurry. */
     bool hurried;
+    /* How strongly that concerns her. */
+    double hurry;
     /* Time without progress, and time of waiting to be sent home, as shares of her patience with each. */
     double blocked, waiting;
-    /* Intensity of the concern of one who is told to hurry. */
+    /* The share at which she is CONCERNED about the way. */
     double th_concerned;
 };
 
@@ -844,22 +903,20 @@ static struct {
 } news;
 
 static struct {
-    struct point at, before, home;
-    /* Where she was driving before the last move, and how far she meant to get. */
-    bool has_aim;
-    struct point aim;
-    double aim_step_m;
+    struct point at, home;
     struct legs legs;
     struct peer waiter;
     enum behavior behavior;
     double lasting_s;
     enum emotion emotion;
-    double intensity;
+    double urgency;
     struct measures measures;
+    struct appraisal appraisal;
     bool hurried, sent_home;
     enum errand pending;
-    /* How far she has come on this way, how far at best, how long ago that was, how long she waits to be sent home. */
-    double way_m, best_way_m, blocked_s, waiting_s;
+    struct closing way;
+    /* How long she has waited to be sent home. */
+    double waiting_s;
     uint32_t trips, given_up;
     double until_joke_s;
     struct stream turns, jokes;
@@ -1017,16 +1074,6 @@ static struct point drive(struct point goal, double stop_m, double speed_mps)
     return stepped(her.at, heading, step_m);
 }
 
-/* A step of the way, remembering what would be progress. */
-static struct point approach(struct point goal, double stop_m, double speed_mps)
-{
-    double step_m = least(speed_mps * told.tick_s, distance_m(her.at, goal) - stop_m);
-    her.has_aim = step_m > 0.0;
-    her.aim = goal;
-    her.aim_step_m = step_m;
-    return drive(goal, stop_m, speed_mps);
-}
-
 /* Direction of her last motion. Rounded to 1e-6 rad, so that languages whose arc tangents differ in the last bit agree. */
 static double direction_rad(void)
 {
@@ -1083,6 +1130,16 @@ static void watch_waiter(void)
     }
 }
 
+/* How recent the place is at which he was last known: from 1, of this tick, to 0, too old to count or unknown. */
+static double place_certainty(void)
+{
+    double unseen_s = her.waiter.unseen_s;
+    if (!her.waiter.has_place) {
+        return 0.0;
+    }
+    return unseen_s == 0.0 ? 1.0 : 1.0 - least(unseen_s / told.parameters.query_stale_s, 1.0);
+}
+
 /* Whether he wants treats of her. Where he cannot be asked she takes it that he does, unless he is known to call for
  * somebody else: Vonda does not step in for Leguin. */
 static bool is_needed(void)
@@ -1111,8 +1168,8 @@ struct emotion_row {
 };
 
 static bool always(const struct measures *m) { (void)m; return true; }
-static bool is_hurried(const struct measures *m) { return m->hurried; }
 static bool is_blocked(const struct measures *m) { return m->blocked >= 1.0; }
+static bool is_pressed(const struct measures *m) { return m->hurried || m->blocked >= m->th_concerned; }
 static bool waits_long(const struct measures *m) { return m->waiting >= 0.5; }
 static bool waits_too_long(const struct measures *m) { return m->waiting >= 1.0; }
 
@@ -1121,22 +1178,57 @@ static const struct emotion_row EMOTION_TABLE[] = {
     /* during                                  when            feel */
     {IN(WAIT) | IN(EXCHANGE) | IN(GO_HOME),    always,         HAPPY},
     {IN(REFILL),                               is_blocked,     FRUSTRATED},
-    {IN(REFILL),                               is_hurried,     CONCERNED},
+    {IN(REFILL),                               is_pressed,     CONCERNED},
     {IN(REFILL),                               always,         CONFIDENT},
     {IN(AWAIT_GO_HOME),                        waits_too_long, FRUSTRATED},
     {IN(AWAIT_GO_HOME),                        waits_long,     CONCERNED},
     {IN(AWAIT_GO_HOME),                        always,         CONFIDENT},
 };
 
-/* How strongly she feels it [I]. */
-static double intensity_of(const struct measures *m)
+static double clamped(double share)
 {
-    double felt = most(most(m->hurried ? m->th_concerned : 0.0, m->blocked), m->waiting);
-    return felt > 0.0 ? least(felt, 1.0) : 0.0;
+    return share > 0.0 ? least(share, 1.0) : 0.0;
+}
+
+/* How pressing the need is [I]. */
+static double urgency_of(const struct measures *m)
+{
+    return clamped(most(most(m->hurry, m->blocked), m->waiting));
+}
+
+/* How strongly she feels it: good feelings are strongest when nothing presses, bad ones when everything does [I]. */
+static double intensity(void)
+{
+    return clamped(FEELINGS[her.emotion].is_negative ? her.urgency : 1.0 - her.urgency);
+}
+
+/* The same, with the sign of the feeling. */
+static double valence(void)
+{
+    return (FEELINGS[her.emotion].is_negative ? -1.0 : 1.0) * intensity();
+}
+
+/* The waiter is responsible if he told her to hurry or keeps her waiting, and the crowd if it blocks her. */
+static enum agency agency_of(const struct measures *m)
+{
+    return m->hurried || waits_long(m) ? THE_WAITER : m->blocked >= m->th_concerned ? THE_CROWD : ONESELF;
+}
+
+/* How she judges the moment [I]. */
+static void appraise(void)
+{
+    const struct measures *m = &her.measures;
+    her.appraisal = (struct appraisal){
+        .goal_congruence = 1.0 - 2.0 * urgency_of(m),
+        .controllability = 1.0 - least(m->blocked, 1.0),
+        .certainty = place_certainty(),
+        .agency = agency_of(m),
+    };
 }
 
 static void update_emotion(void)
 {
+    appraise();
     if (!told.parameters.affect) {
         return;
     }
@@ -1146,7 +1238,7 @@ static void update_emotion(void)
             break;
         }
     }
-    her.intensity = intensity_of(&her.measures);
+    her.urgency = urgency_of(&her.measures);
 }
 
 static const char *emotion_name(void)
@@ -1154,21 +1246,34 @@ static const char *emotion_name(void)
     return told.parameters.affect ? FEELINGS[her.emotion].name : "NEUTRAL";
 }
 
-/* The sensory-motor level: concern speeds her up at once, nothing else changes her speed. */
+/* The sensory-motor level: the stronger her concern, the faster she is; nothing else changes her speed. */
+static double emotional_haste(void)
+{
+    double onset = told.parameters.haste_onset, full = told.parameters.haste_full, felt = intensity();
+    double gain = FEELINGS[her.emotion].is_negative ? told.parameters.hurry_mult : 1.0;
+    double share = felt >= full ? 1.0 : felt <= onset ? 0.0 : (felt - onset) / (full - onset);
+    return 1.0 + (gain - 1.0) * share;
+}
+
+/* The factor on her speed, by her policy. */
 static double haste(void)
 {
-    double gain = FEELINGS[her.emotion].is_negative ? told.parameters.hurry_mult : 1.0;
-    double share = her.intensity >= told.parameters.th_concerned ? 1.0 : 0.0;
-    return told.parameters.sensory_motor ? 1.0 + (gain - 1.0) * share : 1.0;
+    switch (told.parameters.policy) {
+    case BY_EMOTION:
+        return told.parameters.sensory_motor ? emotional_haste() : 1.0;
+    case BY_RULES:
+    case BY_TIMER:
+        return her.hurried ? told.parameters.hurry_mult : 1.0;
+    default:
+        return 1.0;
+    }
 }
 
 /* ------------------------------------------------------------------------------------------------ what she does */
 
 /* What a row's guard can see: as it was at the beginning of the step. */
 struct context {
-    /* Whether what she feels has a say; else `emotion` is none of hers. */
-    bool acts_by_emotion;
-    enum emotion emotion;
+    bool gives_up, is_happy;
     enum errand pending;
     bool waiter_is_needy_here, exchange_is_over, sent_home, is_home, has_joke;
 };
@@ -1190,9 +1295,9 @@ static bool has_errand(const struct context *c) { return c->pending != NO_ERRAND
 static bool is_to_hurry(const struct context *c) { return c->pending == TO_HURRY; }
 static bool exchange_is_over(const struct context *c) { return c->exchange_is_over; }
 static bool was_sent_home(const struct context *c) { return c->sent_home; }
-static bool has_enough(const struct context *c) { return c->acts_by_emotion && c->emotion == FRUSTRATED; }
+static bool has_enough(const struct context *c) { return c->gives_up; }
 static bool is_back(const struct context *c) { return c->is_home; }
-static bool is_in_the_mood(const struct context *c) { return c->acts_by_emotion && c->emotion == HAPPY && c->has_joke; }
+static bool is_in_the_mood(const struct context *c) { return c->is_happy && c->has_joke; }
 
 /* The behavior state generator. Rows are read from the top; one that applies acts, and goes or reads on. */
 static const struct behavior_row BEHAVIOR_TABLE[] = {
@@ -1217,7 +1322,7 @@ static const char *const JOKES[] = {
 /* What she did before counts no more. */
 static void begin_way(void)
 {
-    her.blocked_s = her.way_m = her.best_way_m = 0.0;
+    her.way = (struct closing){0};
 }
 
 static void joke(void)
@@ -1266,15 +1371,30 @@ static void perform(enum act act)
 static bool is_home(void)
 {
     double away_m = distance_m(her.at, her.home);
-    bool is_kept_away = her.blocked_s >= told.parameters.settle_s;
+    bool is_kept_away = her.way.stalled_s >= told.parameters.settle_s;
     return away_m <= told.parameters.arrive_m || (away_m <= told.parameters.settle_m && is_kept_away);
+}
+
+/* Whether she turns back, by her policy. Where what she feels has no say, nothing makes her. */
+static bool gives_up(void)
+{
+    bool acts_by_emotion = told.parameters.affect && told.parameters.schematic;
+    switch (told.parameters.policy) {
+    case BY_EMOTION:
+        return acts_by_emotion && her.emotion == FRUSTRATED;
+    case BY_RULES:
+    case BY_TIMER:
+        return her.measures.blocked >= 1.0 || her.measures.waiting >= 1.0;
+    default:
+        return false;
+    }
 }
 
 static void update_behavior(void)
 {
     struct context context = {
-        .acts_by_emotion = told.parameters.affect && told.parameters.schematic,
-        .emotion = her.emotion,
+        .gives_up = gives_up(),
+        .is_happy = told.parameters.affect && told.parameters.schematic && her.emotion == HAPPY,
         .pending = her.pending,
         .waiter_is_needy_here = is_needed() && is_waiter_here(),
         .exchange_is_over = has_lasted(told.parameters.exchange_s),
@@ -1373,38 +1493,56 @@ static void take_news(void)
     }
 }
 
-/* Was there progress, how long has she waited? */
-static void update_measures(void)
-{
-    const struct parameters *parameters = &told.parameters;
-    double tick_s = told.tick_s;
-    /* How strongly she reacts: 1 with the defaults. */
-    double gain = parameters->caution_gain_base + parameters->caution_gain_slope * parameters->caution;
-    her.lasting_s += tick_s;
-    her.until_joke_s -= tick_s;
-    her.waiting_s = her.behavior == AWAIT_GO_HOME ? her.waiting_s + tick_s : 0.0;
-    if (her.behavior != REFILL && her.behavior != GO_HOME) {
-        begin_way();
-    } else if (her.has_aim) {
-        /* Her own share of what brings them together: the waiter's motion is not hers. To and fro is no progress. */
-        her.way_m += distance_m(her.before, her.aim) - distance_m(her.at, her.aim);
-        bool is_progress = her.way_m >= her.best_way_m + parameters->progress_share * her.aim_step_m;
-        her.best_way_m = most(her.best_way_m, her.way_m);
-        her.blocked_s = is_progress ? 0.0 : her.blocked_s + tick_s;
-    }
-    her.measures = (struct measures){
-        .hurried = her.hurried,
-        .blocked = her.behavior == REFILL ? her.blocked_s * gain / parameters->block_patience_s : 0.0,
-        .waiting = her.waiting_s * gain / parameters->await_patience_s,
-        .th_concerned = parameters->th_concerned,
-    };
-}
-
 /* Where she is going, if anywhere. */
 static const struct point *goal(void)
 {
     bool knows_waiter = her.waiter.has_place && !her.waiter.is_missing;
     return her.behavior == GO_HOME ? &her.home : her.behavior == REFILL && knows_waiter ? &her.waiter.place : NULL;
+}
+
+/* A tick goes by in what she is doing. */
+static void advance(void)
+{
+    double tick_s = told.tick_s;
+    her.lasting_s += tick_s;
+    her.until_joke_s -= tick_s;
+    her.waiting_s = her.behavior == AWAIT_GO_HOME ? her.waiting_s + tick_s : 0.0;
+}
+
+/* Whether she is nearer to her goal than ever before on this way. To and fro is no progress, neither is a search. */
+static void watch_way(void)
+{
+    const struct point *to = goal();
+    struct closing *way = &her.way;
+    bool has_left = her.behavior == REFILL && has_lasted(told.parameters.prep_s);
+    if (!has_left && her.behavior != GO_HOME) {
+        begin_way();
+        return;
+    }
+    way->stalled_s += told.tick_s;
+    if (!to) {
+        return;
+    }
+    double away_m = distance_m(her.at, *to);
+    if (!way->has_nearest || away_m <= way->nearest_m - told.parameters.progress_m) {
+        way->has_nearest = true;
+        way->nearest_m = away_m;
+        way->stalled_s = 0.0;
+    }
+}
+
+static void update_measures(void)
+{
+    const struct parameters *parameters = &told.parameters;
+    /* How strongly she reacts: 1 with the defaults. */
+    double gain = parameters->caution_gain_base + parameters->caution_gain_slope * parameters->caution;
+    her.measures = (struct measures){
+        .hurried = her.hurried,
+        .hurry = her.hurried ? parameters->hurry * gain : 0.0,
+        .blocked = her.behavior == REFILL ? her.way.stalled_s * gain / parameters->block_patience_s : 0.0,
+        .waiting = her.waiting_s * gain / parameters->await_patience_s,
+        .th_concerned = parameters->th_concerned,
+    };
 }
 
 /* On the way to the waiter; if he is not where he was last known to be, in search of him. */
@@ -1415,28 +1553,60 @@ static struct point refill(void)
         return stay();
     }
     const struct point *waiter = goal();
-    if (!waiter) {
-        /* Toward nowhere: whatever she does now is no progress. */
-        her.has_aim = true;
-        her.aim = her.at;
-        her.aim_step_m = speed_mps * told.tick_s;
-        return walk_about(speed_mps);
-    }
-    return approach(*waiter, told.parameters.stand_off_m, speed_mps);
+    return waiter ? drive(*waiter, told.parameters.stand_off_m, speed_mps) : walk_about(speed_mps);
 }
 
 static struct point project_location(void)
 {
-    her.before = her.at;
-    her.has_aim = false;
     switch (her.behavior) {
     case REFILL:
         return refill();
     case GO_HOME:
-        return approach(her.home, 0.0, told.parameters.v_refill_mps);
+        return drive(her.home, 0.0, told.parameters.v_refill_mps);
     default:
         return stay();
     }
+}
+
+/* The words for who is responsible; `self` for her. */
+static void put_agency(const char *self)
+{
+    const struct text *waiter = &told.parameters.waiter;
+    switch (her.appraisal.agency) {
+    case THE_WAITER:
+        put_piece(waiter->bytes, waiter->length);
+        break;
+    case THE_CROWD:
+        put("the crowd");
+        break;
+    default:
+        put("%s", self);
+        break;
+    }
+}
+
+/* What she feels and why; nothing without emotions. */
+static void put_affect(void)
+{
+    if (!told.parameters.affect) {
+        return;
+    }
+    put(",\"valence\":");
+    put_number(valence());
+    put(",\"intensity\":");
+    put_number(intensity());
+    put(",\"urgency\":");
+    put_number(her.urgency);
+    put(",\"goal_congruence\":");
+    put_number(her.appraisal.goal_congruence);
+    put(",\"controllability\":");
+    put_number(her.appraisal.controllability);
+    put(",\"certainty\":");
+    put_number(her.appraisal.certainty);
+    put(",\"agency\":\"");
+    put_agency("self");
+    put("\",\"action_tendency\":\"%s\",\"face\":\"%s\"", FEELINGS[her.emotion].tendency,
+        FEELINGS[her.emotion].face);
 }
 
 static void put_variables(void)
@@ -1445,13 +1615,11 @@ static void put_variables(void)
     put("{\"hurried\":");
     put_flag(her.hurried);
     put(",\"blocked_s\":");
-    put_number(her.blocked_s);
+    put_number(her.way.stalled_s);
     put(",\"waiting_s\":");
     put_number(her.waiting_s);
     put(",\"distance_m\":");
     put_number(to ? distance_m(her.at, *to) : 0.0);
-    put(",\"intensity\":");
-    put_number(her.intensity);
     put(",\"pending\":\"%s\",\"trips\":%lu,\"given_up\":%lu,\"waiter\":", ERRAND_NAMES[her.pending],
         (unsigned long)her.trips, (unsigned long)her.given_up);
     put_bytes(told.parameters.waiter.bytes, told.parameters.waiter.length);
@@ -1459,6 +1627,7 @@ static void put_variables(void)
     put_number(her.home.x_m);
     put(",\"home_y_m\":");
     put_number(her.home.y_m);
+    put_affect();
     putchar('}');
 }
 
@@ -1488,7 +1657,7 @@ static const char *intensity_label(void)
     static const char *const LABELS[] = {"very low", "low", "medium", "high", "very high"};
     size_t reached = 0;
     for (size_t i = 0; i < COUNT(told.parameters.label_cuts); i++) {
-        reached += her.intensity >= told.parameters.label_cuts[i];
+        reached += intensity() >= told.parameters.label_cuts[i];
     }
     return LABELS[reached];
 }
@@ -1507,27 +1676,74 @@ static void put_row(const char *name, const char *format, ...)
     put("]");
 }
 
+/* Why she feels as she does, with her words filled in. */
+static void put_account(const char *account)
+{
+    const struct text *waiter = &told.parameters.waiter, *goods = &told.parameters.goods;
+    putchar('"');
+    for (; *account; account++) {
+        if (*account != '{') {
+            put_piece(account, 1);
+            continue;
+        }
+        if (account[1] == 'g') {
+            put("to bring ");
+            put_piece(goods->bytes, goods->length);
+            put(" to ");
+            put_piece(waiter->bytes, waiter->length);
+        } else if (her.appraisal.agency == ONESELF) {
+            put_piece(waiter->bytes, waiter->length);
+        } else {
+            put_agency("");
+        }
+        account += 2;
+    }
+    putchar('"');
+}
+
+/* What she feels: face, name, strength, account and appraisal. Without emotions a steady face and no name. */
+static void put_feeling(void)
+{
+    const struct appraisal *appraisal = &her.appraisal;
+    if (!told.parameters.affect) {
+        put("{\"widget\":\"face\",\"face\":\"neutral\",\"intensity\":0}");
+        put(",{\"widget\":\"badge\",\"label\":\"emotion\",\"text\":\"%s\",\"tone\":\"neutral\"}", emotion_name());
+        return;
+    }
+    put("{\"widget\":\"face\",\"face\":\"%s\",\"intensity\":", FEELINGS[her.emotion].face);
+    put_number(intensity());
+    put("},{\"widget\":\"badge\",\"label\":\"emotion\",\"text\":\"%s\",\"tone\":\"%s\"}", emotion_name(),
+        FEELINGS[her.emotion].tone);
+    put(",{\"widget\":\"bar\",\"label\":\"intensity (%s)\",\"min\":0,\"max\":1,\"value\":", intensity_label());
+    put_number(intensity());
+    put("},{\"widget\":\"text\",\"label\":\"why\",\"text\":");
+    put_account(FEELINGS[her.emotion].account);
+    put("},{\"widget\":\"table\",\"rows\":[");
+    put_row("goal congruence", "%.2f", appraisal->goal_congruence);
+    put(",");
+    put_row("controllability", "%.2f", appraisal->controllability);
+    put(",");
+    put_row("certainty", "%.2f", appraisal->certainty);
+    put(",[\"agency\",\"");
+    put_agency("self");
+    put("\"]]}");
+}
+
 static void put_panel(void)
 {
-    bool feels = told.parameters.affect;
     const struct point *to = goal();
-    put("{\"type\":\"panel\",\"widgets\":[{\"widget\":\"face\",\"face\":\"%s\",\"intensity\":",
-        feels ? FEELINGS[her.emotion].face : "neutral");
-    put_number(her.intensity);
-    put("},{\"widget\":\"badge\",\"label\":\"emotion\",\"text\":\"%s\",\"tone\":\"%s\"}", emotion_name(),
-        feels ? FEELINGS[her.emotion].tone : "neutral");
-    put(",{\"widget\":\"bar\",\"label\":\"intensity (%s)\",\"min\":0,\"max\":1,\"value\":", intensity_label());
-    put_number(her.intensity);
-    put("},{\"widget\":\"badge\",\"label\":\"behavior\",\"text\":\"%s\",\"tone\":\"neutral\"}",
+    put("{\"type\":\"panel\",\"widgets\":[");
+    put_feeling();
+    put(",{\"widget\":\"badge\",\"label\":\"behavior\",\"text\":\"%s\",\"tone\":\"neutral\"}",
         BEHAVIOR_NAMES[her.behavior]);
-    put(",{\"widget\":\"text\",\"label\":\"brings\",\"text\":");
-    put_bytes(told.parameters.goods.bytes, told.parameters.goods.length);
-    put("},{\"widget\":\"table\",\"rows\":[");
+    put(",{\"widget\":\"table\",\"rows\":[[\"waiter\",");
+    put_bytes(told.parameters.waiter.bytes, told.parameters.waiter.length);
+    put("],");
     put_row("way to go", to ? "%.1f m" : "-", to ? distance_m(her.at, *to) : 0.0);
     put(",");
     put_row("hurried", "%s", her.hurried ? "yes" : "no");
     put(",");
-    put_row("blocked for", "%.1f s", her.blocked_s);
+    put_row("blocked for", "%.1f s", her.way.stalled_s);
     put(",");
     put_row("kept waiting for", "%.1f s", her.waiting_s);
     put(",");
@@ -1604,10 +1820,12 @@ static void begin(void)
     memset(&her, 0, sizeof her);
     her.legs.heading.x = 1.0;
     her.legs.side = 1.0;
+    /* Nothing is in her way yet, and nothing is certain. */
+    her.appraisal = (struct appraisal){.goal_congruence = 1.0, .controllability = 1.0};
     if (!read_point(member(init, "location"), &her.at) || !read_text(member(init, "stream"), &stream_name)) {
         fail("init lacks location or stream");
     }
-    her.before = her.home = her.at;
+    her.home = her.at;
     struct stream own = named(read_seed(init), stream_name.bytes);
     her.turns = seeded(draw(&own));
     her.jokes = seeded(draw(&own));
@@ -1634,8 +1852,10 @@ static void tick(void)
     enum emotion felt = her.emotion;
     enum behavior did = her.behavior;
     take_news();
-    update_measures();
+    advance();
     watch_waiter();
+    watch_way();
+    update_measures();
     update_emotion();
     update_behavior();
     unpainted_s += told.tick_s;
