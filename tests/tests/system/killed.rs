@@ -1,6 +1,7 @@
 //! Processes end with their parent, also if it is killed.
 
-use std::net::TcpListener;
+use std::io::ErrorKind;
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
@@ -35,7 +36,9 @@ fn a_killed_launcher_leaves_no_process_no_port_and_a_whole_record() {
 
     assert!(killed.elapsed() < PATIENCE, "{:?}", killed.elapsed());
     for port in ports {
-        TcpListener::bind(("127.0.0.1", port)).unwrap();
+        // A connection of another test may have the number of the port by now, but nothing listens there.
+        let refused = TcpStream::connect(("127.0.0.1", port)).unwrap_err();
+        assert_eq!(refused.kind(), ErrorKind::ConnectionRefused, "port {port}");
     }
     assert_eq!(lab.events(run).pop().unwrap()["event"], "end");
     assert!(lab.summary(run)["ticks"].as_u64().unwrap() >= 5);

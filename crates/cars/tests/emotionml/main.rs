@@ -453,7 +453,7 @@ fn a_robot_of_ones_own_is_exported_with_the_frame_that_it_publishes() {
         let appraisals = ["urgency", "desirability", "controllability", "agency"];
         let values = appraisals.map(|name| vera.values[name]);
         assert_eq!(values, [0.75, 0.25, 0.25, 0.0]);
-        assert_eq!(vera.values.get("valence").is_some(), !is_standard);
+        assert_eq!(vera.values.contains_key("valence"), !is_standard);
         assert_eq!(vera.target.as_deref(), Some("Butler"));
         let tendency = if is_standard { "avoidance" } else { "avoid" };
         assert_eq!(vera.tendency.as_deref(), Some(tendency));

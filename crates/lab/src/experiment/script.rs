@@ -10,8 +10,8 @@ use toml::{Table, Value};
 
 /// Parameter of a robot that replaces its own emotions.
 const PARAMETER: &str = "script";
-/// State variable with the intensity of the current emotion.
-const INTENSITY: &str = "intensity";
+/// State variable with the urgency of the current emotion.
+const URGENCY: &str = "urgency";
 
 /// The emotions that robots have shown.
 #[derive(Debug, Default)]
@@ -20,19 +20,19 @@ pub(super) struct Script {
 }
 
 impl Script {
-    /// Notes the emotions that begin in a tick, with their intensities.
+    /// Notes the emotions that begin in a tick, with their urgencies.
     pub(super) fn tick(&mut self, simulation: &Simulation, record: &TickRecord) {
         for event in &record.events {
             let Event::Emotion { robot, to, .. } = event else {
                 continue;
             };
             let variables = simulation.state_variables(robot);
-            let intensity = variables.and_then(|variables| variables.get(INTENSITY)?.as_f64());
+            let urgency = variables.and_then(|variables| variables.get(URGENCY)?.as_f64());
 
             let mut shown = Table::new();
             shown.insert("at_s".to_owned(), simulation.time_s(record.tick).into());
             shown.insert("emotion".to_owned(), to.clone().into());
-            shown.insert("intensity".to_owned(), intensity.unwrap_or(0.0).into());
+            shown.insert(URGENCY.to_owned(), urgency.unwrap_or(0.0).into());
             let entries = self.robots.entry(robot.clone()).or_default();
             entries.push(Value::Table(shown));
         }
