@@ -105,6 +105,12 @@ impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> Emotion<G> {
         self.switch.is_on().then(|| self.feeling())
     }
 
+    /// Whether it is HAPPY; switched off, it is not.
+    pub(crate) fn is_happy(&self) -> bool {
+        self.shown()
+            .is_some_and(|feeling| feeling.emotion == StandardEmotion::Happy)
+    }
+
     /// The name under which the emotion is published.
     pub(crate) fn name(&self) -> &'static str {
         self.shown()

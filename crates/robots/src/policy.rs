@@ -19,6 +19,18 @@ pub enum Policy {
     Neither,
 }
 
+impl Policy {
+    /// What a robot acts by, with regard to whether it has emotions that act on its behavior.
+    #[must_use]
+    pub fn given(self, has_emotions: bool) -> Self {
+        if self == Self::Emotion && !has_emotions {
+            Self::Neither
+        } else {
+            self
+        }
+    }
+}
+
 /// How far the waiter goes to be refilled: the action tendencies of the paper's Table 2, in its order \[D\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Urge {

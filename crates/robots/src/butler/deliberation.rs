@@ -215,6 +215,11 @@ impl Deliberator {
         Some(mind.belief)
     }
 
+    /// Whether he plans at all.
+    pub(super) fn plans(&self) -> bool {
+        self.parameters.conceptual.is_on()
+    }
+
     /// Chooses a plan when he is FRUSTRATED and has none or has followed it for long enough; learns from the one before.
     pub(super) fn plan(
         &self,
@@ -223,10 +228,6 @@ impl Deliberator {
         prospects: &Prospects,
         dt_s: f64,
     ) {
-        if !self.parameters.conceptual.is_on() {
-            return;
-        }
-
         let is_frustrated = feeling.emotion == StandardEmotion::Frustrated;
         if let Some(planned) = &mut mind.plan {
             planned.lasted_s += dt_s;

@@ -13,7 +13,9 @@ use affect::{
     Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, Frame, StandardEmotion,
     Urgency,
 };
-use robot::{Action, BadParameters, Cars, Panel, Point, Robot, StateVariables, Widget};
+use robot::{
+    Action, BadParameters, Cars, Panel, Point, PublicState, Robot, StateVariables, Widget,
+};
 use serde::{Deserialize, Serialize};
 
 pub use deliberation::Deliberation;
@@ -227,7 +229,9 @@ impl Butler {
         self.emotion
             .update(&self.state.measures, self.bsg.current(), cars);
         self.state.appraisal = self.appraisal(cars);
-        self.plan(cars);
+        if self.deliberator.plans() {
+            self.plan(cars);
+        }
         self.state.record(self.feeling());
     }
 
@@ -263,60 +267,23 @@ impl Butler {
 
     /// Queries and senses the refiller, and estimates how fast she approaches.
     fn observe_refiller(&mut self, cars: &mut Cars<'_>) {
-        let is_exchanging = self.behavior() == Behavior::Exchange;
-        let is_intercepting = self.behavior() == Behavior::Intercept;
-        let state = &mut self.state;
         let here = cars.location();
-        let before = state.refiller.location();
-        let observation = state.refiller.observe(cars);
-        let located = observation
+        let before = self.state.refiller.location();
+        let observation = self.state.refiller.observe(cars);
+        let distance_m = observation
             .located_after_s
-            .and(state.refiller.location())
+            .and(self.state.refiller.location())
             .map(|location| here.distance_m(location));
+        self.note_answer(observation.state.as_deref());
 
         // Whether she comes is a matter of her motion, not of his.
-        if let (Some(before), Some(distance_m)) = (before, located) {
+        let state = &mut self.state;
+        if let (Some(before), Some(distance_m)) = (before, distance_m) {
             let distance_before_m = here.distance_m(before);
             state.approach.measure_from(distance_before_m);
             state.come_m += distance_before_m - distance_m;
         }
-        let progress_m = self.parameters.progress_m;
-        let behavior = state.refiller.behavior(self.parameters.query_stale_s);
-        if state.need && !is_busy(behavior) {
-            let way_to_go_m = located.map(|_| -state.come_m);
-            state.errand.observe(way_to_go_m, progress_m, cars.tick_s());
-        } else {
-            state.come_m = 0.0;
-            state.errand = Closing::default();
-        }
-        if is_intercepting {
-            state.chase.observe(located, progress_m, cars.tick_s());
-        } else {
-            state.chase = Closing::default();
-        }
-
-        // While she still prepares at the table, her speed does not show how fast she will come.
-        let is_called = state.refiller.behavior(self.parameters.query_stale_s) == Some("REFILL");
-        let moves = observation
-            .state
-            .as_ref()
-            .is_some_and(|refiller| refiller.speed_mps > 0.0);
-        state.refiller_left = is_called && (state.refiller_left || moves);
-
-        if let Some(refiller) = &observation.state {
-            let pending = text(&refiller.state_variables, "pending");
-            state.refiller_is_called = pending.is_some_and(|errand| !errand.is_empty());
-        }
-
-        // She was on her way and is not any more: she has given up, and forgotten his calls.
-        let behavior = state.refiller.behavior(self.parameters.query_stale_s);
-        let has_turned = matches!(behavior, Some("WAIT" | "GO_HOME"));
-        state.refiller_came |= state.called && is_called;
-        if state.refiller_came && has_turned && !state.refiller_is_called && !is_exchanging {
-            state.forget_calls();
-        }
-
-        match (observation.located_after_s, located) {
+        match (observation.located_after_s, distance_m) {
             (Some(after_s), Some(distance_m)) => {
                 state
                     .approach
@@ -324,17 +291,60 @@ impl Butler {
             }
             _ => state.approach.observe_silence(cars.tick_s()),
         }
+
+        self.watch_progress(distance_m, cars.tick_s());
+    }
+
+    /// Notes what the refiller does, by her answer, or by the one before if there is none.
+    fn note_answer(&mut self, answer: Option<&PublicState>) {
+        let is_exchanging = self.behavior() == Behavior::Exchange;
+        let state = &mut self.state;
+        let behavior = state.refiller.behavior(self.parameters.query_stale_s);
+        let is_coming = behavior == Some("REFILL");
+        let has_turned = matches!(behavior, Some("WAIT" | "GO_HOME"));
+
+        // While she still prepares at the table, her speed does not show how fast she will come.
+        let moves = answer.is_some_and(|refiller| refiller.speed_mps > 0.0);
+        state.refiller_left = is_coming && (state.refiller_left || moves);
+        if let Some(refiller) = answer {
+            let pending = text(&refiller.state_variables, "pending");
+            state.refiller_is_called = pending.is_some_and(|errand| !errand.is_empty());
+        }
+
+        // She was on her way and is not any more: she has given up, and forgotten his calls.
+        state.refiller_came |= state.called && is_coming;
+        if state.refiller_came && has_turned && !state.refiller_is_called && !is_exchanging {
+            state.forget_calls();
+        }
+    }
+
+    /// Watches whether the refiller comes nearer by herself while he needs her, and whether he does while he intercepts.
+    fn watch_progress(&mut self, distance_m: Option<f64>, tick_s: f64) {
+        let is_intercepting = self.behavior() == Behavior::Intercept;
+        let progress_m = self.parameters.progress_m;
+        let state = &mut self.state;
+
+        let behavior = state.refiller.behavior(self.parameters.query_stale_s);
+        if state.need && !is_busy(behavior) {
+            let way_to_go_m = distance_m.map(|_| -state.come_m);
+            state.errand.observe(way_to_go_m, progress_m, tick_s);
+        } else {
+            state.come_m = 0.0;
+            state.errand = Closing::default();
+        }
+
+        if is_intercepting {
+            state.chase.observe(distance_m, progress_m, tick_s);
+        } else {
+            state.chase = Closing::default();
+        }
     }
 
     fn measure(&mut self, cars: &Cars<'_>) {
         let rate_per_s = self.state.rate.per_second();
         let time_to_empty_s = time_to_empty_s(f64::from(self.state.treats), rate_per_s);
         // A refiller who has come no nearer for a while is expected to take at least as long again [I].
-        let stalled_s = if self.state.need {
-            self.state.errand.stalled_s()
-        } else {
-            0.0
-        };
+        let stalled_s = self.state.errand.stalled_s();
         let time_to_refill_s = self.time_to_refill_s(cars).max(stalled_s);
         let exchange_is_over = self.behavior() == Behavior::Exchange
             && self.bsg.has_lasted(self.parameters.exchange_s);
@@ -463,7 +473,7 @@ impl Butler {
 
         Context {
             urge: self.urge(),
-            is_happy: self.is_happy(),
+            is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
             need: state.need,
             called: state.called,
             hurried: state.hurried,
@@ -511,12 +521,6 @@ impl Butler {
             Policy::Neither if is_pressed => Urge::Call,
             Policy::Timer | Policy::Neither => Urge::None,
         }
-    }
-
-    fn is_happy(&self) -> bool {
-        let shown = self.emotion.shown();
-        self.parameters.schematic.is_on()
-            && shown.is_some_and(|feeling| feeling.emotion == StandardEmotion::Happy)
     }
 
     /// Whether a message that was sent so long ago is to be repeated.

@@ -221,12 +221,8 @@ impl Parameters {
 
     /// What his actions follow from, with regard to what is switched off.
     pub(super) fn policy(&self) -> Policy {
-        let has_emotions = self.affect.is_on() && self.schematic.is_on();
-        if self.policy == Policy::Emotion && !has_emotions {
-            Policy::Neither
-        } else {
-            self.policy
-        }
+        self.policy
+            .given(self.affect.is_on() && self.schematic.is_on())
     }
 
     pub(super) fn rate(&self) -> RateParameters {

@@ -140,8 +140,6 @@ impl State {
     pub(super) fn raise_need(&mut self) {
         self.need = true;
         self.needed_s = 0.0;
-        self.come_m = 0.0;
-        self.errand = Closing::default();
     }
 
     /// His calls have come to nothing: he may call again.

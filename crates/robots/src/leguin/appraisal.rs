@@ -3,13 +3,10 @@
 use affect::akr::{Agency, Appraisal};
 
 use super::Leguin;
-use super::tables::urgency;
+use super::tables::{KEPT_WAITING, urgency};
 
 /// The name of what blocks her way.
 const CROWD: &str = "the crowd";
-
-/// Share of her patience with being sent home from which she is kept waiting, as in the table of her emotions.
-const KEPT_WAITING: f64 = 0.5;
 
 impl Leguin {
     /// Her judgment of this moment.

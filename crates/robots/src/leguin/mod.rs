@@ -308,7 +308,7 @@ impl Leguin {
         let waiter_is_here = state.waiter.is_within(parameters.exchange_radius_m, cars);
         Context {
             gives_up: self.gives_up(),
-            is_happy: self.is_happy(),
+            is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
             pending: state.pending,
             waiter_is_needy_here: self.is_needed(cars) && waiter_is_here,
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
@@ -326,12 +326,6 @@ impl Leguin {
             Policy::Rules | Policy::Timer => measures.blocked >= 1.0 || measures.waiting >= 1.0,
             Policy::Neither => false,
         }
-    }
-
-    fn is_happy(&self) -> bool {
-        let shown = self.emotion.shown();
-        self.parameters.schematic.is_on()
-            && shown.is_some_and(|feeling| feeling.emotion == StandardEmotion::Happy)
     }
 
     fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {

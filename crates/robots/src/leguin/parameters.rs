@@ -143,12 +143,8 @@ impl Default for Parameters {
 impl Parameters {
     /// What she gives up by, with regard to what is switched off.
     pub(super) fn policy(&self) -> Policy {
-        let has_emotions = self.affect.is_on() && self.schematic.is_on();
-        if self.policy == Policy::Emotion && !has_emotions {
-            Policy::Neither
-        } else {
-            self.policy
-        }
+        self.policy
+            .given(self.affect.is_on() && self.schematic.is_on())
     }
 
     /// How strongly she reacts: 1 with the defaults.

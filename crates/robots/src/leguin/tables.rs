@@ -72,6 +72,9 @@ pub struct Measures {
     pub th_concerned: f64,
 }
 
+/// Share of her patience with being sent home from which she is kept waiting \[I\].
+pub(super) const KEPT_WAITING: f64 = 0.5;
+
 /// The emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts.
 #[rustfmt::skip]
 pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
@@ -80,7 +83,7 @@ pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
     EmotionRow { during: &[Refill], when: |m| m.hurried || m.blocked >= m.th_concerned, feel: Concerned },
     EmotionRow { during: &[Refill], when: |_| true, feel: Confident },
     EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= 1.0, feel: Frustrated },
-    EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= 0.5, feel: Concerned },
+    EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= KEPT_WAITING, feel: Concerned },
     EmotionRow { during: &[AwaitGoHome], when: |_| true, feel: Confident },
 ];
 
