@@ -1,9 +1,12 @@
 //! What emotions do to the team, over many seeds: every behavior that an emotion begins ends, robots notice what stops
 //! them, and the paper's transitions occur. What emotions are worth is an experiment, not a test: `docs/experiments.md`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use lab::experiment::{Arm, Experiment};
 use protocol::Event;
+use protocol::messages::Parameters;
+use system_tests::hall::scenario;
 
 use crate::experiment::{Change, FT_M, HALL, SEEDS, mean, walled_in, watch};
 
@@ -220,4 +223,114 @@ fn a_timer_repeats_nothing_when_nothing_is_lost() {
         messages("robot.Butler.params.resend=on"),
         messages("robot.Butler.params.resend=off")
     );
+}
+
+/// The teams that differ in nothing but what decides about their actions.
+const COMPARED: [&str; 4] = ["emotions", "rules", "timer", "yoked"];
+
+/// The changes that the arm of a shipped experiment makes.
+fn changes_of(arm: &Arm) -> Vec<String> {
+    arm.set.iter().map(ToString::to_string).collect()
+}
+
+/// The parameters of all robots of a team, but for the one that names what decides.
+fn abilities(arm: &Arm) -> Vec<Parameters> {
+    let changes = changes_of(arm);
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    let scenario = scenario(HALL, 1, &changes);
+
+    let mut abilities = Vec::new();
+    for spec in scenario.robots.values() {
+        let mut parameters = spec.parameters.clone();
+        assert!(
+            parameters.remove("policy").is_some(),
+            "an arm names the policy"
+        );
+        abilities.push(parameters);
+    }
+    abilities
+}
+
+#[test]
+fn the_compared_teams_have_the_same_abilities_in_every_shipped_experiment() {
+    for name in ["affect", "deadlock", "partition"] {
+        let experiment = Experiment::shipped(name).expect("a good file");
+        let experiment = experiment.expect("it ships");
+        let arms = experiment.arms.iter();
+        let compared: Vec<&Arm> = arms
+            .filter(|arm| COMPARED.contains(&arm.name.as_str()))
+            .collect();
+        assert_eq!(compared.len(), COMPARED.len(), "{name}");
+
+        let baseline = abilities(compared[0]);
+        for arm in &compared[1..] {
+            assert_eq!(abilities(arm), baseline, "{name}: {}", arm.name);
+        }
+    }
+}
+
+/// Actions that help against a failure, and how often each message was sent since the last exchange.
+#[derive(Default)]
+struct Actions {
+    seen: BTreeSet<&'static str>,
+    sent: BTreeMap<String, u32>,
+}
+
+fn note_actions(actions: &mut Actions, change: &Change<'_>) {
+    for event in change.events {
+        if let Event::CommandSent { command, .. } = event {
+            *actions.sent.entry(command.clone()).or_default() += 1;
+        }
+    }
+    if change.butler.1 == "EXCHANGE" {
+        actions.sent.clear();
+    }
+
+    if actions.sent.contains_key("hurry") {
+        actions.seen.insert("asks to hurry");
+    }
+    if actions.sent.values().any(|count| *count > 1) {
+        actions.seen.insert("repeats a message");
+    }
+    if change.butler.1 == "INTERCEPT" {
+        actions.seen.insert("intercepts");
+    }
+    if change.leguin == ("REFILL", "GO_HOME") {
+        actions.seen.insert("gives up");
+    }
+}
+
+#[test]
+fn every_compared_team_uses_all_of_its_abilities_and_the_team_with_neither_none() {
+    let experiment = Experiment::shipped("affect").expect("a good file");
+    let experiment = experiment.expect("it ships");
+    let all = BTreeSet::from([
+        "asks to hurry",
+        "gives up",
+        "intercepts",
+        "repeats a message",
+    ]);
+    let wall = walled_in();
+
+    for arm in &experiment.arms {
+        let expected = match arm.name.as_str() {
+            "emotions" | "rules" | "timer" => all.clone(),
+            "neither" => BTreeSet::new(),
+            _ => continue,
+        };
+        let changes = changes_of(arm);
+        let mut actions = BTreeSet::new();
+        for failure in [
+            vec!["network.commands={ loss = 0.5 }"],
+            vec![wall.as_str(), "guests.count=0"],
+        ] {
+            let changes = changes.iter().map(String::as_str);
+            let set: Vec<&str> = changes.chain(failure).collect();
+            for team in watch(HALL, &set, note_actions) {
+                actions.extend(team.seen);
+            }
+        }
+
+        assert_eq!(actions, expected, "{}", arm.name);
+    }
 }
