@@ -9,8 +9,8 @@ use config::{Changes, FileError};
 use lab::experiment::{Experiment, Options, is_experiment_file};
 use launch::{LaunchFile, is_launch_file};
 use miette::IntoDiagnostic;
-use simulator::Scenario;
 use simulator::seal::{self, Checked};
+use simulator::{RunFolder, Scenario};
 use terminal::OutputError;
 
 /// `cars check`.
@@ -86,17 +86,9 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
 
 /// The record of a run: its events, those of earlier epochs, too.
 fn describe_run(folder: &Path) -> Result<String, FileError> {
-    let mut epochs = Vec::new();
-    for entry in std::fs::read_dir(folder)
-        .map_err(|error| FileError::unreadable(folder, &error))?
-        .flatten()
-    {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with("events") && name.ends_with(".jsonl") {
-            epochs.push(entry.path());
-        }
-    }
+    let mut epochs = RunFolder::at(folder.to_owned()).epochs();
+    // A simulator that was killed while an epoch began has written no events of it yet.
+    epochs.retain(|files| files.events.exists());
     if epochs.is_empty() {
         let place = folder.display();
         return Err(
@@ -105,11 +97,9 @@ fn describe_run(folder: &Path) -> Result<String, FileError> {
         );
     }
 
-    // Earlier epochs first: events-epoch1.jsonl, events.jsonl.
-    epochs.sort();
     let mut described = Vec::new();
-    for path in epochs {
-        let checked = seal::check(&path)?;
+    for files in epochs {
+        let checked = seal::check(&files.events)?;
         let ticks = count_ticks(&checked);
         let lines = count(checked.lines, "line", "lines");
         described.push(format!("{ticks}, {lines} as written"));

@@ -15,6 +15,7 @@ mod router;
 mod run;
 mod secure;
 mod table;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -44,6 +45,10 @@ enum Subcommands {
     Experiment(experiment::ExperimentArgs),
     /// Check scenario and launch files without running anything.
     Check(check::CheckArgs),
+    /// Execute a recorded run again in this process, and compare it with its record tick by tick.
+    Verify(verify::VerifyArgs),
+    /// Compare two recorded runs: the first difference, and how they go on.
+    Diff(verify::DiffArgs),
     /// Control a run in progress: init, start, pause, step, stop, speed, status.
     Ctl(control::CtlArgs),
     /// Query a robot of a run in progress, for example `cars query Leguin emotion_state`.
@@ -101,6 +106,8 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Run(args) => run::run(args),
         Subcommands::Experiment(args) => experiment::experiment(args),
         Subcommands::Check(args) => check::check(&args),
+        Subcommands::Verify(args) => verify::verify(&args),
+        Subcommands::Diff(args) => verify::diff(&args),
         Subcommands::Ctl(args) => control::ctl(&args),
         Subcommands::Query(args) => control::query(&args),
         Subcommands::Command(args) => control::command(&args),

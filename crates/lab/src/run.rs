@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
-use protocol::{RobotName, RunName};
+use protocol::{Epoch, RobotName, RunName};
 use robot::{LocalHost, Robot};
 use simulator::scenario::FaultEnd;
 use simulator::{Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
@@ -86,7 +86,20 @@ impl Local {
     /// If the scenario cannot be set up, or a class of robots cannot run in this process.
     pub fn new(scenario: Scenario, run: &RunName) -> miette::Result<Self> {
         let robots = make_robots(&scenario, Path::new("the scenario"))?;
-        let mut simulation = Simulation::new(scenario, 1).into_diagnostic()?;
+        Self::with_robots(scenario, 1, run, robots)
+    }
+
+    /// Creates the simulation of an epoch with these robots.
+    ///
+    /// # Errors
+    /// If the scenario cannot be set up.
+    pub fn with_robots(
+        scenario: Scenario,
+        epoch: Epoch,
+        run: &RunName,
+        robots: BTreeMap<RobotName, Box<dyn Robot>>,
+    ) -> miette::Result<Self> {
+        let mut simulation = Simulation::new(scenario, epoch).into_diagnostic()?;
         let mut seats = Vec::new();
         for (name, robot) in robots {
             simulation.list_bodies(&name, robot.senses_bodies());
@@ -107,13 +120,14 @@ impl Local {
     /// If a robot that comes back is of a class that cannot run in this process.
     pub fn carry_out_faults(&mut self, run: &RunName) -> miette::Result<()> {
         let orders = self.simulation.faults_due();
-        self.simulation.note_faults(&orders);
+        let lateness = self.simulation.scenario().lateness.clone();
+        self.simulation
+            .note_faults(&orders, |robot| lateness.of(robot));
 
         for order in orders {
             let name = &order.robot;
             if order.begins {
                 self.robots.crash(name);
-                self.simulation.stop(name);
                 continue;
             }
 

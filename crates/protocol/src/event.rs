@@ -268,6 +268,32 @@ impl Line {
 }
 
 impl Event {
+    /// Its kind, as in the field `event` of its line.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Init { .. } => "init",
+            Self::Joined { .. } => "joined",
+            Self::Lost { .. } => "lost",
+            Self::Missed { .. } => "missed",
+            Self::Blocked { .. } => "blocked",
+            Self::Emotion { .. } => "emotion",
+            Self::Behavior { .. } => "behavior",
+            Self::CommandSent { .. } => "command_sent",
+            Self::CommandDelivered { .. } => "command_delivered",
+            Self::CommandDropped { .. } => "command_dropped",
+            Self::CommandDelayed { .. } => "command_delayed",
+            Self::CommandDuplicated { .. } => "command_duplicated",
+            Self::QueryLost { .. } => "query_lost",
+            Self::LinkCut { .. } => "link_cut",
+            Self::LinkHealed { .. } => "link_healed",
+            Self::Fault { .. } => "fault",
+            Self::Say { .. } => "say",
+            Self::Tick { .. } => "tick",
+            Self::End { .. } => "end",
+        }
+    }
+
     /// Whether it ends a tick or the run. In a file such a line has a seal.
     #[must_use]
     pub fn is_sealed(&self) -> bool {

@@ -155,7 +155,7 @@ impl LocalHost {
 
         let mut actions = Vec::new();
         let mut participant = Participant::new(self.patience, &mut actions);
-        participant.admitted(admission, [], &mut actions);
+        participant.admitted(admission, welcome.states_before(), &mut actions);
         self.barrier.token(name, true, &mut self.outputs);
         self.outputs.clear();
         self.participants[index] = participant;

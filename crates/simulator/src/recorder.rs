@@ -137,9 +137,7 @@ impl RunFolder {
                 continue;
             }
 
-            let prefix = superseded_prefix(name);
-            let suffix = name.rsplit('.').next().unwrap_or_default();
-            let renamed = self.file(&format!("{prefix}{before}.{suffix}"));
+            let renamed = self.file(&superseded_name(name, before));
             std::fs::rename(&file, renamed)
                 .map_err(|error| self.failed("keep files in", &error))?;
         }
@@ -169,9 +167,49 @@ impl RunFolder {
         &self.path
     }
 
+    /// The records of all epochs of the run, the first epoch first. Their files may be missing.
+    #[must_use]
+    pub fn epochs(&self) -> Vec<EpochFiles> {
+        let mut epochs = Vec::new();
+        for epoch in 1.. {
+            let files = EpochFiles {
+                epoch,
+                scenario: self.file(&superseded_name(SCENARIO, epoch)),
+                events: self.file(&superseded_name(EVENTS, epoch)),
+                recording: self.file(&superseded_name(RECORDING, epoch)),
+            };
+            if !files.events.exists() {
+                break;
+            }
+            epochs.push(files);
+        }
+
+        let last = epochs.len() as Epoch + 1;
+        epochs.push(EpochFiles {
+            epoch: last,
+            scenario: self.file(SCENARIO),
+            events: self.file(EVENTS),
+            recording: self.file(RECORDING),
+        });
+        epochs
+    }
+
     fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
         FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
     }
+}
+
+/// The files of the record of one epoch.
+#[derive(Debug, Clone)]
+pub struct EpochFiles {
+    /// The epoch.
+    pub epoch: Epoch,
+    /// Its scenario, complete.
+    pub scenario: PathBuf,
+    /// Its events.
+    pub events: PathBuf,
+    /// Its recording.
+    pub recording: PathBuf,
 }
 
 /// The lock of a run's folder. The operating system releases it when the process ends, also by a crash.
@@ -391,6 +429,13 @@ impl Recorder {
 
 /// Files that every epoch has.
 const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];
+
+/// The name that a file has after the end of its epoch, as in `events-epoch1.jsonl`.
+fn superseded_name(file: &str, epoch: Epoch) -> String {
+    let prefix = superseded_prefix(file);
+    let suffix = file.rsplit('.').next().unwrap_or_default();
+    format!("{prefix}{epoch}.{suffix}")
+}
 
 fn superseded_prefix(file: &str) -> String {
     format!("{}-epoch", file.split('.').next().unwrap_or(file))

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use lockstep::{Exchange, Membership, Naming, Outcome, Sent};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{
-    CommandText, Correction, Cut, Delivery, End, NEWS_FLAGS, News, Performative, Point,
-    ProcessOrder, PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables,
+    CommandText, Correction, Cut, Delivery, End, FaultKind, NEWS_FLAGS, News, OnLate, Performative,
+    Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables,
     Welcome,
 };
 use protocol::random::{Stream, stream};
@@ -505,9 +505,14 @@ impl Simulation {
         due
     }
 
-    /// Records orders that have been carried out, as part of the next tick.
-    pub fn note_faults(&mut self, orders: &[ProcessOrder]) {
+    /// Records orders that are carried out before the next tick, as part of it. A robot whose process they stop, and without
+    /// which the clock goes on by its rule for late robots, cannot be queried in that tick.
+    pub fn note_faults(&mut self, orders: &[ProcessOrder], on_late: impl Fn(&RobotName) -> OnLate) {
         for order in orders {
+            let is_stopped = matches!(order.lasting(), Some(FaultKind::Crash | FaultKind::Hang));
+            if is_stopped && on_late(&order.robot) == OnLate::Continue {
+                self.stop(&order.robot);
+            }
             self.between.push(Event::Fault {
                 robot: order.robot.clone(),
                 kind: order.kind,

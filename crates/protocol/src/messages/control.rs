@@ -256,6 +256,15 @@ pub struct ProcessOrder {
     pub for_s: Option<f64>,
 }
 
+impl ProcessOrder {
+    /// The fault that is in effect from this order on; `None` if it ends, or by itself after a time of the launcher's.
+    #[must_use]
+    pub fn lasting(&self) -> Option<FaultKind> {
+        let lasts = self.begins && self.for_s.is_none();
+        lasts.then_some(self.kind)
+    }
+}
+
 /// A fault of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bus::BusError;
 use protocol::encode;
-use protocol::messages::{FaultKind, FaultOrder, OnLate, ProcessOrder};
+use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
 
 use super::orders::Underway;
 use super::process::{REPEAT_AFTER, Server, Stage};
@@ -32,17 +32,10 @@ impl Server {
             return Ok(None);
         }
 
-        simulation.note_faults(&orders);
+        let lateness = self.barrier.lateness();
+        simulation.note_faults(&orders, |robot| lateness.of(robot));
         for order in &orders {
-            // The end of a fault that lasts for a time of the launcher's is not ordered.
-            let lasts = order.begins && order.for_s.is_none();
-            let fault = lasts.then_some(order.kind);
-            self.barrier.fault(&order.robot, fault);
-            let is_stopped = matches!(fault, Some(FaultKind::Crash | FaultKind::Hang));
-            let policy = self.barrier.lateness().of(&order.robot);
-            if is_stopped && policy == OnLate::Continue {
-                simulation.stop(&order.robot);
-            }
+            self.barrier.fault(&order.robot, order.lasting());
         }
         let now = Instant::now();
         Ok(Some(Underway {

@@ -1,0 +1,160 @@
+//! `cars verify` and `cars diff`: recorded runs, executed again and compared.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use lab::diff::{Comparison, compare};
+use lab::difference::Difference;
+use lab::verify::{Verification, verify as verify_epoch};
+use miette::miette;
+use simulator::{EpochFiles, RunFolder};
+use terminal::OutputError;
+
+/// `cars verify`.
+#[derive(Debug, Args)]
+pub(crate) struct VerifyArgs {
+    /// Name of the run, or its folder.
+    run: PathBuf,
+    /// Where run folders are made.
+    #[arg(long, default_value = "runs", value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// `cars diff`.
+#[derive(Debug, Args)]
+pub(crate) struct DiffArgs {
+    /// Name of a run, or its folder.
+    one: PathBuf,
+    /// Name of the run that is compared with it, or its folder.
+    other: PathBuf,
+    /// Where run folders are made.
+    #[arg(long, default_value = "runs", value_name = "DIR")]
+    out: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Executes a run again and compares it with its record.
+pub(crate) fn verify(args: &VerifyArgs) -> miette::Result<ExitCode> {
+    let folder = find(&args.out, &args.run)?;
+    let epochs = recorded_epochs(&folder)?;
+    let are_several = epochs.len() > 1;
+    for files in epochs {
+        let verification = verify_epoch(&files)?;
+        let epoch = are_several.then_some(files.epoch);
+        OutputError::unless_closed(terminal::print_line(describe(&verification, epoch)))?;
+        if verification.difference.is_some() {
+            return Ok(ExitCode::FAILURE);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Compares two runs.
+pub(crate) fn diff(args: &DiffArgs) -> miette::Result<ExitCode> {
+    let mut last = Vec::new();
+    for run in [&args.one, &args.other] {
+        let folder = find(&args.out, run)?;
+        last.extend(recorded_epochs(&folder)?.pop());
+    }
+    let [one, other] = last.as_slice() else {
+        unreachable!("every record has an epoch");
+    };
+
+    let comparison = compare(one, other)?;
+    let text = if args.json {
+        serde_json::to_string_pretty(&comparison).unwrap_or_default()
+    } else {
+        describe_comparison(&comparison)
+    };
+    OutputError::unless_closed(terminal::print_line(text))?;
+    if comparison.are_same() {
+        Ok(ExitCode::SUCCESS)
+    } else {
+        Ok(ExitCode::FAILURE)
+    }
+}
+
+fn find(out: &Path, run: &Path) -> miette::Result<RunFolder> {
+    lab::folder::find(out, run).ok_or_else(|| {
+        miette!(
+            help = "name a run under --out, or its folder",
+            "there is no run {}",
+            run.display()
+        )
+    })
+}
+
+/// The epochs of a run that have events.
+fn recorded_epochs(folder: &RunFolder) -> miette::Result<Vec<EpochFiles>> {
+    let mut epochs = folder.epochs();
+    epochs.retain(|files| files.events.exists());
+    if epochs.is_empty() {
+        let place = folder.path().display();
+        return Err(miette!(
+            help = "name a folder with an events.jsonl, such as runs/latest",
+            "{place} is not the folder of a run"
+        ));
+    }
+
+    Ok(epochs)
+}
+
+fn describe(verification: &Verification, epoch: Option<u32>) -> String {
+    let mut text = epoch.map_or_else(String::new, |epoch| format!("epoch {epoch}: "));
+    match &verification.difference {
+        Some(difference) => {
+            text += &describe_difference(difference, ["recorded", "executed again"]);
+        }
+        None => {
+            let end = if verification.has_end {
+                "to the end"
+            } else {
+                "and no end"
+            };
+            text += &format!(
+                "the same, {} ticks {end}, digest {}",
+                verification.ticks, verification.digest
+            );
+        }
+    }
+
+    for (robot, tick) in &verification.from_record {
+        text += &format!(
+            "\n{robot} could not be executed in this process from tick {tick} on: its reports were taken from the record"
+        );
+    }
+    text
+}
+
+fn describe_comparison(comparison: &Comparison) -> String {
+    let [last, other_last] = comparison.last;
+    let mut text = match &comparison.first {
+        None if last == other_last => return format!("the same, {last} ticks"),
+        None => format!("the same up to where one ends: tick {last} and tick {other_last}"),
+        Some(difference) => describe_difference(difference, ["first run", "second run"]),
+    };
+
+    text += &format!(
+        "\n{} of {} ticks differ; the last ticks are {last} and {other_last}",
+        comparison.differing, comparison.ticks
+    );
+    if !comparison.only_in.is_empty() {
+        text += "\nevents in only one of the runs: kind, first run, second run";
+    }
+    for (kind, [one, other]) in &comparison.only_in {
+        text += &format!("\n  {kind:<20} {one:>6} {other:>6}");
+    }
+    text
+}
+
+fn describe_difference(difference: &Difference, runs: [&str; 2]) -> String {
+    let mut text = format!("the first difference: {difference}");
+    for (run, value) in runs.iter().zip(&difference.values) {
+        let value = value.as_deref().unwrap_or("nothing");
+        text += &format!("\n  {run:<15} {value}");
+    }
+    text
+}

@@ -1,0 +1,151 @@
+//! The record of an epoch, read tick by tick.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::PathBuf;
+
+use config::FileError;
+use lockstep::Sent;
+use protocol::messages::{CommandText, Report};
+use protocol::{Event, Line, RobotName, Tick};
+use simulator::EpochFiles;
+
+/// Most bytes of a line of events; no event is nearly as long.
+const MAX_LINE_BYTES: u64 = 1 << 20;
+
+/// The record of an epoch.
+pub struct Record {
+    path: PathBuf,
+    lines: BufReader<File>,
+    /// Number of the line that was read last, from 1.
+    number: usize,
+}
+
+/// A complete tick of a record, or the end of the run.
+#[derive(Debug, Clone, Default)]
+pub struct Entry {
+    /// The tick; at the end of the run, the last one.
+    pub tick: Tick,
+    /// What happened in it. Seals are left out.
+    pub events: Vec<Event>,
+    /// What each robot reported, if the record has it.
+    pub reports: Option<BTreeMap<RobotName, Report>>,
+}
+
+impl Entry {
+    /// Whether it is the end of the run.
+    #[must_use]
+    pub fn is_end(&self) -> bool {
+        matches!(self.events.last(), Some(Event::End { .. }))
+    }
+
+    /// The entry without the digest of the run up to it.
+    #[must_use]
+    pub fn without_digest(&self) -> Self {
+        let mut entry = self.clone();
+        entry
+            .events
+            .retain(|event| !matches!(event, Event::Tick { .. } | Event::End { .. }));
+        entry
+    }
+
+    /// Whether a robot took part again from this tick on.
+    #[must_use]
+    pub fn has_joined(&self, name: &RobotName) -> bool {
+        self.events.iter().any(|event| {
+            matches!(event, Event::Joined { robot, generation: Some(_), .. } if robot == name)
+        })
+    }
+
+    /// The commands that a robot sent in the tick.
+    #[must_use]
+    pub fn commands_of(&self, name: &RobotName) -> Vec<Sent<CommandText>> {
+        let mut commands = Vec::new();
+        for event in &self.events {
+            if let Event::CommandSent {
+                from,
+                to,
+                performative,
+                command,
+                ..
+            } = event
+                && from == name
+            {
+                commands.push(Sent {
+                    to: to.clone(),
+                    command: CommandText {
+                        performative: *performative,
+                        command: command.clone(),
+                    },
+                });
+            }
+        }
+        commands
+    }
+
+    /// Whether a robot's report of the tick is missing.
+    #[must_use]
+    pub fn has_missed(&self, name: &RobotName) -> bool {
+        self.events
+            .iter()
+            .any(|event| matches!(event, Event::Missed { robot } if robot == name))
+    }
+}
+
+impl Record {
+    /// Opens the record of an epoch.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be read.
+    pub fn open(files: &EpochFiles) -> Result<Self, FileError> {
+        let path = files.events.clone();
+        let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+        Ok(Self {
+            path,
+            lines: BufReader::new(file),
+            number: 0,
+        })
+    }
+
+    /// The next complete tick; `None` at the end of the record. Events of a tick that was not completed are left out.
+    ///
+    /// # Errors
+    /// [`FileError`] if the file cannot be read, or names a line that is not an event.
+    pub fn next_entry(&mut self) -> Result<Option<Entry>, FileError> {
+        let mut entry = Entry::default();
+        while let Some(Line { tick, mut event }) = self.next_line()? {
+            entry.tick = tick;
+            if let Event::Tick { seal, .. } | Event::End { seal, .. } = &mut event {
+                *seal = None;
+                entry.events.push(event);
+                return Ok(Some(entry));
+            }
+            entry.events.push(event);
+        }
+
+        Ok(None)
+    }
+
+    fn next_line(&mut self) -> Result<Option<Line>, FileError> {
+        let mut bytes = Vec::new();
+        let mut limited = (&mut self.lines).take(MAX_LINE_BYTES);
+        limited
+            .read_until(b'\n', &mut bytes)
+            .map_err(|error| FileError::unreadable(&self.path, &error))?;
+        // The simulator was about to write the last one.
+        if bytes.pop_if(|byte| *byte == b'\n').is_none() && (bytes.len() as u64) < MAX_LINE_BYTES {
+            return Ok(None);
+        }
+
+        self.number += 1;
+        let line = serde_json::from_slice(&bytes).map_err(|error| self.malformed(&error))?;
+        Ok(Some(line))
+    }
+
+    fn malformed(&self, error: &serde_json::Error) -> FileError {
+        let path = self.path.display();
+        FileError::new(format!("{path}, line {}: {error}", self.number))
+            .with_help("the record is damaged: `cars check` says how far it is good")
+    }
+}
