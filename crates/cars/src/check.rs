@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use config::{Changes, FileError};
 use lab::experiment::{Experiment, Options, is_experiment_file};
+use lab::folder::recorded_epochs;
 use launch::{LaunchFile, is_launch_file};
 use miette::IntoDiagnostic;
 use simulator::seal::{self, Checked};
@@ -86,17 +87,7 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
 
 /// The record of a run: its events, those of earlier epochs, too.
 fn describe_run(folder: &Path) -> Result<String, FileError> {
-    let mut epochs = RunFolder::at(folder.to_owned()).epochs();
-    // A simulator that was killed while an epoch began has written no events of it yet.
-    epochs.retain(|files| files.events.exists());
-    if epochs.is_empty() {
-        let place = folder.display();
-        return Err(
-            FileError::new(format!("{place} is not the folder of a run"))
-                .with_help("name a folder with an events.jsonl, such as runs/latest"),
-        );
-    }
-
+    let epochs = recorded_epochs(&RunFolder::at(folder.to_owned()))?;
     let mut described = Vec::new();
     for files in epochs {
         let checked = seal::check(&files.events)?;

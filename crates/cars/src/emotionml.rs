@@ -7,9 +7,9 @@ use std::process::ExitCode;
 
 use clap::Args;
 use lab::emotionml::{Export, ExportError, View};
+use lab::folder::find;
 use miette::miette;
 use protocol::RobotName;
-use simulator::RunFolder;
 use simulator::recorder::LATEST;
 
 /// `cars emotionml`.
@@ -34,7 +34,7 @@ pub(crate) struct EmotionmlArgs {
 
 /// Exports the emotions of a run.
 pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
-    let folder = find(&args)?;
+    let folder = find(&args.out, &args.run)?;
     let view = if args.standard {
         View::Standard
     } else {
@@ -58,28 +58,6 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
         Err(ExportError::Write(error)) => Err(miette!("the document cannot be written: {error}")),
         Err(ExportError::Read(report)) => Err(report),
     }
-}
-
-/// The folder of the run: by its name under `--out`, or by its path.
-fn find(args: &EmotionmlArgs) -> miette::Result<RunFolder> {
-    if let Some(folder) = lab::folder::find(&args.out, &args.run) {
-        return Ok(folder);
-    }
-
-    let run = args.run.display();
-    let out = args.out.display();
-
-    if args.run == Path::new(LATEST) {
-        return Err(miette!(
-            help = "name one, or start one with `cars run`",
-            "there is no run in {out}"
-        ));
-    }
-
-    Err(miette!(
-        help = "give a run's name, with --out where its folder is elsewhere, or its folder",
-        "there is no run {run}, neither in {out} nor as a folder"
-    ))
 }
 
 fn open_output(output: Option<&Path>, source: &Path) -> miette::Result<Box<dyn Write>> {

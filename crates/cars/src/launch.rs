@@ -17,8 +17,12 @@ use crate::table;
 #[derive(Debug, Args)]
 pub(crate) struct LaunchArgs {
     /// The launch file.
-    #[arg(required_unless_present = "roster")]
+    #[arg(required_unless_present_any = ["roster", "resume"])]
     file: Option<PathBuf>,
+    /// A run, or its folder, to go on with where its simulator was killed. It is executed again up to the last tick of its
+    /// record, and compared with it.
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "roster", "run", "seed", "duration", "set", "export"])]
+    resume: Option<PathBuf>,
     /// A list of robots instead of a launch file, one class a line, as in CARSConfig.txt of the first CARS.
     #[arg(long, value_name = "FILE", conflicts_with = "file")]
     roster: Option<PathBuf>,
@@ -79,8 +83,7 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
     let is_dry_run = args.dry_run;
     let export = args.export;
     let is_quiet = args.quiet;
-    let (what, options) = args.options()?;
-    let launch = Launch::load(what, options)?;
+    let launch = args.load()?;
     match export {
         Some(Format::Compose) => {
             terminal::data(launch.export()?)?;
@@ -98,11 +101,14 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
 }
 
 impl LaunchArgs {
-    fn options(self) -> miette::Result<(What, LaunchOptions)> {
+    fn load(self) -> miette::Result<Launch> {
+        let resumed = match &self.resume {
+            Some(run) => Some(lab::folder::find(&self.execution.out, run)?),
+            None => None,
+        };
         let what = match (self.roster, self.file) {
-            (Some(roster), _) => What::Roster(roster),
-            (None, Some(file)) => What::File(file),
-            (None, None) => return Err(miette!("no file is given")),
+            (Some(roster), _) => Some(What::Roster(roster)),
+            (None, file) => file.map(What::File),
         };
         let options = LaunchOptions {
             run: self.execution.options(),
@@ -118,7 +124,11 @@ impl LaunchArgs {
             grace: self.grace,
         };
 
-        Ok((what, options))
+        match (resumed, what) {
+            (Some(folder), _) => Launch::resume(folder.path(), options),
+            (None, Some(what)) => Launch::load(what, options),
+            (None, None) => Err(miette!("no file is given")),
+        }
     }
 }
 

@@ -1,14 +1,13 @@
 //! `cars verify` and `cars diff`: recorded runs, executed again and compared.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 use lab::diff::{Comparison, compare};
-use lab::difference::Difference;
+use lab::folder::{find, recorded_epochs};
 use lab::verify::{Verification, verify as verify_epoch};
-use miette::miette;
-use simulator::{EpochFiles, RunFolder};
+use simulator::difference::Difference;
 use terminal::OutputError;
 
 /// `cars verify`.
@@ -77,31 +76,6 @@ pub(crate) fn diff(args: &DiffArgs) -> miette::Result<ExitCode> {
     }
 }
 
-fn find(out: &Path, run: &Path) -> miette::Result<RunFolder> {
-    lab::folder::find(out, run).ok_or_else(|| {
-        miette!(
-            help = "name a run under --out, or its folder",
-            "there is no run {}",
-            run.display()
-        )
-    })
-}
-
-/// The epochs of a run that have events.
-fn recorded_epochs(folder: &RunFolder) -> miette::Result<Vec<EpochFiles>> {
-    let mut epochs = folder.epochs();
-    epochs.retain(|files| files.events.exists());
-    if epochs.is_empty() {
-        let place = folder.path().display();
-        return Err(miette!(
-            help = "name a folder with an events.jsonl, such as runs/latest",
-            "{place} is not the folder of a run"
-        ));
-    }
-
-    Ok(epochs)
-}
-
 fn describe(verification: &Verification, epoch: Option<u32>) -> String {
     let mut text = epoch.map_or_else(String::new, |epoch| format!("epoch {epoch}: "));
     match &verification.difference {
@@ -152,9 +126,8 @@ fn describe_comparison(comparison: &Comparison) -> String {
 
 fn describe_difference(difference: &Difference, runs: [&str; 2]) -> String {
     let mut text = format!("the first difference: {difference}");
-    for (run, value) in runs.iter().zip(&difference.values) {
-        let value = value.as_deref().unwrap_or("nothing");
-        text += &format!("\n  {run:<15} {value}");
+    for (index, run) in runs.iter().enumerate() {
+        text += &format!("\n  {run:<15} {}", difference.value(index));
     }
     text
 }

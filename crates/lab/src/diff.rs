@@ -7,8 +7,8 @@ use protocol::{Event, Tick};
 use serde::Serialize;
 use simulator::EpochFiles;
 
-use crate::difference::{Difference, between};
-use crate::record::{Entry, Record};
+use simulator::difference::{Difference, between};
+use simulator::record::{Entry, Record};
 
 /// What came of a comparison.
 #[derive(Debug, Default, Serialize)]

@@ -3,16 +3,50 @@
 use std::path::{Path, PathBuf};
 
 use config::FileError;
-use miette::{IntoDiagnostic, WrapErr};
-use simulator::recorder::SUMMARY;
-use simulator::{RunFolder, Summary};
+use miette::{IntoDiagnostic, WrapErr, miette};
+use simulator::recorder::{LATEST, SUMMARY};
+use simulator::{EpochFiles, RunFolder, Summary};
 
 /// Finds the folder of a run by the name of the run under `out`, or by the path of the folder.
-#[must_use]
-pub fn find(out: &Path, run: &Path) -> Option<RunFolder> {
+///
+/// # Errors
+/// If there is none.
+pub fn find(out: &Path, run: &Path) -> miette::Result<RunFolder> {
     let candidates: [PathBuf; 2] = [out.join(run), run.to_owned()];
-    let found = candidates.into_iter().find(|path| path.is_dir());
-    found.map(RunFolder::at)
+    if let Some(found) = candidates.into_iter().find(|path| path.is_dir()) {
+        return Ok(RunFolder::at(found));
+    }
+
+    let out = out.display();
+    if run == Path::new(LATEST) {
+        return Err(miette!(
+            help = "name one, or start one with `cars run`",
+            "there is no run in {out}"
+        ));
+    }
+    Err(miette!(
+        help = "give a run's name, with --out where its folder is elsewhere, or its folder",
+        "there is no run {}, neither in {out} nor as a folder",
+        run.display()
+    ))
+}
+
+/// The records of a run's epochs, the first epoch first.
+///
+/// # Errors
+/// If the folder is not that of a run.
+pub fn recorded_epochs(folder: &RunFolder) -> Result<Vec<EpochFiles>, FileError> {
+    let mut epochs = folder.epochs();
+    // A simulator that was killed while an epoch began has written no events of it yet.
+    epochs.retain(|files| files.events.exists());
+    if epochs.is_empty() {
+        let place = folder.path().display();
+        return Err(
+            FileError::new(format!("{place} is not the folder of a run"))
+                .with_help("name a folder with an events.jsonl, such as runs/latest"),
+        );
+    }
+    Ok(epochs)
 }
 
 /// Reads the summary of a run; `None` if its simulator has not written one.

@@ -1,14 +1,12 @@
-//! Work with runs: executing a scenario in this process ([`run`]), reading a run's folder ([`folder`]) and its record
-//! ([`record`]), executing a recorded run again ([`verify`]) and comparing two runs ([`diff`]), repeating runs and comparing
-//! teams ([`experiment`], [`statistics`]), and presenting results ([`table`], [`emotionml`]).
+//! Work with runs: executing a scenario in this process ([`run`]), reading a run's folder ([`folder`]), executing a recorded
+//! run again ([`verify`]) and comparing two runs ([`diff`]), repeating runs and comparing teams ([`experiment`],
+//! [`statistics`]), and presenting results ([`table`], [`emotionml`]).
 
 pub mod diff;
-pub mod difference;
 pub mod emotionml;
 pub mod experiment;
 pub mod folder;
 mod performance;
-pub mod record;
 pub mod run;
 pub mod statistics;
 pub mod table;

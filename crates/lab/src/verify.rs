@@ -15,9 +15,9 @@ use protocol::{Event, RobotName, RunName, Tick};
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
 use simulator::{EpochFiles, Scenario, TickRecord, seal};
 
-use crate::difference::{Difference, between};
-use crate::record::{Entry, Record};
 use crate::run::Local;
+use simulator::difference::{Difference, between};
+use simulator::record::{Entry, Record};
 
 /// What came of a verification.
 #[derive(Debug)]

@@ -9,12 +9,13 @@ use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName};
-use simulator::recorder::LOGS;
+use simulator::recorder::{LOGS, SCENARIO};
 use simulator::{RunFolder, Scenario, roster};
 
 use super::compose;
 use super::endpoint;
 use super::file::{self, LaunchFile};
+use super::launched::Launched;
 use super::link::ProcessLink;
 use super::observe::{Observer, Watch};
 use super::options::RunOptions;
@@ -72,6 +73,8 @@ pub struct Launch {
     scenario: Scenario,
     run: RunName,
     secured: Option<Secured>,
+    /// Whether the run in the folder is resumed.
+    is_resumed: bool,
 }
 
 impl What {
@@ -115,7 +118,74 @@ impl Launch {
             scenario,
             run,
             secured,
+            is_resumed: false,
         })
+    }
+
+    /// Reads how the run in a folder was launched, to resume it: its scenario and its launch file are those of the folder, and
+    /// so is what the options leave open.
+    ///
+    /// # Errors
+    /// [`FileError`] if it is not the folder of a run that was launched, or the run is in progress or has ended; a missing
+    /// certificate of a secured run.
+    pub fn resume(folder: &Path, mut options: LaunchOptions) -> miette::Result<Self> {
+        let path = folder
+            .canonicalize()
+            .map_err(|error| FileError::unreadable(folder, &error))?;
+        let folder = RunFolder::at(path.clone());
+        // The simulator takes the lock and reads the record.
+        drop(folder.reopen()?);
+        let launched = Launched::read(&folder)?;
+        let scenario = Scenario::load(&folder.file(SCENARIO), &Changes::default())?;
+        let file = launched.launch_file(&scenario)?;
+
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let run = RunName::new(&name).into_diagnostic()?;
+        options.run.out = path.parent().unwrap_or(Path::new("")).to_owned();
+        if options.run.speed.is_none() {
+            options.run.speed = Some(Speed(launched.speed));
+        }
+        options.secure = options.secure.or(launched.secure);
+        options.is_insecure |= launched.is_insecure;
+        let secured = secured(&options, &file)?;
+        let what = if launched.is_roster {
+            What::Roster(launched.file)
+        } else {
+            What::File(launched.file)
+        };
+        Ok(Self {
+            what,
+            options,
+            file,
+            scenario,
+            run,
+            secured,
+            is_resumed: true,
+        })
+    }
+
+    /// Makes the folder of a new run and notes how it is launched, or takes that of the run to resume.
+    fn folder(&self) -> Result<RunFolder, FileError> {
+        if self.is_resumed {
+            return Ok(RunFolder::new(&self.options.run.out, &self.run));
+        }
+
+        let (folder, lock) = self.options.run.folder(&self.run, &self.scenario)?;
+        drop(lock); // The simulator takes it.
+        clear_logs(&folder);
+        let path = self.what.path();
+        let file =
+            std::path::absolute(path).map_err(|error| FileError::unreadable(path, &error))?;
+        let launched = Launched {
+            file,
+            is_roster: matches!(self.what, What::Roster(_)),
+            text: self.file.source.text.clone(),
+            speed: self.speed().0,
+            secure: self.options.secure.clone(),
+            is_insecure: self.options.is_insecure,
+        };
+        launched.write(&folder)?;
+        Ok(folder)
     }
 
     /// The launch as a compose file.
@@ -157,6 +227,7 @@ impl Launch {
             out: &self.options.run.out,
             speed: self.speed(),
             is_paused: self.options.is_paused,
+            is_resumed: self.is_resumed,
             has_console: self.options.has_console,
             opens_browser: self.options.opens_browser,
         };
@@ -220,9 +291,7 @@ impl Launch {
         loop {
             let endpoint = self.endpoint()?;
             let planned = self.plan(&endpoint)?;
-            let (folder, lock) = self.options.run.folder(&self.run, &self.scenario)?;
-            drop(lock); // The simulator takes it.
-            clear_logs(&folder);
+            let folder = self.folder()?;
             if !self.options.is_quiet {
                 self.announce(&endpoint, &folder, &mut notice);
             }
@@ -251,8 +320,9 @@ impl Launch {
             ));
         }
 
+        let is_resumed = if self.is_resumed { ", resumed" } else { "" };
         notice(&format!(
-            "run {} at {endpoint}, recorded in {}",
+            "run {}{is_resumed} at {endpoint}, recorded in {}",
             self.run,
             folder.path().display()
         ));

@@ -8,6 +8,7 @@ mod ending;
 mod endpoint;
 pub mod exec;
 mod file;
+mod launched;
 mod launching;
 mod lines;
 mod link;

@@ -9,6 +9,8 @@ use protocol::name::BadName;
 use simulator::recorder::RunLock;
 use simulator::{RunFolder, Scenario};
 
+use super::launched::Launched;
+
 /// Options of one execution of a scenario.
 #[derive(Debug, Clone)]
 pub struct RunOptions {
@@ -78,6 +80,7 @@ impl RunOptions {
     ) -> Result<(RunFolder, RunLock), config::FileError> {
         let folder = RunFolder::new(&self.out, run);
         let lock = folder.create(scenario)?;
+        Launched::clear(&folder)?;
         folder.point_latest();
         Ok((folder, lock))
     }

@@ -94,6 +94,8 @@ pub(super) struct Execution<'a> {
     pub(super) out: &'a Path,
     pub(super) speed: Speed,
     pub(super) is_paused: bool,
+    /// Whether the run in the folder is resumed.
+    pub(super) is_resumed: bool,
     /// Whether the console is started.
     pub(super) has_console: bool,
     /// Whether the console opens a browser.
@@ -209,6 +211,7 @@ fn simulator(
     ]);
 
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
+    args.extend(execution.is_resumed.then(|| "--resume".to_owned()));
     args.extend(execution.is_insecure.then(|| "--insecure".to_owned()));
 
     let mut env = process.env.clone();

@@ -10,6 +10,8 @@ pub const LOG: &str = "cars.log";
 pub const RECORDING: &str = "recording.jsonl";
 /// The summary at the end of the run.
 pub const SUMMARY: &str = "summary.json";
+/// How the run was launched, to resume it.
+pub const LAUNCHED: &str = "launched.json";
 /// Folder with the output of each process.
 pub const LOGS: &str = "logs";
 /// Endpoint of the simulator during the run.
@@ -54,7 +56,7 @@ fn is_plain(name: &str) -> bool {
 
 /// Whether another file has the name, or an earlier epoch's file could have it.
 fn is_taken(name: &str) -> bool {
-    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG];
+    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG, LAUNCHED];
     let prefixes = ["scenario", "events", "recording"];
     names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))
 }

@@ -1,11 +1,13 @@
 //! The simulator: the scenario of a run ([`scenario`]), one tick ([`Simulation::step`]), the lock-step over the bus
-//! ([`server`]), and the record ([`recorder`]).
+//! ([`server`]), and the record: written ([`recorder`]), read ([`record`]), and compared ([`difference`]).
 //!
 //! It owns the environment and the clock. It does not know the robots' emotions: there is no dependency on `affect`.
 
+pub mod difference;
 pub mod digest;
 mod files;
 pub mod medium;
+pub mod record;
 pub mod recorder;
 pub mod roster;
 pub mod scenario;

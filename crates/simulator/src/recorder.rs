@@ -13,12 +13,12 @@ use protocol::{Epoch, Event, Line, RobotName, RunName};
 
 use crate::files::{LOCK, check_log_name};
 use crate::scenario::{Scenario, SyncPoint};
-use crate::seal::Seal;
+use crate::seal::{self, Seal};
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::Summary;
 
 pub use crate::files::{
-    ENDPOINT, EVENTS, LATEST, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO, SUMMARY,
+    ENDPOINT, EVENTS, LATEST, LAUNCHED, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO, SUMMARY,
 };
 
 /// The folder of a run: `OUT/NAME`.
@@ -64,10 +64,16 @@ impl RunFolder {
 
     /// Removes the files of an earlier run.
     fn clear(&self) -> Result<(), FileError> {
+        let log = self.log();
         let mut files = self.superseded();
-        files.push(self.log());
         for name in [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG] {
             files.push(self.file(name));
+        }
+        files.push(log);
+        for file in files.clone() {
+            let mut draft = file.into_os_string();
+            draft.push(DRAFT);
+            files.push(draft.into());
         }
 
         for file in files {
@@ -98,6 +104,29 @@ impl RunFolder {
         if let Err(error) = std::os::unix::fs::symlink(name, &link) {
             tracing::debug!(%error, "no link to the latest run");
         }
+    }
+
+    /// Takes the folder of a run whose simulator has gone, to resume it, with the record of its last epoch; without a record if
+    /// no tick was completed. The record is checked first.
+    ///
+    /// # Errors
+    /// [`FileError`] if it is not the folder of a run, the run is in progress or has ended, or the record is damaged.
+    pub fn reopen(&self) -> Result<(RunLock, Option<EpochFiles>), FileError> {
+        let place = self.path.display();
+        if !self.file(SCENARIO).exists() {
+            let error = FileError::new(format!("{place} is not the folder of a run"));
+            return Err(error.with_help("name a run under --out, or its folder"));
+        }
+
+        let lock = self.lock()?;
+        let files = self.epochs().pop().filter(|files| files.events.exists());
+        if let Some(files) = &files
+            && seal::check(&files.events)?.has_end
+        {
+            let error = FileError::new(format!("the run in {place} has ended"));
+            return Err(error.with_help("start it again without --resume"));
+        }
+        Ok((lock, files))
     }
 
     fn lock(&self) -> Result<RunLock, FileError> {
@@ -281,6 +310,8 @@ pub struct Recorder {
     sync: SyncPoint,
     synced_at: Instant,
     summary: Summary,
+    /// Names of files that are to replace those of the record of a run that is resumed.
+    drafts: Vec<String>,
 }
 
 impl Recorder {
@@ -301,31 +332,80 @@ impl Recorder {
             folder.write_scenario(scenario)?;
         }
 
-        let mut log = None;
-        if scenario.record.log {
-            let path = folder.file(&scenario.record.log_name);
-            log = Some(Lines::open(
-                path,
-                File::options().create(true).append(true),
-            )?);
+        let record = &scenario.record;
+        let path = folder.file(&record.log_name);
+        let log = record
+            .log
+            .then(|| Lines::open(path, File::options().create(true).append(true)));
+        Self::open(folder, run, simulation, log.transpose()?, "")
+    }
+
+    /// Begins to write the record of an epoch once more, into drafts: [`Self::supersede_record`] puts them in the place of the
+    /// record when they have all of it. Until then, and if they never do, the record is as it was.
+    ///
+    /// # Errors
+    /// [`FileError`] if the files cannot be made.
+    pub fn resume(
+        folder: &RunFolder,
+        run: &RunName,
+        simulation: &Simulation,
+    ) -> Result<Self, FileError> {
+        let record = &simulation.scenario().record;
+        let log_name = format!("{}{DRAFT}", record.log_name);
+        let log = record.log.then(|| Lines::create(folder.file(&log_name)));
+        let mut recorder = Self::open(folder, run, simulation, log.transpose()?, DRAFT)?;
+
+        recorder.drafts.push(EVENTS.to_owned());
+        if recorder.log.is_some() {
+            recorder.drafts.push(record.log_name.clone());
         }
+        if recorder.recording.is_some() {
+            recorder.drafts.push(RECORDING.to_owned());
+        }
+        Ok(recorder)
+    }
+
+    /// Opens the files of the record, whose names end with `suffix`.
+    fn open(
+        folder: &RunFolder,
+        run: &RunName,
+        simulation: &Simulation,
+        log: Option<Lines>,
+        suffix: &str,
+    ) -> Result<Self, FileError> {
+        let record = &simulation.scenario().record;
         let mut recording = None;
-        if scenario.record.frames {
-            let mut file = Lines::create(folder.file(RECORDING))?;
+        if record.frames {
+            let mut file = Lines::create(folder.file(&format!("{RECORDING}{suffix}")))?;
             file.add(&json(&header(run, simulation)))?;
             recording = Some(file);
         }
 
         Ok(Self {
             folder: folder.clone(),
-            events: Lines::create(folder.file(EVENTS))?,
+            events: Lines::create(folder.file(&format!("{EVENTS}{suffix}")))?,
             seal: Seal::default(),
             log,
             recording,
-            sync: scenario.record.sync,
+            sync: record.sync,
             synced_at: Instant::now(),
             summary: Summary::begin(run, simulation),
+            drafts: Vec::new(),
         })
+    }
+
+    /// Puts the drafts of a run that is resumed in the place of its record.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be written or renamed.
+    pub fn supersede_record(&mut self) -> Result<(), FileError> {
+        self.sync()?;
+        for name in std::mem::take(&mut self.drafts) {
+            let draft = self.folder.file(&format!("{name}{DRAFT}"));
+            std::fs::rename(&draft, self.folder.file(&name))
+                .map_err(|error| unwritable(&draft, &error))?;
+        }
+        Ok(())
     }
 
     /// Writes a tick. Returns the lines of the log, for observers.
@@ -417,6 +497,11 @@ impl Recorder {
     /// [`FileError`] if it cannot be written.
     pub fn finish(mut self, simulation: &Simulation) -> Result<Summary, FileError> {
         self.summary.finish(simulation);
+        if !self.drafts.is_empty() {
+            // The run was ended before it was resumed: its record is as it was.
+            return Ok(self.summary);
+        }
+
         let text = serde_json::to_string_pretty(&self.summary)
             .map_err(|error| FileError::new(error.to_string()))?;
         let mut file = Lines::create(self.folder.file(SUMMARY))?;
@@ -426,6 +511,9 @@ impl Recorder {
         Ok(self.summary)
     }
 }
+
+/// With this their names end while a run that is resumed is executed again.
+const DRAFT: &str = ".draft";
 
 /// Files that every epoch has.
 const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];

@@ -12,8 +12,10 @@ mod join;
 mod observers;
 mod orders;
 mod pace;
+mod past;
 mod process;
 mod timers;
 mod watchdog;
 
+pub use past::Past;
 pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError};

@@ -8,6 +8,7 @@
 )]
 
 mod affect;
+mod again;
 mod bench;
 mod boundaries;
 mod browser;

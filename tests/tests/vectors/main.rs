@@ -221,7 +221,7 @@ fn echo_over_zenoh() {
     let lock = run_folder.create(&scenario).unwrap();
     let simulator = std::thread::spawn(move || {
         let _lock = lock;
-        server.run(scenario, &run_folder).unwrap();
+        server.run(scenario, &run_folder, None).unwrap();
     });
 
     let witness = Witness::new(&endpoint, &run, "Echo", "Caller");

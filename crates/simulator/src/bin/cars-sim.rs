@@ -11,9 +11,9 @@ use config::units::Time;
 use miette::{IntoDiagnostic, WrapErr};
 use protocol::RunName;
 use protocol::messages::End;
-use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG};
+use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
 use simulator::scenario::{Changes, Override, Scenario};
-use simulator::server::{Event, Options, REPEAT_AFTER, Server};
+use simulator::server::{Event, Options, Past, REPEAT_AFTER, Server};
 use simulator::{RunFolder, Summary};
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
@@ -56,6 +56,10 @@ struct Args {
     /// and take the place of any robot.
     #[arg(long)]
     insecure: bool,
+    /// Resume the run in its folder, whose simulator was killed: the run is executed again up to the last tick of its record,
+    /// and compared with it, and goes on from there.
+    #[arg(long, conflicts_with_all = ["seed", "duration", "set"])]
+    resume: bool,
 }
 
 fn main() -> ExitCode {
@@ -91,7 +95,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
     // Before anything is made: a refusal leaves nothing behind.
     check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
     let folder = RunFolder::new(&args.out, &args.run);
-    let _lock = folder.create(&scenario)?;
+    let (_lock, past) = open_folder(&folder, &scenario, args.resume)?;
     let role = Role::Router {
         listen: args.listen.clone(),
         trusts_network: args.insecure,
@@ -115,7 +119,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
     }
 
     write_line(&folder.file(ENDPOINT), &connectable(&args.listen))?;
-    let outcome = server.run(scenario, &folder).into_diagnostic();
+    let outcome = server.run(scenario, &folder, past).into_diagnostic();
 
     for name in [ENDPOINT, OPERATOR_CONFIG]
         .map(|name| folder.file(name))
@@ -128,6 +132,24 @@ fn run(args: &Args) -> miette::Result<Summary> {
     }
 
     outcome
+}
+
+/// Makes the folder of a new run, or opens that of a run to resume, with its record.
+fn open_folder(
+    folder: &RunFolder,
+    scenario: &Scenario,
+    is_resumed: bool,
+) -> miette::Result<(RunLock, Option<Past>)> {
+    if !is_resumed {
+        return Ok((folder.create(scenario)?, None));
+    }
+
+    let (lock, files) = folder.reopen()?;
+    let past = match files {
+        Some(files) => Past::open(&files)?,
+        None => None,
+    };
+    Ok((lock, past))
 }
 
 /// Writes a file that others wait for: they see it whole or not at all.

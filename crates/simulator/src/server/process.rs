@@ -10,18 +10,20 @@ use protocol::keys::{Keys, STATE};
 use protocol::messages::{
     Clock, Command, CommandText, End, MAX_ENTRIES, Presence, Reason, Report, Waiting,
 };
-use protocol::{Epoch, Generation, Malformed, RobotName, RunName, Tick, decode, encode};
+use protocol::{Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 
 use crate::diagnostic::FileError;
+use crate::difference::Difference;
 use crate::recorder::{Recorder, RunFolder};
 use crate::scenario::Scenario;
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, TickRecord};
 use crate::summary::{Summary, Wall};
 
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
 use super::orders::{Orders, Underway};
 use super::pace::Pace;
+use super::past::{Past, Repeated};
 use super::timers::Timers;
 use super::watchdog::{Doing, Watchdog};
 
@@ -59,6 +61,14 @@ pub enum ServerError {
     /// The environment cannot be set up.
     #[error(transparent)]
     Hall(#[from] world::HallError),
+    /// A run that is resumed does not go as its record.
+    #[error(
+        "the run cannot be resumed: executed again, it differs from its record at {0} (recorded: {recorded}; now: {now}). \
+         The record is as it was",
+        recorded = .0.value(0),
+        now = .0.value(1)
+    )]
+    NotRepeated(Box<Difference>),
 }
 
 /// Everything that can happen to a simulator process.
@@ -161,6 +171,8 @@ pub struct Server {
     pub(super) wall: Wall,
     /// Commands from outside the roster that are sent at the next tick boundary.
     operator: Vec<(RobotName, String)>,
+    /// The record of a run that is resumed, until it has been executed again.
+    past: Option<Past>,
 }
 
 impl Server {
@@ -202,6 +214,7 @@ impl Server {
             culprits: Vec::new(),
             wall: Wall::default(),
             operator: Vec::new(),
+            past: None,
             declared: Vec::new(),
             options,
             bus,
@@ -272,7 +285,8 @@ impl Server {
         Ok(())
     }
 
-    /// Runs until the run ends: epoch after epoch, tick after tick.
+    /// Runs until the run ends: epoch after epoch, tick after tick. With a past the epoch of its record is executed again and
+    /// then resumed.
     ///
     /// # Errors
     /// [`ServerError`] if it cannot go on; what was recorded until then is kept.
@@ -280,11 +294,17 @@ impl Server {
         mut self,
         mut scenario: Scenario,
         folder: &RunFolder,
+        past: Option<Past>,
     ) -> Result<Summary, ServerError> {
-        let mut epoch: Epoch = 1;
+        let mut epoch = past.as_ref().map_or(1, Past::epoch);
+        self.past = past;
         loop {
             let mut simulation = Simulation::new(scenario, epoch)?;
-            let recorder = Recorder::begin(folder, &self.options.run, &simulation)?;
+            let recorder = if self.past.is_some() {
+                Recorder::resume(folder, &self.options.run, &simulation)?
+            } else {
+                Recorder::begin(folder, &self.options.run, &simulation)?
+            };
             self.begin_epoch(&mut simulation);
 
             let inbox = self.inbox.clone();
@@ -371,7 +391,9 @@ impl Server {
         match &self.stage {
             Stage::Robots => return Ok(Next::Wait(self.timers.next())),
             Stage::Grant => {
-                if let Err(patience) = self.pace.take_grant(simulation.scenario().tick_s) {
+                if self.past.is_none()
+                    && let Err(patience) = self.pace.take_grant(simulation.scenario().tick_s)
+                {
                     return Ok(Next::Wait(patience));
                 }
                 if let Some(underway) = self.order_faults(simulation)? {
@@ -386,7 +408,11 @@ impl Server {
             }
         }
 
-        for (to, command) in std::mem::take(&mut self.operator) {
+        let commands = match &self.past {
+            Some(past) => past.commands(),
+            None => std::mem::take(&mut self.operator),
+        };
+        for (to, command) in commands {
             simulation.command(&to, &command);
         }
         let tick = simulation.begin_tick();
@@ -471,7 +497,9 @@ impl Server {
         let lines = recorder.write(simulation, &record)?;
         self.watchdog.note(Some(Doing::Work));
         self.observers.log(&lines);
-        if record.tick == 0 {
+        if self.past.is_some() {
+            self.compare(&record, recorder)?;
+        } else if record.tick == 0 {
             self.pace.ready();
         }
         self.stage = Stage::Grant;
@@ -481,6 +509,27 @@ impl Server {
         }
         if self.observers.is_frame_due() {
             self.observers.frame(simulation, &self.status(simulation));
+        }
+        Ok(())
+    }
+
+    /// Compares a tick of a run that is resumed with its record. Its last tick ends the repetition, and the clock is ready.
+    fn compare(&mut self, record: &TickRecord, recorder: &mut Recorder) -> Result<(), Interrupt> {
+        let Some(past) = &mut self.past else {
+            return Ok(());
+        };
+
+        match past.compare(record)? {
+            Repeated::Same => {}
+            Repeated::Different(difference) => {
+                return Err(Interrupt::Failed(ServerError::NotRepeated(difference)));
+            }
+            Repeated::Last => {
+                self.past = None;
+                recorder.supersede_record()?;
+                self.pace.ready();
+                tracing::info!("resumed after tick {}", record.tick);
+            }
         }
         Ok(())
     }

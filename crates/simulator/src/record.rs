@@ -5,11 +5,11 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 
+use crate::recorder::EpochFiles;
 use config::FileError;
 use lockstep::Sent;
 use protocol::messages::{CommandText, Report};
 use protocol::{Event, Line, RobotName, Tick};
-use simulator::EpochFiles;
 
 /// Most bytes of a line of events; no event is nearly as long.
 const MAX_LINE_BYTES: u64 = 1 << 20;

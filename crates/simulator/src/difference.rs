@@ -26,6 +26,15 @@ pub struct Difference {
     pub values: [Option<String>; 2],
 }
 
+impl Difference {
+    /// What one of the runs, 0 or 1, has there.
+    #[must_use]
+    pub fn value(&self, run: usize) -> &str {
+        let value = self.values.get(run).and_then(Option::as_deref);
+        value.unwrap_or("nothing")
+    }
+}
+
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let tick = self.tick;

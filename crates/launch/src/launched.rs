@@ -1,0 +1,93 @@
+//! How a run was launched, in the run's folder, so that it can be resumed after its simulator or the machine was killed.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use config::{FileError, Source};
+use serde::{Deserialize, Serialize};
+use simulator::recorder::LAUNCHED;
+use simulator::{RunFolder, Scenario};
+
+use super::file::LaunchFile;
+
+/// `launched.json`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Launched {
+    /// Absolute path of the launch file or of the roster.
+    pub(super) file: PathBuf,
+    /// Whether it is a roster.
+    pub(super) is_roster: bool,
+    /// Its text: the file may have been changed since.
+    pub(super) text: String,
+    /// Simulated seconds per second; `None` is as fast as possible.
+    pub(super) speed: Option<f64>,
+    /// Folder of certificates.
+    pub(super) secure: Option<PathBuf>,
+    /// Whether the simulator was allowed to listen without certificates where other machines can connect.
+    pub(super) is_insecure: bool,
+}
+
+impl Launched {
+    /// Writes it into the folder of the run.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be written.
+    pub(super) fn write(&self, folder: &RunFolder) -> Result<(), FileError> {
+        let text = serde_json::to_string_pretty(self)
+            .unwrap_or_else(|error| unreachable!("it is always JSON: {error}"));
+        let path = folder.file(LAUNCHED);
+        std::fs::write(&path, text)
+            .map_err(|error| FileError::new(format!("cannot write {}: {error}", path.display())))
+    }
+
+    /// Removes that of an earlier run from the folder. The simulator, which clears the folder when it begins, leaves it.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be removed.
+    pub(super) fn clear(folder: &RunFolder) -> Result<(), FileError> {
+        let path = folder.file(LAUNCHED);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::new(format!(
+                "cannot remove {}: {error}",
+                path.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Reads it from the folder of a run.
+    ///
+    /// # Errors
+    /// [`FileError`] if the run was not launched, or the file cannot be read.
+    pub(super) fn read(folder: &RunFolder) -> Result<Self, FileError> {
+        let path = folder.file(LAUNCHED);
+        if !path.exists() {
+            let place = folder.path().display();
+            let error = FileError::new(format!("the run in {place} was not started by a launch"));
+            return Err(
+                error.with_help("`cars run` with the scenario.toml there executes it again")
+            );
+        }
+
+        let source = Source::read(&path)?;
+        serde_json::from_str(&source.text)
+            .map_err(|error| FileError::new(format!("{}: {error}", path.display())))
+    }
+
+    /// The launch file as it was, for the scenario of the run.
+    ///
+    /// # Errors
+    /// [`FileError`] with line and caret, where a later version does not read it.
+    pub(super) fn launch_file(&self, scenario: &Scenario) -> Result<LaunchFile, FileError> {
+        let source = Source {
+            name: self.file.display().to_string(),
+            text: self.text.clone(),
+        };
+        if self.is_roster {
+            return Ok(LaunchFile::of_roster(&self.file, source, scenario));
+        }
+
+        let folder = self.file.parent().unwrap_or(Path::new(""));
+        LaunchFile::parse(source, folder)
+    }
+}

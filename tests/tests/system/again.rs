@@ -1,0 +1,295 @@
+//! Runs that are executed again: verified against their record, compared with one another, resumed.
+
+use std::path::Path;
+
+use nix::sys::signal::Signal;
+use system_tests::processes::{Running, nobody_is_left, send};
+use system_tests::{Lab, assert_same, eventually, root};
+
+const HALL: &str = "launch/hors_doeuvres.toml";
+
+/// Verifies a run of a lab; returns what is printed.
+fn verify(lab: &Lab, run: &str) -> String {
+    lab.ok(&["verify", run])
+}
+
+#[test]
+fn every_shipped_scenario_is_executed_again_with_the_same_result() {
+    let lab = Lab::new();
+    let mut count = 0;
+    for entry in std::fs::read_dir(root().join("configs")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        let is_scenario = path.extension().is_some_and(|ending| ending == "toml");
+        // Its robots are not of this process: see below.
+        if !is_scenario || name == "any_language" {
+            continue;
+        }
+        lab.ok(&["run", path.to_str().unwrap(), "--duration", "60 s"]);
+
+        let said = verify(&lab, &name);
+        assert!(said.contains("the same, "), "{name}: {said}");
+        assert!(said.contains("to the end"), "{name}: {said}");
+        count += 1;
+    }
+    assert!(count >= 5, "{count}");
+}
+
+/// The hall as processes, of which Leguin crashes and Butler hangs, both without holding the clock.
+const FAULTS: &str = r#"fault=[
+    { robot = "Leguin", do = "crash", at = "10 s", until = "16 s" },
+    { robot = "Butler", do = "hang", at = "20 s", until = "24 s" },
+]"#;
+
+#[test]
+fn faults_lost_commands_and_returns_are_executed_again_from_the_scenario() {
+    let lab = Lab::new();
+    lab.ok(&[
+        "launch",
+        HALL,
+        "--run",
+        "faults",
+        "--no-console",
+        "--speed",
+        "max",
+        "--duration",
+        "60 s",
+        "--set",
+        FAULTS,
+        "--set",
+        "on_late=continue",
+        "--set",
+        "network.commands={ loss = 0.3 }",
+    ]);
+
+    let said = verify(&lab, "faults");
+    assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+    assert!(!said.contains("taken from the record"), "{said}");
+}
+
+/// Starts the hall and waits until it has reached a tick.
+fn start_hall(lab: &Lab, run: &str, tick: u64, args: &[&str]) -> Running {
+    let mut all = vec!["launch", HALL, "--no-console", "--duration", "60 s"];
+    all.extend(args);
+    let launch = lab.start(run, &all);
+    await_tick(lab, run, tick);
+    launch
+}
+
+fn await_tick(lab: &Lab, run: &str, tick: u64) {
+    let event = format!("{{\"tick\":{tick},\"event\":\"tick\"");
+    eventually("a tick", || {
+        let events = std::fs::read_to_string(lab.file(run, "events.jsonl")).ok()?;
+        events.contains(&event).then_some(())
+    });
+}
+
+#[test]
+fn what_an_operator_and_the_machine_did_is_taken_from_the_record() {
+    let lab = Lab::new();
+    let run = "by-hand";
+    let continues = ["--set", "on_late=continue", "--set", "deadline=0.3 s"];
+    let mut launch = start_hall(
+        &lab,
+        run,
+        10,
+        &[&["--speed", "10"], &continues[..]].concat(),
+    );
+    lab.ok(&["command", "Leguin", "hurry", "--run", run]);
+    // She misses ticks, and goes on without having been lost, or comes back.
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    eventually("a missed tick", || {
+        let events = std::fs::read_to_string(lab.file(run, "events.jsonl")).ok()?;
+        events
+            .contains("\"missed\",\"robot\":\"Leguin\"")
+            .then_some(())
+    });
+    send(leguin, Signal::SIGCONT);
+    launch.finish();
+
+    let said = verify(&lab, run);
+    assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+    let events = String::from_utf8(lab.bytes(run)).unwrap();
+    assert!(events.contains("\"from\":\"operator\""));
+}
+
+/// Changes the first place where a text stands after another one in a file.
+fn replace(file: &Path, after: &str, from: &str, to: &str) {
+    let text = std::fs::read_to_string(file).unwrap();
+    let begin = text.find(after).expect("the text is there");
+    let place = begin + text[begin..].find(from).expect("the text is there");
+    let changed = format!("{}{to}{}", &text[..place], &text[place + from.len()..]);
+    std::fs::write(file, changed).unwrap();
+}
+
+#[test]
+fn a_record_that_is_not_what_the_scenario_gives_is_told_by_tick_robot_and_field() {
+    let lab = Lab::new();
+    let whole = |run: &str| {
+        lab.ok(&["run", HALL, "--run", run, "--duration", "60 s"]);
+        lab.file(run, "events.jsonl")
+    };
+
+    // One byte of an event. The tick is that of the line.
+    let events = whole("byte");
+    let text = std::fs::read_to_string(&events).unwrap();
+    let line = text
+        .lines()
+        .find(|line| line.contains("\"to\":\"CONFIDENT\""))
+        .unwrap();
+    let tick = line.split(&[':', ','][..]).nth(1).unwrap().to_owned();
+    replace(&events, line, "CONFIDENT", "CONFIDENX");
+    let (code, said) = lab.fails(&["verify", "byte"]);
+    assert_eq!(code, 1);
+    let place = format!("the first difference: tick {tick}, Butler, emotion.to");
+    assert!(said.contains(&place), "{said}");
+    assert!(
+        said.contains("CONFIDENX") && said.contains("\"CONFIDENT\""),
+        "{said}"
+    );
+
+    // Another seed.
+    whole("seed");
+    replace(&lab.file("seed", "scenario.toml"), "seed", "2002", "2003");
+    let (_, said) = lab.fails(&["verify", "seed"]);
+    assert!(said.contains("tick 0, init.seed"), "{said}");
+
+    // A robot with another parameter: nothing but what she does differs.
+    whole("parameter");
+    let scenario = lab.file("parameter", "scenario.toml");
+    replace(
+        &scenario,
+        "name = \"Leguin\"",
+        "v_refill_mps = 0.",
+        "v_refill_mps = 1.",
+    );
+    let (_, said) = lab.fails(&["verify", "parameter"]);
+    assert!(said.contains(", Leguin, "), "{said}");
+
+    // A seal that was changed, where nothing else differs.
+    let events = whole("seal");
+    let text = std::fs::read_to_string(&events).unwrap();
+    let at = text.find("\"seal\":\"").unwrap() + 8;
+    let other = if &text[at..=at] == "0" { "1" } else { "0" };
+    let changed = format!("{}{other}{}", &text[..at], &text[at + 1..]);
+    std::fs::write(&events, changed).unwrap();
+    let (_, said) = lab.fails(&["verify", "seal"]);
+    assert!(said.contains("are damaged"), "{said}");
+}
+
+#[test]
+fn two_runs_are_compared_up_to_the_end_of_both() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--run", "one", "--duration", "60 s"]);
+    lab.ok(&["run", HALL, "--run", "longer", "--duration", "90 s"]);
+    let lossy = "network.commands={ loss = 1.0 }";
+    lab.ok(&[
+        "run",
+        HALL,
+        "--run",
+        "lossy",
+        "--duration",
+        "60 s",
+        "--set",
+        lossy,
+    ]);
+
+    assert!(
+        lab.ok(&["diff", "one", "one"])
+            .contains("the same, 120 ticks")
+    );
+    let (code, said) = lab.fails(&["diff", "one", "longer"]);
+    assert_eq!(code, 1);
+    assert!(said.contains("tick 120 and tick 180"), "{said}");
+
+    let (_, said) = lab.fails(&["diff", "one", "lossy", "--json"]);
+    let comparison: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let events = lab.events("lossy");
+    let lost = events
+        .iter()
+        .find(|event| event["event"] == "command_dropped");
+    assert_eq!(comparison["first"]["tick"], lost.unwrap()["tick"]);
+    let dropped = events
+        .iter()
+        .filter(|event| event["event"] == "command_dropped");
+    assert_eq!(comparison["only_in"]["command_dropped"][1], dropped.count());
+}
+
+/// Kills the simulator of a launch that has reached a tick, and waits until all of it is gone.
+fn kill_simulator(launch: &mut Running, run: &str) {
+    send(launch.process("cars-sim"), Signal::SIGKILL);
+    assert!(!launch.wait().success());
+    nobody_is_left(run);
+}
+
+#[test]
+fn a_run_whose_simulator_was_killed_goes_on_as_if_nothing_had_happened() {
+    let lab = Lab::new();
+    let run = "resumed";
+    let set = ["--set", "network.commands={ loss = 0.2 }", "--set", FAULTS];
+    let set = [&set[..], &["--set", "on_late=continue"]].concat();
+    let mut launch = start_hall(&lab, run, 30, &[&["--speed", "10"], &set[..]].concat());
+    kill_simulator(&mut launch, run);
+    let killed_at = lab.bytes(run);
+
+    // Killed again after it has gone on.
+    let resume = ["launch", "--no-console", "--resume", run];
+    let mut again = Running::start(lab.cars(&resume), run, lab.out().join(run));
+    await_tick(&lab, run, 60);
+    kill_simulator(&mut again, run);
+    assert!(lab.bytes(run).len() > killed_at.len());
+    lab.ok(&[&resume[..], &["--speed", "max"]].concat());
+
+    let whole = [
+        "launch",
+        HALL,
+        "--no-console",
+        "--run",
+        "whole",
+        "--duration",
+        "60 s",
+    ];
+    lab.ok(&[&whole[..], &["--speed", "max"], &set].concat());
+    assert_same(("resumed", &lab.bytes(run)), ("whole", &lab.bytes("whole")));
+    let log = |run| std::fs::read_to_string(lab.file(run, "cars.log")).unwrap();
+    assert_eq!(log(run), log("whole"));
+    let said = verify(&lab, run);
+    assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+}
+
+#[test]
+fn a_run_that_cannot_be_resumed_keeps_its_record() {
+    let lab = Lab::new();
+    let resume = |run: &str| lab.fails(&["launch", "--no-console", "--resume", run]).1;
+    lab.ok(&["run", HALL, "--run", "local", "--duration", "10 s"]);
+    assert!(resume("local").contains("has ended"));
+    assert!(resume("nowhere").contains("there is no run nowhere"));
+
+    let run = "other";
+    let mut launch = start_hall(&lab, run, 20, &["--speed", "10"]);
+    assert!(resume(run).contains("is in progress"));
+    kill_simulator(&mut launch, run);
+
+    // The robots are not the ones of the record: their parameters are others.
+    let record = lab.bytes(run);
+    let scenario = lab.file(run, "scenario.toml");
+    let text = std::fs::read_to_string(&scenario).unwrap();
+    replace(&scenario, "seed", "2002", "2003");
+    let said = resume(run);
+    assert!(said.contains("cannot be resumed"), "{said}");
+    assert!(said.contains("tick 0, init.seed"), "{said}");
+    assert_same(("kept", &lab.bytes(run)), ("record", &record));
+
+    // A damaged record is refused; one that ends in the middle of a line is not.
+    std::fs::write(&scenario, text).unwrap();
+    let events = lab.file(run, "events.jsonl");
+    let mut damaged = record.clone();
+    damaged[200] ^= 1;
+    std::fs::write(&events, &damaged).unwrap();
+    assert!(resume(run).contains("are damaged"));
+    std::fs::write(&events, &record[..record.len() - 7]).unwrap();
+    lab.ok(&["launch", "--no-console", "--resume", run, "--speed", "max"]);
+    lab.ok(&["run", HALL, "--run", "whole", "--duration", "60 s"]);
+    assert_same(("resumed", &lab.bytes(run)), ("whole", &lab.bytes("whole")));
+}
