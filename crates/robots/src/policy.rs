@@ -11,7 +11,7 @@ pub enum Policy {
     /// Emotions \[D\]. Where they are switched off, this is [`Self::Neither`].
     #[default]
     Emotion,
-    /// Rules written by hand: thresholds of the same measures of progress, without filter, hysteresis or caution \[I\].
+    /// Rules written by hand: thresholds of the same measures of progress, without filter or hysteresis \[I\].
     Rules,
     /// The time since the need arose \[I\].
     Timer,

@@ -6,8 +6,8 @@ pub const SCENARIO: &str = "scenario.toml";
 pub const EVENTS: &str = "events.jsonl";
 /// The log, for people.
 pub const LOG: &str = "cars.log";
-/// Locations and states after every tick, for replay in the console.
-pub const RECORDING: &str = "recording.jsonl";
+/// Everything about every tick, to look at it again and to compare it.
+pub const RECORDING: &str = "run.mcap";
 /// The summary at the end of the run.
 pub const SUMMARY: &str = "summary.json";
 /// How the run was launched, to resume it.
@@ -56,7 +56,12 @@ fn is_plain(name: &str) -> bool {
 
 /// Whether another file has the name, or an earlier epoch's file could have it.
 fn is_taken(name: &str) -> bool {
+<<<<<<< HEAD
     let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG, LAUNCHED];
     let prefixes = ["scenario", "events", "recording"];
+=======
+    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG];
+    let prefixes = ["scenario", "events", "run"];
+>>>>>>> e6d0adc337072d9da731c358045acd60925a3cce
     names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))
 }

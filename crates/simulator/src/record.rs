@@ -1,6 +1,6 @@
 //! The record of an epoch, read tick by tick.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
@@ -10,6 +10,7 @@ use config::FileError;
 use lockstep::Sent;
 use protocol::messages::{CommandText, Report};
 use protocol::{Event, Line, RobotName, Tick};
+use recording::{Recording, RecordingError};
 
 /// Most bytes of a line of events; no event is nearly as long.
 const MAX_LINE_BYTES: u64 = 1 << 20;
@@ -20,7 +21,14 @@ pub struct Record {
     lines: BufReader<File>,
     /// Number of the line that was read last, from 1.
     number: usize,
+    /// What robots reported, if it was recorded.
+    recording: Option<Recording>,
+    /// Reports of the next ticks.
+    ahead: VecDeque<BTreeMap<RobotName, Report>>,
 }
+
+/// Ticks of the recording that are read in one go.
+const TICKS_AT_ONCE: Tick = 64;
 
 /// A complete tick of a record, or the end of the run.
 #[derive(Debug, Clone, Default)]
@@ -101,10 +109,18 @@ impl Record {
     pub fn open(files: &EpochFiles) -> Result<Self, FileError> {
         let path = files.events.clone();
         let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+        let recording = files
+            .recording
+            .exists()
+            .then(|| Recording::open(&files.recording))
+            .transpose()
+            .map_err(|error| unreadable(&error))?;
         Ok(Self {
             path,
             lines: BufReader::new(file),
             number: 0,
+            recording,
+            ahead: VecDeque::new(),
         })
     }
 
@@ -118,13 +134,36 @@ impl Record {
             entry.tick = tick;
             if let Event::Tick { seal, .. } | Event::End { seal, .. } = &mut event {
                 *seal = None;
+                let is_end = matches!(event, Event::End { .. });
                 entry.events.push(event);
+                if !is_end {
+                    entry.reports = self.reports(tick)?;
+                }
                 return Ok(Some(entry));
             }
             entry.events.push(event);
         }
 
         Ok(None)
+    }
+
+    /// What robots reported for the next tick; `None` where the recording has ended earlier than the events.
+    fn reports(
+        &mut self,
+        tick: Tick,
+    ) -> Result<Option<BTreeMap<RobotName, Report>>, FileError> {
+        let Some(recording) = &self.recording else {
+            return Ok(None);
+        };
+
+        if self.ahead.is_empty() && tick < recording.len() {
+            let to = recording.len().min(tick + TICKS_AT_ONCE);
+            let ticks = recording
+                .read(tick, to)
+                .map_err(|error| unreadable(&error))?;
+            self.ahead.extend(ticks.into_iter().map(|tick| tick.reports));
+        }
+        Ok(self.ahead.pop_front())
     }
 
     fn next_line(&mut self) -> Result<Option<Line>, FileError> {
@@ -148,4 +187,9 @@ impl Record {
         FileError::new(format!("{path}, line {}: {error}", self.number))
             .with_help("the record is damaged: `cars check` says how far it is good")
     }
+}
+
+fn unreadable(error: &RecordingError) -> FileError {
+    FileError::new(error.to_string())
+        .with_help("without the recording file the events alone are compared")
 }

@@ -1,6 +1,7 @@
 //! The folder of a run and its record. Every tick is written at once, so a crash of the simulator loses at most the current
 //! one; `record.sync` in the scenario says when it also survives a crash of the machine.
 
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -8,8 +9,10 @@ use std::time::{Duration, Instant};
 
 use config::FileError;
 use protocol::event::log_line;
-use protocol::messages::{LogRecord, RecordedRobot, RecordedTick, RecordingHeader};
-use protocol::{Epoch, Event, Line, RobotName, RunName};
+use protocol::messages::LogRecord;
+use protocol::{Epoch, Event, Line, PROTOCOL_VERSION, RunName};
+use recording::content::Missed;
+use recording::{Frame, Header, PlacedRobot, RecordedTick, Wall, WriteError, Writer};
 
 use crate::files::{LOCK, check_log_name};
 use crate::scenario::{Scenario, SyncPoint};
@@ -306,7 +309,7 @@ pub struct Recorder {
     /// The lines of `events` so far.
     seal: Seal,
     log: Option<Lines>,
-    recording: Option<Lines>,
+    recording: Option<Writer>,
     sync: SyncPoint,
     synced_at: Instant,
     summary: Summary,
@@ -376,9 +379,10 @@ impl Recorder {
         let record = &simulation.scenario().record;
         let mut recording = None;
         if record.frames {
-            let mut file = Lines::create(folder.file(&format!("{RECORDING}{suffix}")))?;
-            file.add(&json(&header(run, simulation)))?;
-            recording = Some(file);
+            let path = folder.file(&format!("{RECORDING}{suffix}"));
+            let scenario = simulation.scenario().to_toml()?;
+            let writer = Writer::create(&path, &header(run, simulation), &scenario);
+            recording = Some(writer.map_err(unrecordable)?);
         }
 
         Ok(Self {
@@ -404,6 +408,9 @@ impl Recorder {
             let draft = self.folder.file(&format!("{name}{DRAFT}"));
             std::fs::rename(&draft, self.folder.file(&name))
                 .map_err(|error| unwritable(&draft, &error))?;
+        }
+        if let Some(recording) = &mut self.recording {
+            recording.renamed(&self.folder.file(RECORDING));
         }
         Ok(())
     }
@@ -436,10 +443,14 @@ impl Recorder {
         self.write_log(&lines)?;
 
         // The event of the end belongs to the last tick, which is recorded already.
-        let is_end = matches!(record.events.last(), Some(Event::End { .. }));
-        if !is_end && let Some(recording) = &mut self.recording {
-            recording.add(&json(&recorded(simulation)))?;
-            recording.flush()?;
+        let end = record.events.last();
+        let is_end = matches!(end, Some(Event::End { .. }));
+        if is_end && let Some(recording) = self.recording.take() {
+            recording.finish(record.tick, end).map_err(unrecordable)?;
+        }
+        if let Some(recording) = &mut self.recording {
+            let tick = recorded(simulation, record);
+            recording.tick(&tick).map_err(unrecordable)?;
         }
 
         if is_end || self.is_sync_due() {
@@ -477,8 +488,11 @@ impl Recorder {
 
     fn sync(&mut self) -> Result<(), FileError> {
         self.events.sync()?;
-        for file in [&self.log, &self.recording].into_iter().flatten() {
-            file.sync()?;
+        if let Some(log) = &self.log {
+            log.sync()?;
+        }
+        if let Some(recording) = &mut self.recording {
+            recording.sync().map_err(unrecordable)?;
         }
 
         self.synced_at = Instant::now();
@@ -529,7 +543,7 @@ fn superseded_prefix(file: &str) -> String {
     format!("{}-epoch", file.split('.').next().unwrap_or(file))
 }
 
-fn unwritable(path: &Path, error: &std::io::Error) -> FileError {
+fn unwritable(path: &Path, error: &dyn std::fmt::Display) -> FileError {
     let place = path.display();
     FileError::new(format!("cannot write {place}: {error}")).with_help(format!(
         "what was recorded before is kept; `cars check {}` says how far it is good",
@@ -537,52 +551,67 @@ fn unwritable(path: &Path, error: &std::io::Error) -> FileError {
     ))
 }
 
-fn json(value: &impl serde::Serialize) -> String {
-    serde_json::to_string(value)
-        .unwrap_or_else(|error| unreachable!("a record is always JSON: {error}"))
+fn unrecordable(error: WriteError) -> FileError {
+    unwritable(&error.path, &error.error)
 }
 
-fn header(run: &RunName, simulation: &Simulation) -> RecordingHeader {
+fn header(run: &RunName, simulation: &Simulation) -> Header {
     let scenario = simulation.scenario();
-    RecordingHeader {
+    Header {
         run: run.clone(),
         epoch: simulation.epoch(),
         seed: scenario.seed,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        commit: option_env!("CARS_COMMIT").map(str::to_owned),
+        protocol: PROTOCOL_VERSION,
         tick_s: scenario.tick_s,
         duration_s: scenario.duration_s(),
         field_m: scenario.field_m,
         body_m: scenario.body_m,
         obstacles: scenario.obstacles.iter().map(|at| [at.x, at.y]).collect(),
+        robots: simulation.names().to_vec(),
     }
 }
 
-fn recorded(simulation: &Simulation) -> RecordedTick {
-    let names = simulation.names().iter();
-    let robots = names.filter_map(|name| recorded_robot(simulation, name));
+fn recorded(simulation: &Simulation, record: &TickRecord) -> RecordedTick {
+    let mut robots = Vec::new();
+    let mut reports = BTreeMap::new();
+    for name in simulation.names() {
+        let last = simulation.report(name);
+        let report = last.filter(|report| report.tick == record.tick);
+        if let Some(report) = report {
+            reports.insert(name.clone(), report.clone());
+        }
+        robots.push(PlacedRobot {
+            name: name.clone(),
+            location: simulation.location(name).unwrap_or_default(),
+            blocked: simulation.is_blocked(name),
+            missed: report.is_none().then(|| Missed {
+                last_report: last.map(|report| report.tick),
+            }),
+        });
+    }
+
+    RecordedTick {
+        frame: Frame {
+            tick: record.tick,
+            robots,
+            guests_mm: guests_mm(simulation),
+            cuts: simulation.cuts(),
+            unreachable: simulation.unreachable().clone(),
+        },
+        events: record.events.clone(),
+        reports,
+        panels: BTreeMap::new(),
+        wall: Wall::default(),
+    }
+}
+
+fn guests_mm(simulation: &Simulation) -> Vec<i64> {
     let mut guests_mm = Vec::new();
     for guest in simulation.world().guests() {
         guests_mm.push((guest.x * 1000.0).round() as i64);
         guests_mm.push((guest.y * 1000.0).round() as i64);
     }
-
-    RecordedTick {
-        tick: simulation.tick(),
-        robots: robots.collect(),
-        guests_mm,
-    }
-}
-
-fn recorded_robot(simulation: &Simulation, name: &RobotName) -> Option<RecordedRobot> {
-    let report = simulation.report(name)?;
-    Some(RecordedRobot {
-        name: name.clone(),
-        location: simulation.location(name)?,
-        speed_mps: report.speed_mps,
-        direction_rad: report.direction_rad,
-        blocked: simulation.is_blocked(name),
-        missed: report.tick != simulation.tick(),
-        emotion_state: report.emotion_state.clone(),
-        behavior_state: report.behavior_state.clone(),
-        state_variables: report.state_variables.clone(),
-    })
+    guests_mm
 }

@@ -452,7 +452,8 @@ class Leguin(cars_robot.Robot):
         parameters, dynamics = self.parameters, self.parameters.dynamics
         if parameters.policy == "emotion" and parameters.sensory_motor == "on":
             return motor_gain(self.feeling, parameters.hurry_mult, dynamics.haste_onset, dynamics.haste_full)
-        hurries = parameters.policy in ("rules", "timer") and self.hurried
+        is_concerning = self.hurried or self.measures.blocked >= dynamics.th_concerned
+        hurries = is_concerning if parameters.policy == "rules" else parameters.policy == "timer" and self.hurried
         return parameters.hurry_mult if hurries else 1.0
 
     # What others see.

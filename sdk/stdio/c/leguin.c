@@ -620,7 +620,7 @@ static void say(const char *bytes, size_t length)
 
 #define FT_M 0.3048
 
-/* What her speed and her giving up follow from. RULES and TIMER are the same for her. */
+/* What her speed and her giving up follow from. By RULES she also hurries when her way is blocked. */
 enum policy { BY_EMOTION, BY_RULES, BY_TIMER, BY_NEITHER };
 static const char *const POLICY_NAMES[] = {"emotion", "rules", "timer", "neither"};
 
@@ -1262,6 +1262,7 @@ static double haste(void)
     case BY_EMOTION:
         return told.parameters.sensory_motor ? emotional_haste() : 1.0;
     case BY_RULES:
+        return her.hurried || her.measures.blocked >= her.measures.th_concerned ? told.parameters.hurry_mult : 1.0;
     case BY_TIMER:
         return her.hurried ? told.parameters.hurry_mult : 1.0;
     default:

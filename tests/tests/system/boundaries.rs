@@ -12,14 +12,23 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
     ("bus", &["protocol"]),
+    ("recording", &["protocol"]),
     ("terminal", &["protocol"]),
     ("robot", &["bus", "lockstep", "protocol", "terminal"]),
     ("robots", &["robot", "affect", "lockstep", "protocol"]),
     (
         "simulator",
-        &["world", "bus", "config", "lockstep", "protocol", "terminal"],
+        &[
+            "world",
+            "bus",
+            "config",
+            "lockstep",
+            "protocol",
+            "recording",
+            "terminal",
+        ],
     ),
-    ("console", &["bus", "protocol", "terminal"]),
+    ("console", &["bus", "protocol", "recording", "terminal"]),
     ("conform", &["bus", "lockstep", "protocol"]),
     (
         "launch",
@@ -41,6 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "affect",
             "config",
             "protocol",
+            "recording",
         ],
     ),
     (
@@ -70,6 +80,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "lockstep",
             "bus",
             "protocol",
+            "recording",
         ],
     ),
 ];

@@ -413,11 +413,14 @@ impl Leguin {
     /// The factor on her speed, by her policy.
     fn haste(&self) -> f64 {
         let parameters = &self.parameters;
+        let measures = &self.state.measures;
+        let is_concerning = self.state.hurried || measures.blocked >= measures.th_concerned;
         match parameters.policy {
             Policy::Emotion if parameters.sensory_motor.is_on() => {
                 self.haste.gain(self.feeling().affect())
             }
-            Policy::Rules | Policy::Timer if self.state.hurried => parameters.hurry_mult,
+            Policy::Rules if is_concerning => parameters.hurry_mult,
+            Policy::Timer if self.state.hurried => parameters.hurry_mult,
             Policy::Emotion | Policy::Rules | Policy::Timer | Policy::Neither => 1.0,
         }
     }

@@ -21,7 +21,8 @@ pub struct Parameters {
     pub goods: String,
     /// Whether she has emotions. Default on \[I\].
     pub affect: Switch,
-    /// What her speed and her giving up follow from; `rules` and `timer` are the same for her. Default emotion \[D\].
+    /// What her speed and her giving up follow from. `rules` and `timer` give up alike; by `rules` she also hurries when her
+    /// way is blocked, as she does when that makes her CONCERNED. Default emotion \[D\].
     pub policy: Policy,
     /// Emotions that she shows and acts by in the place of her own, for experiments. Default none \[I\].
     #[serde(skip_serializing_if = "Script::is_empty")]

@@ -1,0 +1,22 @@
+//! The recording of an epoch of a run, `run.mcap`: what it contains ([`content`]), and how it is written ([`Writer`]) and
+//! read ([`Recording`]).
+//!
+//! The file is MCAP. Its times are simulated. Chunks end at the end of a tick, so a file that was cut off by a crash has
+//! complete ticks up to its last complete chunk.
+
+pub mod content;
+mod damage;
+mod index;
+mod read;
+mod topic;
+mod write;
+
+pub use content::{Frame, Header, PlacedRobot, RecordedTick, Wall};
+pub use damage::RecordingError;
+pub use read::Recording;
+pub use write::{WriteError, Writer};
+
+/// Name of the attached scenario.
+pub const SCENARIO: &str = "scenario.toml";
+/// Name of the metadata record.
+pub const METADATA: &str = "cars";

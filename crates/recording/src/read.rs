@@ -1,0 +1,357 @@
+//! Reads a recording.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::Path;
+
+use mcap::records::{Record, op};
+use protocol::messages::{Panel, Report};
+use protocol::{Line, RobotName, Tick};
+use serde::de::DeserializeOwned;
+
+use crate::content::{Frame, Header, RecordedTick, Wall};
+use crate::damage::{Name, RecordingError};
+use crate::index::{Bytes, Chunk};
+use crate::topic::Topic;
+
+/// The recording of an epoch. Only where its parts are is kept in memory.
+#[derive(Debug)]
+pub struct Recording {
+    bytes: Bytes,
+    header: Header,
+    topics: BTreeMap<u16, Topic>,
+    /// The chunks with ticks, in their order.
+    chunks: Vec<TickChunk>,
+    scenario: Option<u64>,
+    is_finished: bool,
+}
+
+/// A chunk and its first and last tick.
+#[derive(Debug)]
+struct TickChunk {
+    chunk: Chunk,
+    first: Tick,
+    last: Tick,
+}
+
+/// A message of a chunk.
+struct Message<'a> {
+    channel: u16,
+    time_ns: u64,
+    json: &'a [u8],
+}
+
+/// A tick of which not everything has been read yet.
+#[derive(Default)]
+struct Partial {
+    frame: Option<Frame>,
+    wall: Option<Wall>,
+    events: Vec<protocol::Event>,
+    reports: BTreeMap<RobotName, Report>,
+    panels: BTreeMap<RobotName, Panel>,
+}
+
+impl Recording {
+    /// Opens a recording. One that was cut off, by a crash of the simulator, has the ticks of its complete chunks.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if the file cannot be read, is not a recording, or is damaged.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let name = Name::of(path);
+        let file = File::open(path).map_err(|error| name.unreadable(error))?;
+        let bytes = Bytes::new(name, file)?;
+        let index = bytes.index()?;
+
+        let mut chunks = index.chunks.into_iter();
+        let preamble = chunks.next().ok_or_else(|| bytes.name.headless())?;
+        let (header, topics) = read_preamble(&bytes, &preamble)?;
+        let chunks = tick_chunks(&bytes.name, &header, chunks)?;
+
+        Ok(Self {
+            bytes,
+            header,
+            topics,
+            chunks,
+            scenario: index.scenario,
+            is_finished: index.is_finished,
+        })
+    }
+
+    /// What does not change during the epoch.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Whether the file was finished; otherwise the simulator was killed, or the run is in progress.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.is_finished
+    }
+
+    /// Number of complete ticks. The first one is tick 0.
+    #[must_use]
+    pub fn len(&self) -> u64 {
+        self.chunks.last().map_or(0, |chunk| chunk.last + 1)
+    }
+
+    /// Whether no tick is complete.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.chunks.is_empty()
+    }
+
+    /// The scenario of the epoch, as a file.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if it cannot be read or is damaged.
+    pub fn scenario(&self) -> Result<String, RecordingError> {
+        let offset = self.scenario.ok_or_else(|| self.bytes.name.headless())?;
+        let text = self.bytes.attachment(offset)?;
+        String::from_utf8(text).map_err(|error| self.bytes.name.damaged(offset, error))
+    }
+
+    /// Reads the ticks from `from` up to and excluding `to`; fewer if the recording ends before.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if they cannot be read or are damaged.
+    pub fn read(&self, from: Tick, to: Tick) -> Result<Vec<RecordedTick>, RecordingError> {
+        let to = to.min(self.len());
+        let mut ticks = Vec::new();
+        let mut next = from;
+        let mut partial: BTreeMap<Tick, Partial> = BTreeMap::new();
+
+        for chunk in self.chunks_of(from, to) {
+            self.read_chunk(chunk, from, to, &mut partial)?;
+            // A further chunk may go on with the last tick of this one.
+            let complete = partial.split_off(&chunk.last);
+            for (tick, parts) in std::mem::replace(&mut partial, complete) {
+                ticks.push(self.whole(tick, next, parts, chunk)?);
+                next += 1;
+            }
+        }
+        if let Some(last) = self.chunks_of(from, to).last() {
+            for (tick, parts) in partial {
+                ticks.push(self.whole(tick, next, parts, last)?);
+                next += 1;
+            }
+        }
+
+        if next < to {
+            return Err(self.bytes.name.no_such_tick(next, self.len()));
+        }
+        Ok(ticks)
+    }
+
+    fn chunks_of(&self, from: Tick, to: Tick) -> &[TickChunk] {
+        let begin = self.chunks.partition_point(|chunk| chunk.last < from);
+        let end = self.chunks.partition_point(|chunk| chunk.first < to);
+        self.chunks.get(begin..end).unwrap_or_default()
+    }
+
+    /// Adds what a chunk has of a range of ticks.
+    fn read_chunk(
+        &self,
+        chunk: &TickChunk,
+        from: Tick,
+        to: Tick,
+        ticks: &mut BTreeMap<Tick, Partial>,
+    ) -> Result<(), RecordingError> {
+        let content = self.bytes.chunk(&chunk.chunk)?;
+        let messages =
+            messages(&content).ok_or_else(|| self.damaged(chunk, "a length is wrong"))?;
+
+        for message in messages {
+            let tick = self.header.tick_at(message.time_ns);
+            if !(chunk.first..=chunk.last).contains(&tick) {
+                return Err(self.damaged(chunk, "a message of another tick"));
+            }
+            if !(from..to).contains(&tick) {
+                continue;
+            }
+            if let Some(topic) = self.topics.get(&message.channel) {
+                let partial = ticks.entry(tick).or_default();
+                partial
+                    .add(topic, message.json)
+                    .map_err(|error| self.damaged(chunk, error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A tick of which everything has been read.
+    fn whole(
+        &self,
+        tick: Tick,
+        expected: Tick,
+        parts: Partial,
+        chunk: &TickChunk,
+    ) -> Result<RecordedTick, RecordingError> {
+        let is_expected = tick == expected;
+        let frame = parts
+            .frame
+            .filter(|frame| is_expected && frame.tick == tick);
+        let frame =
+            frame.ok_or_else(|| self.damaged(chunk, format!("tick {expected} is missing")))?;
+
+        Ok(RecordedTick {
+            frame,
+            events: parts.events,
+            reports: parts.reports,
+            panels: parts.panels,
+            wall: parts.wall.unwrap_or_default(),
+        })
+    }
+
+    /// The report of a robot for a tick; `None` if it has none.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if it cannot be read or is damaged.
+    pub fn report(&self, robot: &RobotName, tick: Tick) -> Result<Option<Report>, RecordingError> {
+        let mut ticks = self.read(tick, tick.saturating_add(1))?;
+        Ok(ticks.pop().and_then(|mut tick| tick.reports.remove(robot)))
+    }
+
+    /// The newest panel of a robot at the end of a tick; `None` if none was recorded until then.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if it cannot be read or is damaged.
+    pub fn panel(&self, robot: &RobotName, tick: Tick) -> Result<Option<Panel>, RecordingError> {
+        let wanted = Topic::Panel(robot.clone());
+        let channel = self.topics.iter().find(|(_, topic)| **topic == wanted);
+        let Some((channel, _)) = channel else {
+            return Ok(None);
+        };
+
+        for chunk in self.chunks_of(0, tick.saturating_add(1)).iter().rev() {
+            if !chunk.chunk.channels.contains(channel) {
+                continue;
+            }
+            let content = self.bytes.chunk(&chunk.chunk)?;
+            let messages =
+                messages(&content).ok_or_else(|| self.damaged(chunk, "a length is wrong"))?;
+            for message in messages.iter().rev() {
+                if message.channel == *channel && self.header.tick_at(message.time_ns) <= tick {
+                    let panel = parse(message.json).map_err(|error| self.damaged(chunk, error))?;
+                    return Ok(Some(panel));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn damaged(&self, chunk: &TickChunk, reason: impl ToString) -> RecordingError {
+        self.bytes.name.damaged(chunk.chunk.offset, reason)
+    }
+}
+
+impl Partial {
+    fn add(&mut self, topic: &Topic, json: &[u8]) -> Result<(), serde_json::Error> {
+        match topic {
+            Topic::Header => {}
+            Topic::Frame => self.frame = Some(parse(json)?),
+            Topic::Wall => self.wall = Some(parse(json)?),
+            Topic::Events => self.events.push(parse::<Line>(json)?.event),
+            Topic::Report(robot) => {
+                self.reports.insert(robot.clone(), parse(json)?);
+            }
+            Topic::Panel(robot) => {
+                self.panels.insert(robot.clone(), parse(json)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The header and the channels, which are in the first chunk.
+fn read_preamble(
+    bytes: &Bytes,
+    chunk: &Chunk,
+) -> Result<(Header, BTreeMap<u16, Topic>), RecordingError> {
+    let damaged = |reason: String| bytes.name.damaged(chunk.offset, reason);
+
+    let content = bytes.chunk(chunk)?;
+    let mut topics = BTreeMap::new();
+    for (_, body) in records(&content)
+        .ok_or_else(|| damaged("a length is wrong".to_owned()))?
+        .into_iter()
+        .filter(|(op, _)| *op == op::CHANNEL)
+    {
+        let record = mcap::parse_record(op::CHANNEL, body);
+        let Ok(Record::Channel(channel)) = record else {
+            return Err(damaged("a channel cannot be read".to_owned()));
+        };
+        if let Some(topic) = Topic::parse(&channel.topic) {
+            topics.insert(channel.id, topic);
+        }
+    }
+
+    for message in messages(&content).unwrap_or_default() {
+        if topics.get(&message.channel) == Some(&Topic::Header) {
+            let header: Header = parse(message.json).map_err(|error| damaged(error.to_string()))?;
+            if header.tick_s.is_finite() && header.tick_s > 0.0 {
+                return Ok((header, topics));
+            }
+            return Err(damaged(format!("a tick cannot last {} s", header.tick_s)));
+        }
+    }
+    Err(bytes.name.headless())
+}
+
+/// The chunks with their ticks, of which none may be left out. The end of a run may be in a chunk of its own, with the last
+/// tick.
+fn tick_chunks(
+    name: &Name,
+    header: &Header,
+    chunks: impl Iterator<Item = Chunk>,
+) -> Result<Vec<TickChunk>, RecordingError> {
+    let mut found: Vec<TickChunk> = Vec::new();
+    for chunk in chunks {
+        let first = header.tick_at(chunk.start_ns);
+        let last = header.tick_at(chunk.end_ns);
+        let before = found.last().map(|chunk| chunk.last);
+        let due = before.map_or(0, |tick| tick + 1);
+        let goes_on = before == Some(first) && first == last;
+        if last < first || (first != due && !goes_on) {
+            let reason = format!("ticks {first} to {last} where tick {due} is due");
+            return Err(name.damaged(chunk.offset, reason));
+        }
+        found.push(TickChunk { chunk, first, last });
+    }
+    Ok(found)
+}
+
+/// The records of a chunk, each with its operation code; `None` if a length is wrong.
+fn records(content: &[u8]) -> Option<Vec<(u8, &[u8])>> {
+    let mut records = Vec::new();
+    let mut rest = content;
+    while !rest.is_empty() {
+        let (head, after) = rest.split_at_checked(9)?;
+        let len = u64::from_le_bytes(head[1..].try_into().ok()?);
+        let (body, after) = after.split_at_checked(usize::try_from(len).ok()?)?;
+        records.push((head[0], body));
+        rest = after;
+    }
+    Some(records)
+}
+
+/// The messages of a chunk; `None` if a length is wrong.
+fn messages(content: &[u8]) -> Option<Vec<Message<'_>>> {
+    let mut messages = Vec::new();
+    for (op, body) in records(content)? {
+        if op != op::MESSAGE {
+            continue;
+        }
+        let (head, json) = body.split_at_checked(2 + 4 + 8 + 8)?;
+        messages.push(Message {
+            channel: u16::from_le_bytes(head[..2].try_into().ok()?),
+            time_ns: u64::from_le_bytes(head[6..14].try_into().ok()?),
+            json,
+        });
+    }
+    Some(messages)
+}
+
+fn parse<T: DeserializeOwned>(json: &[u8]) -> Result<T, serde_json::Error> {
+    serde_json::from_slice(json)
+}

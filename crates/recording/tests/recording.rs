@@ -1,0 +1,287 @@
+//! Recordings as they are written and read, whole, cut off and damaged.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use protocol::messages::{
+    Awaited, Cut, End, Panel, Performative, Point, Reason, Report, Variable, Widget,
+};
+use protocol::{Event, RobotName, RunName, Tick};
+use recording::content::Missed;
+use recording::{
+    Frame, Header, PlacedRobot, RecordedTick, Recording, RecordingError, Wall, Writer,
+};
+
+const SCENARIO: &str = "seed = 7\n";
+/// Enough for several chunks.
+const TICKS: Tick = 3000;
+
+fn name(name: &str) -> RobotName {
+    RobotName::new(name).unwrap()
+}
+
+fn header() -> Header {
+    Header {
+        run: RunName::new("hall").unwrap(),
+        epoch: 2,
+        seed: 7,
+        version: "1.2.3".to_owned(),
+        commit: Some("abc".to_owned()),
+        protocol: 2,
+        tick_s: 0.1,
+        duration_s: 300.0,
+        field_m: [30.0, 20.0],
+        body_m: 0.5,
+        obstacles: vec![[1.0, 2.0]],
+        robots: vec![name("Butler"), name("Leguin")],
+    }
+}
+
+fn report(tick: Tick) -> Report {
+    Report {
+        epoch: 2,
+        tick,
+        generation: 1 + (tick / 1000) as u32,
+        proposal: Point {
+            x: (tick as f64).sqrt(),
+            y: 1.0 / (1.0 + tick as f64),
+        },
+        speed_mps: 0.1,
+        direction_rad: -0.000_001,
+        emotion_state: "HAPPY".to_owned(),
+        behavior_state: format!("behavior-{}", tick % 7),
+        state_variables: [
+            ("treats".to_owned(), Variable::Number(tick as f64)),
+            ("is_full".to_owned(), Variable::Flag(tick % 2 == 0)),
+        ]
+        .into(),
+        commands: (tick % 3) as u32,
+        log: vec![format!("line {tick}")],
+    }
+}
+
+/// A tick; Leguin misses every tenth one.
+fn tick(tick: Tick) -> RecordedTick {
+    let is_missed = tick % 10 == 9;
+    let mut reports = BTreeMap::from([(name("Butler"), report(tick))]);
+    if !is_missed {
+        reports.insert(name("Leguin"), report(tick));
+    }
+    let mut panels = BTreeMap::new();
+    if tick == 5 || tick == 1234 {
+        let label = format!("panel {tick}");
+        let text = String::new();
+        let widgets = vec![Widget::Text { label, text }];
+        panels.insert(name("Leguin"), Panel { widgets });
+    }
+
+    RecordedTick {
+        frame: Frame {
+            tick,
+            robots: vec![
+                PlacedRobot {
+                    name: name("Butler"),
+                    location: Point { x: 0.1, y: 0.3 },
+                    blocked: tick % 4 == 0,
+                    missed: None,
+                },
+                PlacedRobot {
+                    name: name("Leguin"),
+                    location: Point { x: 0.7, y: 1e-9 },
+                    blocked: false,
+                    missed: is_missed.then_some(Missed {
+                        last_report: tick.checked_sub(1),
+                    }),
+                },
+            ],
+            guests_mm: (0..40)
+                .map(|i| (i * 7919 + tick as i64 * 31) % 29_989)
+                .collect(),
+            cuts: vec![Cut {
+                from: name("Butler"),
+                to: name("Leguin"),
+                commands: true,
+                queries: false,
+            }],
+            unreachable: [(name("Butler"), vec![name("Leguin")])].into(),
+        },
+        events: vec![
+            Event::CommandSent {
+                from: name("Leguin"),
+                to: name("Butler"),
+                seq: tick,
+                performative: Performative::Achieve,
+                command: "come".to_owned(),
+            },
+            Event::Tick {
+                digest: format!("{tick:032x}"),
+                seal: None,
+            },
+        ],
+        reports,
+        panels,
+        wall: Wall {
+            opened_ns: tick * 1000,
+            completed_ns: tick * 1000 + 500,
+            reports_ns: [(name("Butler"), tick * 1000 + 400)].into(),
+            awaited: vec![Awaited {
+                name: name("Butler"),
+                since_s: 0.5,
+                because: Reason::Silent,
+            }],
+        },
+    }
+}
+
+fn end() -> Event {
+    Event::End {
+        reason: End::Finished,
+        digest: "0".repeat(32),
+        seal: None,
+    }
+}
+
+/// The tick as it is read: the last one has the end of the run.
+fn expected(number: Tick, ticks: Tick) -> RecordedTick {
+    let mut expected = tick(number);
+    if number + 1 == ticks {
+        expected.events.push(end());
+    }
+    expected
+}
+
+fn write(folder: &Path, ticks: Tick) -> PathBuf {
+    let path = folder.join("run.mcap");
+    let mut writer = Writer::create(&path, &header(), SCENARIO).unwrap();
+    for number in 0..ticks {
+        writer.tick(&tick(number)).unwrap();
+    }
+    writer.finish(ticks - 1, Some(&end())).unwrap();
+    path
+}
+
+#[test]
+fn what_is_read_is_what_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = Recording::open(&write(folder.path(), TICKS)).unwrap();
+
+    assert_eq!(*recording.header(), header());
+    assert_eq!(recording.scenario().unwrap(), SCENARIO);
+    assert!(recording.is_finished());
+    assert_eq!(recording.len(), TICKS);
+    let ticks = recording.read(0, TICKS + 5).unwrap();
+    assert_eq!(ticks.len() as u64, TICKS);
+    for (number, tick) in ticks.into_iter().enumerate() {
+        assert_eq!(tick, expected(number as u64, TICKS));
+    }
+
+    for from in (0..TICKS).step_by(97) {
+        let ticks = recording.read(from, from + 3).unwrap();
+        for (number, tick) in (from..).zip(&ticks) {
+            assert_eq!(*tick, expected(number, TICKS));
+        }
+        assert_eq!(ticks.len() as u64, 3.min(TICKS - from));
+    }
+    assert_eq!(recording.read(TICKS, TICKS + 1).unwrap(), []);
+}
+
+#[test]
+fn the_newest_panel_and_an_old_report_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = Recording::open(&write(folder.path(), TICKS)).unwrap();
+    let leguin = name("Leguin");
+
+    for (at, newest) in [(4, None), (5, Some(5)), (1233, Some(5)), (2999, Some(1234))] {
+        let panel = newest.map(|newest| tick(newest).panels[&leguin].clone());
+        assert_eq!(recording.panel(&leguin, at).unwrap(), panel, "tick {at}");
+    }
+    assert_eq!(recording.panel(&name("Butler"), 2999).unwrap(), None);
+    assert_eq!(recording.panel(&name("Vonda"), 2999).unwrap(), None);
+
+    assert_eq!(recording.report(&leguin, 1008).unwrap(), Some(report(1008)));
+    assert_eq!(recording.report(&leguin, 1009).unwrap(), None);
+}
+
+/// Opens a file with this content; whatever it has must be what was written.
+fn check(folder: &Path, bytes: &[u8], what: &str) -> Result<u64, RecordingError> {
+    let path = folder.join("other.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    let recording = Recording::open(&path)?;
+    assert_eq!(*recording.header(), header(), "{what}");
+    if let Ok(scenario) = recording.scenario() {
+        assert_eq!(scenario, SCENARIO, "{what}");
+    }
+
+    // Range by range, so that the parts before and after damage are read.
+    let mut damage = None;
+    for from in (0..recording.len()).step_by(100) {
+        match recording.read(from, from + 100) {
+            Ok(ticks) => {
+                for (number, found) in (from..).zip(ticks) {
+                    // The end of the run is lost with the chunk that has it.
+                    let is_whole = found == expected(number, TICKS);
+                    assert!(is_whole || found == tick(number), "{what}: tick {number}");
+                }
+            }
+            Err(error) => {
+                let text = error.to_string();
+                let names_place = text.contains("other.mcap") && text.contains(" byte ");
+                assert!(names_place, "{what}: {text}");
+                damage = Some(error);
+            }
+        }
+    }
+    match damage {
+        Some(error) => Err(error),
+        None => Ok(recording.len()),
+    }
+}
+
+#[test]
+fn a_recording_that_was_cut_off_has_its_complete_chunks() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(write(folder.path(), TICKS)).unwrap();
+
+    let mut before = 0;
+    for tenth in 1..10 {
+        let what = format!("{tenth} tenths");
+        let cut = &bytes[..bytes.len() * tenth / 10];
+        let ticks = check(folder.path(), cut, &what).unwrap();
+        assert!((before..=TICKS).contains(&ticks), "{what}: {ticks}");
+        before = ticks;
+    }
+    assert!(before > TICKS / 2, "{before} of {TICKS} ticks");
+
+    // Without anything of the index, all ticks are left.
+    let end = bytes.len() - 100;
+    assert_eq!(
+        check(folder.path(), &bytes[..end], "no end").unwrap(),
+        TICKS
+    );
+    for len in [0, 7, 8, 40] {
+        let error = check(folder.path(), &bytes[..len], "beginning").unwrap_err();
+        assert!(matches!(error, RecordingError::Headless { .. }), "{error}");
+    }
+}
+
+#[test]
+fn a_damaged_byte_is_an_error_that_names_the_place_or_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(write(folder.path(), TICKS)).unwrap();
+
+    let mut errors = 0;
+    let inner = (400..bytes.len() - 400).step_by(bytes.len() / 60);
+    let places = (0..400).step_by(9).chain(inner);
+    for at in places.chain((bytes.len() - 400..bytes.len()).step_by(9)) {
+        for mask in [0x01, 0x80] {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= mask;
+            let what = format!("byte {at} of {} ^ {mask:#x}", bytes.len());
+            if let Err(error) = check(folder.path(), &damaged, &what) {
+                assert!(error.to_string().contains("other.mcap"), "{what}: {error}");
+                errors += 1;
+            }
+        }
+    }
+    assert!(errors > 50, "{errors}");
+}
