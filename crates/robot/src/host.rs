@@ -28,6 +28,9 @@ use crate::network::{Network, Undelivered};
 use crate::seat::{Done, Seat};
 use shared::{HostAction, HostAnswer, Shared, Thread, Waited};
 
+/// Most robots for which a publisher of commands is declared. Without one, zenoh compares each command's key with all keys that
+/// anyone has declared in the network; with one, it does so once.
+const MAX_COMMANDED: usize = 64;
 /// A panel is for eyes: it is put no more often than this.
 const PANEL_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -132,6 +135,8 @@ struct Member {
     report: Publisher,
     state: Publisher,
     panel: Publisher,
+    /// Publishers of the commands to the robots that it has commanded.
+    commands: BTreeMap<RobotName, Publisher>,
     painted: Option<Instant>,
     token: Option<Declared>,
 }
@@ -181,6 +186,7 @@ impl Host {
                 report: bus.publisher(&keys.report(&name))?,
                 state: bus.publisher(&keys.query(&name, STATE))?,
                 panel: bus.observer_publisher(&keys.panel(&name))?,
+                commands: BTreeMap::new(),
                 painted: None,
                 token: None,
             };
@@ -466,8 +472,16 @@ impl Host {
             return Ok(());
         };
         for (to, command) in answer.commands_from(1) {
-            self.bus
-                .put(&self.keys.command(to, name), encode(&command))?;
+            let key = self.keys.command(to, name);
+            if !member.commands.contains_key(to) && member.commands.len() < MAX_COMMANDED {
+                let publisher = self.bus.publisher(&key)?;
+                member.commands.insert(to.clone(), publisher);
+            }
+
+            match member.commands.get(to) {
+                Some(publisher) => publisher.put(encode(&command))?,
+                None => self.bus.put(&key, encode(&command))?,
+            }
         }
         if member.state.has_subscribers() {
             member.state.put(encode(answer.state.as_ref()))?;

@@ -56,12 +56,7 @@ fn is_plain(name: &str) -> bool {
 
 /// Whether another file has the name, or an earlier epoch's file could have it.
 fn is_taken(name: &str) -> bool {
-<<<<<<< HEAD
     let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG, LAUNCHED];
-    let prefixes = ["scenario", "events", "recording"];
-=======
-    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG];
-    let prefixes = ["scenario", "events", "run"];
->>>>>>> e6d0adc337072d9da731c358045acd60925a3cce
+    let prefixes = ["scenario", "events", "run.mcap", "run-epoch"];
     names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))
 }

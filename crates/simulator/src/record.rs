@@ -148,10 +148,7 @@ impl Record {
     }
 
     /// What robots reported for the next tick; `None` where the recording has ended earlier than the events.
-    fn reports(
-        &mut self,
-        tick: Tick,
-    ) -> Result<Option<BTreeMap<RobotName, Report>>, FileError> {
+    fn reports(&mut self, tick: Tick) -> Result<Option<BTreeMap<RobotName, Report>>, FileError> {
         let Some(recording) = &self.recording else {
             return Ok(None);
         };
@@ -161,7 +158,8 @@ impl Record {
             let ticks = recording
                 .read(tick, to)
                 .map_err(|error| unreadable(&error))?;
-            self.ahead.extend(ticks.into_iter().map(|tick| tick.reports));
+            self.ahead
+                .extend(ticks.into_iter().map(|tick| tick.reports));
         }
         Ok(self.ahead.pop_front())
     }

@@ -8,6 +8,7 @@ use protocol::keys::Keys;
 use protocol::messages::Clock;
 use protocol::{RunName, encode};
 use system_tests::processes::{nobody_is_left, send};
+use system_tests::stalls::Stalls;
 use system_tests::{Lab, PATIENCE, assert_same, root, side_by_side};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
@@ -597,4 +598,47 @@ fn a_stopped_simulator_is_named_while_it_is_stopped_and_afterwards() {
         ("stopped", &lab.bytes("sim-stopped")),
         ("undisturbed", &lab.bytes("sim-undisturbed")),
     );
+}
+
+/// What robots answered before the stop, or in it, arrives after the deadline: they are not late.
+#[test]
+fn a_stopped_simulator_misses_no_robot() {
+    const STOPS: usize = 12;
+    const DEADLINE: Duration = Duration::from_millis(700);
+    // Shorter than the lease of a link, which would lose every robot.
+    const STOP: Duration = Duration::from_millis(1000);
+
+    let lab = Lab::new();
+    let run = "sim-stops";
+    let deadline = format!("deadline={} s", DEADLINE.as_secs_f64());
+    // At this speed a tick is open nearly always.
+    let mut args = vec!["launch", FILE, "--speed", "max", "--duration", "1000000 s"];
+    args.extend(["--set", "on_late=continue", "--set", &deadline]);
+    args.extend(["--set", "record.frames=false"]);
+    let stalls = Stalls::watch();
+    let mut launch = lab.start(run, &args);
+    launch.prints("behavior");
+    let simulator = launch.process("cars-sim");
+    for _ in 0..STOPS {
+        send(simulator, Signal::SIGSTOP);
+        std::thread::sleep(STOP);
+        send(simulator, Signal::SIGCONT);
+        lab.ok(&["ctl", "status", "--run", run]);
+    }
+    lab.ok(&["ctl", "stop", "--run", run]);
+    launch.finish();
+
+    let events = lab.events(run);
+    let late = events
+        .iter()
+        .filter(|event| event["event"] == "missed" || event["event"] == "lost");
+    let late = late.count();
+    println!(
+        "{STOPS} stops, {} ticks, {late} late",
+        events.last().unwrap()["tick"]
+    );
+    // A machine that stands still keeps the robots waiting, too.
+    let is_disturbed = stalls.longer_than(DEADLINE / 2) > 0;
+    assert!(late == 0 || is_disturbed, "{late} robots were late");
+    nobody_is_left(run);
 }

@@ -14,6 +14,7 @@ mod boundaries;
 mod browser;
 mod conform;
 mod control;
+mod dependencies;
 mod determinism;
 mod exec;
 mod experiment;

@@ -2,7 +2,8 @@
 //! from a seed. Nothing hangs, ticks follow the last fault, no process is left behind, and the record is whole.
 //!
 //! Each seed is one launch. A few fixed ones are always played. `CARS_NEMESIS_S=60` plays launches for so many seconds, with
-//! seeds from the clock on; `CARS_NEMESIS_SEED=17` begins with this one, and alone plays only it.
+//! seeds from the clock on; `CARS_NEMESIS_SEED=17` begins with this one, and alone plays only it. `CARS_NEMESIS_BURST=5000`
+//! floods with 20,000 messages at a time instead of 2,000.
 
 mod cable;
 mod damage;
@@ -11,6 +12,7 @@ mod rogue;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -26,7 +28,7 @@ use plan::{Fault, Flood, Plan};
 use rogue::Rogue;
 
 /// Launches of the short version: every size, both policies, plain and secured, every kind of fault.
-const SHORT: [u64; 5] = [1, 2, 8, 17, 26];
+const SHORT: [u64; 5] = [0, 1, 3, 4, 8];
 /// Ticks that must follow the last fault.
 const FOLLOWING: u64 = 20;
 /// Within this time.
@@ -37,6 +39,8 @@ const RETURN: Duration = Duration::from_secs(30);
 const FLOOD: Duration = Duration::from_secs(60);
 /// A stop or a cut lasts for at least so many ticks where the clock goes on, so that the robot misses one of them.
 const MISSED: u64 = 3;
+/// Messages of a burst of a flood, unless `CARS_NEMESIS_BURST` states another number.
+const BURST: usize = 500;
 /// Length of a tick, simulated seconds.
 const TICK_S: f64 = 0.5;
 
@@ -99,6 +103,16 @@ fn certificates(lab: &Lab, robots: &[RobotName]) -> PathBuf {
     folder
 }
 
+/// What was played so far: how often each fault, how many messages, files and records.
+#[derive(Default)]
+struct Counts(BTreeMap<String, usize>);
+
+impl Counts {
+    fn add(&mut self, what: &str, count: usize) {
+        *self.0.entry(what.to_owned()).or_default() += count;
+    }
+}
+
 /// A launch whose robots have a link each, and what happens to it.
 struct Hall<'a> {
     lab: &'a Lab,
@@ -106,7 +120,7 @@ struct Hall<'a> {
     launch: Running,
     cables: Vec<Cable>,
     rogue: Rogue,
-    floods: Vec<JoinHandle<usize>>,
+    floods: Vec<(Flood, JoinHandle<usize>)>,
 }
 
 impl<'a> Hall<'a> {
@@ -140,6 +154,7 @@ impl<'a> Hall<'a> {
             stolen,
             run: RunName::new(run).unwrap(),
             robots,
+            burst: number("CARS_NEMESIS_BURST").map_or(BURST, |burst| burst as usize),
         };
 
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
@@ -197,11 +212,12 @@ impl<'a> Hall<'a> {
                         self.pass(MISSED);
                     }
                 }
+                Fault::Starve(lasting) => self.starve(lasting),
                 Fault::Flood(flood) => {
                     let rogue = self.rogue.clone();
                     let seed = plan.seed.wrapping_add(number as u64);
-                    let flood = std::thread::spawn(move || rogue.flood(flood, seed));
-                    self.floods.push(flood);
+                    let flooding = std::thread::spawn(move || rogue.flood(flood, seed));
+                    self.floods.push((flood, flooding));
                 }
             }
             if let Fault::Kill(robot) | Fault::Stop(robot, _) | Fault::Cut(robot, _) = fault {
@@ -232,6 +248,16 @@ impl<'a> Hall<'a> {
         send(pid, Signal::SIGCONT);
     }
 
+    /// Lowers the simulator's limit of open files below what it has open, for this long.
+    fn starve(&self, lasting: Duration) {
+        let simulator = self.launch.process("cars-sim").to_string();
+        let limit = prlimit(&simulator, &["--nofile", "--output=SOFT", "--noheadings"]);
+
+        prlimit(&simulator, &["--nofile=3:"]);
+        std::thread::sleep(lasting);
+        prlimit(&simulator, &[&format!("--nofile={}:", limit.trim())]);
+    }
+
     /// The process of a robot. One that was killed is restarted.
     fn process(&self, robot: usize) -> u32 {
         let name = format!("R{robot}");
@@ -241,7 +267,7 @@ impl<'a> Hall<'a> {
     }
 
     /// Waits until every fault is over.
-    fn heal(&mut self) {
+    fn heal(&mut self, plan: &Plan, counts: &mut Counts) {
         eventually("the end of the cuts", || {
             for cable in &mut self.cables {
                 cable.heal_if_due();
@@ -249,12 +275,18 @@ impl<'a> Hall<'a> {
             (!self.cables.iter().any(Cable::is_cut)).then_some(())
         });
 
-        for flood in self.floods.drain(..) {
+        for (flood, flooding) in self.floods.drain(..) {
             within(FLOOD, "the end of a flood", || {
-                flood.is_finished().then_some(())
+                flooding.is_finished().then_some(())
             });
-            let count = flood.join().expect("the flood goes as planned");
+            let count = flooding.join().expect("the flood goes as planned");
             println!("{}: a flood of {count}", self.run);
+
+            let what = match flood {
+                Flood::Silent => "silent connections",
+                Flood::Rubbish | Flood::Stale | Flood::Forged => "rogue messages",
+            };
+            counts.add(&format!("{what}, {}", plan.security()), count);
         }
     }
 
@@ -309,12 +341,31 @@ impl<'a> Hall<'a> {
         }
     }
 
-    /// Ends the run. Nothing is left behind.
+    /// Ends the run. Nothing is left behind, and no program has panicked.
     fn finish(mut self) {
         self.lab.ok(&["ctl", "stop", "--run", &self.run]);
         self.launch.finish();
         nobody_is_left(&self.run);
+
+        let printed = self.launch.printed();
+        assert!(!printed.contains("panicked"), "{printed}");
+        for log in std::fs::read_dir(self.lab.file(&self.run, "logs")).unwrap() {
+            let log = log.unwrap().path();
+            let bytes = std::fs::read(&log).unwrap();
+            let text = String::from_utf8_lossy(&bytes);
+            assert!(!text.contains("panicked"), "{}: {text}", log.display());
+        }
     }
+}
+
+/// Reads or sets a limit of a process. Returns what is printed.
+fn prlimit(pid: &str, arguments: &[&str]) -> String {
+    let mut command = Command::new("prlimit");
+    let output = command.args(["--pid", pid]).args(arguments).output();
+    let output = output.expect("prlimit is part of every Linux distribution");
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+
+    String::from_utf8(output.stdout).unwrap()
 }
 
 /// The status of a run, if it replies.
@@ -347,15 +398,15 @@ impl Drop for Repeat {
     }
 }
 
-/// Plays the launch of a seed.
-fn play(plan: &Plan) {
+/// Plays the launch of a seed, and counts what happened.
+fn play(plan: &Plan, counts: &mut Counts) {
     let lab = Lab::new();
     let run = format!("nemesis-{}", plan.seed);
     let files = write_files(&lab, plan);
 
     let mut hall = Hall::start(&lab, &run, plan, &files);
     let struck = hall.strike(plan);
-    hall.heal();
+    hall.heal(plan, counts);
     hall.recovers();
     hall.has_ignored_floods(plan);
     hall.finish();
@@ -365,13 +416,19 @@ fn play(plan: &Plan) {
     assert_eq!(code, 0, "{text}");
     if plan.waits() {
         check_record(&lab, &run, &BTreeSet::new());
-        check_undisturbed(&lab, &run, &files.scenario);
+        let compared = check_undisturbed(&lab, &run, &files.scenario);
+        counts.add(&format!("equal records, {}", plan.security()), 1);
+        counts.add("bytes of equal records", compared);
     } else {
         check_record(&lab, &run, &struck);
     }
 
     damage::record(&lab, &run, plan.seed);
-    damage::files(&lab, plan.seed);
+    counts.add("damaged records", 1);
+    counts.add("damaged files", damage::files(&lab, plan.seed));
+    for fault in &plan.faults {
+        counts.add(&format!("{}, {}", fault.kind(), plan.security()), 1);
+    }
 }
 
 /// A number in an environment variable.
@@ -396,7 +453,7 @@ fn whatever_happens_the_run_goes_on_and_its_record_is_whole() {
     };
 
     let mut launches = 0;
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut counts = Counts::default();
     for seed in seeds {
         let plan = Plan::draw(seed);
         let repeat = Repeat(seed);
@@ -407,21 +464,18 @@ fn whatever_happens_the_run_goes_on_and_its_record_is_whole() {
             plan.is_secured,
             repeat.command()
         );
-        play(&plan);
+        play(&plan, &mut counts);
 
         launches += 1;
-        for fault in &plan.faults {
-            *counts.entry(fault.kind()).or_default() += 1;
-        }
+        println!(
+            "{launches} launches in {:.0} s: {:?}",
+            begun.elapsed().as_secs_f64(),
+            counts.0
+        );
         if length.is_some_and(|length| begun.elapsed() >= length) {
             break;
         }
     }
-
-    println!(
-        "{launches} launches in {:.0} s: {counts:?}",
-        begun.elapsed().as_secs_f64()
-    );
 }
 
 #[test]
@@ -439,12 +493,13 @@ fn the_short_version_has_everything() {
         }
     }
 
-    // Four sizes, two policies with and without certificates, three kinds of faults and four kinds of floods.
-    assert_eq!(kinds.len(), 4 + 4 + 7, "{kinds:?}");
+    // Four sizes, two policies with and without certificates, four kinds of faults and four kinds of floods.
+    assert_eq!(kinds.len(), 4 + 4 + 8, "{kinds:?}");
 }
 
-/// The record, up to where the run was stopped, is that of the same scenario without processes and faults.
-fn check_undisturbed(lab: &Lab, run: &str, scenario: &Path) {
+/// The record, up to where the run was stopped, is that of the same scenario without processes and faults. Returns how many
+/// bytes these are.
+fn check_undisturbed(lab: &Lab, run: &str, scenario: &Path) -> usize {
     let disturbed = ticks(&lab.bytes(run));
     let last = lab.events(run).last().unwrap()["tick"].as_u64().unwrap();
     assert!(last >= FOLLOWING, "the run has {last} ticks");
@@ -463,6 +518,8 @@ fn check_undisturbed(lab: &Lab, run: &str, scenario: &Path) {
         (run, &disturbed),
         ("undisturbed", &ticks(&lab.bytes("undisturbed"))),
     );
+
+    disturbed.len()
 }
 
 /// A record without its last line, which states why the run ended.

@@ -505,6 +505,71 @@ fn a_robot_neither_queries_nor_receives_nor_replies_what_is_not_its_own() {
     castle.finish_unharmed();
 }
 
+/// Also under the names of other runs, which a certificate admits for its own robot.
+#[test]
+fn declarations_in_anothers_name_are_refused() {
+    const EACH: usize = 300;
+
+    let castle = Castle::new("secure-declare");
+    let butler = name("Butler");
+    let vonda = name("Vonda");
+    let other = |i: usize| Keys::new(&RunName::new(&format!("other-{i}")).unwrap());
+    let tokens = Received::default();
+    let seen = tokens.0.clone();
+    let watching = castle
+        .operator
+        .liveliness("cars/*/alive/**", move |key, _| {
+            seen.lock().expect("no panic").push(key.to_owned());
+        });
+    let watching = watching.unwrap();
+    let forbidden = other(0).command(&butler, &RobotName::operator());
+    let forbidden = castle.operator.publisher(&forbidden).unwrap();
+    let allowed = other(0).query(&butler, STATE);
+    let allowed = castle.operator.publisher(&allowed).unwrap();
+
+    let thief = castle.enter("Vonda");
+    let mut declared = Vec::new();
+    for i in 0..EACH {
+        let keys = other(i);
+        let commands = keys.command(&butler, &RobotName::operator());
+        declared.push(thief.token(&keys.alive_robot(&butler)).unwrap());
+        declared.push(thief.subscribe(&commands, |_, _| {}).unwrap());
+        let state = keys.query(&butler, STATE);
+        declared.push(
+            thief
+                .queryable(&state, |query| {
+                    query.reply(query.key(), RUBBISH.to_vec());
+                })
+                .unwrap(),
+        );
+    }
+    // What is handled after all of that.
+    let states = "cars/other-0/robot/*/state";
+    declared.push(thief.subscribe(states, |_, _| {}).unwrap());
+    let own = other(0).alive_robot(&vonda);
+    declared.push(thief.token(&own).unwrap());
+
+    eventually("its own token", || {
+        tokens.keys().contains(&own).then_some(())
+    });
+    eventually("its own subscriber", || {
+        allowed.has_subscribers().then_some(())
+    });
+    let mut strange = tokens.keys();
+    strange.retain(|key| key.starts_with("cars/other"));
+    assert_eq!(strange, [own]);
+    assert!(!forbidden.has_subscribers());
+    let state = other(0).query(&butler, STATE);
+    let reply = castle.operator.get_within(&state, "", None, PATIENCE);
+    assert!(reply.unwrap().is_none(), "it replies as Butler");
+
+    castle.step(60);
+    drop(declared);
+    drop(watching);
+    thief.close();
+    castle.finish_unharmed();
+}
+
 #[test]
 fn a_flood_on_a_robots_own_keys_is_counted_and_changes_nothing() {
     const FLOOD: u64 = 100_000;

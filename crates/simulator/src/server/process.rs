@@ -363,7 +363,7 @@ impl Server {
             while let Some(event) = self.events.try_next() {
                 self.handle(event, simulation)?;
             }
-            while let Some(timer) = self.timers.take_due() {
+            while let Some(timer) = self.timers.take_due(Instant::now()) {
                 self.barrier.timer(&timer, &mut self.outputs);
             }
             self.carry_out(simulation, recorder)?;
@@ -389,7 +389,7 @@ impl Server {
     /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.
     fn advance(&mut self, simulation: &mut Simulation) -> Result<Next, Interrupt> {
         match &self.stage {
-            Stage::Robots => return Ok(Next::Wait(self.timers.next())),
+            Stage::Robots => return Ok(Next::Wait(self.timers.next(Instant::now()))),
             Stage::Grant => {
                 if self.past.is_none()
                     && let Err(patience) = self.pace.take_grant(simulation.scenario().tick_s)
@@ -442,7 +442,7 @@ impl Server {
                         self.observers.released(simulation, &status);
                     }
                     Output::Aborted => return Err(Interrupt::End(End::Aborted)),
-                    Output::SetTimer(timer, after) => self.timers.set(timer, after),
+                    Output::SetTimer(timer, after) => self.timers.set(timer, after, Instant::now()),
                     Output::Ignored(reason, robot) => self.ignore(reason.as_str(), robot.as_str()),
                 }
             }

@@ -16,10 +16,11 @@ use crate::record;
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// Damages a shipped scenario and a shipped launch file: each is used, or the error names it or the file that
-/// it refers to.
-pub(super) fn files(lab: &Lab, seed: u64) {
+/// it refers to. Returns how many files were damaged.
+pub(super) fn files(lab: &Lab, seed: u64) -> usize {
     let folder = lab.out().join("files");
-    for (kind, others) in [("configs", "launch"), ("launch", "configs")] {
+    let kinds = [("configs", "launch"), ("launch", "configs")];
+    for (kind, others) in kinds {
         make_surroundings(&folder, kind, others);
         let file = folder.join(kind).join("damaged.toml");
         std::fs::write(&file, draw(kind, seed)).unwrap();
@@ -43,6 +44,8 @@ pub(super) fn files(lab: &Lab, seed: u64) {
             assert!(is_named, "{what}: {printed}");
         }
     }
+
+    kinds.len()
 }
 
 /// A program that read a damaged file has ended in order.

@@ -21,6 +21,8 @@ pub(super) enum Fault {
     Stop(usize, Duration),
     /// The link of a robot is cut for this long, while further faults happen.
     Cut(usize, Duration),
+    /// The simulator can open no further file and accept no further connection for this long.
+    Starve(Duration),
     /// A rogue client floods the run, while further faults happen.
     Flood(Flood),
 }
@@ -45,6 +47,7 @@ impl Fault {
             Self::Kill(_) => "kill",
             Self::Stop(..) => "stop",
             Self::Cut(..) => "cut",
+            Self::Starve(_) => "no file descriptors",
             Self::Flood(Flood::Rubbish) => "flood of rubbish",
             Self::Flood(Flood::Stale) => "flood of stale messages",
             Self::Flood(Flood::Forged) => "flood of forged messages",
@@ -102,16 +105,22 @@ impl Plan {
     pub(super) fn waits(&self) -> bool {
         self.on_late == OnLate::Wait
     }
+
+    /// Whether the run is secured, as the test counts it.
+    pub(super) fn security(&self) -> &'static str {
+        if self.is_secured { "secured" } else { "plain" }
+    }
 }
 
 fn draw_fault(chance: &mut Stream, robots: usize) -> Fault {
     let robot = below(chance, robots);
 
-    match below(chance, 4) {
+    match below(chance, 5) {
         0 => Fault::Kill(robot),
         1 => Fault::Stop(robot, milliseconds(chance, 500, 500)),
         // Shorter and longer than the lease of a link.
         2 => Fault::Cut(robot, milliseconds(chance, 500, 4000)),
+        3 => Fault::Starve(milliseconds(chance, 500, 2000)),
         _ => Fault::Flood(match below(chance, 4) {
             0 => Flood::Rubbish,
             1 => Flood::Stale,

@@ -23,8 +23,6 @@ use super::plan::{Flood, below, milliseconds};
 
 /// Bursts of a flood.
 const BURSTS: usize = 4;
-/// Messages of a burst.
-const MESSAGES: usize = 500;
 /// Connections that send nothing: fewer than keep participants out (`docs/security.md`).
 const CONNECTIONS: usize = 60;
 /// Messages that are recorded before a flood of stale ones.
@@ -52,6 +50,8 @@ pub(super) struct Rogue {
     pub(super) stolen: Option<PathBuf>,
     pub(super) run: RunName,
     pub(super) robots: Vec<RobotName>,
+    /// Messages of a burst.
+    pub(super) burst: usize,
 }
 
 impl Rogue {
@@ -113,14 +113,14 @@ impl Intruder<'_> {
     /// Puts bursts of messages, with pauses between them.
     fn burst(&self, chance: &mut Stream, mut draw: impl FnMut(&mut Stream) -> Message) -> usize {
         for _ in 0..BURSTS {
-            for _ in 0..MESSAGES {
+            for _ in 0..self.rogue.burst {
                 let (key, message) = draw(chance);
                 self.bus.put(&key, message).unwrap();
             }
             std::thread::sleep(milliseconds(chance, 50, 200));
         }
 
-        BURSTS * MESSAGES
+        BURSTS * self.rogue.burst
     }
 
     fn put_rubbish(&self, chance: &mut Stream) -> usize {
