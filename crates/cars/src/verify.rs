@@ -1,14 +1,24 @@
 //! `cars verify` and `cars diff`: recorded runs, executed again and compared.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use config::units::Time;
+use config::{FileError, Speed};
 use lab::diff::{Comparison, compare};
 use lab::folder::{find, recorded_epochs};
 use lab::verify::{Verification, verify as verify_epoch};
+use launch::{Launch, LaunchOptions, RunOptions};
+use miette::{IntoDiagnostic, miette};
+use protocol::RobotName;
 use simulator::difference::Difference;
+use simulator::record::Record;
+use simulator::{EpochFiles, RunFolder};
 use terminal::OutputError;
+
+/// How long a process may take to exit before it is killed, seconds.
+const GRACE_S: f64 = 3.0;
 
 /// `cars verify`.
 #[derive(Debug, Args)]
@@ -18,6 +28,9 @@ pub(crate) struct VerifyArgs {
     /// Where run folders are made.
     #[arg(long, default_value = "runs", value_name = "DIR")]
     out: PathBuf,
+    /// Start its processes again as they were launched, instead of executing it in this process.
+    #[arg(long)]
+    processes: bool,
 }
 
 /// `cars diff`.
@@ -40,6 +53,10 @@ pub(crate) fn verify(args: &VerifyArgs) -> miette::Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
     let epochs = recorded_epochs(&folder)?;
     let are_several = epochs.len() > 1;
+    if args.processes {
+        return verify_processes(&folder, &epochs);
+    }
+
     for files in epochs {
         let verification = verify_epoch(&files)?;
         let epoch = are_several.then_some(files.epoch);
@@ -49,6 +66,79 @@ pub(crate) fn verify(args: &VerifyArgs) -> miette::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Launches a run once more, in a temporary folder, and compares.
+fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result<ExitCode> {
+    let [files] = epochs else {
+        return Err(miette!(
+            help = "`cars verify` without --processes executes each of them",
+            "the run has several epochs, which were begun by hand"
+        ));
+    };
+    if has_commands_of_operator(files)? {
+        return Err(miette!(
+            help = "`cars verify` without --processes sends them again",
+            "the run has commands of an operator"
+        ));
+    }
+
+    let scratch = tempfile::tempdir().into_diagnostic()?;
+    let launch = Launch::again(folder.path(), quiet_options(scratch.path()))?;
+    let (outcome, again) = launch.play(|_| {})?;
+    if let Some(failure) = &outcome.failure {
+        terminal::note(failure);
+    }
+    let [files_again] = recorded_epochs(&again)?
+        .try_into()
+        .map_err(|_| miette!("the run has begun another epoch"))?;
+    let comparison = compare(files, &files_again)?;
+    let text = if comparison.are_same() {
+        format!("the same as processes, {} ticks", comparison.last[0])
+    } else {
+        describe_comparison(&comparison, ["recorded", "executed again"])
+    };
+    OutputError::unless_closed(terminal::print_line(text))?;
+    if comparison.are_same() {
+        Ok(ExitCode::SUCCESS)
+    } else {
+        Ok(ExitCode::FAILURE)
+    }
+}
+
+fn has_commands_of_operator(files: &EpochFiles) -> Result<bool, FileError> {
+    let operator = RobotName::operator();
+    let mut record = Record::open(files)?;
+    while let Some(entry) = record.next_entry()? {
+        if !entry.commands_of(&operator).is_empty() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Options of a launch that shows nothing, as fast as possible.
+fn quiet_options(out: &Path) -> LaunchOptions {
+    LaunchOptions {
+        run: RunOptions {
+            run: None,
+            seed: None,
+            duration: None,
+            speed: Some(Speed(None)),
+            out: out.to_owned(),
+            set: Vec::new(),
+        },
+        is_paused: false,
+        opens_browser: false,
+        has_console: false,
+        is_quiet: true,
+        connect_port: None,
+        listen: None,
+        links: Vec::new(),
+        secure: None,
+        is_insecure: false,
+        grace: Time(GRACE_S),
+    }
 }
 
 /// Compares two runs.
@@ -66,7 +156,7 @@ pub(crate) fn diff(args: &DiffArgs) -> miette::Result<ExitCode> {
     let text = if args.json {
         serde_json::to_string_pretty(&comparison).unwrap_or_default()
     } else {
-        describe_comparison(&comparison)
+        describe_comparison(&comparison, ["first run", "second run"])
     };
     OutputError::unless_closed(terminal::print_line(text))?;
     if comparison.are_same() {
@@ -103,12 +193,12 @@ fn describe(verification: &Verification, epoch: Option<u32>) -> String {
     text
 }
 
-fn describe_comparison(comparison: &Comparison) -> String {
+fn describe_comparison(comparison: &Comparison, runs: [&str; 2]) -> String {
     let [last, other_last] = comparison.last;
     let mut text = match &comparison.first {
         None if last == other_last => return format!("the same, {last} ticks"),
         None => format!("the same up to where one ends: tick {last} and tick {other_last}"),
-        Some(difference) => describe_difference(difference, ["first run", "second run"]),
+        Some(difference) => describe_difference(difference, runs),
     };
 
     text += &format!(
@@ -116,7 +206,10 @@ fn describe_comparison(comparison: &Comparison) -> String {
         comparison.differing, comparison.ticks
     );
     if !comparison.only_in.is_empty() {
-        text += "\nevents in only one of the runs: kind, first run, second run";
+        text += &format!(
+            "\nevents in only one of the runs: kind, {}, {}",
+            runs[0], runs[1]
+        );
     }
     for (kind, [one, other]) in &comparison.only_in {
         text += &format!("\n  {kind:<20} {one:>6} {other:>6}");

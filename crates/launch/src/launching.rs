@@ -132,16 +132,31 @@ impl Launch {
         let path = folder
             .canonicalize()
             .map_err(|error| FileError::unreadable(folder, &error))?;
-        let folder = RunFolder::at(path.clone());
         // The simulator takes the lock and reads the record.
-        drop(folder.reopen()?);
+        drop(RunFolder::at(path.clone()).reopen()?);
+        options.run.out = path.parent().unwrap_or(Path::new("")).to_owned();
+
+        let mut launch = Self::again(&path, options)?;
+        launch.is_resumed = true;
+        Ok(launch)
+    }
+
+    /// Reads how the run in a folder was launched, to launch it once more from the beginning, under the folder that the options
+    /// name.
+    ///
+    /// # Errors
+    /// [`FileError`] if it is not the folder of a run that was launched; a missing certificate of a secured run.
+    pub fn again(folder: &Path, mut options: LaunchOptions) -> miette::Result<Self> {
+        let path = folder
+            .canonicalize()
+            .map_err(|error| FileError::unreadable(folder, &error))?;
+        let folder = RunFolder::at(path.clone());
         let launched = Launched::read(&folder)?;
         let scenario = Scenario::load(&folder.file(SCENARIO), &Changes::default())?;
         let file = launched.launch_file(&scenario)?;
 
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let run = RunName::new(&name).into_diagnostic()?;
-        options.run.out = path.parent().unwrap_or(Path::new("")).to_owned();
         if options.run.speed.is_none() {
             options.run.speed = Some(Speed(launched.speed));
         }
@@ -160,7 +175,7 @@ impl Launch {
             scenario,
             run,
             secured,
-            is_resumed: true,
+            is_resumed: false,
         })
     }
 

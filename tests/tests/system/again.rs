@@ -65,6 +65,59 @@ fn faults_lost_commands_and_returns_are_executed_again_from_the_scenario() {
     let said = verify(&lab, "faults");
     assert!(said.contains("the same, 120 ticks to the end"), "{said}");
     assert!(!said.contains("taken from the record"), "{said}");
+    let said = lab.ok(&["verify", "faults", "--processes"]);
+    assert!(said.contains("the same as processes, 120 ticks"), "{said}");
+}
+
+#[test]
+fn a_robot_of_another_language_is_taken_from_the_record() {
+    let lab = Lab::new();
+    let scenario = lab.write(
+        "scenario.toml",
+        r#"
+            seed = 3
+            tick = "0.5 s"
+            duration = "20 s"
+
+            [field]
+            size = ["20 ft", "20 ft"]
+
+            [guests]
+            count = 20
+
+            [[robot]]
+            name = "Bruno"
+            at = ["5 ft", "5 ft"]
+
+            [[robot]]
+            name = "Vonda"
+            at = ["15 ft", "15 ft"]
+            params = { waiter = "Bruno" }
+        "#,
+    );
+    let stroller = root().join("sdk/stdio/bash/stroller.sh");
+    let launch = format!(
+        r#"
+            scenario = {scenario:?}
+
+            [[process]]
+            name = "Bruno"
+            command = ["cars", "exec", "--", {stroller:?}]
+
+            [[process]]
+            name = "Vonda"
+            command = ["cars-vonda"]
+        "#
+    );
+    let launch = lab.write("bruno.toml", &launch);
+    let launch = launch.to_str().unwrap();
+    lab.ok(&["launch", launch, "--no-console", "--speed", "max"]);
+
+    let said = verify(&lab, "bruno");
+    assert!(said.contains("the same, 40 ticks to the end"), "{said}");
+    let note = "Bruno could not be executed in this process from tick 0 on";
+    assert!(said.contains(note), "{said}");
+    assert!(!said.contains("Vonda could not"), "{said}");
 }
 
 /// Starts the hall and waits until it has reached a tick.
@@ -110,6 +163,8 @@ fn what_an_operator_and_the_machine_did_is_taken_from_the_record() {
 
     let said = verify(&lab, run);
     assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+    let (_, refused) = lab.fails(&["verify", run, "--processes"]);
+    assert!(refused.contains("commands of an operator"), "{refused}");
     let events = String::from_utf8(lab.bytes(run)).unwrap();
     assert!(events.contains("\"from\":\"operator\""));
 }
