@@ -25,8 +25,8 @@ const ACCEPT: Duration = Duration::from_secs(2);
 const LEASE: Duration = Duration::from_secs(2);
 /// Longest wait for a session: much longer than any attempt, because one that is lost never comes back.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Handshakes of a sweep. With 200 in this one process and much other load, 192 clients once did not return within 20 s, for a
-/// reason that is not known.
+/// Handshakes of a sweep. With 200 in this one process and much other load, no attempt may end within its limit, because all
+/// begin at the same time: each is given up and begun again until the load is less.
 const SWEEP: u32 = 50;
 /// What is held of the handshakes of a sweep arrives until so long before and after the time limit.
 const AROUND: Duration = Duration::from_millis(10);

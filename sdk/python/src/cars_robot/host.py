@@ -40,6 +40,9 @@ from .version import __version__
 
 PANEL_INTERVAL_S = 0.05
 """A panel is for eyes: no more often than this."""
+MAX_COMMANDED = 64
+"""Most robots for which a publisher of commands is declared. Without one, zenoh compares each command's key with all keys that
+anyone has declared in the network; with one, it does so once."""
 JOIN_AGAIN_S = 0.1
 """Between two attempts to join."""
 MAX_NEWS = 4
@@ -272,6 +275,8 @@ class _Member:
         self._report: Publisher = link.bus.publisher(keys.report(name))
         self._state: Publisher = link.bus.publisher(keys.query(name, STATE))
         self._panel: Publisher = link.bus.publisher(keys.panel(name), may_drop=True)
+        self._commanded: dict[str, Publisher] = {}
+        """Publishers of the commands to the robots that it has commanded, by key."""
         self._painted_at = float("-inf")
         self._show_predecessor()
 
@@ -410,7 +415,13 @@ class _Member:
         """Puts what came of the last tick. Who follows has the state before the next clock, because both come the same
         way."""
         for key, command in self._commands:
-            self._link.put(key, command)
+            if key not in self._commanded and len(self._commanded) < MAX_COMMANDED:
+                self._commanded[key] = self._link.bus.publisher(key)
+            publisher = self._commanded.get(key)
+            if publisher is None:
+                self._link.put(key, command)
+            else:
+                publisher.put(command)
         if self._own_state:
             self._state.put(self._own_state)
         self._report.put(self._own_report)
