@@ -52,6 +52,9 @@ pub(crate) struct BenchArgs {
     /// A folder with another build of cars, cars-sim, cars-butler and cars-leguin, to compare this build with.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
+    /// Secure every run with certificates. The floors stay plain.
+    #[arg(long)]
+    secured: bool,
     /// Measure only the subjects with this text in their names, and their floors.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
@@ -79,6 +82,7 @@ fn measure_all(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Results>>
         hall_file: &args.scenario,
         hall: Scenario::load(&args.scenario, &Changes::default())?,
         ticks: args.ticks,
+        is_secured: args.secured,
         scratch,
     };
 

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use launch::Certificates;
 use miette::{IntoDiagnostic, WrapErr};
+use protocol::RobotName;
 use serde::Deserialize;
 use simulator::recorder::SUMMARY;
 
@@ -28,9 +30,10 @@ pub(super) fn bare(
     let scenario = write(workload, &bare_scenario(robots))?;
     let mut commands = Vec::new();
     for number in 0..robots {
+        let name = format!("r{number}");
         let mut command = programs.command("cars");
-        command.args(["bench-robot", "--name", &format!("r{number}")]);
-        commands.push(command);
+        command.args(["bench-robot", "--name", &name]);
+        commands.push((name, command));
     }
 
     let duration_s = duration_s(workload, robots);
@@ -65,7 +68,9 @@ pub(super) fn crowd(
     let mut commands = Vec::new();
     for number in 0..robots / 2 {
         for class in ["Butler", "Leguin"] {
-            commands.push(robot(programs, class, &format!("{class}{number}")));
+            let name = format!("{class}{number}");
+            let command = robot(programs, class, &name);
+            commands.push((name, command));
         }
     }
 
@@ -131,7 +136,8 @@ fn side_of_square(count: usize) -> usize {
 pub(super) fn hall(workload: &Workload<'_>, programs: &Programs) -> miette::Result<f64> {
     let mut commands = Vec::new();
     for (name, spec) in &workload.hall.robots {
-        commands.push(robot(programs, &spec.class, name.as_str()));
+        let command = robot(programs, &spec.class, name.as_str());
+        commands.push((name.to_string(), command));
     }
     let duration_s = hall_duration_s(workload);
     as_processes(workload, programs, workload.hall_file, duration_s, commands)
@@ -160,24 +166,62 @@ fn robot(programs: &Programs, class: &str, name: &str) -> Command {
     command
 }
 
-/// Ticks per second of a simulator and robots as processes.
+/// Ticks per second of a simulator and robots as processes; the robots come with their names.
 fn as_processes(
     workload: &Workload<'_>,
     programs: &Programs,
     scenario: &Path,
     duration_s: f64,
-    robots: Vec<Command>,
+    robots: Vec<(String, Command)>,
 ) -> miette::Result<f64> {
-    let endpoint = free_endpoint()?;
+    let certificates = if workload.is_secured {
+        Some(make_certificates(workload, &robots)?)
+    } else {
+        None
+    };
+    let endpoint = free_endpoint(workload.is_secured)?;
     let mut simulator = programs.command("cars-sim");
     simulator.arg(scenario).args(["--listen", &endpoint]);
+    secure(&mut simulator, certificates.as_deref(), "simulator");
+
     let mut commands = Vec::new();
-    for mut robot in robots {
+    for (name, mut robot) in robots {
         robot.env("CARS_RUN", RUN).env("CARS_CONNECT", &endpoint);
+        secure(&mut robot, certificates.as_deref(), &name);
         commands.push(robot);
     }
 
     execute(workload, &mut simulator, duration_s, commands)
+}
+
+/// Makes certificates for these robots; returns their folder.
+fn make_certificates(
+    workload: &Workload<'_>,
+    robots: &[(String, Command)],
+) -> miette::Result<PathBuf> {
+    let mut names = Vec::new();
+    for (name, _) in robots {
+        names.push(RobotName::new(name).into_diagnostic()?);
+    }
+
+    let folder = workload.scratch.join("certificates");
+    let certificates = Certificates {
+        folder: folder.clone(),
+        robots: names,
+        hosts: Vec::new(),
+        days: 1,
+        run: None,
+        replaces: true,
+    };
+    certificates.make()?;
+    Ok(folder)
+}
+
+/// Gives a process the configuration file with its certificate.
+fn secure(process: &mut Command, certificates: Option<&Path>, name: &str) {
+    if let Some(folder) = certificates {
+        process.env("CARS_ZENOH_CONFIG", folder.join(name).join("zenoh.json5"));
+    }
 }
 
 /// Runs a simulation and its robots to the end. Returns ticks per second as measured by the simulation.

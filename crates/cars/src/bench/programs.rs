@@ -72,10 +72,11 @@ fn command(program: &Path) -> Command {
 }
 
 /// An endpoint on this machine where nothing listens.
-pub(super) fn free_endpoint() -> miette::Result<String> {
+pub(super) fn free_endpoint(is_secured: bool) -> miette::Result<String> {
     let listener = TcpListener::bind("127.0.0.1:0").into_diagnostic()?;
     let address = listener.local_addr().into_diagnostic()?;
-    Ok(format!("tcp/{address}"))
+    let link = if is_secured { "tls" } else { "tcp" };
+    Ok(format!("{link}/{address}"))
 }
 
 /// Processes of one measurement. They are killed on drop, so none outlives a measurement that fails.

@@ -62,7 +62,7 @@ pub(super) fn measure(clients: usize, ticks: u64) -> miette::Result<f64> {
 
 /// Runs a star to its end; returns what its router printed.
 fn run_star(clients: usize, ticks: u64) -> miette::Result<String> {
-    let endpoint = free_endpoint()?;
+    let endpoint = free_endpoint(false)?;
     let mut router = own_command()?;
     router
         .args(["bench-star", "--listen", &endpoint])

@@ -19,6 +19,8 @@ pub(super) struct Workload<'a> {
     pub(super) hall: Scenario,
     /// Ticks of a measurement with two processes.
     pub(super) ticks: u64,
+    /// Whether runs are secured with certificates.
+    pub(super) is_secured: bool,
     /// Folder for scenarios and runs, removed after the last measurement.
     pub(super) scratch: &'a Path,
 }

@@ -229,7 +229,8 @@ impl Butler {
         self.emotion
             .update(&self.state.measures, self.bsg.current(), cars);
         self.state.appraisal = self.appraisal(cars);
-        if self.deliberator.plans() {
+        // A plan is a matter of what he feels.
+        if self.deliberator.plans() && self.parameters.policy() == Policy::Emotion {
             self.plan(cars);
         }
         self.state.record(self.feeling());
