@@ -54,7 +54,7 @@ fn is_plain(name: &str) -> bool {
 
 /// Whether another file has the name, or an earlier epoch's file could have it.
 fn is_taken(name: &str) -> bool {
-    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG];
-    let prefixes = ["scenario", "events", "run"];
+    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG, RECORDING];
+    let prefixes = ["scenario", "events", "run-epoch"];
     names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))
 }
