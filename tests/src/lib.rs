@@ -23,6 +23,7 @@ use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use processes::Running;
+use recording::{RecordedTick, Recording};
 use serde_json::Value;
 
 /// Longest wait of a test.
@@ -214,6 +215,12 @@ impl Lab {
     pub fn bytes(&self, run: &str) -> Vec<u8> {
         let file = self.file(run, "events.jsonl");
         std::fs::read(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
+    }
+
+    /// All ticks of a run's recording.
+    pub fn recorded(&self, run: &str) -> Vec<RecordedTick> {
+        let recording = Recording::open(&self.file(run, "run.mcap")).unwrap();
+        recording.read(0, recording.len()).unwrap()
     }
 
     /// The events of a run.

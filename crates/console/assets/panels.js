@@ -77,7 +77,7 @@ function split(widgets) {
 }
 
 /**
- * The panel of a robot without one, and of all robots in a recording: its published state.
+ * The panel of a robot without one: its published state.
  * @param {RobotFrame} robot
  * @returns {Panel}
  */

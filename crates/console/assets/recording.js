@@ -2,12 +2,23 @@
 // A recorded run: fetched in chunks, played through the same store as a live one.
 
 /** @typedef {import("./store.js").Store} Store */
-/** @typedef {import("./types/messages.js").RecordingHeader} RecordingHeader */
-/** @typedef {import("./types/messages.js").RecordedTick} RecordedTick */
+/** @typedef {import("./types/messages.js").Awaited} Awaited */
+/** @typedef {import("./types/messages.js").Cut} Cut */
 /** @typedef {import("./types/messages.js").Flight} Flight */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
+/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
-/** @typedef {{ticks: RecordedTick[], flights: Flight[], log: LogRecord[]}} Chunk */
+/**
+ * What does not change; `ticks` is the last tick.
+ * @typedef {{run: string, epoch: number, seed: number, tick_s: number, field_m: [number, number], body_m: number,
+ *   obstacles: [number, number][], ticks: number}} RecordingHeader
+ */
+/**
+ * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], cuts: Cut[], awaiting: Awaited[]}} RecordedTick
+ */
+/** A panel and the tick in which it arrived. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
+/** @typedef {{ticks: RecordedTick[], panels: RecordedPanel[], flights: Flight[], log: LogRecord[]}} Chunk */
 
 /** Ticks in a chunk. */
 const CHUNK = 128;
@@ -15,6 +26,8 @@ const CHUNK = 128;
 const MOST_NUMBERS = 12_000_000;
 /** Least time between two frames. */
 const FRAME_MS = 33;
+/** How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states. */
+const PANEL_S = 1;
 /** The factor of playback at speed "max". */
 const FASTEST = 200;
 
@@ -26,7 +39,7 @@ export class Player {
   constructor(store, client) {
     this.store = store;
     this.client = client;
-    /** @type {(RecordingHeader & {ticks: number}) | null} */
+    /** @type {RecordingHeader | null} */
     this.header = null;
     /** By number, in order of their last use. @type {Map<number, Promise<Chunk>>} */
     this.chunks = new Map();
@@ -128,6 +141,7 @@ export class Player {
 
     const flights = isPlayed ? chunk.flights.filter((flight) => flight.tick > this.tick && flight.tick <= tick) : [];
     this.tick = record.tick;
+    this.store.setPanels(panelsAt(chunk, record.tick, header.tick_s));
     this.store.show(this.frame(header, record, flights));
   }
 
@@ -153,16 +167,11 @@ export class Player {
       duration_s: this.last * header.tick_s,
       speed: this.factor,
       phase: this.isPlaying ? "running" : record.tick >= this.last ? "ended" : "paused",
-      awaiting: [],
+      awaiting: record.awaiting,
       guests,
       flights,
-      cuts: [],
-      robots: record.robots.map(({ missed, blocked, ...robot }) => ({
-        ...robot,
-        blocked: blocked ?? false,
-        generation: 1,
-        presence: missed ? "gone" : "here",
-      })),
+      cuts: record.cuts,
+      robots: record.robots,
     };
   }
 
@@ -202,6 +211,22 @@ export class Player {
       await new Promise((resolve) => setTimeout(resolve, FRAME_MS));
     }
   }
+}
+
+/**
+ * The newest panel of each robot at a tick of a chunk.
+ * @param {Chunk} chunk
+ * @param {number} tick
+ * @param {number} tick_s
+ */
+function panelsAt(chunk, tick, tick_s) {
+  const lifetime = Math.max(1, Math.round(PANEL_S / tick_s));
+  /** @type {Map<string, Panel>} */
+  const panels = new Map();
+  for (const one of chunk.panels) {
+    if (one.tick <= tick && one.tick > tick - lifetime) panels.set(one.robot, one.panel);
+  }
+  return panels;
 }
 
 /** @param {Chunk} chunk */

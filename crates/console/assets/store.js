@@ -148,6 +148,15 @@ export class Store {
     this.emit("frame");
   }
 
+  /**
+   * Replaces all panels, where a recording is shown at another tick.
+   * @param {Map<string, Panel>} panels
+   */
+  setPanels(panels) {
+    this.panels = panels;
+    this.emit("panel");
+  }
+
   /** @param {LogRecord[]} lines */
   addLines(lines) {
     this.log.push(...lines);
@@ -182,10 +191,11 @@ export class Store {
 
   /**
    * The robots that the clock waits for, with seconds of wall clock as of now. In every tick the clock waits a short time
-   * for each robot; only late ones are listed.
+   * for each robot; only late ones are listed. In a recording, the robots for which the clock was held in the tick.
    * @returns {import("./types/messages.js").Awaited[]}
    */
   awaiting() {
+    if (this.mode === "recording") return this.frame?.awaiting ?? [];
     if (!this.isLive) return [];
     const since_s = this.frame ? (performance.now() - this.frameAt_ms) / 1000 : 0;
     const awaiting = this.frame?.awaiting ?? this.status?.awaiting ?? [];

@@ -11,8 +11,6 @@ const MESSAGES = [
   "control_answer",
   "log_record",
   "panel",
-  "recorded_tick",
-  "recording_header",
   "world_frame",
 ];
 const OUTPUT = new URL("../assets/types/messages.d.ts", import.meta.url);

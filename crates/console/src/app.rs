@@ -6,7 +6,7 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watc
 
 use crate::guard::Guard;
 use crate::live::Live;
-use crate::recording::Recording;
+use crate::playback::Recording;
 
 /// Most browsers at a time.
 pub(crate) const MAX_BROWSERS: usize = 32;

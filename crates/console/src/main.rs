@@ -10,9 +10,8 @@ mod guard;
 mod live;
 mod opening;
 mod page;
-mod recording;
+mod playback;
 mod server;
-mod tick_file;
 
 use std::io::ErrorKind;
 use std::net::SocketAddr;
@@ -31,7 +30,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use app::{App, Mode};
 use guard::Guard;
 use live::Live;
-use recording::Recording;
+use playback::Recording;
 
 /// The address to serve at without `--bind`.
 const DEFAULT_BIND: &str = "127.0.0.1:7007";

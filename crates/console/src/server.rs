@@ -25,7 +25,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use crate::app::{App, Ending, Mode};
 use crate::browser;
 use crate::guard::{ENTRANCE, HEADERS, Refusal};
-use crate::recording::MAX_TICKS;
+use crate::playback::MAX_TICKS;
 
 /// Most connections at a time; a browser uses one for its WebSocket and up to six for HTTP requests.
 const MAX_CONNECTIONS: usize = 256;

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
-use protocol::{Epoch, RobotName, RunName};
+use protocol::{Epoch, RobotName, RunName, Tick};
 use robot::{LocalHost, Robot};
+use simulator::recorder::Observed;
 use simulator::scenario::FaultEnd;
 use simulator::{Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
 
@@ -24,21 +25,44 @@ pub fn execute(
 ) -> miette::Result<Summary> {
     let mut recorder = None;
     let begun = Instant::now();
-    let simulation = play(scenario, run, |simulation, record| {
+    let mut opened = begun;
+    let simulation = play_with_robots(scenario, run, |local, record| {
+        let simulation = &local.simulation;
         let recorder = match &mut recorder {
             Some(recorder) => recorder,
             none => none.insert(Recorder::begin(folder, run, simulation)?),
         };
+        if recorder.is_recording() {
+            recorder.observe(observed(local, opened));
+        }
         recorder.write(simulation, record)?;
         if let Some(speed) = speed {
             wait_until(begun, simulation.time_s(simulation.tick()) / speed);
         }
+        opened = Instant::now();
         Ok(())
     })?;
 
     let recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
 
     Ok(recorder.finish(&simulation)?)
+}
+
+/// What is observed of a tick for the recording: panels once a simulated second.
+fn observed(local: &Local, opened: Instant) -> Observed {
+    let scenario = local.simulation.scenario();
+    let panel_interval = (1.0 / scenario.tick_s).round().max(1.0) as Tick;
+    let mut panels = BTreeMap::new();
+    if scenario.record.has_panels() && local.simulation.tick() % panel_interval == 0 {
+        panels = local.robots.panels();
+    }
+
+    Observed {
+        opened,
+        reports: BTreeMap::new(),
+        awaited: Vec::new(),
+        panels,
+    }
 }
 
 /// Sleeps until this many seconds after `begun`.
@@ -57,17 +81,28 @@ pub fn play(
     run: &RunName,
     mut each: impl FnMut(&Simulation, &TickRecord) -> miette::Result<()>,
 ) -> miette::Result<Simulation> {
+    play_with_robots(scenario, run, |local, record| {
+        each(&local.simulation, record)
+    })
+}
+
+/// Plays a scenario as [`play`] does; `each` also sees the robots.
+fn play_with_robots(
+    scenario: Scenario,
+    run: &RunName,
+    mut each: impl FnMut(&Local, &TickRecord) -> miette::Result<()>,
+) -> miette::Result<Simulation> {
     check_faults(&scenario)?;
     let mut local = Local::new(scenario, run)?;
     let record = local.simulation.init(&mut local.robots).into_diagnostic()?;
-    each(&local.simulation, &record)?;
+    each(&local, &record)?;
 
     while local.simulation.tick() < local.simulation.scenario().ticks {
         local.carry_out_faults(run)?;
         let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
-        each(&local.simulation, &record)?;
+        each(&local, &record)?;
     }
-    each(&local.simulation, &local.simulation.end(End::Finished))?;
+    each(&local, &local.simulation.end(End::Finished))?;
     Ok(local.simulation)
 }
 

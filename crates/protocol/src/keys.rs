@@ -145,6 +145,12 @@ impl Keys {
         format!("{}/robot/{robot}/panel", self.root)
     }
 
+    /// All panels of the run.
+    #[must_use]
+    pub fn panels(&self) -> String {
+        format!("{}/robot/*/panel", self.root)
+    }
+
     /// Queryable at the simulator: init, start, pause, step, stop, speed, command, status.
     #[must_use]
     pub fn control(&self) -> String {

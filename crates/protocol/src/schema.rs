@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::messages::{
     Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, News,
-    Panel, PublicState, RecordedTick, RecordingHeader, Report, Waiting, WorldFrame,
+    Panel, PublicState, Report, Waiting, WorldFrame,
 };
 
 /// The schema of every message, by the name of its file.
@@ -31,8 +31,6 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("panel", one::<Panel>()),
         ("public_state", one::<PublicState>()),
         ("report", one::<Report>()),
-        ("recorded_tick", one::<RecordedTick>()),
-        ("recording_header", one::<RecordingHeader>()),
         ("waiting", one::<Waiting>()),
         ("world_frame", one::<WorldFrame>()),
     ]

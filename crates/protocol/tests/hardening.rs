@@ -6,8 +6,8 @@
 use proptest::prelude::*;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, RecordedTick,
-    RecordingHeader, Report, Waiting, WorldFrame,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report, Waiting,
+    WorldFrame,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde_json::Value;
@@ -104,8 +104,6 @@ fn survives(bytes: &[u8]) {
     one::<News>(bytes);
     one::<Panel>(bytes);
     one::<PublicState>(bytes);
-    one::<RecordedTick>(bytes);
-    one::<RecordingHeader>(bytes);
     one::<Report>(bytes);
     one::<Waiting>(bytes);
     one::<WorldFrame>(bytes);

@@ -1,5 +1,6 @@
 //! Why a recording cannot be read.
 
+use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
@@ -60,7 +61,7 @@ impl Name {
         }
     }
 
-    pub(crate) fn damaged(&self, offset: u64, reason: impl ToString) -> RecordingError {
+    pub(crate) fn damaged(&self, offset: u64, reason: &dyn Display) -> RecordingError {
         RecordingError::Damaged {
             file: self.0.clone(),
             offset,

@@ -1,6 +1,6 @@
 //! Where the parts of a file are: read from the index at its end, or found record by record in a file that has none.
 
-use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 
@@ -32,8 +32,8 @@ pub(crate) struct Chunk {
     pub(crate) start_ns: u64,
     /// Simulated time of its last message, nanoseconds.
     pub(crate) end_ns: u64,
-    /// Channels that have messages in it.
-    pub(crate) channels: BTreeSet<u16>,
+    /// Its size before compression, bytes.
+    pub(crate) size: u64,
 }
 
 /// The parts of a file.
@@ -68,7 +68,7 @@ impl Bytes {
     fn read(&self, offset: u64, len: u64) -> Result<Vec<u8>, RecordingError> {
         let is_within = offset.checked_add(len).is_some_and(|end| end <= self.len);
         if !is_within || len > MAX_BYTES {
-            return Err(self.name.damaged(offset, "a length is wrong"));
+            return Err(self.name.damaged(offset, &"a length is wrong"));
         }
 
         let mut bytes = vec![0; len as usize];
@@ -80,7 +80,8 @@ impl Bytes {
 
     /// The head of the record at an offset; `None` if the file ends within it.
     fn record_at(&self, offset: u64) -> Result<Option<RecordHead>, RecordingError> {
-        if offset + RECORD_HEAD > self.len {
+        let head_end = offset.checked_add(RECORD_HEAD);
+        if head_end.is_none_or(|end| end > self.len) {
             return Ok(None);
         }
 
@@ -158,7 +159,7 @@ impl Bytes {
                     offset: chunk.chunk_start_offset,
                     start_ns: chunk.message_start_time,
                     end_ns: chunk.message_end_time,
-                    channels: chunk.message_index_offsets.into_keys().collect(),
+                    size: chunk.uncompressed_size,
                 });
             }
             if head[0] == op::ATTACHMENT_INDEX {
@@ -181,28 +182,22 @@ impl Bytes {
                         offset,
                         start_ns: header.message_start_time,
                         end_ns: header.message_end_time,
-                        channels: BTreeSet::new(),
+                        size: header.uncompressed_size,
                     });
                 }
-                op::MESSAGE_INDEX => {
-                    let channel = little_endian(&self.read(record.body, 2)?);
-                    if let Some(chunk) = index.chunks.last_mut() {
-                        chunk.channels.insert(channel as u16);
-                    }
-                }
                 op::ATTACHMENT => index.scenario = Some(offset),
-                op::HEADER | op::METADATA => {}
+                op::HEADER | op::METADATA | op::MESSAGE_INDEX => {}
                 op::DATA_END => return Ok(index),
                 other => {
                     let reason = format!("an unknown record of type {other}");
-                    return Err(self.name.damaged(offset, reason));
+                    return Err(self.name.damaged(offset, &reason));
                 }
             }
             offset = record.body + record.len;
         }
 
         if self.has_end()? {
-            return Err(self.name.damaged(offset, "a length is wrong"));
+            return Err(self.name.damaged(offset, &"a length is wrong"));
         }
         Ok(index)
     }
@@ -220,44 +215,41 @@ impl Bytes {
         // The size of a content that is left out.
         match body.get_mut(size_at..size_at.saturating_add(8)) {
             Some(size) => size.fill(0),
-            None => return Err(self.name.damaged(record.body, "a chunk without a header")),
+            None => return Err(self.name.damaged(record.body, &"a chunk without a header")),
         }
         match mcap::parse_record(op::CHUNK, &body) {
             Ok(Record::Chunk { header, .. }) => Ok(header),
-            Ok(_) => Err(self.name.damaged(record.body, "not a chunk")),
-            Err(error) => Err(self.name.damaged(record.body, error)),
+            Ok(_) => Err(self.name.damaged(record.body, &"not a chunk")),
+            Err(error) => Err(self.name.damaged(record.body, &error)),
         }
     }
 
     /// The content of a chunk: decompressed and compared with its checksum.
     pub(crate) fn chunk(&self, chunk: &Chunk) -> Result<Vec<u8>, RecordingError> {
-        let damaged = |reason: String| self.name.damaged(chunk.offset, reason);
+        let damaged = |reason: &dyn Display| self.name.damaged(chunk.offset, reason);
 
         let record = self.record_at(chunk.offset)?;
         let record = record.filter(|record| record.op == op::CHUNK);
-        let record =
-            record.ok_or_else(|| damaged("no chunk where the index has one".to_owned()))?;
+        let record = record.ok_or_else(|| damaged(&"no chunk where the index has one"))?;
         let body = self.body(&record)?;
         let parsed = mcap::parse_record(op::CHUNK, &body);
         let Ok(Record::Chunk { header, data }) = parsed else {
-            return Err(damaged("not a chunk".to_owned()));
+            return Err(damaged(&"not a chunk"));
         };
         if header.message_start_time != chunk.start_ns || header.message_end_time != chunk.end_ns {
-            return Err(damaged("its times are not those of the index".to_owned()));
+            return Err(damaged(&"its times are not those of the index"));
         }
         if header.uncompressed_size > MAX_BYTES {
-            return Err(damaged("a length is wrong".to_owned()));
+            return Err(damaged(&"a length is wrong"));
         }
 
         let size = header.uncompressed_size as usize;
         let content = match header.compression.as_str() {
-            "zstd" => {
-                zstd::bulk::decompress(&data, size).map_err(|error| damaged(error.to_string()))?
-            }
-            other => return Err(damaged(format!("unknown compression {other:?}"))),
+            "zstd" => zstd::bulk::decompress(&data, size).map_err(|error| damaged(&error))?,
+            other => return Err(damaged(&format!("unknown compression {other:?}"))),
         };
         if content.len() != size || crc32fast::hash(&content) != header.uncompressed_crc {
-            return Err(damaged("the checksum is wrong".to_owned()));
+            return Err(damaged(&"the checksum is wrong"));
         }
         Ok(content)
     }
@@ -266,7 +258,7 @@ impl Bytes {
     pub(crate) fn attachment(&self, offset: u64) -> Result<Vec<u8>, RecordingError> {
         let damaged = || {
             self.name
-                .damaged(offset, "the attached scenario is damaged")
+                .damaged(offset, &"the attached scenario is damaged")
         };
 
         let record = self.record_at(offset)?;
@@ -278,11 +270,22 @@ impl Bytes {
         if covered.is_empty() || u64::from(crc32fast::hash(covered)) != little_endian(stated) {
             return Err(damaged());
         }
-        match mcap::parse_record(op::ATTACHMENT, &body) {
-            Ok(Record::Attachment { data, .. }) => Ok(data.into_owned()),
-            _ => Err(damaged()),
-        }
+        let data = attached(covered).ok_or_else(damaged)?;
+        Ok(data.to_vec())
     }
+}
+
+/// The data in the body of an attachment, after two times and two texts.
+fn attached(body: &[u8]) -> Option<&[u8]> {
+    let rest = after_text(body.get(2 * 8..)?)?;
+    let (len, data) = after_text(rest)?.split_at_checked(8)?;
+    data.get(..usize::try_from(little_endian(len)).ok()?)
+}
+
+/// What follows a text, which has its length before it.
+fn after_text(bytes: &[u8]) -> Option<&[u8]> {
+    let (len, rest) = bytes.split_at_checked(4)?;
+    rest.get(usize::try_from(little_endian(len)).ok()?..)
 }
 
 /// At most eight bytes as a number.

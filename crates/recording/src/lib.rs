@@ -4,13 +4,17 @@
 //! The file is MCAP. Its times are simulated. Chunks end at the end of a tick, so a file that was cut off by a crash has
 //! complete ticks up to its last complete chunk.
 
+mod background;
 pub mod content;
 mod damage;
 mod index;
+mod protobuf;
 mod read;
 mod topic;
+mod viewers;
 mod write;
 
+pub use background::BackgroundWriter;
 pub use content::{Frame, Header, PlacedRobot, RecordedTick, Wall};
 pub use damage::RecordingError;
 pub use read::Recording;

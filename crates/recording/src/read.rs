@@ -1,6 +1,7 @@
 //! Reads a recording.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::fs::File;
 use std::path::Path;
 
@@ -92,7 +93,9 @@ impl Recording {
     /// Number of complete ticks. The first one is tick 0.
     #[must_use]
     pub fn len(&self) -> u64 {
-        self.chunks.last().map_or(0, |chunk| chunk.last + 1)
+        self.chunks
+            .last()
+            .map_or(0, |chunk| chunk.last.saturating_add(1))
     }
 
     /// Whether no tick is complete.
@@ -108,7 +111,7 @@ impl Recording {
     pub fn scenario(&self) -> Result<String, RecordingError> {
         let offset = self.scenario.ok_or_else(|| self.bytes.name.headless())?;
         let text = self.bytes.attachment(offset)?;
-        String::from_utf8(text).map_err(|error| self.bytes.name.damaged(offset, error))
+        String::from_utf8(text).map_err(|error| self.bytes.name.damaged(offset, &error))
     }
 
     /// Reads the ticks from `from` up to and excluding `to`; fewer if the recording ends before.
@@ -143,6 +146,21 @@ impl Recording {
         Ok(ticks)
     }
 
+    /// The end of a range from `from` on, at most `to`, of which about `max_bytes` have to be read; at least one chunk.
+    #[must_use]
+    pub fn fitting(&self, from: Tick, to: Tick, max_bytes: u64) -> Tick {
+        let mut bytes: u64 = 0;
+        let mut end = from;
+        for chunk in self.chunks_of(from, to) {
+            bytes = bytes.saturating_add(chunk.chunk.size);
+            if bytes > max_bytes && end > from {
+                return end;
+            }
+            end = chunk.last.saturating_add(1);
+        }
+        end.min(to)
+    }
+
     fn chunks_of(&self, from: Tick, to: Tick) -> &[TickChunk] {
         let begin = self.chunks.partition_point(|chunk| chunk.last < from);
         let end = self.chunks.partition_point(|chunk| chunk.first < to);
@@ -159,12 +177,12 @@ impl Recording {
     ) -> Result<(), RecordingError> {
         let content = self.bytes.chunk(&chunk.chunk)?;
         let messages =
-            messages(&content).ok_or_else(|| self.damaged(chunk, "a length is wrong"))?;
+            messages(&content).ok_or_else(|| self.damaged(chunk, &"a length is wrong"))?;
 
         for message in messages {
             let tick = self.header.tick_at(message.time_ns);
             if !(chunk.first..=chunk.last).contains(&tick) {
-                return Err(self.damaged(chunk, "a message of another tick"));
+                return Err(self.damaged(chunk, &"a message of another tick"));
             }
             if !(from..to).contains(&tick) {
                 continue;
@@ -173,7 +191,7 @@ impl Recording {
                 let partial = ticks.entry(tick).or_default();
                 partial
                     .add(topic, message.json)
-                    .map_err(|error| self.damaged(chunk, error))?;
+                    .map_err(|error| self.damaged(chunk, &error))?;
             }
         }
         Ok(())
@@ -192,7 +210,7 @@ impl Recording {
             .frame
             .filter(|frame| is_expected && frame.tick == tick);
         let frame =
-            frame.ok_or_else(|| self.damaged(chunk, format!("tick {expected} is missing")))?;
+            frame.ok_or_else(|| self.damaged(chunk, &format!("tick {expected} is missing")))?;
 
         Ok(RecordedTick {
             frame,
@@ -212,35 +230,7 @@ impl Recording {
         Ok(ticks.pop().and_then(|mut tick| tick.reports.remove(robot)))
     }
 
-    /// The newest panel of a robot at the end of a tick; `None` if none was recorded until then.
-    ///
-    /// # Errors
-    /// [`RecordingError`] if it cannot be read or is damaged.
-    pub fn panel(&self, robot: &RobotName, tick: Tick) -> Result<Option<Panel>, RecordingError> {
-        let wanted = Topic::Panel(robot.clone());
-        let channel = self.topics.iter().find(|(_, topic)| **topic == wanted);
-        let Some((channel, _)) = channel else {
-            return Ok(None);
-        };
-
-        for chunk in self.chunks_of(0, tick.saturating_add(1)).iter().rev() {
-            if !chunk.chunk.channels.contains(channel) {
-                continue;
-            }
-            let content = self.bytes.chunk(&chunk.chunk)?;
-            let messages =
-                messages(&content).ok_or_else(|| self.damaged(chunk, "a length is wrong"))?;
-            for message in messages.iter().rev() {
-                if message.channel == *channel && self.header.tick_at(message.time_ns) <= tick {
-                    let panel = parse(message.json).map_err(|error| self.damaged(chunk, error))?;
-                    return Ok(Some(panel));
-                }
-            }
-        }
-        Ok(None)
-    }
-
-    fn damaged(&self, chunk: &TickChunk, reason: impl ToString) -> RecordingError {
+    fn damaged(&self, chunk: &TickChunk, reason: &dyn Display) -> RecordingError {
         self.bytes.name.damaged(chunk.chunk.offset, reason)
     }
 }
@@ -268,18 +258,18 @@ fn read_preamble(
     bytes: &Bytes,
     chunk: &Chunk,
 ) -> Result<(Header, BTreeMap<u16, Topic>), RecordingError> {
-    let damaged = |reason: String| bytes.name.damaged(chunk.offset, reason);
+    let damaged = |reason: &dyn Display| bytes.name.damaged(chunk.offset, reason);
 
     let content = bytes.chunk(chunk)?;
     let mut topics = BTreeMap::new();
     for (_, body) in records(&content)
-        .ok_or_else(|| damaged("a length is wrong".to_owned()))?
+        .ok_or_else(|| damaged(&"a length is wrong"))?
         .into_iter()
         .filter(|(op, _)| *op == op::CHANNEL)
     {
         let record = mcap::parse_record(op::CHANNEL, body);
         let Ok(Record::Channel(channel)) = record else {
-            return Err(damaged("a channel cannot be read".to_owned()));
+            return Err(damaged(&"a channel cannot be read"));
         };
         if let Some(topic) = Topic::parse(&channel.topic) {
             topics.insert(channel.id, topic);
@@ -288,11 +278,11 @@ fn read_preamble(
 
     for message in messages(&content).unwrap_or_default() {
         if topics.get(&message.channel) == Some(&Topic::Header) {
-            let header: Header = parse(message.json).map_err(|error| damaged(error.to_string()))?;
+            let header: Header = parse(message.json).map_err(|error| damaged(&error))?;
             if header.tick_s.is_finite() && header.tick_s > 0.0 {
                 return Ok((header, topics));
             }
-            return Err(damaged(format!("a tick cannot last {} s", header.tick_s)));
+            return Err(damaged(&format!("a tick cannot last {} s", header.tick_s)));
         }
     }
     Err(bytes.name.headless())
@@ -310,11 +300,11 @@ fn tick_chunks(
         let first = header.tick_at(chunk.start_ns);
         let last = header.tick_at(chunk.end_ns);
         let before = found.last().map(|chunk| chunk.last);
-        let due = before.map_or(0, |tick| tick + 1);
+        let due = before.map_or(0, |tick| tick.saturating_add(1));
         let goes_on = before == Some(first) && first == last;
         if last < first || (first != due && !goes_on) {
             let reason = format!("ticks {first} to {last} where tick {due} is due");
-            return Err(name.damaged(chunk.offset, reason));
+            return Err(name.damaged(chunk.offset, &reason));
         }
         found.push(TickChunk { chunk, first, last });
     }

@@ -15,6 +15,30 @@ pub(crate) enum Topic {
     Panel(RobotName),
 }
 
+/// A channel that viewers draw.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum View {
+    Field,
+    Robots,
+    Guests,
+    Transforms,
+    Log,
+    Pose(RobotName),
+}
+
+impl fmt::Display for View {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Field => f.write_str("/view/field"),
+            Self::Robots => f.write_str("/view/robots"),
+            Self::Guests => f.write_str("/view/guests"),
+            Self::Transforms => f.write_str("/view/transforms"),
+            Self::Log => f.write_str("/view/log"),
+            Self::Pose(robot) => write!(f, "/view/pose/{robot}"),
+        }
+    }
+}
+
 impl fmt::Display for Topic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

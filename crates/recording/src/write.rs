@@ -15,13 +15,17 @@ use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 
 use crate::content::{Frame, Header, RecordedTick, Wall};
-use crate::topic::Topic;
+use crate::protobuf::Protobuf;
+use crate::topic::{Topic, View};
+use crate::viewers::{self, Schema};
 use crate::{METADATA, SCENARIO};
 
 /// A chunk ends with the tick in which it gets this large, bytes before compression.
 const CHUNK_BYTES: usize = 1 << 20;
 /// A chunk ends with the first tick that is complete this long after the chunk began: what a crash can lose of a slow run.
-const CHUNK_INTERVAL: Duration = Duration::from_secs(1);
+pub(crate) const CHUNK_INTERVAL: Duration = Duration::from_secs(1);
+/// Simulated time between two pictures for viewers, seconds.
+const VIEW_INTERVAL_S: f64 = 0.1;
 /// Level of compression: higher ones cost more time than they save bytes.
 const COMPRESSION_LEVEL: u32 = 1;
 
@@ -39,8 +43,13 @@ pub struct WriteError {
 pub struct Writer {
     path: PathBuf,
     file: mcap::Writer<BufWriter<File>>,
+    /// The same file, to synchronize it, also after it has been renamed.
+    disk: File,
     header: Header,
     channels: BTreeMap<Topic, u16>,
+    views: BTreeMap<View, u16>,
+    /// Ticks between two pictures for viewers.
+    view_interval: Tick,
     /// A message, encoded; kept for its memory.
     message: Vec<u8>,
     /// Bytes in the chunk so far, before compression.
@@ -54,7 +63,9 @@ impl Writer {
     /// # Errors
     /// [`WriteError`] if the file cannot be written.
     pub fn create(path: &Path, header: &Header, scenario: &str) -> Result<Self, WriteError> {
-        let file = File::create(path)
+        let disk = File::create(path).map_err(|error| failed(path, error.into()))?;
+        let file = disk
+            .try_clone()
             .map_err(McapError::from)
             .and_then(|file| options().create(BufWriter::new(file)))
             .map_err(|error| failed(path, error))?;
@@ -62,8 +73,11 @@ impl Writer {
         let mut writer = Self {
             path: path.to_owned(),
             file,
+            disk,
             header: header.clone(),
             channels: BTreeMap::new(),
+            views: BTreeMap::new(),
+            view_interval: (VIEW_INTERVAL_S / header.tick_s).round().max(1.0) as Tick,
             message: Vec::new(),
             chunk_bytes: 0,
             chunk_begun: Instant::now(),
@@ -91,8 +105,14 @@ impl Writer {
         self.add_channel::<Wall>(Topic::Wall, "cars.Wall")?;
         for robot in self.header.robots.clone() {
             self.add_channel::<Report>(Topic::Report(robot.clone()), "cars.Report")?;
-            self.add_channel::<Panel>(Topic::Panel(robot), "cars.Panel")?;
+            self.add_channel::<Panel>(Topic::Panel(robot.clone()), "cars.Panel")?;
+            self.add_view(View::Pose(robot), Schema::PoseInFrame)?;
         }
+        self.add_view(View::Field, Schema::SceneUpdate)?;
+        self.add_view(View::Robots, Schema::SceneUpdate)?;
+        self.add_view(View::Guests, Schema::PointCloud)?;
+        self.add_view(View::Transforms, Schema::FrameTransforms)?;
+        self.add_view(View::Log, Schema::Log)?;
 
         let header = self.header.clone();
         self.add(&Topic::Header, 0, &header)?;
@@ -108,6 +128,18 @@ impl Writer {
             .file
             .add_channel(schema, &topic.to_string(), "json", &BTreeMap::new())?;
         self.channels.insert(topic, id);
+        Ok(())
+    }
+
+    /// Adds a channel that viewers draw.
+    fn add_view(&mut self, view: View, schema: Schema) -> Result<(), McapError> {
+        let schema = self
+            .file
+            .add_schema(schema.name(), "protobuf", schema.descriptor())?;
+        let id = self
+            .file
+            .add_channel(schema, &view.to_string(), "protobuf", &BTreeMap::new())?;
+        self.views.insert(view, id);
         Ok(())
     }
 
@@ -133,6 +165,7 @@ impl Writer {
             self.add(&Topic::Panel(robot.clone()), number, panel)?;
         }
         self.add(&Topic::Wall, number, &tick.wall)?;
+        self.add_views(tick)?;
 
         if self.chunk_bytes >= CHUNK_BYTES || self.chunk_begun.elapsed() >= CHUNK_INTERVAL {
             self.end_chunk()?;
@@ -161,16 +194,58 @@ impl Writer {
         self.message.clear();
         serde_json::to_writer(&mut self.message, message)
             .unwrap_or_else(|error| unreachable!("a record is always JSON: {error}"));
-        let time_ns = self.header.time_ns(tick);
-        let header = MessageHeader {
-            channel_id: *channel_id,
-            sequence: tick as u32,
-            log_time: time_ns,
-            publish_time: time_ns,
-        };
+        let header = self.message_header(*channel_id, tick);
         self.file.write_to_known_channel(&header, &self.message)?;
         self.chunk_bytes += self.message.len();
         Ok(())
+    }
+
+    fn message_header(&self, channel_id: u16, tick: Tick) -> MessageHeader {
+        let time_ns = self.header.time_ns(tick);
+        MessageHeader {
+            channel_id,
+            sequence: tick as u32,
+            log_time: time_ns,
+            publish_time: time_ns,
+        }
+    }
+
+    /// Adds what viewers draw, limited in its rate.
+    fn add_views(&mut self, tick: &RecordedTick) -> Result<(), McapError> {
+        let number = tick.tick();
+        let time_ns = self.header.time_ns(number);
+        for line in tick.log(&self.header) {
+            self.view(&View::Log, number, viewers::log(&line, time_ns))?;
+        }
+        if number % self.view_interval != 0 {
+            return Ok(());
+        }
+
+        if number == 0 {
+            self.view(&View::Field, number, viewers::field(&self.header))?;
+        }
+        let robots = viewers::robots(&self.header, tick, time_ns);
+        self.view(&View::Robots, number, robots)?;
+        let guests = viewers::guests(&tick.frame.guests_mm, time_ns);
+        self.view(&View::Guests, number, guests)?;
+        let transforms = viewers::transforms(tick, time_ns);
+        self.view(&View::Transforms, number, transforms)?;
+        for robot in &tick.frame.robots {
+            let pose = viewers::robot_pose(tick, robot, time_ns);
+            self.view(&View::Pose(robot.name.clone()), number, pose)?;
+        }
+        Ok(())
+    }
+
+    fn view(&mut self, view: &View, tick: Tick, message: Protobuf) -> Result<(), McapError> {
+        let Some(channel_id) = self.views.get(view) else {
+            return Ok(()); // A robot outside the scenario has no place.
+        };
+
+        let header = self.message_header(*channel_id, tick);
+        let message = message.into_bytes();
+        self.chunk_bytes += message.len();
+        self.file.write_to_known_channel(&header, &message)
     }
 
     /// Ends the chunk, so that everything so far is in the file.
@@ -179,11 +254,6 @@ impl Writer {
     /// [`WriteError`] if the file cannot be written.
     pub fn flush(&mut self) -> Result<(), WriteError> {
         self.end_chunk().map_err(|error| failed(&self.path, error))
-    }
-
-    /// The file has been renamed.
-    pub fn renamed(&mut self, path: &Path) {
-        path.clone_into(&mut self.path);
     }
 
     fn end_chunk(&mut self) -> Result<(), McapError> {
@@ -199,22 +269,28 @@ impl Writer {
     /// [`WriteError`] if the file cannot be written.
     pub fn sync(&mut self) -> Result<(), WriteError> {
         self.flush()?;
-        File::open(&self.path)
-            .and_then(|file| file.sync_data())
+        self.disk
+            .sync_data()
             .map_err(|error| failed(&self.path, error.into()))
     }
 
-    /// Writes the event of the end of the run, if it has ended in order, and the index, which makes seeking fast.
+    /// Writes the event of the end of the run, after its last tick.
     ///
     /// # Errors
     /// [`WriteError`] if the file cannot be written.
-    pub fn finish(mut self, last: Tick, end: Option<&Event>) -> Result<(), WriteError> {
-        let mut written = Ok(());
-        if let Some(event) = end {
-            written = self.add_event(last, event);
-        }
-        written
-            .and_then(|()| self.file.finish().map(drop))
+    pub fn end(&mut self, last: Tick, event: &Event) -> Result<(), WriteError> {
+        self.add_event(last, event)
+            .map_err(|error| failed(&self.path, error))
+    }
+
+    /// Writes the index, which makes seeking fast, and ends the file.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be written.
+    pub fn finish(mut self) -> Result<(), WriteError> {
+        self.file
+            .finish()
+            .map(drop)
             .map_err(|error| failed(&self.path, error))
     }
 }

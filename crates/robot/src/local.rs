@@ -10,7 +10,7 @@ use lockstep::{
     Timing, Turn,
 };
 use protocol::messages::{
-    CommandText, FaultKind, MAX_ENTRIES, News, OnLate, PublicState, Report, Welcome,
+    CommandText, FaultKind, MAX_ENTRIES, News, OnLate, Panel, PublicState, Report, Welcome,
 };
 use protocol::{Generation, RobotName, Tick};
 
@@ -161,6 +161,18 @@ impl LocalHost {
         self.participants[index] = participant;
         self.seats[index] = Seat::new(robot, welcome);
         self.crashed.remove(&index);
+    }
+
+    /// The panel of every robot that has not crashed.
+    #[must_use]
+    pub fn panels(&self) -> BTreeMap<RobotName, Panel> {
+        let mut panels = BTreeMap::new();
+        for (index, name) in self.names.iter().enumerate() {
+            if !self.crashed.contains(&index) {
+                panels.insert(name.clone(), self.seats[index].panel());
+            }
+        }
+        panels
     }
 
     fn index(&self, name: &RobotName) -> Option<usize> {

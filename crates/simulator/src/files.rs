@@ -56,7 +56,14 @@ fn is_plain(name: &str) -> bool {
 
 /// Whether another file has the name, or an earlier epoch's file could have it.
 fn is_taken(name: &str) -> bool {
-    let names = [SUMMARY, LOGS, ENDPOINT, OPERATOR_CONFIG, LAUNCHED];
-    let prefixes = ["scenario", "events", "run.mcap", "run-epoch"];
+    let names = [
+        SUMMARY,
+        LOGS,
+        ENDPOINT,
+        OPERATOR_CONFIG,
+        LAUNCHED,
+        RECORDING,
+    ];
+    let prefixes = ["scenario", "events", "run-epoch"];
     names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))
 }

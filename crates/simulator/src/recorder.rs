@@ -1,5 +1,6 @@
-//! The folder of a run and its record. Every tick is written at once, so a crash of the simulator loses at most the current
-//! one; `record.sync` in the scenario says when it also survives a crash of the machine.
+//! The folder of a run and its record. The events of every tick are written at once, so a crash of the simulator loses at most
+//! the current one, and of the recording the current chunk; `record.sync` in the scenario says when they also survive a crash
+//! of the machine.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -9,10 +10,12 @@ use std::time::{Duration, Instant};
 
 use config::FileError;
 use protocol::event::log_line;
-use protocol::messages::LogRecord;
-use protocol::{Epoch, Event, Line, PROTOCOL_VERSION, RunName};
+use protocol::messages::{Awaited, LogRecord, Panel};
+use protocol::{Epoch, Event, Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
-use recording::{Frame, Header, PlacedRobot, RecordedTick, Wall, WriteError, Writer};
+use recording::{
+    BackgroundWriter, Frame, Header, PlacedRobot, RecordedTick, Wall, WriteError, Writer,
+};
 
 use crate::files::{LOCK, check_log_name};
 use crate::scenario::{Scenario, SyncPoint};
@@ -302,6 +305,19 @@ impl Lines {
     }
 }
 
+/// What was observed of a tick beside its record. It differs from run to run, and nothing compares it.
+#[derive(Debug)]
+pub struct Observed {
+    /// When the tick was opened.
+    pub opened: Instant,
+    /// When the report of each robot arrived.
+    pub reports: BTreeMap<RobotName, Instant>,
+    /// Robots for which the clock was held.
+    pub awaited: Vec<Awaited>,
+    /// The newest panel of each robot from which one arrived.
+    pub panels: BTreeMap<RobotName, Panel>,
+}
+
 /// Writes the record of one epoch.
 pub struct Recorder {
     folder: RunFolder,
@@ -309,7 +325,10 @@ pub struct Recorder {
     /// The lines of `events` so far.
     seal: Seal,
     log: Option<Lines>,
-    recording: Option<Writer>,
+    recording: Option<BackgroundWriter>,
+    begun: Instant,
+    /// Of the tick that is written next.
+    observed: Option<Observed>,
     sync: SyncPoint,
     synced_at: Instant,
     summary: Summary,
@@ -382,7 +401,7 @@ impl Recorder {
             let path = folder.file(&format!("{RECORDING}{suffix}"));
             let scenario = simulation.scenario().to_toml()?;
             let writer = Writer::create(&path, &header(run, simulation), &scenario);
-            recording = Some(writer.map_err(unrecordable)?);
+            recording = Some(BackgroundWriter::start(writer.map_err(unrecordable)?));
         }
 
         Ok(Self {
@@ -391,6 +410,8 @@ impl Recorder {
             seal: Seal::default(),
             log,
             recording,
+            begun: Instant::now(),
+            observed: None,
             sync: record.sync,
             synced_at: Instant::now(),
             summary: Summary::begin(run, simulation),
@@ -409,10 +430,18 @@ impl Recorder {
             std::fs::rename(&draft, self.folder.file(&name))
                 .map_err(|error| unwritable(&draft, &error))?;
         }
-        if let Some(recording) = &mut self.recording {
-            recording.renamed(&self.folder.file(RECORDING));
-        }
         Ok(())
+    }
+
+    /// Whether every tick is recorded, so that [`Recorder::observe`] is of use.
+    #[must_use]
+    pub fn is_recording(&self) -> bool {
+        self.recording.is_some()
+    }
+
+    /// Notes what was observed of the tick that is written next.
+    pub fn observe(&mut self, observed: Observed) {
+        self.observed = Some(observed);
     }
 
     /// Writes a tick. Returns the lines of the log, for observers.
@@ -444,19 +473,40 @@ impl Recorder {
 
         // The event of the end belongs to the last tick, which is recorded already.
         let end = record.events.last();
-        let is_end = matches!(end, Some(Event::End { .. }));
-        if is_end && let Some(recording) = self.recording.take() {
-            recording.finish(record.tick, end).map_err(unrecordable)?;
+        let end = end.filter(|event| matches!(event, Event::End { .. }));
+        if let Some(event) = end
+            && let Some(mut recording) = self.recording.take()
+        {
+            recording.end(record.tick, event).map_err(unrecordable)?;
+            recording.finish().map_err(unrecordable)?;
         }
-        if let Some(recording) = &mut self.recording {
-            let tick = recorded(simulation, record);
-            recording.tick(&tick).map_err(unrecordable)?;
+        let is_end = end.is_some();
+        if self.recording.is_some() && !is_end {
+            self.record_tick(simulation, record)?;
         }
 
         if is_end || self.is_sync_due() {
             self.sync()?;
         }
         Ok(lines)
+    }
+
+    fn record_tick(
+        &mut self,
+        simulation: &Simulation,
+        record: &TickRecord,
+    ) -> Result<(), FileError> {
+        let observed = self.observed.take();
+        let mut tick = recorded(simulation, record);
+        if let Some(observed) = observed {
+            tick.wall = wall(self.begun, &observed);
+            tick.panels = observed.panels;
+        }
+
+        match &mut self.recording {
+            Some(recording) => recording.tick(tick).map_err(unrecordable),
+            None => Ok(()),
+        }
     }
 
     fn add_event(&mut self, line: &Line) -> Result<(), FileError> {
@@ -503,6 +553,17 @@ impl Recorder {
     #[must_use]
     pub fn summary(&mut self) -> &mut Summary {
         &mut self.summary
+    }
+
+    /// Ends an epoch that another one follows.
+    ///
+    /// # Errors
+    /// [`FileError`] if what remains to be recorded cannot be written.
+    pub fn supersede(mut self) -> Result<(), FileError> {
+        match self.recording.take() {
+            Some(recording) => recording.finish().map_err(unrecordable),
+            None => Ok(()),
+        }
     }
 
     /// Ends the epoch and writes the summary.
@@ -604,6 +665,20 @@ fn recorded(simulation: &Simulation, record: &TickRecord) -> RecordedTick {
         reports,
         panels: BTreeMap::new(),
         wall: Wall::default(),
+    }
+}
+
+/// The times of a tick that is complete now.
+fn wall(begun: Instant, observed: &Observed) -> Wall {
+    let since = |time: Instant| time.saturating_duration_since(begun).as_nanos() as u64;
+    let reports = observed.reports.iter();
+    Wall {
+        opened_ns: since(observed.opened),
+        completed_ns: since(Instant::now()),
+        reports_ns: reports
+            .map(|(robot, arrived)| (robot.clone(), since(*arrived)))
+            .collect(),
+        awaited: observed.awaited.clone(),
     }
 }
 

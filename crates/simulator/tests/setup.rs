@@ -129,7 +129,8 @@ fn every_mistake_is_told_beside_its_field() {
         ".hidden",
         "events.jsonl",
         "scenario.toml",
-        "recording.jsonl",
+        "run.mcap",
+        "run-epoch1.mcap",
         "x\n",
     ] {
         assert_eq!(

@@ -64,6 +64,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "bus",
             "config",
             "protocol",
+            "recording",
             "terminal",
         ],
     ),

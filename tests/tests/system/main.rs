@@ -29,6 +29,7 @@ mod paths;
 mod programs;
 mod python;
 mod record;
+mod recordings;
 mod secure;
 mod shell;
 mod temporary;

@@ -630,21 +630,13 @@ fn a_robot_in_perl_draws_and_keeps_the_rules() {
 
 /// The length of the way of a robot in a run, meters.
 fn way_m(lab: &Lab, run: &str, robot: &str) -> f64 {
-    let text = std::fs::read_to_string(lab.file(run, "recording.jsonl")).unwrap();
-    let places: Vec<(f64, f64)> = text
-        .lines()
-        .filter_map(|line| {
-            let tick: serde_json::Value = serde_json::from_str(line).unwrap();
-            let own = tick["robots"]
-                .as_array()?
-                .iter()
-                .find(|other| other["name"] == robot)?;
-            Some((
-                own["location"]["x"].as_f64()?,
-                own["location"]["y"].as_f64()?,
-            ))
-        })
-        .collect();
+    let mut places = Vec::new();
+    for tick in lab.recorded(run) {
+        let mut robots = tick.frame.robots.into_iter();
+        if let Some(own) = robots.find(|other| other.name.as_str() == robot) {
+            places.push((own.location.x, own.location.y));
+        }
+    }
 
     places
         .windows(2)

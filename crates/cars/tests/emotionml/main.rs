@@ -6,15 +6,15 @@ mod rules;
 mod schema;
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
 
+use protocol::messages::{Point, Report};
+use protocol::{RobotName, RunName, Tick};
+use recording::{Frame, Header, PlacedRobot, RecordedTick, Recording, Wall, Writer};
 use roxmltree::{Document, Node};
 use serde_json::{Value, json};
-
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A place for runs, and the means to make and export them.
 struct Lab(tempfile::TempDir);
@@ -85,10 +85,35 @@ impl Lab {
         stderr(&output)
     }
 
-    /// Writes a recording of its own making: lines as given.
-    fn record(&self, name: &str, text: &str) {
+    fn recording(&self, run: &str) -> PathBuf {
+        self.path(run).join("run.mcap")
+    }
+
+    /// Writes a recording of its own making: the robots of each tick.
+    fn record(&self, name: &str, ticks: &[Value]) {
         std::fs::create_dir_all(self.path(name)).unwrap();
-        std::fs::write(self.path(name).join("recording.jsonl"), text).unwrap();
+        let ticks = (0..).zip(ticks);
+        write(
+            &self.recording(name),
+            &header(),
+            ticks.map(|(tick, robots)| recorded(tick, robots)),
+        );
+    }
+
+    /// The ticks of a recording, each with its robots.
+    fn ticks(&self, run: &str) -> Vec<Value> {
+        let recording = Recording::open(&self.recording(run)).unwrap();
+        let mut ticks = Vec::new();
+        for tick in recording.read(0, recording.len()).unwrap() {
+            let mut robots = Vec::new();
+            for (name, report) in &tick.reports {
+                let mut robot = serde_json::to_value(report).unwrap();
+                robot["name"] = name.as_str().into();
+                robots.push(robot);
+            }
+            ticks.push(json!({"tick": tick.tick(), "robots": robots}));
+        }
+        ticks
     }
 
     fn lines(&self, run: &str, file: &str) -> Vec<Value> {
@@ -258,7 +283,8 @@ fn says_what_the_record_says(lab: &Lab, run: &str, emotions: &[Emotion]) {
     assert_eq!(found.collect::<BTreeMap<_, _>>(), begun, "{run}");
 
     let mut recorded: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for robot in lab.lines(run, "recording.jsonl")[1..]
+    for robot in lab
+        .ticks(run)
         .iter()
         .flat_map(|tick| tick["robots"].as_array().unwrap())
     {
@@ -332,7 +358,7 @@ fn an_emotion_carries_its_components() {
 
     // Every number is the mean of what he published.
     let span = concerned.offset_ms / 500..(concerned.offset_ms + concerned.duration_ms) / 500;
-    let ticks = &lab.lines("hall", "recording.jsonl")[1..];
+    let ticks = lab.ticks("hall");
     let published = |name: &str| -> Vec<f64> {
         let variable = |tick: u64| {
             let butler = &ticks[usize::try_from(tick).unwrap()]["robots"][0];
@@ -418,7 +444,7 @@ fn an_emotion_is_targeted_at_the_robot_that_is_held_responsible() {
     ] {
         let lab = Lab::new();
         let ticks = [robots("CONFIDENT", "self"), robots("FRUSTRATED", agency)];
-        lab.record("way", &recording(&ticks));
+        lab.record("way", &ticks);
         let all = emotions(&lab.export(&["way"]).0);
 
         let frustrated = category(&all, "Leguin", "FRUSTRATED")[0];
@@ -443,7 +469,7 @@ fn a_robot_of_ones_own_is_exported_with_the_frame_that_it_publishes() {
         robot("Butler", "HAPPY", "SERVE", &json!({})),
         robot("Vera", "SHY", "HIDE", &variables)
     ]);
-    lab.record("party", &recording(&[robots]));
+    lab.record("party", &[robots]);
 
     for view in [&["party"][..], &["party", "--standard"]] {
         let all = emotions(&lab.export(view).0);
@@ -463,25 +489,75 @@ fn a_robot_of_ones_own_is_exported_with_the_frame_that_it_publishes() {
 
 /// A robot of a recording.
 fn robot(name: &str, emotion: &str, behavior: &str, variables: &Value) -> Value {
-    json!({"name": name, "location": {"x": 1.0, "y": 1.0}, "speed_mps": 0.0, "direction_rad": 0.0,
-        "emotion_state": emotion, "behavior_state": behavior, "state_variables": variables})
+    json!({"name": name, "emotion_state": emotion, "behavior_state": behavior, "state_variables": variables})
 }
 
-fn header() -> Value {
-    json!({"run": "made", "epoch": 1, "seed": 1, "tick_s": 0.5, "duration_s": 600.0, "field_m": [15.24, 15.24],
-        "body_m": 0.6096, "obstacles": []})
+fn header() -> Header {
+    let names = ["Ada", "Butler", "Leguin", "Vera"];
+    Header {
+        run: RunName::new("made").unwrap(),
+        epoch: 1,
+        seed: 1,
+        version: "1.2.3".to_owned(),
+        commit: None,
+        protocol: 2,
+        tick_s: 0.5,
+        duration_s: 600.0,
+        field_m: [15.24, 15.24],
+        body_m: 0.6096,
+        obstacles: Vec::new(),
+        robots: names.map(|name| RobotName::new(name).unwrap()).into(),
+    }
 }
 
-fn tick(tick: usize, robots: &Value) -> Value {
-    json!({"tick": tick, "robots": robots, "guests_mm": []})
+/// A tick with robots that have all reported.
+fn recorded(tick: Tick, robots: &Value) -> RecordedTick {
+    let mut frame = Frame {
+        tick,
+        ..Frame::default()
+    };
+    let mut reports = BTreeMap::new();
+    for robot in robots.as_array().unwrap() {
+        let name = RobotName::new(robot["name"].as_str().unwrap()).unwrap();
+        let location = Point::new(1.0, 1.0);
+        let variables = robot["state_variables"].clone();
+        let report = Report {
+            epoch: 1,
+            tick,
+            generation: 1,
+            proposal: location,
+            speed_mps: 0.0,
+            direction_rad: 0.0,
+            emotion_state: robot["emotion_state"].as_str().unwrap().to_owned(),
+            behavior_state: robot["behavior_state"].as_str().unwrap().to_owned(),
+            state_variables: serde_json::from_value(variables).unwrap(),
+            commands: 0,
+            log: Vec::new(),
+        };
+        reports.insert(name.clone(), report);
+        frame.robots.push(PlacedRobot {
+            name,
+            location,
+            blocked: false,
+            missed: None,
+        });
+    }
+
+    RecordedTick {
+        frame,
+        events: Vec::new(),
+        reports,
+        panels: BTreeMap::new(),
+        wall: Wall::default(),
+    }
 }
 
-fn recording(ticks: &[Value]) -> String {
-    let ticks = ticks
-        .iter()
-        .enumerate()
-        .map(|(at, robots)| tick(at, robots).to_string() + "\n");
-    header().to_string() + "\n" + &ticks.collect::<String>()
+fn write(file: &Path, header: &Header, ticks: impl IntoIterator<Item = RecordedTick>) {
+    let mut writer = Writer::create(file, header, "").unwrap();
+    for tick in ticks {
+        writer.tick(&tick).unwrap();
+    }
+    writer.finish().unwrap();
 }
 
 #[test]
@@ -541,10 +617,10 @@ fn without_recording_the_events_say_when_but_not_how_strongly() {
     let lab = Lab::new();
     lab.run("hors_doeuvres.toml", "hall", &[]);
     let recorded = emotions(&lab.export(&["hall"]).0);
-    std::fs::remove_file(lab.path("hall").join("recording.jsonl")).unwrap();
+    std::fs::remove_file(lab.recording("hall")).unwrap();
     let (document, notes) = lab.export(&["hall"]);
     assert!(
-        notes.contains("has no recording.jsonl") && notes.contains("without intensities"),
+        notes.contains("has no run.mcap") && notes.contains("without intensities"),
         "{notes}"
     );
 
@@ -598,13 +674,14 @@ fn emotions_of_foreign_robots_are_told_whatever_their_names() {
     ];
     let lab = Lab::new();
     lab.run("hors_doeuvres.toml", "hall", &[]);
-    let file = lab.path("hall").join("recording.jsonl");
-    let mut lines = lab.lines("hall", "recording.jsonl");
-    for (tick, line) in lines[1..].iter_mut().enumerate() {
-        line["robots"][1]["emotion_state"] = NAMES[tick / 10 % NAMES.len()].into();
+    let recording = Recording::open(&lab.recording("hall")).unwrap();
+    let mut ticks = recording.read(0, recording.len()).unwrap();
+    let leguin = RobotName::new("Leguin").unwrap();
+    for (at, tick) in ticks.iter_mut().enumerate() {
+        let report = tick.reports.get_mut(&leguin).unwrap();
+        report.emotion_state = NAMES[at / 10 % NAMES.len()].to_owned();
     }
-    let text: String = lines.iter().map(|line| line.to_string() + "\n").collect();
-    std::fs::write(file, text).unwrap();
+    write(&lab.recording("hall"), recording.header(), ticks);
 
     let (document, _) = lab.export(&["hall", "--robot", "Leguin"]);
     let (all, tree) = (emotions(&document), Document::parse(&document).unwrap());
@@ -645,7 +722,7 @@ fn emotions_of_foreign_robots_are_told_whatever_their_names() {
 fn a_robot_that_publishes_no_intensity_has_emotions_without() {
     let lab = Lab::new();
     let foreign = json!([robot("Ada", "CURIOUS", "LOOK", &json!({"intensity": 70.0}))]);
-    lab.record("made", &recording(&[foreign]));
+    lab.record("made", &[foreign]);
     let (document, notes) = lab.export(&["made"]);
     assert!(
         notes.contains("Ada does not publish `intensity` between 0 and 1"),
@@ -670,46 +747,35 @@ fn a_robot_that_publishes_no_intensity_has_emotions_without() {
 }
 
 #[test]
-fn a_last_line_that_broke_off_is_left_out_and_any_other_is_an_error() {
+fn what_a_crash_cut_off_is_left_out_and_damage_is_an_error() {
     let lab = Lab::new();
     let happy = json!([robot("Ada", "HAPPY", "", &json!({"intensity": 0.5}))]);
-    let whole = recording(&vec![happy; 4]);
-    lab.record("whole", &whole);
+    lab.record("whole", &vec![happy.clone(); 10_000]);
     let all = emotions(&lab.export(&["whole"]).0);
-    assert_eq!((all.len(), all[0].duration_ms), (1, 2000));
+    assert_eq!((all.len(), all[0].duration_ms), (1, 5_000_000));
 
-    for left in [2, 40, 100] {
-        lab.record("broken", &whole[..whole.len() - left]);
-        let (document, notes) = lab.export(&["broken"]);
-        assert!(
-            notes.contains("the last line of") && notes.contains("incomplete"),
-            "{notes}"
-        );
-        assert_eq!(emotions(&document)[0].duration_ms, 1500);
-    }
-    let lines: Vec<&str> = whole.lines().collect();
-    lab.record(
-        "garbled",
-        &[lines[0], lines[1], "{\"tick\": 1,", lines[3], ""].join("\n"),
-    );
-    assert!(lab.refusal(&["garbled"]).contains("line 3"));
-    lab.record("gap", &[lines[0], lines[1], lines[3], ""].join("\n"));
+    let bytes = std::fs::read(lab.recording("whole")).unwrap();
+    lab.record("broken", &[]);
+    std::fs::write(lab.recording("broken"), &bytes[..bytes.len() / 2]).unwrap();
+    let (document, notes) = lab.export(&["broken"]);
     assert!(
-        lab.refusal(&["gap"])
-            .contains("line 3: tick 2 where 1 is due")
+        notes.contains("was not finished: what comes after tick"),
+        "{notes}"
     );
-    lab.record("empty", "");
-    assert!(lab.refusal(&["empty"]).contains("holds no run yet"));
-    lab.record("begun", &(lines[0].to_owned() + "\n"));
+    let kept_ms = emotions(&document)[0].duration_ms;
+    assert!((500..5_000_000).contains(&kept_ms), "{kept_ms}");
+
+    let mut garbled = bytes.clone();
+    garbled[bytes.len() / 2] ^= 1;
+    std::fs::write(lab.recording("broken"), garbled).unwrap();
+    let refusal = lab.refusal(&["broken"]);
+    assert!(refusal.contains("damaged at byte"), "{refusal}");
+
+    std::fs::write(lab.recording("broken"), "").unwrap();
+    let refusal = lab.refusal(&["broken"]);
+    assert!(refusal.contains("is not a recording of a run"), "{refusal}");
+    lab.record("begun", &[]);
     assert!(lab.refusal(&["begun"]).contains("holds no tick yet"));
-    lab.record(
-        "timeless",
-        &whole.replacen("\"tick_s\":0.5", "\"tick_s\":0.0", 1),
-    );
-    assert!(
-        lab.refusal(&["timeless"])
-            .contains("a tick cannot last 0 s")
-    );
 }
 
 #[test]
@@ -725,96 +791,52 @@ fn what_cannot_be_exported_is_refused_with_a_reason() {
     std::fs::create_dir(lab.path("bare")).unwrap();
     assert!(
         lab.refusal(&["bare"])
-            .contains("has neither recording.jsonl nor events.jsonl")
+            .contains("has neither run.mcap nor events.jsonl")
     );
 
     lab.run("hors_doeuvres.toml", "hall", &[]);
-    let file = lab.path("hall").join("recording.jsonl");
+    let file = lab.recording("hall");
     let before = std::fs::read(&file).unwrap();
-    let refusal = lab.refusal(&["hall", "--output", "hall/recording.jsonl"]);
+    let refusal = lab.refusal(&["hall", "--output", "hall/run.mcap"]);
     assert!(
         refusal.contains("choose another --output") && std::fs::read(&file).unwrap() == before,
         "{refusal}"
     );
 }
 
-/// A pipe takes the place of the recording: a document that began before the recording ended was not held back, and what
-/// a process never held it cannot have needed.
+/// The document is read in two parts: in between, the program waits for its output to be read, and has used the memory that
+/// it needs for nearly all of the recording.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_huge_run_is_exported_as_it_is_read() {
     let lab = Lab::new();
-    lab.record("huge", "");
-    let pipe = lab.path("huge").join("recording.jsonl");
-    std::fs::remove_file(&pipe).unwrap();
-    assert!(
-        Command::new("mkfifo")
-            .arg(&pipe)
-            .status()
-            .unwrap()
-            .success()
-    );
+    let ticks: u64 = 25_000;
+    std::fs::create_dir_all(lab.path("huge")).unwrap();
+    let padding = "x".repeat(4000);
+    let robots = (0..ticks).map(|tick| {
+        let variables = json!({"intensity": 0.5, "padding": padding});
+        let is_happy = (tick / 5).is_multiple_of(2);
+        let emotion = if is_happy { "HAPPY" } else { "CONCERNED" };
+        recorded(tick, &json!([robot("Ada", emotion, "", &variables)]))
+    });
+    write(&lab.recording("huge"), &header(), robots);
+
     let mut child = lab
         .cars(&["emotionml", "huge"])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    // Open for both, so that neither side waits for the other; the child sees the end when this is closed.
-    let mut feed = std::fs::File::options()
-        .read(true)
-        .write(true)
-        .open(&pipe)
-        .unwrap();
-    let (sender, received) = std::sync::mpsc::channel();
-    let stdout = child.stdout.take().unwrap();
-    let reader = std::thread::spawn(move || {
-        let mut document = BufReader::new(stdout);
-        let (mut line, mut emotions) = (String::new(), 0_usize);
-        while document.read_line(&mut line).unwrap() > 0 {
-            if line.contains("</emotion>") {
-                emotions += 1;
-                let _ = sender.send(emotions);
-            }
-            line.clear();
-        }
-        emotions
-    });
+    let mut document = BufReader::new(child.stdout.take().unwrap());
+    let episodes = ticks / 5;
+    // What follows is more than a pipe holds.
+    let mut found = 0;
+    while found < episodes * 9 / 10 {
+        let count = emotions_in_line(&mut document).unwrap();
+        found += count;
+    }
 
-    let ticks = 25_000;
-    // In a thread of its own: it would wait for ever for a child that reads no more.
-    let feeder = std::thread::spawn(move || {
-        let padding = "x".repeat(4000);
-        writeln!(feed, "{}", header()).unwrap();
-        for at in 0..ticks {
-            let variables = json!({"intensity": 0.5, "padding": padding});
-            let emotion = if at / 5 % 2 == 0 {
-                "HAPPY"
-            } else {
-                "CONCERNED"
-            };
-            writeln!(
-                feed,
-                "{}",
-                tick(at, &json!([robot("Ada", emotion, "", &variables)]))
-            )
-            .unwrap();
-        }
-        feed
-    });
-    // The last episode is still open, and the line of the one before ends with what follows it.
-    let (episodes, begun) = (ticks / 5, Instant::now());
-    while received
-        .recv_timeout(PATIENCE.saturating_sub(begun.elapsed()))
-        .unwrap()
-        < episodes - 2
-    {}
-    let mut status = String::new();
-    let file = format!("/proc/{}/status", child.id());
-    std::fs::File::open(file)
-        .unwrap()
-        .read_to_string(&mut status)
-        .unwrap();
+    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
     let peak = status
         .lines()
         .find_map(|line| line.strip_prefix("VmHWM:"))
@@ -824,204 +846,18 @@ fn a_huge_run_is_exported_as_it_is_read() {
         peak_kib < 32 * 1024,
         "{peak_kib} KiB for a recording of 100 MB"
     );
-    drop(feeder.join().unwrap());
-    assert_eq!(reader.join().unwrap(), episodes);
+
+    while let Some(count) = emotions_in_line(&mut document) {
+        found += count;
+    }
+    assert_eq!(found, episodes);
     assert!(child.wait().unwrap().success());
 }
 
-/// A document written by hand that keeps all rules and uses all parts.
-const SOUND: &str = r##"<?xml version="1.0" encoding="UTF-8"?>
-<emotionml version="1.0" xmlns="http://www.w3.org/2009/10/emotionml" dimension-set="http://www.w3.org/TR/emotion-voc/xml#fsre-dimensions">
-  <info>a <b xmlns="urn:other"/></info>
-  <emotion id="e1" category-set="#own" appraisal-set="http://www.w3.org/TR/emotion-voc/xml#ema-appraisals" action-tendency-set="#acts" time-ref-uri="clock" offset-to-start="0" duration="1000" expressed-through="face">
-    <info>b</info>
-    <category name="BORED"><trace freq="2Hz" samples="0.5 1"/></category>
-    <dimension name="valence" value="0.5"/>
-    <appraisal name="urgency" value="0.25"/>
-    <action-tendency name="leave" value="1"/>
-    <reference uri="robot" role="experiencedBy"/>
-  </emotion>
-  <vocabulary type="category" id="own"><item name="BORED"/><item name="KEEN"/></vocabulary>
-  <vocabulary type="action-tendency" id="acts"><item name="leave"/></vocabulary>
-</emotionml>
-"##;
-
-/// Each rule with an edit of the sound document that breaks it, and whether W3C's schema sees that, too.
-const BREAKS: [(&str, &str, &str, bool); 44] = [
-    ("xml", "</emotionml>", "", true),
-    ("101", "2009/10/emotionml\"", "2009/10/other\"", true),
-    ("111", "version=\"1.0\" xmlns", "xmlns", true),
-    (
-        "111",
-        "version=\"1.0\" xmlns",
-        "version=\"1.1\" xmlns",
-        true,
-    ),
-    (
-        "114",
-        " dimension-set=",
-        " category-set=\"#acts\" dimension-set=",
-        false,
-    ),
-    ("117", "#fsre-dimensions", "#ema-appraisals", false),
-    (
-        "120",
-        " dimension-set=",
-        " appraisal-set=\"#own\" dimension-set=",
-        false,
-    ),
-    (
-        "123",
-        " dimension-set=",
-        " action-tendency-set=\"#gone\" dimension-set=",
-        false,
-    ),
-    (
-        "161",
-        " category-set=\"#own\"",
-        " category-set=\"#acts\"",
-        false,
-    ),
-    (
-        "161",
-        " category-set=\"#own\"",
-        " category-set=\"#gone\"",
-        false,
-    ),
-    (
-        "164",
-        " category-set=",
-        " dimension-set=\"#own\" category-set=",
-        false,
-    ),
-    ("167", "#ema-appraisals", "#fsre-dimensions", false),
-    (
-        "170",
-        "action-tendency-set=\"#acts\"",
-        "action-tendency-set=\"#own\"",
-        false,
-    ),
-    ("210", " category-set=\"#own\"", "", false),
-    (
-        "220",
-        " dimension-set=\"http://www.w3.org/TR/emotion-voc/xml#fsre-dimensions\"",
-        "",
-        false,
-    ),
-    (
-        "230",
-        " appraisal-set=\"http://www.w3.org/TR/emotion-voc/xml#ema-appraisals\"",
-        "",
-        false,
-    ),
-    ("240", " action-tendency-set=\"#acts\"", "", false),
-    (
-        "212",
-        "<category name=\"BORED\">",
-        "<category name=\"bored\">",
-        false,
-    ),
-    ("222", "name=\"valence\"", "name=\"pleasure\"", false),
-    ("232", "name=\"urgency\"", "name=\"suddenness\"", false),
-    (
-        "242",
-        "<action-tendency name=\"leave\"",
-        "<action-tendency name=\"stay\"",
-        false,
-    ),
-    (
-        "213",
-        "<dimension",
-        "<category name=\"BORED\"/><dimension",
-        true,
-    ),
-    (
-        "223",
-        "<appraisal",
-        "<dimension name=\"valence\" value=\"0\"/><appraisal",
-        true,
-    ),
-    (
-        "233",
-        "<action",
-        "<appraisal name=\"urgency\"/><action",
-        true,
-    ),
-    (
-        "243",
-        "<reference",
-        "<action-tendency name=\"leave\"/><reference",
-        true,
-    ),
-    (
-        "156",
-        "</emotionml>",
-        "<emotion time-ref-uri=\"clock\"><info/></emotion></emotionml>",
-        true,
-    ),
-    (
-        "216",
-        "<category name=\"BORED\">",
-        "<category name=\"BORED\" value=\"1\">",
-        false,
-    ),
-    (
-        "226",
-        "value=\"0.5\"/>",
-        "value=\"0.5\"><trace freq=\"1Hz\" samples=\"1\"/></dimension>",
-        false,
-    ),
-    (
-        "236",
-        "value=\"0.25\"/>",
-        "value=\"0.25\"><trace freq=\"1Hz\" samples=\"1\"/></appraisal>",
-        false,
-    ),
-    (
-        "246",
-        "value=\"1\"/>",
-        "value=\"1\"><trace freq=\"1Hz\" samples=\"1\"/></action-tendency>",
-        false,
-    ),
-    ("224", " value=\"0.5\"", "", false),
-    ("304", "<info>b</info>", "<info><info/></info>", true),
-    ("410", " uri=\"robot\"", "", true),
-    ("schema role", "experiencedBy", "feltBy", true),
-    ("schema value", "0.25", "1.25", true),
-    ("schema freq", "2Hz", "2", true),
-    ("schema samples", "0.5 1\"", "0.5 1.5\"", true),
-    ("schema samples", "0.5 1\"", "\"", true),
-    ("schema time", "duration=\"1000\"", "duration=\"1.5\"", true),
-    (
-        "schema order",
-        "<info>b</info>",
-        "<reference uri=\"x\"/>",
-        true,
-    ),
-    ("schema item", "KEEN", "VERY KEEN", true),
-    ("schema vocabulary", "<item name=\"leave\"/>", "", true),
-    ("schema id", "id=\"acts\"", "id=\"own\"", true),
-    ("trace", "0.5 1\"", "0.5 1 1\"", false),
-];
-
-#[test]
-fn every_rule_can_be_broken() {
-    let lab = Lab::new();
-    assert_eq!(rules::broken(SOUND), [].into());
-    assert_ne!(schema::is_valid(SOUND, lab.0.path()), Some(false));
-
-    for (rule, from, to, by_schema) in BREAKS {
-        let document = SOUND.replacen(from, to, 1);
-        assert_ne!(document, SOUND, "{rule}: nothing was broken");
-        let broken = rules::broken(&document);
-        assert!(broken.contains(rule), "{rule} by {to:?}: {broken:?}");
-        if rule == "xml" {
-            continue;
-        }
-        let valid = schema::is_valid(&document, lab.0.path());
-        assert!(
-            valid.is_none_or(|valid| valid != by_schema),
-            "{rule} by {to:?}: the schema says {valid:?}"
-        );
-    }
+/// How many emotions end in the next line of a document; `None` at its end.
+#[cfg(target_os = "linux")]
+fn emotions_in_line(document: &mut impl BufRead) -> Option<u64> {
+    let mut line = String::new();
+    let length = document.read_line(&mut line).unwrap();
+    (length > 0).then(|| line.matches("</emotion>").count() as u64)
 }

@@ -235,14 +235,14 @@ export type Tone = "good" | "neutral" | "warning" | "bad";
  */
 export type Face = "happy" | "sad" | "surprised" | "disgusted" | "angry" | "fearful" | "neutral";
 /**
+ * What became of a command.
+ */
+export type Fate = "sent" | "delivered" | "dropped";
+/**
  * A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
  * languages that do not tell them apart give the same run.
  */
 export type Variable = boolean | number | string;
-/**
- * What became of a command.
- */
-export type Fate = "sent" | "delivered" | "dropped";
 
 /**
  * What a person can change between two epochs: the set-up screen of the paper ("Overall Architecture"). Everything else
@@ -459,97 +459,6 @@ export interface Panel {
    * The widgets, from top to bottom.
    */
   widgets: Widget[];
-}
-/**
- * Every further line of a recording: the field after a tick.
- */
-export interface RecordedTick {
-  /**
-   * Centers of the guests in whole millimeters, x and y in turn: small, and more than an eye can tell.
-   */
-  guests_mm: number[];
-  /**
-   * The robots, by name.
-   */
-  robots: RecordedRobot[];
-  /**
-   * The tick.
-   */
-  tick: number;
-}
-/**
- * A robot in a [`RecordedTick`].
- */
-export interface RecordedRobot {
-  /**
-   * Its behavior state.
-   */
-  behavior_state: string;
-  /**
-   * Whether its last move was refused.
-   */
-  blocked?: boolean;
-  /**
-   * Direction of motion, radians counter-clockwise from +x.
-   */
-  direction_rad: number;
-  /**
-   * Its emotion state.
-   */
-  emotion_state: string;
-  location: Point;
-  /**
-   * Whether its report of this tick is missing, so that what follows is older.
-   */
-  missed?: boolean;
-  name: RobotName;
-  /**
-   * Magnitude of its velocity, m/s.
-   */
-  speed_mps: number;
-  /**
-   * What it publishes about itself.
-   */
-  state_variables: {
-    [k: string]: Variable;
-  };
-}
-/**
- * The recording of an epoch begins with this line: what does not change during it.
- */
-export interface RecordingHeader {
-  /**
-   * Side of every body, meters.
-   */
-  body_m: number;
-  /**
-   * Simulated time at which the run was to end, seconds.
-   */
-  duration_s: number;
-  /**
-   * The epoch.
-   */
-  epoch: number;
-  /**
-   * Width and height of the field, meters.
-   *
-   * @minItems 2
-   * @maxItems 2
-   */
-  field_m: [number, number];
-  /**
-   * Centers of the fixed obstacles, meters.
-   */
-  obstacles: [number, number][];
-  run: RunName;
-  /**
-   * Its seed.
-   */
-  seed: number;
-  /**
-   * Length of a tick, simulated seconds.
-   */
-  tick_s: number;
 }
 /**
  * The field at a moment, published at a display rate while somebody watches.

@@ -2,11 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
-use protocol::messages::{Performative, Point, RecordedRobot, RecordedTick, RecordingHeader};
-use protocol::{Event, Line, RobotName, RunName};
-use serde_json::Value;
+use protocol::messages::{Awaited, Cut, Panel, Performative, Point, Reason, Report, Widget};
+use protocol::{Event, RobotName, RunName};
+use recording::content::Missed;
+use recording::{Frame, Header, PlacedRobot, RecordedTick, Wall, Writer};
+use serde_json::{Value, json};
 
 use crate::client::{Console, fails};
 
@@ -14,54 +17,41 @@ fn robot(name: &str) -> RobotName {
     RobotName::new(name).unwrap()
 }
 
-fn header() -> RecordingHeader {
-    RecordingHeader {
+fn header() -> Header {
+    Header {
         run: RunName::new("past").unwrap(),
         epoch: 3,
         seed: 9_007_199_254_740_991,
+        version: "1.2.3".to_owned(),
+        commit: None,
+        protocol: 2,
         tick_s: 0.5,
         duration_s: 600.0,
         field_m: [15.24, 15.24],
         body_m: 0.6096,
         obstacles: vec![[1.0, 2.0]],
+        robots: vec![robot("Butler")],
     }
 }
 
-fn recorded_tick(tick: u64) -> RecordedTick {
-    let butler = RecordedRobot {
-        name: robot("Butler"),
-        location: Point::new(0.1 + 0.2, tick as f64),
+fn report(tick: u64) -> Report {
+    Report {
+        epoch: 3,
+        tick,
+        generation: 2,
+        proposal: Point::new(1.0, 1.0),
         speed_mps: 1.0 / 3.0,
         direction_rad: 0.0,
-        blocked: false,
-        missed: false,
         emotion_state: "HAPPY".to_owned(),
         behavior_state: "SERVE".to_owned(),
-        state_variables: [("treats".to_owned(), 7.0.into())].into(),
-    };
-
-    RecordedTick {
-        tick,
-        robots: vec![butler],
-        guests_mm: vec![-1, tick as i64],
+        state_variables: [("treats".to_owned(), (tick as f64).into())].into(),
+        commands: 0,
+        log: Vec::new(),
     }
 }
 
-/// The lines of a recording: a header and `ticks` ticks.
-fn recording(ticks: u64) -> Vec<String> {
-    let mut lines = vec![serde_json::to_string(&header()).unwrap()];
-    for tick in 0..ticks {
-        lines.push(serde_json::to_string(&recorded_tick(tick)).unwrap());
-    }
-    lines
-}
-
-/// The lines of its events: `Say` in every tick, a command in every tenth.
-fn events(ticks: u64) -> Vec<String> {
-    (0..ticks).flat_map(events_of_tick).collect()
-}
-
-fn events_of_tick(tick: u64) -> Vec<String> {
+/// `Say` in every tick, a command in every tenth.
+fn events(tick: u64) -> Vec<Event> {
     let mut events = vec![Event::Say {
         robot: robot("Butler"),
         text: format!("tick {tick}"),
@@ -75,26 +65,47 @@ fn events_of_tick(tick: u64) -> Vec<String> {
             command: "refill".to_owned(),
         });
     }
-    events.push(Event::Tick {
-        digest: "x".to_owned(),
-        seal: None,
-    });
-
     events
-        .into_iter()
-        .map(|event| Line { tick, event }.to_json())
-        .collect()
 }
 
-fn write(folder: &Path, file: &str, lines: &[String]) {
-    std::fs::write(folder.join(file), lines.join("\n") + "\n").unwrap();
+fn recorded_tick(tick: u64) -> RecordedTick {
+    let butler = PlacedRobot {
+        name: robot("Butler"),
+        location: Point::new(0.1 + 0.2, tick as f64),
+        blocked: false,
+        missed: None,
+    };
+
+    RecordedTick {
+        frame: Frame {
+            tick,
+            robots: vec![butler],
+            guests_mm: vec![-1, tick as i64],
+            ..Frame::default()
+        },
+        events: events(tick),
+        reports: [(robot("Butler"), report(tick))].into(),
+        panels: BTreeMap::new(),
+        wall: Wall::default(),
+    }
+}
+
+fn write(file: &Path, ticks: impl IntoIterator<Item = RecordedTick>) {
+    let mut writer = Writer::create(file, &header(), "").unwrap();
+    for tick in ticks {
+        writer.tick(&tick).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn file(folder: &Path) -> PathBuf {
+    folder.join("run.mcap")
 }
 
 /// The folder of a run of `ticks` ticks.
 fn run_folder(ticks: u64) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), "recording.jsonl", &recording(ticks));
-    write(folder.path(), "events.jsonl", &events(ticks));
+    write(&file(folder.path()), (0..ticks).map(recorded_tick));
     folder
 }
 
@@ -224,52 +235,115 @@ fn a_recording_cannot_be_changed() {
 }
 
 #[test]
-fn a_last_line_that_a_crash_left_unfinished_is_ignored() {
-    let folder = run_folder(100);
-    for (file, lines) in [
-        ("recording.jsonl", recording(100)),
-        ("events.jsonl", events(100)),
-    ] {
-        let text = lines.join("\n");
-        std::fs::write(folder.path().join(file), &text[..text.len() - 9]).unwrap();
+fn a_robot_that_misses_ticks_is_shown_with_its_last_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let ticks = (0..2000).map(|tick| {
+        let mut recorded = recorded_tick(tick);
+        if tick >= 3 {
+            recorded.reports.clear();
+            recorded.frame.robots[0].missed = Some(Missed {
+                last_report: Some(2),
+            });
+        }
+        recorded
+    });
+    write(&file(folder.path()), ticks);
+    let console = open(folder.path());
+
+    for (tick, presence, treats) in [(2, "here", 2.0), (3, "gone", 2.0), (1999, "gone", 2.0)] {
+        let butler = &get_range(&console, tick, 1)["ticks"][0]["robots"][0];
+        assert_eq!(butler["presence"], presence, "{tick}");
+        assert_eq!(butler["state_variables"]["treats"], treats, "{tick}");
+        assert_eq!(butler["location"]["y"], tick as f64);
+        assert_eq!(butler["generation"], 2);
     }
+}
+
+#[test]
+fn cuts_panels_and_who_held_the_clock_up_are_shown() {
+    let panel = |text: &str| Panel {
+        widgets: vec![Widget::Text {
+            label: "why".to_owned(),
+            text: text.to_owned(),
+        }],
+    };
+    let cut = Cut {
+        from: robot("Butler"),
+        to: robot("Leguin"),
+        commands: true,
+        queries: false,
+    };
+    let awaited = Awaited {
+        name: robot("Butler"),
+        since_s: 0.75,
+        because: Reason::Silent,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let ticks = (0..2000).map(|tick| {
+        let mut recorded = recorded_tick(tick);
+        if tick == 1 || tick == 9 {
+            let text = format!("at {tick}");
+            recorded.panels.insert(robot("Butler"), panel(&text));
+        }
+        if tick == 9 {
+            recorded.frame.cuts.push(cut.clone());
+            recorded.wall.awaited.push(awaited.clone());
+        }
+        recorded
+    });
+    write(&file(folder.path()), ticks);
+    let console = open(folder.path());
+
+    let ticks = get_range(&console, 0, 12)["ticks"].clone();
+    for tick in 0..12 {
+        let cuts = if tick == 9 { json!([cut]) } else { json!([]) };
+        assert_eq!(ticks[tick]["cuts"], cuts, "{tick}");
+        let awaiting = if tick == 9 {
+            json!([awaited])
+        } else {
+            json!([])
+        };
+        assert_eq!(ticks[tick]["awaiting"], awaiting, "{tick}");
+    }
+
+    // With the panels of the simulated second before, which is two ticks.
+    let shown =
+        |tick: u64| json!({"tick": tick, "robot": "Butler", "panel": panel(&format!("at {tick}"))});
+    for (from, expected) in [
+        (0, json!([shown(1), shown(9)])),
+        (2, json!([shown(1), shown(9)])),
+        (3, json!([shown(9)])),
+        (10, json!([shown(9)])),
+        (11, json!([])),
+    ] {
+        assert_eq!(get_range(&console, from, 20)["panels"], expected, "{from}");
+    }
+}
+
+#[test]
+fn a_recording_that_a_crash_cut_off_is_shown_as_far_as_it_goes() {
+    let folder = run_folder(20_000);
+    let bytes = std::fs::read(file(folder.path())).unwrap();
+    std::fs::write(file(folder.path()), &bytes[..bytes.len() / 2]).unwrap();
 
     let console = open(folder.path());
 
-    assert_eq!(console.get("recording").json()["ticks"], 98);
-    let range = get_range(&console, 98, 9);
-    assert_eq!(ticks(&range["ticks"]), [98]);
+    let last = console.get("recording").json()["ticks"].as_u64().unwrap();
+    assert!((100..20_000).contains(&last), "{last}");
+    let range = get_range(&console, last, 9);
+    assert_eq!(ticks(&range["ticks"]), [last]);
 }
 
 #[test]
-fn recording_and_events_may_end_at_different_ticks() {
-    let folder = run_folder(100);
+fn the_recording_of_an_earlier_epoch_is_shown_by_its_file() {
+    let folder = run_folder(3);
+    let earlier = folder.path().join("run-epoch1.mcap");
+    write(&earlier, (0..5).map(recorded_tick));
 
-    write(folder.path(), "events.jsonl", &events(50));
-    let range = get_range(&open(folder.path()), 48, 10);
-    assert_eq!(ticks(&range["ticks"]).len(), 10);
-    assert_eq!(ticks(&range["log"]).len(), 2);
+    let console = open(&earlier);
 
-    write(folder.path(), "events.jsonl", &events(150));
-    let range = get_range(&open(folder.path()), 99, 10);
-    assert_eq!(ticks(&range["ticks"]), [99]);
-    assert_eq!(ticks(&range["log"]), [99]);
-}
-
-#[test]
-fn the_recording_of_an_earlier_epoch_has_its_own_events() {
-    let folder = run_folder(5);
-    for file in ["recording", "events"] {
-        let current = folder.path().join(format!("{file}.jsonl"));
-        let earlier = folder.path().join(format!("{file}-epoch1.jsonl"));
-        std::fs::rename(current, earlier).unwrap();
-    }
-    let other = ["not of this epoch".to_owned()];
-    write(folder.path(), "events.jsonl", &other);
-
-    let console = open(&folder.path().join("recording-epoch1.jsonl"));
-
-    let range = get_range(&console, 0, 5);
+    let range = get_range(&console, 0, 9);
+    assert_eq!(ticks(&range["ticks"]).len(), 5);
     assert_eq!(ticks(&range["log"]).len(), 6);
 }
 
@@ -279,86 +353,54 @@ fn refusal(folder: &Path) -> String {
     fails(&["--bind", "127.0.0.1:0", "--recording", folder])
 }
 
-fn with_line(lines: &[String], index: usize, line: &str) -> Vec<String> {
-    let mut lines = lines.to_vec();
-    lines[index] = line.to_owned();
-    lines
-}
-
 #[test]
-fn a_missing_file_is_named() {
+fn a_recording_that_cannot_be_shown_is_named() {
     let empty = tempfile::tempdir().unwrap();
     let text = refusal(empty.path());
-    assert!(text.contains("recording.jsonl"), "{text}");
+    assert!(text.contains("run.mcap"), "{text}");
     assert!(text.contains("the folder of a run"), "{text}");
 
-    let folder = run_folder(10);
-    std::fs::remove_file(folder.path().join("events.jsonl")).unwrap();
+    let folder = run_folder(0);
     let text = refusal(folder.path());
-    assert!(text.contains("events.jsonl"), "{text}");
-}
+    assert!(text.contains("run.mcap: no tick was completed"), "{text}");
 
-#[test]
-fn a_malformed_recording_is_refused_with_file_and_line() {
-    let good = recording(10);
-
-    for (lines, expected) in [
-        (
-            with_line(&good, 4, "{\"tick\":3}"),
-            "recording.jsonl, line 5: missing field",
-        ),
-        (
-            with_line(&good, 4, "garbage"),
-            "recording.jsonl, line 5: expected value",
-        ),
-        (
-            with_line(&good, 4, &good[7]),
-            "line 5: tick 6 where tick 3 should be",
-        ),
-        (
-            with_line(&good, 0, "{}"),
-            "recording.jsonl, line 1: missing field `run`",
-        ),
-        (good[..1].to_vec(), "no tick was completed"),
-        (Vec::new(), "recording.jsonl, line 1"),
-    ] {
-        let folder = run_folder(10);
-        write(folder.path(), "recording.jsonl", &lines);
+    for content in ["", "{}\n"] {
+        std::fs::write(file(folder.path()), content).unwrap();
         let text = refusal(folder.path());
-        assert!(text.contains(expected), "expected {expected:?} in {text}");
+        assert!(text.contains("run.mcap is not a recording"), "{text}");
     }
 }
 
 #[test]
-fn malformed_events_are_refused_with_file_and_line() {
-    let good = events(10);
+fn damage_is_reported_with_its_place_where_it_is_read() {
+    let folder = run_folder(20_000);
+    let mut bytes = std::fs::read(file(folder.path())).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(file(folder.path()), bytes).unwrap();
+    let console = open(folder.path());
 
-    for (lines, expected) in [
-        (with_line(&good, 6, "[]"), "events.jsonl, line 7"),
-        (
-            with_line(&good, 20, &good[1]),
-            "line 21: tick 0 after a later one",
-        ),
-    ] {
-        let folder = run_folder(10);
-        write(folder.path(), "events.jsonl", &lines);
-        let text = refusal(folder.path());
-        assert!(text.contains(expected), "expected {expected:?} in {text}");
+    let mut answers = Vec::new();
+    for from in (0..20_000).step_by(500) {
+        answers.push(console.get(&format!("recording/ticks?from={from}&count=1")));
     }
+    let is_damaged = |body: &str| body.contains("run.mcap: damaged at byte ");
+    let damaged = answers.iter().filter(|answer| is_damaged(&answer.body));
+    let good = answers.iter().filter(|answer| answer.status == 200);
+    let counts = (damaged.count(), good.count());
+    assert!(counts.0 > 0 && counts.1 > 0, "{counts:?}");
+    assert_eq!(counts.0 + counts.1, answers.len());
 }
 
 #[test]
 fn a_large_range_is_answered_in_part() {
-    let folder = run_folder(0);
-    let guests = "1234,".repeat(200_000);
-    let mut lines = recording(0);
-    for tick in 0..40 {
-        lines.push(format!(
-            r#"{{"tick":{tick},"robots":[],"guests_mm":[{guests}0]}}"#
-        ));
-    }
-    write(folder.path(), "recording.jsonl", &lines);
-    write(folder.path(), "events.jsonl", &events(40));
+    let folder = tempfile::tempdir().unwrap();
+    let ticks = (0..40).map(|tick| {
+        let mut recorded = recorded_tick(tick);
+        recorded.frame.guests_mm = vec![1234; 200_000];
+        recorded
+    });
+    write(&file(folder.path()), ticks);
 
     let range = get_range(&open(folder.path()), 0, 40);
 

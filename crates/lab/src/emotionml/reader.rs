@@ -1,19 +1,23 @@
 //! Reads the states of a run's robots tick by tick, from its recording, or from its events if it has no recording.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use config::Changes;
 use miette::{IntoDiagnostic, miette};
-use protocol::messages::{Parameters, RecordedRobot, RecordedTick, RecordingHeader};
+use protocol::messages::{Parameters, Report};
 use protocol::{Epoch, Event, Line, RobotName, RunName, Tick};
+use recording::{RecordedTick, Recording};
 use serde::de::DeserializeOwned;
 use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
 use simulator::{RunFolder, Scenario};
 
 use super::episode::RobotState;
+
+/// Most ticks of a recording that are in memory.
+const TICKS_AT_ONCE: Tick = 64;
 /// Longest line of a record, bytes; a tick of a thousand robots that publish much takes a hundredth of it.
 const MAX_LINE_BYTES: u64 = 1 << 28;
 
@@ -41,25 +45,39 @@ pub(super) struct Snapshot {
 
 /// A record that is being read.
 pub(super) struct Reader {
-    lines: Lines,
+    path: PathBuf,
     facts: Facts,
+    source: Source,
     /// The tick that must come next.
     due: Tick,
-    /// The states so far, if events are read.
-    replay: Option<Replay>,
     /// What the record lacks, for people.
     notes: Vec<String>,
+}
+
+/// What is read.
+enum Source {
+    Recording(Box<Playback>),
+    Events { lines: Lines, replay: Replay },
+}
+
+/// A recording that is read from its beginning to its end.
+struct Playback {
+    recording: Recording,
+    /// Ticks that have been read from the file and come next.
+    ticks: VecDeque<RecordedTick>,
+    /// The last report of each robot.
+    reports: BTreeMap<RobotName, Report>,
 }
 
 impl Reader {
     /// Opens the recording of a run, or its events.
     ///
     /// # Errors
-    /// If neither exists, or its first line is not the expected one.
+    /// If neither exists, or it has no beginning.
     pub(super) fn open(folder: &RunFolder) -> miette::Result<Self> {
         let recording = folder.file(RECORDING);
         if recording.exists() {
-            return Self::recording(folder, Lines::open(recording)?);
+            return Self::recording(folder, recording);
         }
 
         let events = folder.file(EVENTS);
@@ -74,9 +92,18 @@ impl Reader {
         ))
     }
 
-    fn recording(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
-        let header: RecordingHeader = lines.first()?;
+    fn recording(folder: &RunFolder, path: PathBuf) -> miette::Result<Self> {
+        let recording = Recording::open(&path).into_diagnostic()?;
         let mut notes = Vec::new();
+        if !recording.is_finished() {
+            let path = path.display();
+            notes.push(format!(
+                "{path} was not finished: what comes after tick {} is left out",
+                recording.len().saturating_sub(1)
+            ));
+        }
+
+        let header = recording.header().clone();
         let facts = Facts {
             run: header.run,
             epoch: Some(header.epoch),
@@ -85,20 +112,24 @@ impl Reader {
             file: RECORDING,
             parameters: parameters(folder, &mut notes),
         };
+        let playback = Playback {
+            recording,
+            ticks: VecDeque::new(),
+            reports: BTreeMap::new(),
+        };
 
-        Self::begin(lines, facts, None, notes)
+        let source = Source::Recording(Box::new(playback));
+        Self::begin(path, facts, source, notes)
     }
 
     fn events(folder: &RunFolder, mut lines: Lines) -> miette::Result<Self> {
+        let path = lines.path.clone();
         let Line {
             event: Event::Init { seed, tick_s, .. },
             ..
         } = lines.first()?
         else {
-            return Err(miette!(
-                "{} does not begin with `init`",
-                lines.path.display()
-            ));
+            return Err(miette!("{} does not begin with `init`", path.display()));
         };
 
         let mut notes = vec![format!(
@@ -114,26 +145,27 @@ impl Reader {
             parameters: parameters(folder, &mut notes),
         };
 
-        Self::begin(lines, facts, Some(Replay::default()), notes)
+        let replay = Replay::default();
+        Self::begin(path, facts, Source::Events { lines, replay }, notes)
     }
 
     fn begin(
-        lines: Lines,
+        path: PathBuf,
         facts: Facts,
-        replay: Option<Replay>,
+        source: Source,
         notes: Vec<String>,
     ) -> miette::Result<Self> {
         let tick_s = facts.tick_s;
         if !(tick_s > 0.0 && tick_s.is_finite()) {
-            let path = lines.path.display();
+            let path = path.display();
             return Err(miette!("{path}: a tick cannot last {tick_s} s"));
         }
 
         Ok(Self {
-            lines,
+            path,
             facts,
+            source,
             due: 0,
-            replay,
             notes,
         })
     }
@@ -145,13 +177,15 @@ impl Reader {
 
     /// The file that is read.
     pub(super) fn path(&self) -> &Path {
-        &self.lines.path
+        &self.path
     }
 
     /// What the record lacks, for people.
     pub(super) fn into_notes(mut self) -> Vec<String> {
-        if self.lines.is_incomplete {
-            let path = self.path().display();
+        if let Source::Events { lines, .. } = &self.source
+            && lines.is_incomplete
+        {
+            let path = self.path.display();
             let note = format!("the last line of {path} is incomplete and left out");
             self.notes.push(note);
         }
@@ -161,56 +195,74 @@ impl Reader {
     /// The next tick; `None` after the last complete one.
     ///
     /// # Errors
-    /// If a line cannot be decoded, or has another tick than the next one.
+    /// If it cannot be decoded, or is another one than the next.
     pub(super) fn next(&mut self) -> miette::Result<Option<Snapshot>> {
-        let Some(snapshot) = self.read()? else {
-            return Ok(None);
-        };
+        match &mut self.source {
+            Source::Recording(playback) => playback.next(&mut self.due),
+            Source::Events { lines, replay } => {
+                let Some(snapshot) = next_of(lines, replay)? else {
+                    return Ok(None);
+                };
+                if snapshot.tick != self.due {
+                    return Err(miette!(
+                        "{}, line {}: tick {} where {} is due",
+                        self.path.display(),
+                        lines.number,
+                        snapshot.tick,
+                        self.due
+                    ));
+                }
 
-        if snapshot.tick != self.due {
-            return Err(miette!(
-                "{}, line {}: tick {} where {} is due",
-                self.path().display(),
-                self.lines.number,
-                snapshot.tick,
-                self.due
-            ));
-        }
-
-        self.due += 1;
-        Ok(Some(snapshot))
-    }
-
-    fn read(&mut self) -> miette::Result<Option<Snapshot>> {
-        let Some(replay) = &mut self.replay else {
-            let recorded: Option<RecordedTick> = self.lines.next()?;
-            return Ok(recorded.map(|recorded| Snapshot {
-                tick: recorded.tick,
-                robots: recorded.robots.into_iter().map(RobotState::from).collect(),
-            }));
-        };
-
-        while let Some(line) = self.lines.next::<Line>()? {
-            let tick = line.tick;
-            if let Some(robots) = replay.apply(line.event) {
-                return Ok(Some(Snapshot { tick, robots }));
+                self.due += 1;
+                Ok(Some(snapshot))
             }
         }
-
-        Ok(None)
     }
 }
 
-impl From<RecordedRobot> for RobotState {
-    fn from(robot: RecordedRobot) -> Self {
-        Self {
-            name: robot.name,
-            missed: robot.missed,
-            emotion: robot.emotion_state,
-            behavior: robot.behavior_state,
-            variables: Some(robot.state_variables),
+impl Playback {
+    /// The next tick, which is tick `due`.
+    fn next(&mut self, due: &mut Tick) -> miette::Result<Option<Snapshot>> {
+        if self.ticks.is_empty() {
+            let read = self.recording.read(*due, *due + TICKS_AT_ONCE);
+            self.ticks = read.into_diagnostic()?.into();
+        }
+        let Some(mut tick) = self.ticks.pop_front() else {
+            return Ok(None);
+        };
+        *due += 1;
+
+        self.reports.append(&mut tick.reports);
+        let mut robots = Vec::new();
+        for robot in &tick.frame.robots {
+            // A robot has a state from its first report on.
+            if let Some(report) = self.reports.get(&robot.name) {
+                robots.push(RobotState {
+                    name: robot.name.clone(),
+                    missed: robot.missed.is_some(),
+                    emotion: report.emotion_state.clone(),
+                    behavior: report.behavior_state.clone(),
+                    variables: Some(report.state_variables.clone()),
+                });
+            }
+        }
+        Ok(Some(Snapshot {
+            tick: tick.frame.tick,
+            robots,
+        }))
+    }
+}
+
+/// The next tick that the events tell of; `None` after the last complete one.
+fn next_of(lines: &mut Lines, replay: &mut Replay) -> miette::Result<Option<Snapshot>> {
+    while let Some(line) = lines.next::<Line>()? {
+        let tick = line.tick;
+        if let Some(robots) = replay.apply(line.event) {
+            return Ok(Some(Snapshot { tick, robots }));
         }
     }
+
+    Ok(None)
 }
 
 /// The states of the robots, restored from events, which contain only changes.

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::control::{Awaited, Phase, Presence};
-use super::limits::{few, finite, is_false, short};
+use super::limits::{few, finite, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
 use super::state::StateVariables;
@@ -124,67 +124,6 @@ pub struct RobotFrame {
     /// Whether it is there.
     pub presence: Presence,
 }
-
-/// The recording of an epoch begins with this line: what does not change during it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct RecordingHeader {
-    /// The run.
-    pub run: RunName,
-    /// The epoch.
-    pub epoch: Epoch,
-    /// Its seed.
-    pub seed: u64,
-    /// Length of a tick, simulated seconds.
-    pub tick_s: f64,
-    /// Simulated time at which the run was to end, seconds.
-    pub duration_s: f64,
-    /// Width and height of the field, meters.
-    pub field_m: [f64; 2],
-    /// Side of every body, meters.
-    pub body_m: f64,
-    /// Centers of the fixed obstacles, meters.
-    pub obstacles: Vec<[f64; 2]>,
-}
-
-/// Every further line of a recording: the field after a tick.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct RecordedTick {
-    /// The tick.
-    pub tick: Tick,
-    /// The robots, by name.
-    pub robots: Vec<RecordedRobot>,
-    /// Centers of the guests in whole millimeters, x and y in turn: small, and more than an eye can tell.
-    pub guests_mm: Vec<i64>,
-}
-
-/// A robot in a [`RecordedTick`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct RecordedRobot {
-    /// Who.
-    pub name: RobotName,
-    /// Where.
-    pub location: Point,
-    /// Magnitude of its velocity, m/s.
-    pub speed_mps: f64,
-    /// Direction of motion, radians counter-clockwise from +x.
-    pub direction_rad: f64,
-    /// Whether its last move was refused.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub blocked: bool,
-    /// Whether its report of this tick is missing, so that what follows is older.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub missed: bool,
-    /// Its emotion state.
-    pub emotion_state: String,
-    /// Its behavior state.
-    pub behavior_state: String,
-    /// What it publishes about itself.
-    pub state_variables: StateVariables,
-}
-
-impl Message for RecordingHeader {}
-
-impl Message for RecordedTick {}
 
 /// One line of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

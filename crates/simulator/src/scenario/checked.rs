@@ -68,14 +68,16 @@ pub struct Record {
     pub log: bool,
     /// Name of the log in the run's folder.
     pub log_name: String,
-    /// Whether every tick is recorded, for replay in the console.
+    /// Whether every tick is recorded in `run.mcap`, to be shown again and compared.
     pub frames: bool,
+    /// Whether the recording has the robots' panels. Without effect where ticks are not recorded.
+    pub panels: bool,
     /// When the record is on the disk for certain.
     pub sync: SyncPoint,
 }
 
 /// When the files of a record are synchronized with the disk: what was written before survives a crash of the machine. A crash
-/// of the simulator alone loses nothing but the tick in progress.
+/// of the simulator alone loses nothing but the tick in progress, and of `run.mcap` about the last second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SyncPoint {
@@ -88,12 +90,21 @@ pub enum SyncPoint {
     End,
 }
 
+impl Record {
+    /// Whether the robots' panels are recorded.
+    #[must_use]
+    pub fn has_panels(&self) -> bool {
+        self.frames && self.panels
+    }
+}
+
 impl Default for Record {
     fn default() -> Self {
         Self {
             log: true,
             log_name: crate::files::LOG.to_owned(),
             frames: true,
+            panels: true,
             sync: SyncPoint::default(),
         }
     }

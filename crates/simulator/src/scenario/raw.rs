@@ -79,6 +79,7 @@ struct RecordTable {
     log: Option<bool>,
     log_name: Option<Spanned<String>>,
     frames: Option<bool>,
+    panels: Option<bool>,
     sync: Option<checked::SyncPoint>,
 }
 
@@ -307,6 +308,7 @@ fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError
         log: raw.log.unwrap_or(default.log),
         log_name: raw.log_name.map_or(default.log_name, Spanned::into_inner),
         frames: raw.frames.unwrap_or(default.frames),
+        panels: raw.panels.unwrap_or(default.panels),
         sync: raw.sync.unwrap_or(default.sync),
     })
 }
@@ -421,6 +423,7 @@ impl From<&checked::Scenario> for Scenario {
             log: Some(scenario.record.log),
             log_name: Some(unplaced(scenario.record.log_name.clone())),
             frames: Some(scenario.record.frames),
+            panels: Some(scenario.record.panels),
             sync: Some(scenario.record.sync),
         };
 

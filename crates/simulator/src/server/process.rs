@@ -8,13 +8,14 @@ use bus::{Bus, BusError, Declared, Publisher, Query};
 use lockstep::{Barrier, Naming, Outcome, Output, Sent, Stamp, Timing};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Clock, Command, CommandText, End, MAX_ENTRIES, Presence, Reason, Report, Waiting,
+    Awaited, Clock, Command, CommandText, End, MAX_ENTRIES, Panel, Presence, Reason, Report,
+    Waiting,
 };
 use protocol::{Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 
 use crate::diagnostic::FileError;
 use crate::difference::Difference;
-use crate::recorder::{Recorder, RunFolder};
+use crate::recorder::{Observed, Recorder, RunFolder};
 use crate::scenario::Scenario;
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::{Summary, Wall};
@@ -96,6 +97,13 @@ pub enum Event {
         /// What it put.
         waiting: Result<Waiting, Malformed>,
     },
+    /// A robot shows a panel.
+    Panel {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        panel: Result<Panel, Malformed>,
+    },
     /// A robot asks to take part.
     Join(Query),
     /// An operator asks for something.
@@ -173,6 +181,45 @@ pub struct Server {
     operator: Vec<(RobotName, String)>,
     /// The record of a run that is resumed, until it has been executed again.
     past: Option<Past>,
+    /// The subscriber to panels, while they are recorded: robots put them only if there is one.
+    panel_subscriber: Option<Declared>,
+    observing: Observing,
+}
+
+/// What is observed of the tick in progress, for the recording.
+#[derive(Default)]
+struct Observing {
+    /// Whether ticks are recorded. Otherwise nothing is observed.
+    is_on: bool,
+    /// The tick of the last report of each robot, and when the first of that tick arrived.
+    reports: BTreeMap<RobotName, (Tick, Instant)>,
+    awaited: Vec<Awaited>,
+    panels: BTreeMap<RobotName, Panel>,
+}
+
+impl Observing {
+    fn report(&mut self, robot: &RobotName, tick: Tick) {
+        let is_known = self.reports.get(robot).is_some_and(|last| last.0 == tick);
+        if self.is_on && !is_known {
+            self.reports.insert(robot.clone(), (tick, Instant::now()));
+        }
+    }
+
+    /// Takes what was observed of a tick that is complete.
+    fn take(&mut self, tick: Tick, opened: Instant) -> Observed {
+        let mut reports = BTreeMap::new();
+        for (robot, (reported, arrived)) in &self.reports {
+            if *reported == tick {
+                reports.insert(robot.clone(), *arrived);
+            }
+        }
+        Observed {
+            opened,
+            reports,
+            awaited: std::mem::take(&mut self.awaited),
+            panels: std::mem::take(&mut self.panels),
+        }
+    }
 }
 
 impl Server {
@@ -215,6 +262,8 @@ impl Server {
             wall: Wall::default(),
             operator: Vec::new(),
             past: None,
+            panel_subscriber: None,
+            observing: Observing::default(),
             declared: Vec::new(),
             options,
             bus,
@@ -305,6 +354,7 @@ impl Server {
             } else {
                 Recorder::begin(folder, &self.options.run, &simulation)?
             };
+            self.begin_observing(&simulation)?;
             self.begin_epoch(&mut simulation);
 
             let inbox = self.inbox.clone();
@@ -322,6 +372,7 @@ impl Server {
             self = server;
             match interrupt {
                 Interrupt::Init(next) => {
+                    recorder.supersede()?;
                     scenario = *next;
                     epoch += 1;
                 }
@@ -332,6 +383,31 @@ impl Server {
                 }
             }
         }
+    }
+
+    /// Begins to observe for the recording what the scenario wants recorded. Nothing of an epoch before is kept.
+    fn begin_observing(&mut self, simulation: &Simulation) -> Result<(), BusError> {
+        let record = &simulation.scenario().record;
+        self.observing = Observing {
+            is_on: record.frames,
+            ..Observing::default()
+        };
+        if !record.has_panels() {
+            self.panel_subscriber = None;
+            return Ok(());
+        }
+        if self.panel_subscriber.is_some() {
+            return Ok(());
+        }
+
+        let inbox = self.inbox.clone();
+        let panels = self.bus.subscribe(&self.keys.panels(), move |key, bytes| {
+            let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+            let panel = decode(key, &robot, bytes);
+            inbox.send(Event::Panel { robot, panel });
+        })?;
+        self.panel_subscriber = Some(panels);
+        Ok(())
     }
 
     /// Begins to gather robots. Nothing of an epoch before may reach into this one.
@@ -494,6 +570,9 @@ impl Server {
         let record = simulation.end_tick(outcome);
         self.observers.note(&record);
         self.watchdog.note(Some(Doing::Record));
+        if self.observing.is_on {
+            recorder.observe(self.observing.take(record.tick, self.waiting_since));
+        }
         let lines = recorder.write(simulation, &record)?;
         self.watchdog.note(Some(Doing::Work));
         self.observers.log(&lines);
@@ -545,6 +624,9 @@ impl Server {
         }
 
         let status = self.status(simulation);
+        if self.observing.is_on {
+            self.observing.awaited.clone_from(&status.awaiting);
+        }
         self.observers.held(simulation, &status);
         if let Some(query) = self.pace.give_up_stepping() {
             self.answer_status(&query, simulation);
@@ -579,6 +661,7 @@ impl Server {
         self.clock.put(encode(&clock))?;
         self.say_goodbye(&clock, simulation);
         self.declared.clear();
+        self.panel_subscriber = None;
         self.bus.close();
         Ok(recorded?)
     }
@@ -654,6 +737,10 @@ impl Server {
                 robot,
                 waiting: Ok(waiting),
             } => self.on_waiting(&robot, &waiting),
+            Event::Panel {
+                robot,
+                panel: Ok(panel),
+            } => self.on_panel(&robot, panel),
             Event::Report {
                 report: Err(error), ..
             }
@@ -664,6 +751,9 @@ impl Server {
             | Event::Waiting {
                 waiting: Err(error),
                 ..
+            }
+            | Event::Panel {
+                panel: Err(error), ..
             } => self.ignore("malformed", &error.to_string()),
             Event::Join(query) => self.on_join(&query, simulation),
             Event::Token { robot, is_present } => self.on_token(&robot, is_present),
@@ -699,10 +789,20 @@ impl Server {
         let Some(name) = self.known(robot) else {
             return;
         };
+        self.observing.report(&name, report.tick);
         let stamp = Stamp::from(&report);
         let commands = report.commands;
         self.barrier
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
+    }
+
+    fn on_panel(&mut self, robot: &str, panel: Panel) {
+        let Some(name) = self.known(robot) else {
+            return;
+        };
+        if self.observing.is_on {
+            self.observing.panels.insert(name, panel);
+        }
     }
 
     fn on_command(&mut self, from: &str, to: &str, command: Command) {

@@ -1,0 +1,226 @@
+//! Messages that general viewers draw, in the schemas of Foxglove: Foxglove draws all of them, Rerun all but the scenes.
+//! The run's own channels have everything that these have.
+
+use protocol::RobotName;
+use protocol::messages::LogRecord;
+
+use crate::content::{Header, PlacedRobot, RecordedTick};
+use crate::protobuf::Protobuf;
+
+/// Frame of reference of everything: the origin is the corner of the field, x and y are its edges, in meters.
+const FIELD: &str = "field";
+/// Height of bodies, as a part of their side: the field is flat, and viewers are not.
+const HEIGHT: f64 = 0.5;
+
+/// A kind of message, with the descriptor of its schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Schema {
+    SceneUpdate,
+    PointCloud,
+    PoseInFrame,
+    FrameTransforms,
+    Log,
+}
+
+impl Schema {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::SceneUpdate => "foxglove.SceneUpdate",
+            Self::PointCloud => "foxglove.PointCloud",
+            Self::PoseInFrame => "foxglove.PoseInFrame",
+            Self::FrameTransforms => "foxglove.FrameTransforms",
+            Self::Log => "foxglove.Log",
+        }
+    }
+
+    /// A `FileDescriptorSet`.
+    pub(crate) fn descriptor(self) -> &'static [u8] {
+        match self {
+            Self::SceneUpdate => include_bytes!("../descriptors/SceneUpdate.bin"),
+            Self::PointCloud => include_bytes!("../descriptors/PointCloud.bin"),
+            Self::PoseInFrame => include_bytes!("../descriptors/PoseInFrame.bin"),
+            Self::FrameTransforms => include_bytes!("../descriptors/FrameTransforms.bin"),
+            Self::Log => include_bytes!("../descriptors/Log.bin"),
+        }
+    }
+}
+
+/// The field and its obstacles, which stay.
+pub(crate) fn field(header: &Header) -> Protobuf {
+    let [width, height] = header.field_m;
+    let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
+    let mut outline = Protobuf::default()
+        .integer(1, LINE_LOOP)
+        .message(2, &pose(0.0, 0.0, 0.0, 0.0))
+        .double(3, header.body_m / 10.0);
+    for (x, y) in corners {
+        outline = outline.message(5, &vector(x, y, 0.0));
+    }
+    outline = outline.message(6, &color([0.5, 0.5, 0.5]));
+
+    let mut entity = entity(0, "field").message(11, &outline);
+    for [x, y] in &header.obstacles {
+        let cube = cube(*x, *y, 0.0, header.body_m, [0.4, 0.4, 0.4]);
+        entity = entity.message(8, &cube);
+    }
+    Protobuf::default().message(2, &entity)
+}
+
+/// The robots, each with its name, its emotion and its behavior.
+pub(crate) fn robots(header: &Header, tick: &RecordedTick, time_ns: u64) -> Protobuf {
+    let mut scene = Protobuf::default();
+    for (index, robot) in tick.frame.robots.iter().enumerate() {
+        let at = robot.location;
+        let color_of = ROBOT_COLORS[index % ROBOT_COLORS.len()];
+        let cube = cube(
+            at.x,
+            at.y,
+            direction_rad(tick, robot),
+            header.body_m,
+            color_of,
+        );
+        let label = Protobuf::default()
+            .message(1, &pose(at.x, at.y, header.body_m, 0.0))
+            .integer(2, 1)
+            .double(3, header.body_m / 2.0)
+            .message(5, &color([1.0, 1.0, 1.0]))
+            .text(6, &label(tick, &robot.name));
+
+        let entity = entity(time_ns, robot.name.as_str())
+            .message(8, &cube)
+            .message(13, &label);
+        scene = scene.message(2, &entity);
+    }
+    scene
+}
+
+fn label(tick: &RecordedTick, robot: &RobotName) -> String {
+    match tick.reports.get(robot) {
+        Some(report) => format!(
+            "{robot}\n{}\n{}",
+            report.emotion_state, report.behavior_state
+        ),
+        None => format!("{robot}\n(no report)"),
+    }
+}
+
+/// The guests.
+pub(crate) fn guests(guests_mm: &[i64], time_ns: u64) -> Protobuf {
+    let mut data = Vec::with_capacity(guests_mm.len() * 6);
+    for place in guests_mm.chunks_exact(2) {
+        for coordinate in [place[0], place[1], 0] {
+            data.extend_from_slice(&(coordinate as f32 / 1000.0).to_le_bytes());
+        }
+    }
+
+    let mut cloud = Protobuf::default()
+        .message(1, &timestamp(time_ns))
+        .text(2, FIELD)
+        .message(3, &pose(0.0, 0.0, 0.0, 0.0))
+        .fixed32(4, 3 * 4);
+    for (name, offset) in [("x", 0), ("y", 4), ("z", 8)] {
+        let field = Protobuf::default()
+            .text(1, name)
+            .fixed32(2, offset)
+            .integer(3, FLOAT32);
+        cloud = cloud.message(5, &field);
+    }
+    cloud.bytes(6, &data)
+}
+
+/// The pose of a robot.
+pub(crate) fn robot_pose(tick: &RecordedTick, robot: &PlacedRobot, time_ns: u64) -> Protobuf {
+    let at = robot.location;
+    Protobuf::default()
+        .message(1, &timestamp(time_ns))
+        .text(2, FIELD)
+        .message(3, &pose(at.x, at.y, 0.0, direction_rad(tick, robot)))
+}
+
+/// The frame of reference of each robot, which has its name.
+pub(crate) fn transforms(tick: &RecordedTick, time_ns: u64) -> Protobuf {
+    let mut transforms = Protobuf::default();
+    for robot in &tick.frame.robots {
+        let transform = Protobuf::default()
+            .message(1, &timestamp(time_ns))
+            .text(2, FIELD)
+            .text(3, robot.name.as_str())
+            .message(4, &vector(robot.location.x, robot.location.y, 0.0))
+            .message(5, &rotation(direction_rad(tick, robot)));
+        transforms = transforms.message(1, &transform);
+    }
+    transforms
+}
+
+/// A line of the log.
+pub(crate) fn log(line: &LogRecord, time_ns: u64) -> Protobuf {
+    Protobuf::default()
+        .message(1, &timestamp(time_ns))
+        .integer(2, INFO)
+        .text(3, &line.text)
+        .text(4, &line.source)
+}
+
+const LINE_LOOP: u64 = 1;
+const FLOAT32: u64 = 7;
+const INFO: u64 = 2;
+/// Told apart by people with any color vision (Okabe and Ito).
+const ROBOT_COLORS: [[f64; 3]; 4] = [
+    [0.0, 0.45, 0.7],
+    [0.9, 0.6, 0.0],
+    [0.0, 0.62, 0.45],
+    [0.8, 0.47, 0.65],
+];
+
+/// The direction of a robot; that of x for one without a report.
+fn direction_rad(tick: &RecordedTick, robot: &PlacedRobot) -> f64 {
+    let report = tick.reports.get(&robot.name);
+    report.map_or(0.0, |report| report.direction_rad)
+}
+
+/// An entity of a scene, which stays until another one with its id replaces it.
+fn entity(time_ns: u64, id: &str) -> Protobuf {
+    Protobuf::default()
+        .message(1, &timestamp(time_ns))
+        .text(2, FIELD)
+        .text(3, id)
+}
+
+fn cube(x: f64, y: f64, direction_rad: f64, side_m: f64, rgb: [f64; 3]) -> Protobuf {
+    let height_m = side_m * HEIGHT;
+    Protobuf::default()
+        .message(1, &pose(x, y, height_m / 2.0, direction_rad))
+        .message(2, &vector(side_m, side_m, height_m))
+        .message(3, &color(rgb))
+}
+
+fn pose(x: f64, y: f64, z: f64, direction_rad: f64) -> Protobuf {
+    Protobuf::default()
+        .message(1, &vector(x, y, z))
+        .message(2, &rotation(direction_rad))
+}
+
+fn vector(x: f64, y: f64, z: f64) -> Protobuf {
+    Protobuf::default().double(1, x).double(2, y).double(3, z)
+}
+
+/// A rotation about the vertical, as a quaternion.
+fn rotation(direction_rad: f64) -> Protobuf {
+    Protobuf::default()
+        .double(3, libm::sin(direction_rad / 2.0))
+        .double(4, libm::cos(direction_rad / 2.0))
+}
+
+fn color([r, g, b]: [f64; 3]) -> Protobuf {
+    Protobuf::default()
+        .double(1, r)
+        .double(2, g)
+        .double(3, b)
+        .double(4, 1.0)
+}
+
+fn timestamp(time_ns: u64) -> Protobuf {
+    Protobuf::default()
+        .integer(1, time_ns / 1_000_000_000)
+        .integer(2, time_ns % 1_000_000_000)
+}
