@@ -2,8 +2,15 @@
 //! out.
 
 /// A message, encoded field by field.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Protobuf(Vec<u8>);
+
+/// An empty message, with room for most of those that have no others within them.
+impl Default for Protobuf {
+    fn default() -> Self {
+        Self(Vec::with_capacity(64))
+    }
+}
 
 /// Kinds of encoded values.
 const VARINT: u64 = 0;
@@ -92,6 +99,6 @@ mod tests {
             [9, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f, 0x15, 7, 0, 0, 0]
         );
         let defaults = Protobuf::default().integer(1, 0).double(2, 0.0).text(3, "");
-        assert_eq!(defaults.0, []);
+        assert!(defaults.0.is_empty());
     }
 }

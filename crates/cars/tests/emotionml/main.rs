@@ -765,8 +765,15 @@ fn what_a_crash_cut_off_is_left_out_and_damage_is_an_error() {
     let kept_ms = emotions(&document)[0].duration_ms;
     assert!((500..5_000_000).contains(&kept_ms), "{kept_ms}");
 
+    // In the content of a chunk, which begins with these bytes.
+    let middle = bytes.len() / 2;
+    let content = bytes[middle..].windows(4);
+    let mut starts = content
+        .enumerate()
+        .filter(|(_, bytes)| *bytes == [0x28, 0xb5, 0x2f, 0xfd]);
+    let start = starts.next().unwrap().0;
     let mut garbled = bytes.clone();
-    garbled[bytes.len() / 2] ^= 1;
+    garbled[middle + start + 100] ^= 1;
     std::fs::write(lab.recording("broken"), garbled).unwrap();
     let refusal = lab.refusal(&["broken"]);
     assert!(refusal.contains("damaged at byte"), "{refusal}");

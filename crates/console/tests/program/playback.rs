@@ -375,8 +375,14 @@ fn a_recording_that_cannot_be_shown_is_named() {
 fn damage_is_reported_with_its_place_where_it_is_read() {
     let folder = run_folder(20_000);
     let mut bytes = std::fs::read(file(folder.path())).unwrap();
+    // In the content of a chunk, which begins with these bytes.
     let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
+    let content = bytes[middle..].windows(4);
+    let mut starts = content
+        .enumerate()
+        .filter(|(_, bytes)| *bytes == [0x28, 0xb5, 0x2f, 0xfd]);
+    let start = starts.next().unwrap().0;
+    bytes[middle + start + 100] ^= 1;
     std::fs::write(file(folder.path()), bytes).unwrap();
     let console = open(folder.path());
 
@@ -395,12 +401,12 @@ fn damage_is_reported_with_its_place_where_it_is_read() {
 #[test]
 fn a_large_range_is_answered_in_part() {
     let folder = tempfile::tempdir().unwrap();
-    let ticks = (0..40).map(|tick| {
+    let large = (0..40).map(|tick| {
         let mut recorded = recorded_tick(tick);
         recorded.frame.guests_mm = vec![1234; 200_000];
         recorded
     });
-    write(&file(folder.path()), ticks);
+    write(&file(folder.path()), large);
 
     let range = get_range(&open(folder.path()), 0, 40);
 
