@@ -176,12 +176,18 @@ fn describe(verification: &Verification, epoch: Option<u32>) -> String {
             let end = if verification.has_end {
                 "to the end"
             } else {
-                "and no end"
+                "and no end (the simulator was killed, or the run is in progress)"
             };
             text += &format!(
                 "the same, {} ticks {end}, digest {}",
                 verification.ticks, verification.digest
             );
+            text += &match verification.reports_to {
+                Some(tick) if tick >= verification.ticks => String::new(),
+                Some(tick) => format!("\nthe robots' reports were compared up to tick {tick}"),
+                None => "\nthe robots' reports were not recorded: events and digests were compared"
+                    .to_owned(),
+            };
         }
     }
 

@@ -20,7 +20,7 @@ pub(crate) enum Mode {
     /// A run in progress, or one that has not started yet.
     Live(Arc<Live>),
     /// A recorded run.
-    Recording(Recording),
+    Recording(Box<Recording>),
 }
 
 /// The state that all connections share.

@@ -100,7 +100,7 @@ fn run(args: Args) -> Result<(), String> {
 
 fn open_recording(path: &std::path::Path) -> Result<Mode, String> {
     Recording::open(path)
-        .map(Mode::Recording)
+        .map(|recording| Mode::Recording(Box::new(recording)))
         .map_err(|error| error.to_string())
 }
 

@@ -53,7 +53,7 @@ fn observed(local: &Local, opened: Instant) -> Observed {
     let scenario = local.simulation.scenario();
     let panel_interval = (1.0 / scenario.tick_s).round().max(1.0) as Tick;
     let mut panels = BTreeMap::new();
-    if scenario.record.has_panels() && local.simulation.tick() % panel_interval == 0 {
+    if scenario.record.has_panels() && local.simulation.tick().is_multiple_of(panel_interval) {
         panels = local.robots.panels();
     }
 

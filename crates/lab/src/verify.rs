@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use config::Changes;
+use config::{Changes, FileError};
 use lockstep::{Exchange, Membership, Outcome};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{CommandText, News, Report};
@@ -18,6 +18,7 @@ use simulator::{EpochFiles, Scenario, TickRecord, seal};
 use crate::run::Local;
 use simulator::difference::{Difference, between};
 use simulator::record::{Entry, Record};
+use simulator::recorder::{EVENTS, SUMMARY};
 
 /// What came of a verification.
 #[derive(Debug)]
@@ -28,6 +29,8 @@ pub struct Verification {
     pub has_end: bool,
     /// Digest of the run at that tick.
     pub digest: String,
+    /// The last tick of which the record has the robots' reports, so that they were compared, too.
+    pub reports_to: Option<Tick>,
     /// Robots that were not executed in some ticks, and the first of these.
     pub from_record: BTreeMap<RobotName, Tick>,
     /// The first difference: recorded, then executed again.
@@ -42,11 +45,14 @@ pub struct Verification {
 pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
     let mut record = Record::open(files)?;
     let scenario = Scenario::load(&files.scenario, &Changes::default())?;
+    let has_recording = scenario.record.frames;
+    check_scenario(files, &record)?;
     let mut again = Reexecution::new(scenario, files)?;
     let mut verification = Verification {
         ticks: 0,
         has_end: false,
         digest: String::new(),
+        reports_to: None,
         from_record: BTreeMap::new(),
         difference: None,
     };
@@ -59,15 +65,80 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         }
         verification.ticks = recorded.tick;
         verification.has_end = recorded.is_end();
+        if recorded.reports.is_some() {
+            verification.reports_to = Some(recorded.tick);
+        }
     }
 
-    verification.digest = again.local.simulation.digest();
+    if verification.ticks > 0 || !again.is_at_start() {
+        verification.digest = again.local.simulation.digest();
+    }
     verification.from_record = again.from_record;
     if verification.difference.is_none() {
         // What nothing depends on may be damaged, too.
         seal::check(&files.events)?;
+        check_end(files, &record, &verification, has_recording)?;
     }
     Ok(verification)
+}
+
+/// Checks that the scenario beside the record is the one that the recording contains.
+fn check_scenario(files: &EpochFiles, record: &Record) -> miette::Result<()> {
+    let Some(recording) = record.recording() else {
+        return Ok(());
+    };
+
+    let recorded = recording.scenario().into_diagnostic()?;
+    let scenario = std::fs::read_to_string(&files.scenario)
+        .map_err(|error| FileError::unreadable(&files.scenario, &error))?;
+    if scenario != recorded {
+        return Err(miette!(
+            help =
+                "the recording contains the scenario of the run, as the attachment scenario.toml",
+            "{} was changed since the run",
+            files.scenario.display()
+        ));
+    }
+    Ok(())
+}
+
+/// Checks that the parts of the record end alike.
+fn check_end(
+    files: &EpochFiles,
+    record: &Record,
+    verification: &Verification,
+    has_recording: bool,
+) -> miette::Result<()> {
+    let events = files.events.display();
+    let recording = files.recording.display();
+    let last = verification.ticks;
+    if verification.digest.is_empty() {
+        return Err(miette!("{events} has no complete tick"));
+    }
+
+    let summary = files.events.with_file_name(SUMMARY);
+    let is_last_epoch = files.events.file_name().is_some_and(|name| name == EVENTS);
+    if !verification.has_end && is_last_epoch && summary.exists() {
+        return Err(miette!(
+            "{events} ends at tick {last} without an end of the run, and the run has ended: it has a summary"
+        ));
+    }
+    match record.recording() {
+        None if has_recording && verification.has_end => Err(miette!(
+            "the run was recorded, and {recording} is not there"
+        )),
+        Some(file) if verification.has_end && (!file.is_finished() || file.len() != last + 1) => {
+            Err(miette!(
+                "{recording} is not whole: it has {} complete ticks, and the events go to the end at tick {last}",
+                file.len()
+            ))
+        }
+        Some(file) if file.len() > last + 1 => Err(miette!(
+            "{events} ends at tick {last}, and {recording} has {} ticks",
+            file.len()
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// An epoch that is executed again.
@@ -108,6 +179,13 @@ impl Reexecution {
             absent: BTreeSet::new(),
             from_record,
         })
+    }
+
+    /// Whether no tick has been executed.
+    fn is_at_start(&self) -> bool {
+        let simulation = &self.local.simulation;
+        let names = simulation.names();
+        simulation.tick() == 0 && names.iter().all(|name| simulation.report(name).is_none())
     }
 
     /// Executes a tick that was recorded, or the end of the run.

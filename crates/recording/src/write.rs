@@ -36,7 +36,7 @@ pub struct WriteError {
     /// The file.
     pub path: PathBuf,
     /// Why.
-    pub error: McapError,
+    pub error: String,
 }
 
 /// Writes the recording of an epoch. A writer that is dropped finishes its file, without reporting errors.
@@ -63,12 +63,12 @@ impl Writer {
     /// # Errors
     /// [`WriteError`] if the file cannot be written.
     pub fn create(path: &Path, header: &Header, scenario: &str) -> Result<Self, WriteError> {
-        let disk = File::create(path).map_err(|error| failed(path, error.into()))?;
+        let disk = File::create(path).map_err(|error| failed(path, &error.into()))?;
         let file = disk
             .try_clone()
             .map_err(McapError::from)
             .and_then(|file| options().create(BufWriter::new(file)))
-            .map_err(|error| failed(path, error))?;
+            .map_err(|error| failed(path, &error))?;
 
         let mut writer = Self {
             path: path.to_owned(),
@@ -84,7 +84,7 @@ impl Writer {
         };
         writer
             .begin(scenario)
-            .map_err(|error| failed(path, error))?;
+            .map_err(|error| failed(path, &error))?;
         Ok(writer)
     }
 
@@ -149,7 +149,7 @@ impl Writer {
     /// [`WriteError`] if the file cannot be written.
     pub fn tick(&mut self, tick: &RecordedTick) -> Result<(), WriteError> {
         self.try_tick(tick)
-            .map_err(|error| failed(&self.path, error))
+            .map_err(|error| failed(&self.path, &error))
     }
 
     fn try_tick(&mut self, tick: &RecordedTick) -> Result<(), McapError> {
@@ -217,7 +217,7 @@ impl Writer {
         for line in tick.log(&self.header) {
             self.view(&View::Log, number, viewers::log(&line, time_ns))?;
         }
-        if number % self.view_interval != 0 {
+        if !number.is_multiple_of(self.view_interval) {
             return Ok(());
         }
 
@@ -253,7 +253,7 @@ impl Writer {
     /// # Errors
     /// [`WriteError`] if the file cannot be written.
     pub fn flush(&mut self) -> Result<(), WriteError> {
-        self.end_chunk().map_err(|error| failed(&self.path, error))
+        self.end_chunk().map_err(|error| failed(&self.path, &error))
     }
 
     fn end_chunk(&mut self) -> Result<(), McapError> {
@@ -271,7 +271,7 @@ impl Writer {
         self.flush()?;
         self.disk
             .sync_data()
-            .map_err(|error| failed(&self.path, error.into()))
+            .map_err(|error| failed(&self.path, &error.into()))
     }
 
     /// Writes the event of the end of the run, after its last tick.
@@ -280,7 +280,7 @@ impl Writer {
     /// [`WriteError`] if the file cannot be written.
     pub fn end(&mut self, last: Tick, event: &Event) -> Result<(), WriteError> {
         self.add_event(last, event)
-            .map_err(|error| failed(&self.path, error))
+            .map_err(|error| failed(&self.path, &error))
     }
 
     /// Writes the index, which makes seeking fast, and ends the file.
@@ -291,7 +291,7 @@ impl Writer {
         self.file
             .finish()
             .map(drop)
-            .map_err(|error| failed(&self.path, error))
+            .map_err(|error| failed(&self.path, &error))
     }
 }
 
@@ -325,9 +325,17 @@ fn metadata(header: &Header) -> Metadata {
     }
 }
 
-fn failed(path: &Path, error: McapError) -> WriteError {
+/// The error with its causes: the first one alone does not name that of the operating system.
+fn failed(path: &Path, error: &McapError) -> WriteError {
+    let mut reason = error.to_string();
+    let mut cause = std::error::Error::source(error);
+    while let Some(error) = cause {
+        reason += &format!(": {error}");
+        cause = error.source();
+    }
+
     WriteError {
         path: path.to_owned(),
-        error,
+        error: reason,
     }
 }

@@ -1,5 +1,9 @@
 //! Names of the files in the folder of a run.
 
+use std::path::PathBuf;
+
+use protocol::Epoch;
+
 /// The scenario of the epoch in progress, complete.
 pub const SCENARIO: &str = "scenario.toml";
 /// The events, for programs.
@@ -22,6 +26,19 @@ pub const OPERATOR_CONFIG: &str = "operator_config";
 pub const LATEST: &str = "latest";
 /// Lock file of the process that writes the record.
 pub(crate) const LOCK: &str = ".lock";
+
+/// The files of the record of one epoch.
+#[derive(Debug, Clone)]
+pub struct EpochFiles {
+    /// The epoch.
+    pub epoch: Epoch,
+    /// Its scenario, complete.
+    pub scenario: PathBuf,
+    /// Its events.
+    pub events: PathBuf,
+    /// Its recording.
+    pub recording: PathBuf,
+}
 
 /// Why a name cannot be that of the log.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

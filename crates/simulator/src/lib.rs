@@ -18,8 +18,9 @@ pub mod summary;
 
 /// Source texts and their errors, which [`Scenario::parse`] takes and returns.
 pub use config::diagnostic;
+pub use files::EpochFiles;
 pub use protocol::{Event, Line};
-pub use recorder::{EpochFiles, Recorder, RunFolder};
+pub use recorder::{Recorder, RunFolder};
 pub use scenario::{OnLate, Scenario};
 pub use simulation::{Reports, Simulation, TickRecord};
 pub use summary::Summary;

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 
-use crate::recorder::EpochFiles;
+use crate::files::EpochFiles;
 use config::FileError;
 use lockstep::Sent;
 use protocol::messages::{CommandText, Report};
@@ -21,6 +21,8 @@ pub struct Record {
     lines: BufReader<File>,
     /// Number of the line that was read last, from 1.
     number: usize,
+    /// The tick of the next entry.
+    tick: Tick,
     /// What robots reported, if it was recorded.
     recording: Option<Recording>,
     /// Reports of the next ticks.
@@ -119,29 +121,49 @@ impl Record {
             path,
             lines: BufReader::new(file),
             number: 0,
+            tick: 0,
             recording,
             ahead: VecDeque::new(),
         })
     }
 
+    /// The recording of the epoch, if there is one.
+    #[must_use]
+    pub fn recording(&self) -> Option<&Recording> {
+        self.recording.as_ref()
+    }
+
     /// The next complete tick; `None` at the end of the record. Events of a tick that was not completed are left out.
     ///
     /// # Errors
-    /// [`FileError`] if the file cannot be read, or names a line that is not an event.
+    /// [`FileError`] if the file cannot be read, or names a line that is not an event or is of another tick.
     pub fn next_entry(&mut self) -> Result<Option<Entry>, FileError> {
-        let mut entry = Entry::default();
+        let mut entry = Entry {
+            tick: self.tick,
+            ..Entry::default()
+        };
         while let Some(Line { tick, mut event }) = self.next_line()? {
-            entry.tick = tick;
+            let is_end = matches!(event, Event::End { .. });
+            if is_end {
+                entry.tick = self.tick.saturating_sub(1);
+            }
+            if tick != entry.tick {
+                let expected = entry.tick;
+                return Err(self.malformed(&format!("tick {tick} where tick {expected} is due")));
+            }
+
             if let Event::Tick { seal, .. } | Event::End { seal, .. } = &mut event {
                 *seal = None;
-                let is_end = matches!(event, Event::End { .. });
-                entry.events.push(event);
-                if !is_end {
-                    entry.reports = self.reports(tick)?;
-                }
+            }
+            let is_last = event.is_sealed();
+            entry.events.push(event);
+            if is_last && !is_end {
+                self.tick += 1;
+                entry.reports = self.reports(tick)?;
+            }
+            if is_last {
                 return Ok(Some(entry));
             }
-            entry.events.push(event);
         }
 
         Ok(None)
@@ -180,7 +202,7 @@ impl Record {
         Ok(Some(line))
     }
 
-    fn malformed(&self, error: &serde_json::Error) -> FileError {
+    fn malformed(&self, error: &dyn std::fmt::Display) -> FileError {
         let path = self.path.display();
         FileError::new(format!("{path}, line {}: {error}", self.number))
             .with_help("the record is damaged: `cars check` says how far it is good")
@@ -189,5 +211,5 @@ impl Record {
 
 fn unreadable(error: &RecordingError) -> FileError {
     FileError::new(error.to_string())
-        .with_help("without the recording file the events alone are compared")
+        .with_help("the recording is damaged: nothing can be said of what the robots reported")
 }

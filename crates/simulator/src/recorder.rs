@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Write};
+use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,8 @@ use recording::{
     BackgroundWriter, Frame, Header, PlacedRobot, RecordedTick, Wall, WriteError, Writer,
 };
 
-use crate::files::{LOCK, check_log_name};
+use crate::files::{EpochFiles, LOCK, check_log_name};
+use crate::record::Record;
 use crate::scenario::{Scenario, SyncPoint};
 use crate::seal::{self, Seal};
 use crate::simulation::{Simulation, TickRecord};
@@ -112,12 +113,12 @@ impl RunFolder {
         }
     }
 
-    /// Takes the folder of a run whose simulator has gone, to resume it, with the record of its last epoch; without a record if
-    /// no tick was completed. The record is checked first.
+    /// Takes the folder of a run whose simulator has gone, to resume it, with the record of its last epoch, the files of which
+    /// may not be there yet. The record is checked first.
     ///
     /// # Errors
     /// [`FileError`] if it is not the folder of a run, the run is in progress or has ended, or the record is damaged.
-    pub fn reopen(&self) -> Result<(RunLock, Option<EpochFiles>), FileError> {
+    pub fn reopen(&self) -> Result<(RunLock, EpochFiles), FileError> {
         let place = self.path.display();
         if !self.file(SCENARIO).exists() {
             let error = FileError::new(format!("{place} is not the folder of a run"));
@@ -125,10 +126,8 @@ impl RunFolder {
         }
 
         let lock = self.lock()?;
-        let files = self.epochs().pop().filter(|files| files.events.exists());
-        if let Some(files) = &files
-            && seal::check(&files.events)?.has_end
-        {
+        let files = self.last_epoch();
+        if files.events.exists() && seal::check(&files.events)?.has_end {
             let error = FileError::new(format!("the run in {place} has ended"));
             return Err(error.with_help("start it again without --resume"));
         }
@@ -190,6 +189,30 @@ impl RunFolder {
         self.file(name.unwrap_or(LOG))
     }
 
+    /// Copies the lines of the log that are of epochs before the last one: a line for each event that people read.
+    fn copy_log_of_earlier_epochs(&self, log: &str, to: &mut Lines) -> Result<(), FileError> {
+        let mut epochs = self.epochs();
+        epochs.pop();
+        let mut count = 0;
+        for files in epochs {
+            let mut record = Record::open(&files)?;
+            while let Some(entry) = record.next_entry()? {
+                let lines = entry.events.iter().filter_map(Event::readable);
+                count += lines.count();
+            }
+        }
+        if count == 0 {
+            return Ok(());
+        }
+
+        let path = self.file(log);
+        let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+        for line in BufReader::new(file).lines().take(count) {
+            to.add(&line.map_err(|error| FileError::unreadable(&path, &error))?)?;
+        }
+        Ok(())
+    }
+
     /// A file of the folder.
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
@@ -202,49 +225,38 @@ impl RunFolder {
         &self.path
     }
 
-    /// The records of all epochs of the run, the first epoch first. Their files may be missing.
+    /// The records of all epochs of the run, the first epoch first. The files of the last one may be missing.
     #[must_use]
     pub fn epochs(&self) -> Vec<EpochFiles> {
+        let last = self.last_epoch();
         let mut epochs = Vec::new();
-        for epoch in 1.. {
-            let files = EpochFiles {
+        for epoch in 1..last.epoch {
+            epochs.push(EpochFiles {
                 epoch,
                 scenario: self.file(&superseded_name(SCENARIO, epoch)),
                 events: self.file(&superseded_name(EVENTS, epoch)),
                 recording: self.file(&superseded_name(RECORDING, epoch)),
-            };
-            if !files.events.exists() {
-                break;
-            }
-            epochs.push(files);
+            });
         }
+        epochs.push(last);
+        epochs
+    }
 
-        let last = epochs.len() as Epoch + 1;
-        epochs.push(EpochFiles {
-            epoch: last,
+    /// The record of the last epoch.
+    fn last_epoch(&self) -> EpochFiles {
+        let is_superseded = |epoch: &Epoch| self.file(&superseded_name(EVENTS, *epoch)).exists();
+        let superseded = (1..).take_while(is_superseded).count();
+        EpochFiles {
+            epoch: superseded as Epoch + 1,
             scenario: self.file(SCENARIO),
             events: self.file(EVENTS),
             recording: self.file(RECORDING),
-        });
-        epochs
+        }
     }
 
     fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
         FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
     }
-}
-
-/// The files of the record of one epoch.
-#[derive(Debug, Clone)]
-pub struct EpochFiles {
-    /// The epoch.
-    pub epoch: Epoch,
-    /// Its scenario, complete.
-    pub scenario: PathBuf,
-    /// Its events.
-    pub events: PathBuf,
-    /// Its recording.
-    pub recording: PathBuf,
 }
 
 /// The lock of a run's folder. The operating system releases it when the process ends, also by a crash.
@@ -374,8 +386,13 @@ impl Recorder {
     ) -> Result<Self, FileError> {
         let record = &simulation.scenario().record;
         let log_name = format!("{}{DRAFT}", record.log_name);
-        let log = record.log.then(|| Lines::create(folder.file(&log_name)));
-        let mut recorder = Self::open(folder, run, simulation, log.transpose()?, DRAFT)?;
+        let mut log = None;
+        if record.log {
+            let mut draft = Lines::create(folder.file(&log_name))?;
+            folder.copy_log_of_earlier_epochs(&record.log_name, &mut draft)?;
+            log = Some(draft);
+        }
+        let mut recorder = Self::open(folder, run, simulation, log, DRAFT)?;
 
         recorder.drafts.push(EVENTS.to_owned());
         if recorder.log.is_some() {
@@ -401,7 +418,9 @@ impl Recorder {
             let path = folder.file(&format!("{RECORDING}{suffix}"));
             let scenario = simulation.scenario().to_toml()?;
             let writer = Writer::create(&path, &header(run, simulation), &scenario);
-            recording = Some(BackgroundWriter::start(writer.map_err(unrecordable)?));
+            recording = Some(BackgroundWriter::start(
+                writer.map_err(|error| unrecordable(&error))?,
+            ));
         }
 
         Ok(Self {
@@ -477,8 +496,10 @@ impl Recorder {
         if let Some(event) = end
             && let Some(mut recording) = self.recording.take()
         {
-            recording.end(record.tick, event).map_err(unrecordable)?;
-            recording.finish().map_err(unrecordable)?;
+            recording
+                .end(record.tick, event)
+                .map_err(|error| unrecordable(&error))?;
+            recording.finish().map_err(|error| unrecordable(&error))?;
         }
         let is_end = end.is_some();
         if self.recording.is_some() && !is_end {
@@ -504,7 +525,7 @@ impl Recorder {
         }
 
         match &mut self.recording {
-            Some(recording) => recording.tick(tick).map_err(unrecordable),
+            Some(recording) => recording.tick(tick).map_err(|error| unrecordable(&error)),
             None => Ok(()),
         }
     }
@@ -542,7 +563,7 @@ impl Recorder {
             log.sync()?;
         }
         if let Some(recording) = &mut self.recording {
-            recording.sync().map_err(unrecordable)?;
+            recording.sync().map_err(|error| unrecordable(&error))?;
         }
 
         self.synced_at = Instant::now();
@@ -561,7 +582,7 @@ impl Recorder {
     /// [`FileError`] if what remains to be recorded cannot be written.
     pub fn supersede(mut self) -> Result<(), FileError> {
         match self.recording.take() {
-            Some(recording) => recording.finish().map_err(unrecordable),
+            Some(recording) => recording.finish().map_err(|error| unrecordable(&error)),
             None => Ok(()),
         }
     }
@@ -612,7 +633,7 @@ fn unwritable(path: &Path, error: &dyn std::fmt::Display) -> FileError {
     ))
 }
 
-fn unrecordable(error: WriteError) -> FileError {
+fn unrecordable(error: &WriteError) -> FileError {
     unwritable(&error.path, &error.error)
 }
 

@@ -204,14 +204,22 @@ fn a_record_that_is_not_what_the_scenario_gives_is_told_by_tick_robot_and_field(
         "{said}"
     );
 
-    // Another seed.
-    whole("seed");
+    // Another seed. With a recording the change of the scenario itself would be told.
+    let unrecorded = |run: &str| {
+        let frames = ["--set", "record.frames=false"];
+        lab.ok(&[
+            &["run", HALL, "--run", run, "--duration", "60 s"],
+            &frames[..],
+        ]
+        .concat());
+    };
+    unrecorded("seed");
     replace(&lab.file("seed", "scenario.toml"), "seed", "2002", "2003");
     let (_, said) = lab.fails(&["verify", "seed"]);
     assert!(said.contains("tick 0, init.seed"), "{said}");
 
     // A robot with another parameter: nothing but what she does differs.
-    whole("parameter");
+    unrecorded("parameter");
     let scenario = lab.file("parameter", "scenario.toml");
     replace(
         &scenario,
@@ -231,6 +239,51 @@ fn a_record_that_is_not_what_the_scenario_gives_is_told_by_tick_robot_and_field(
     std::fs::write(&events, changed).unwrap();
     let (_, said) = lab.fails(&["verify", "seal"]);
     assert!(said.contains("are damaged"), "{said}");
+}
+
+#[test]
+fn a_record_that_is_not_whole_is_not_the_same() {
+    let lab = Lab::new();
+    let fails = |run: &str| {
+        let (code, said) = lab.fails(&["verify", run]);
+        assert_eq!(code, 1, "{run}: {said}");
+        assert!(!said.contains("panicked"), "{run}: {said}");
+        said.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    for run in ["cut", "gone", "events", "empty", "order", "scenario"] {
+        lab.ok(&["run", HALL, "--run", run, "--duration", "30 s"]);
+    }
+    let keep = |run: &str, file: &str, share: f64| {
+        let path = lab.file(run, file);
+        let bytes = std::fs::read(&path).unwrap();
+        let kept = (bytes.len() as f64 * share) as usize;
+        std::fs::write(&path, &bytes[..kept]).unwrap();
+    };
+
+    keep("cut", "run.mcap", 0.7);
+    let said = fails("cut");
+    assert!(said.contains("run.mcap"), "{said}");
+    std::fs::remove_file(lab.file("gone", "run.mcap")).unwrap();
+    assert!(fails("gone").contains("is not there"));
+    keep("events", "events.jsonl", 0.5);
+    assert!(fails("events").contains("it has a summary"));
+    keep("empty", "events.jsonl", 0.0);
+    assert!(fails("empty").contains("no complete tick"));
+
+    let events = lab.file("order", "events.jsonl");
+    let text = std::fs::read_to_string(&events).unwrap();
+    let at = text.find("{\"tick\":10,").unwrap();
+    let stray = "{\"tick\":0,\"event\":\"tick\",\"digest\":\"aa\"}\n";
+    std::fs::write(&events, format!("{}{stray}{}", &text[..at], &text[at..])).unwrap();
+    assert!(fails("order").contains("tick 0 where tick 10 is due"));
+
+    replace(
+        &lab.file("scenario", "scenario.toml"),
+        "duration",
+        "30 s",
+        "90 s",
+    );
+    assert!(fails("scenario").contains("was changed since the run"));
 }
 
 #[test]
@@ -311,6 +364,53 @@ fn a_run_whose_simulator_was_killed_goes_on_as_if_nothing_had_happened() {
     assert_eq!(log(run), log("whole"));
     let said = verify(&lab, run);
     assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+}
+
+#[test]
+fn an_epoch_after_init_is_resumed_and_the_one_before_is_kept() {
+    let lab = Lab::new();
+    let run = "second-epoch";
+    let mut launch = start_hall(&lab, run, 10, &["--speed", "10"]);
+    lab.ctl(run, &["init", "--seed", "7"]);
+    lab.until_ready(run);
+    let first = std::fs::read(lab.file(run, "events-epoch1.jsonl")).unwrap();
+    let log = std::fs::read_to_string(lab.file(run, "cars.log")).unwrap();
+    lab.step(run, 15);
+    kill_simulator(&mut launch, run);
+
+    lab.ok(&["launch", "--no-console", "--resume", run, "--speed", "max"]);
+    let kept = std::fs::read(lab.file(run, "events-epoch1.jsonl")).unwrap();
+    assert_same(("kept", &kept), ("first", &first));
+    let resumed = std::fs::read_to_string(lab.file(run, "cars.log")).unwrap();
+    assert!(resumed.starts_with(&log), "{resumed}");
+    lab.ok(&[
+        "run",
+        HALL,
+        "--run",
+        "whole",
+        "--seed",
+        "7",
+        "--duration",
+        "60 s",
+    ]);
+    assert_same(("resumed", &lab.bytes(run)), ("whole", &lab.bytes("whole")));
+    let said = verify(&lab, run);
+    assert!(
+        said.contains("epoch 1: the same") && said.contains("epoch 2: the same"),
+        "{said}"
+    );
+
+    // Killed before a tick of the second epoch was complete.
+    for file in ["events.jsonl", "run.mcap", "summary.json"] {
+        std::fs::remove_file(lab.file(run, file)).unwrap();
+    }
+    lab.ok(&["launch", "--no-console", "--resume", run, "--speed", "max"]);
+    assert_same(("resumed", &lab.bytes(run)), ("whole", &lab.bytes("whole")));
+    let said = verify(&lab, run);
+    assert!(
+        said.contains("epoch 2: the same, 120 ticks to the end"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -49,6 +49,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "robots",
             "affect",
             "config",
+            "lockstep",
             "protocol",
             "recording",
         ],

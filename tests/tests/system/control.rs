@@ -251,7 +251,7 @@ fn another_scenario_for_the_same_robots_is_loaded_without_a_new_start() {
     for kept in [
         "events-epoch1.jsonl",
         "scenario-epoch1.toml",
-        "recording-epoch1.jsonl",
+        "run-epoch1.mcap",
     ] {
         assert!(lab.file("ctl-load", kept).exists(), "{kept}");
     }

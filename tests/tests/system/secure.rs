@@ -398,7 +398,7 @@ fn a_participant_puts_nothing_in_anothers_name() {
         )
         .unwrap();
 
-    let status = castle.ignored("malformed", 3);
+    let status = castle.ignored("malformed", 4);
     assert_eq!(status.ignored.len(), 1, "{:?}", status.ignored);
     let expected = keys.query(&leguin, "panel");
     eventually("what is allowed", || {

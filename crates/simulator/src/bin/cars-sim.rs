@@ -145,11 +145,7 @@ fn open_folder(
     }
 
     let (lock, files) = folder.reopen()?;
-    let past = match files {
-        Some(files) => Past::open(&files)?,
-        None => None,
-    };
-    Ok((lock, past))
+    Ok((lock, Some(Past::open(&files)?)))
 }
 
 /// Writes a file that others wait for: they see it whole or not at all.

@@ -5,16 +5,16 @@ use config::FileError;
 use protocol::{Epoch, RobotName};
 
 use crate::difference::{Difference, between};
+use crate::files::EpochFiles;
 use crate::record::{Entry, Record};
-use crate::recorder::EpochFiles;
 use crate::simulation::TickRecord;
 
 /// What is left of the record of a run that is resumed.
 pub struct Past {
     epoch: Epoch,
-    record: Record,
-    /// The tick that is executed next.
-    next: Entry,
+    record: Option<Record>,
+    /// The tick that is executed next; `None` if no tick was completed.
+    next: Option<Entry>,
 }
 
 /// How a tick that was executed again compares with the record.
@@ -28,18 +28,23 @@ pub(super) enum Repeated {
 }
 
 impl Past {
-    /// The record of an epoch; `None` if no tick was completed.
+    /// The record of an epoch.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read.
-    pub fn open(files: &EpochFiles) -> Result<Option<Self>, FileError> {
-        let mut record = Record::open(files)?;
-        let first = record.next_entry()?;
-        Ok(first.map(|next| Self {
+    pub fn open(files: &EpochFiles) -> Result<Self, FileError> {
+        let mut record = None;
+        let mut next = None;
+        if files.events.exists() {
+            let mut events = Record::open(files)?;
+            next = events.next_entry()?;
+            record = Some(events);
+        }
+        Ok(Self {
             epoch: files.epoch,
             record,
             next,
-        }))
+        })
     }
 
     /// The epoch of the record.
@@ -47,10 +52,16 @@ impl Past {
         self.epoch
     }
 
+    /// Whether no tick was completed, so that there is nothing to execute again.
+    pub(super) fn is_empty(&self) -> bool {
+        self.next.is_none()
+    }
+
     /// The operator's commands that were sent before the next tick.
     pub(super) fn commands(&self) -> Vec<(RobotName, String)> {
         let operator = RobotName::operator();
-        let sent = self.next.commands_of(&operator).into_iter();
+        let next = self.next.iter();
+        let sent = next.flat_map(|entry| entry.commands_of(&operator));
         sent.map(|sent| (sent.to, sent.command.command)).collect()
     }
 
@@ -64,14 +75,18 @@ impl Past {
             events: executed.events.clone(),
             reports: None,
         };
-        if let Some(difference) = between(&self.next, &executed) {
+        let recorded = self.next.take().unwrap_or_default();
+        if let Some(difference) = between(&recorded, &executed) {
             return Ok(Repeated::Different(Box::new(difference)));
         }
 
-        match self.record.next_entry()? {
-            Some(next) => self.next = next,
-            None => return Ok(Repeated::Last),
+        if let Some(record) = &mut self.record {
+            self.next = record.next_entry()?;
         }
-        Ok(Repeated::Same)
+        if self.is_empty() {
+            Ok(Repeated::Last)
+        } else {
+            Ok(Repeated::Same)
+        }
     }
 }

@@ -349,11 +349,7 @@ impl Server {
         self.past = past;
         loop {
             let mut simulation = Simulation::new(scenario, epoch)?;
-            let recorder = if self.past.is_some() {
-                Recorder::resume(folder, &self.options.run, &simulation)?
-            } else {
-                Recorder::begin(folder, &self.options.run, &simulation)?
-            };
+            let recorder = self.begin_record(folder, &simulation)?;
             self.begin_observing(&simulation)?;
             self.begin_epoch(&mut simulation);
 
@@ -590,6 +586,25 @@ impl Server {
             self.observers.frame(simulation, &self.status(simulation));
         }
         Ok(())
+    }
+
+    /// Begins the record of an epoch, or to write that of an epoch that is resumed once more.
+    fn begin_record(
+        &mut self,
+        folder: &RunFolder,
+        simulation: &Simulation,
+    ) -> Result<Recorder, FileError> {
+        let run = &self.options.run;
+        let Some(past) = &self.past else {
+            return Recorder::begin(folder, run, simulation);
+        };
+
+        let mut recorder = Recorder::resume(folder, run, simulation)?;
+        if past.is_empty() {
+            self.past = None;
+            recorder.supersede_record()?;
+        }
+        Ok(recorder)
     }
 
     /// Compares a tick of a run that is resumed with its record. Its last tick ends the repetition, and the clock is ready.
