@@ -218,7 +218,7 @@ fn a_record_that_is_not_what_the_scenario_gives_is_told_by_tick_robot_and_field(
     let (_, said) = lab.fails(&["verify", "seed"]);
     assert!(said.contains("tick 0, init.seed"), "{said}");
 
-    // A robot with another parameter: nothing but what she does differs.
+    // A robot with another parameter.
     unrecorded("parameter");
     let scenario = lab.file("parameter", "scenario.toml");
     replace(
@@ -228,7 +228,40 @@ fn a_record_that_is_not_what_the_scenario_gives_is_told_by_tick_robot_and_field(
         "v_refill_mps = 1.",
     );
     let (_, said) = lab.fails(&["verify", "parameter"]);
-    assert!(said.contains(", Leguin, "), "{said}");
+    assert!(said.contains("the first difference: tick "), "{said}");
+
+    // A program that is not what the scenario says it is.
+    let scenario = root().join("configs/hors_doeuvres.toml");
+    let stroller = root().join("sdk/stdio/bash/stroller.sh");
+    let launch = format!(
+        r#"
+            scenario = {scenario:?}
+
+            [[process]]
+            name = "Butler"
+            command = ["cars-butler"]
+
+            [[process]]
+            name = "Leguin"
+            command = ["cars", "exec", "--", {stroller:?}]
+        "#
+    );
+    let launch = lab.write("impostor.toml", &launch);
+    let launch = launch.to_str().unwrap();
+    lab.ok(&[
+        "launch",
+        launch,
+        "--no-console",
+        "--speed",
+        "max",
+        "--duration",
+        "5 s",
+    ]);
+    let (_, said) = lab.fails(&["verify", "impostor"]);
+    assert!(
+        said.contains("the first difference: tick 0, Leguin, "),
+        "{said}"
+    );
 
     // A seal that was changed, where nothing else differs.
     let events = whole("seal");
