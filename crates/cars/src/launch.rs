@@ -102,14 +102,6 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
 
 impl LaunchArgs {
     fn load(self) -> miette::Result<Launch> {
-        let resumed = match &self.resume {
-            Some(run) => Some(lab::folder::find(&self.execution.out, run)?),
-            None => None,
-        };
-        let what = match (self.roster, self.file) {
-            (Some(roster), _) => Some(What::Roster(roster)),
-            (None, file) => file.map(What::File),
-        };
         let options = LaunchOptions {
             run: self.execution.options(),
             is_paused: self.paused,
@@ -124,10 +116,14 @@ impl LaunchArgs {
             grace: self.grace,
         };
 
-        match (resumed, what) {
-            (Some(folder), _) => Launch::resume(folder.path(), options),
-            (None, Some(what)) => Launch::load(what, options),
-            (None, None) => Err(miette!("no file is given")),
+        match (self.resume, self.roster, self.file) {
+            (Some(run), ..) => {
+                let folder = lab::folder::find(&options.run.out, &run)?;
+                Launch::resume(folder.path(), options)
+            }
+            (None, Some(roster), _) => Launch::load(What::Roster(roster), options),
+            (None, None, Some(file)) => Launch::load(What::File(file), options),
+            (None, None, None) => Err(miette!("no file is given")),
         }
     }
 }

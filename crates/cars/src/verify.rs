@@ -98,8 +98,13 @@ fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result
     } else {
         describe_comparison(&comparison, ["recorded", "executed again"])
     };
+    conclude(&text, comparison.are_same())
+}
+
+/// Prints what came of a comparison. The exit status is that of the comparison also where its text is not read.
+fn conclude(text: &str, are_same: bool) -> miette::Result<ExitCode> {
     OutputError::unless_closed(terminal::print_line(text))?;
-    if comparison.are_same() {
+    if are_same {
         Ok(ExitCode::SUCCESS)
     } else {
         Ok(ExitCode::FAILURE)
@@ -108,7 +113,7 @@ fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result
 
 fn has_commands_of_operator(files: &EpochFiles) -> Result<bool, FileError> {
     let operator = RobotName::operator();
-    let mut record = Record::open(files)?;
+    let mut record = Record::of_events(&files.events)?;
     while let Some(entry) = record.next_entry()? {
         if !entry.commands_of(&operator).is_empty() {
             return Ok(true);
@@ -158,12 +163,7 @@ pub(crate) fn diff(args: &DiffArgs) -> miette::Result<ExitCode> {
     } else {
         describe_comparison(&comparison, ["first run", "second run"])
     };
-    OutputError::unless_closed(terminal::print_line(text))?;
-    if comparison.are_same() {
-        Ok(ExitCode::SUCCESS)
-    } else {
-        Ok(ExitCode::FAILURE)
-    }
+    conclude(&text, comparison.are_same())
 }
 
 fn describe(verification: &Verification, epoch: Option<u32>) -> String {

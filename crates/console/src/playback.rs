@@ -10,8 +10,6 @@ use protocol::{Event, RobotName, Tick};
 use recording::{Header, PlacedRobot, RecordedTick, RecordingError};
 use serde::Serialize;
 
-/// The file with the recording in the folder of a run.
-const RECORDING_FILE: &str = "run.mcap";
 /// Most ticks in one answer.
 pub(crate) const MAX_TICKS: u64 = 512;
 /// How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states.
@@ -85,7 +83,7 @@ impl Recording {
     /// [`OpenError`] names the file.
     pub(crate) fn open(path: &Path) -> Result<Self, OpenError> {
         let path = if path.is_dir() {
-            path.join(RECORDING_FILE)
+            path.join(recording::FILE)
         } else {
             path.to_owned()
         };

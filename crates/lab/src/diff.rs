@@ -6,7 +6,6 @@ use config::FileError;
 use protocol::{Event, Tick};
 use serde::Serialize;
 use simulator::EpochFiles;
-
 use simulator::difference::{Difference, between};
 use simulator::record::{Entry, Record};
 

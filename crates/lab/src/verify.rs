@@ -13,12 +13,12 @@ use miette::{IntoDiagnostic, miette};
 use protocol::messages::{CommandText, News, Report};
 use protocol::{Event, RobotName, RunName, Tick};
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
-use simulator::{EpochFiles, Scenario, TickRecord, seal};
-
-use crate::run::Local;
 use simulator::difference::{Difference, between};
 use simulator::record::{Entry, Record};
 use simulator::recorder::{EVENTS, SUMMARY};
+use simulator::{EpochFiles, Scenario, TickRecord, seal};
+
+use crate::run::Local;
 
 /// What came of a verification.
 #[derive(Debug)]
@@ -57,7 +57,12 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         difference: None,
     };
 
-    while let Some(recorded) = record.next_entry()? {
+    let mut next = record.next_entry()?;
+    if next.is_none() {
+        let events = files.events.display();
+        return Err(miette!("{events} has no complete tick"));
+    }
+    while let Some(recorded) = next {
         let executed = again.play(&recorded)?;
         verification.difference = between(&recorded, &executed);
         if verification.difference.is_some() {
@@ -68,11 +73,10 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         if recorded.reports.is_some() {
             verification.reports_to = Some(recorded.tick);
         }
+        next = record.next_entry()?;
     }
 
-    if verification.ticks > 0 || !again.is_at_start() {
-        verification.digest = again.local.simulation.digest();
-    }
+    verification.digest = again.local.simulation.digest();
     verification.from_record = again.from_record;
     if verification.difference.is_none() {
         // What nothing depends on may be damaged, too.
@@ -112,9 +116,6 @@ fn check_end(
     let events = files.events.display();
     let recording = files.recording.display();
     let last = verification.ticks;
-    if verification.digest.is_empty() {
-        return Err(miette!("{events} has no complete tick"));
-    }
 
     let summary = files.events.with_file_name(SUMMARY);
     let is_last_epoch = files.events.file_name().is_some_and(|name| name == EVENTS);
@@ -181,13 +182,6 @@ impl Reexecution {
         })
     }
 
-    /// Whether no tick has been executed.
-    fn is_at_start(&self) -> bool {
-        let simulation = &self.local.simulation;
-        let names = simulation.names();
-        simulation.tick() == 0 && names.iter().all(|name| simulation.report(name).is_none())
-    }
-
     /// Executes a tick that was recorded, or the end of the run.
     fn play(&mut self, recorded: &Entry) -> miette::Result<Entry> {
         if let Some(Event::End { reason, .. }) = recorded.events.last() {
@@ -225,15 +219,8 @@ impl Reexecution {
         let lateness = simulation.scenario().lateness.clone();
         simulation.note_faults(&orders, |robot| lateness.of(robot));
 
-        let operator = RobotName::operator();
-        for event in &recorded.events {
-            if let Event::CommandSent {
-                from, to, command, ..
-            } = event
-                && *from == operator
-            {
-                simulation.command(to, command);
-            }
+        for sent in recorded.commands_of(&RobotName::operator()) {
+            simulation.command(&sent.to, &sent.command.command);
         }
     }
 

@@ -110,6 +110,17 @@ impl Launch {
         let (file, scenario) = what.load(&options.run.changes())?;
         file.check_robots(&scenario)?;
         let run = options.run.run_name(what.path()).into_diagnostic()?;
+        Self::of(what, file, scenario, run, options)
+    }
+
+    /// A launch of which everything has been read.
+    fn of(
+        what: What,
+        file: LaunchFile,
+        scenario: Scenario,
+        run: RunName,
+        options: LaunchOptions,
+    ) -> miette::Result<Self> {
         let secured = secured(&options, &file)?;
         Ok(Self {
             what,
@@ -162,21 +173,12 @@ impl Launch {
         }
         options.secure = options.secure.or(launched.secure);
         options.is_insecure |= launched.is_insecure;
-        let secured = secured(&options, &file)?;
         let what = if launched.is_roster {
             What::Roster(launched.file)
         } else {
             What::File(launched.file)
         };
-        Ok(Self {
-            what,
-            options,
-            file,
-            scenario,
-            run,
-            secured,
-            is_resumed: false,
-        })
+        Self::of(what, file, scenario, run, options)
     }
 
     /// Makes the folder of a new run and notes how it is launched, or takes that of the run to resume.

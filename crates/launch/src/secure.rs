@@ -59,6 +59,12 @@ impl Certificates {
         self.make_files()
     }
 
+    /// The configuration file of a participant: a robot, or the simulator.
+    #[must_use]
+    pub fn config_of(&self, name: &str) -> PathBuf {
+        config_of(&self.folder, name)
+    }
+
     /// Names of all participants but the simulator.
     pub fn clients(&self) -> impl Iterator<Item = &str> {
         self.robots
@@ -263,6 +269,11 @@ fn remove(file: &Path) -> miette::Result<()> {
         .wrap_err_with(|| format!("cannot replace {}", file.display()))
 }
 
+/// The configuration file of a participant in a folder of certificates.
+fn config_of(folder: &Path, name: &str) -> PathBuf {
+    folder.join(name).join(CONFIG)
+}
+
 /// A folder made by `cars secure init`.
 #[derive(Debug, Clone)]
 pub(crate) struct Secured {
@@ -293,7 +304,7 @@ impl Secured {
 
     /// The configuration file of a participant.
     pub(crate) fn config_of(&self, name: &str) -> PathBuf {
-        self.folder.join(name).join(CONFIG)
+        config_of(&self.folder, name)
     }
 
     /// The configuration file of the operator.

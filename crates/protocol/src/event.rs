@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::messages::{End, FaultKind, LogKind, LogRecord, Performative, Point};
 use crate::name::RobotName;
 use crate::plain::escape_line;
-use crate::{Generation, Seq, Tick};
+use crate::{Epoch, Generation, Seq, Tick};
 
 /// One line of `events.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -300,9 +300,22 @@ impl Event {
         matches!(self, Self::Tick { .. } | Self::End { .. })
     }
 
-    /// The event as a line of the readable log, with its source and kind; `None` for what only machines read.
+    /// The event as a line of the readable log; `None` for what only machines read.
     #[must_use]
-    pub fn readable(&self) -> Option<(String, LogKind, String)> {
+    pub fn log_record(&self, epoch: Epoch, tick: Tick, time_s: f64) -> Option<LogRecord> {
+        let (source, kind, text) = self.readable()?;
+        Some(LogRecord {
+            epoch,
+            tick,
+            time_s,
+            source,
+            kind,
+            text,
+        })
+    }
+
+    /// Source, kind and text of the line of the readable log; `None` for what only machines read.
+    fn readable(&self) -> Option<(String, LogKind, String)> {
         let simulator = |kind, text: String| Some(("simulator".to_owned(), kind, text));
         let says = |robot: &RobotName, kind, text: String| Some((robot.to_string(), kind, text));
         match self {

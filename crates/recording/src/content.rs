@@ -76,18 +76,11 @@ impl RecordedTick {
     /// The lines of the log about this tick, which are made from its events.
     #[must_use]
     pub fn log(&self, header: &Header) -> Vec<LogRecord> {
+        let tick = self.tick();
+        let time_s = tick as f64 * header.tick_s;
         let mut lines = Vec::new();
         for event in &self.events {
-            if let Some((source, kind, text)) = event.readable() {
-                lines.push(LogRecord {
-                    epoch: header.epoch,
-                    tick: self.tick(),
-                    time_s: self.tick() as f64 * header.tick_s,
-                    source,
-                    kind,
-                    text,
-                });
-            }
+            lines.extend(event.log_record(header.epoch, tick, time_s));
         }
         lines
     }

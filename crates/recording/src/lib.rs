@@ -10,6 +10,7 @@ mod damage;
 mod index;
 mod protobuf;
 mod read;
+mod ticks;
 mod topic;
 mod viewers;
 mod write;
@@ -18,8 +19,11 @@ pub use background::BackgroundWriter;
 pub use content::{Frame, Header, PlacedRobot, RecordedTick, Wall};
 pub use damage::RecordingError;
 pub use read::Recording;
+pub use ticks::Ticks;
 pub use write::{WriteError, Writer};
 
+/// Name of the file in the folder of a run.
+pub const FILE: &str = "run.mcap";
 /// Name of the attached scenario.
 pub const SCENARIO: &str = "scenario.toml";
 /// Name of the metadata record.

@@ -11,7 +11,7 @@ pub const EVENTS: &str = "events.jsonl";
 /// The log, for people.
 pub const LOG: &str = "cars.log";
 /// Everything about every tick, to look at it again and to compare it.
-pub const RECORDING: &str = "run.mcap";
+pub const RECORDING: &str = recording::FILE;
 /// The summary at the end of the run.
 pub const SUMMARY: &str = "summary.json";
 /// How the run was launched, to resume it.

@@ -1,36 +1,28 @@
 //! The record of an epoch, read tick by tick.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
-use crate::files::EpochFiles;
 use config::FileError;
 use lockstep::Sent;
 use protocol::messages::{CommandText, Report};
 use protocol::{Event, Line, RobotName, Tick};
-use recording::{Recording, RecordingError};
+use recording::{Recording, RecordingError, Ticks};
 
-/// Most bytes of a line of events; no event is nearly as long.
-const MAX_LINE_BYTES: u64 = 1 << 20;
+use crate::files::EpochFiles;
+use crate::seal::RawLines;
 
 /// The record of an epoch.
 pub struct Record {
     path: PathBuf,
-    lines: BufReader<File>,
+    lines: RawLines,
     /// Number of the line that was read last, from 1.
     number: usize,
     /// The tick of the next entry.
     tick: Tick,
-    /// What robots reported, if it was recorded.
-    recording: Option<Recording>,
-    /// Reports of the next ticks.
-    ahead: VecDeque<BTreeMap<RobotName, Report>>,
+    /// What robots reported, if it was recorded and is read, too.
+    recorded: Option<Ticks>,
 }
-
-/// Ticks of the recording that are read in one go.
-const TICKS_AT_ONCE: Tick = 64;
 
 /// A complete tick of a record, or the end of the run.
 #[derive(Debug, Clone, Default)]
@@ -104,33 +96,38 @@ impl Entry {
 }
 
 impl Record {
-    /// Opens the record of an epoch.
+    /// Opens the record of an epoch: its events, and its recording if there is one.
     ///
     /// # Errors
     /// [`FileError`] if a file cannot be read.
     pub fn open(files: &EpochFiles) -> Result<Self, FileError> {
-        let path = files.events.clone();
-        let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error))?;
-        let recording = files
-            .recording
-            .exists()
-            .then(|| Recording::open(&files.recording))
-            .transpose()
-            .map_err(|error| unreadable(&error))?;
+        let mut record = Self::of_events(&files.events)?;
+        if files.recording.exists() {
+            let recording = Recording::open(&files.recording);
+            let recording = recording.map_err(|error| unreadable(&error))?;
+            record.recorded = Some(Ticks::of(recording));
+        }
+        Ok(record)
+    }
+
+    /// Opens a file of events alone.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read.
+    pub fn of_events(path: &Path) -> Result<Self, FileError> {
         Ok(Self {
-            path,
-            lines: BufReader::new(file),
+            path: path.to_owned(),
+            lines: RawLines::open(path)?,
             number: 0,
             tick: 0,
-            recording,
-            ahead: VecDeque::new(),
+            recorded: None,
         })
     }
 
-    /// The recording of the epoch, if there is one.
+    /// The recording of the epoch, if there is one and it is read.
     #[must_use]
     pub fn recording(&self) -> Option<&Recording> {
-        self.recording.as_ref()
+        self.recorded.as_ref().map(Ticks::recording)
     }
 
     /// The next complete tick; `None` at the end of the record. Events of a tick that was not completed are left out.
@@ -159,7 +156,7 @@ impl Record {
             entry.events.push(event);
             if is_last && !is_end {
                 self.tick += 1;
-                entry.reports = self.reports(tick)?;
+                entry.reports = self.reports()?;
             }
             if is_last {
                 return Ok(Some(entry));
@@ -170,35 +167,25 @@ impl Record {
     }
 
     /// What robots reported for the next tick; `None` where the recording has ended earlier than the events.
-    fn reports(&mut self, tick: Tick) -> Result<Option<BTreeMap<RobotName, Report>>, FileError> {
-        let Some(recording) = &self.recording else {
+    fn reports(&mut self) -> Result<Option<BTreeMap<RobotName, Report>>, FileError> {
+        let Some(recorded) = &mut self.recorded else {
             return Ok(None);
         };
 
-        if self.ahead.is_empty() && tick < recording.len() {
-            let to = recording.len().min(tick + TICKS_AT_ONCE);
-            let ticks = recording
-                .read(tick, to)
-                .map_err(|error| unreadable(&error))?;
-            self.ahead
-                .extend(ticks.into_iter().map(|tick| tick.reports));
-        }
-        Ok(self.ahead.pop_front())
+        let tick = recorded.next_tick().map_err(|error| unreadable(&error))?;
+        Ok(tick.map(|tick| tick.reports))
     }
 
     fn next_line(&mut self) -> Result<Option<Line>, FileError> {
-        let mut bytes = Vec::new();
-        let mut limited = (&mut self.lines).take(MAX_LINE_BYTES);
-        limited
-            .read_until(b'\n', &mut bytes)
-            .map_err(|error| FileError::unreadable(&self.path, &error))?;
-        // The simulator was about to write the last one.
-        if bytes.pop_if(|byte| *byte == b'\n').is_none() && (bytes.len() as u64) < MAX_LINE_BYTES {
+        let Some(raw) = self.lines.next()? else {
             return Ok(None);
+        };
+        if !raw.is_whole && !raw.is_too_long() {
+            return Ok(None); // A line that the simulator was about to write.
         }
 
         self.number += 1;
-        let line = serde_json::from_slice(&bytes).map_err(|error| self.malformed(&error))?;
+        let line = serde_json::from_slice(&raw.bytes).map_err(|error| self.malformed(&error))?;
         Ok(Some(line))
     }
 

@@ -195,9 +195,11 @@ impl RunFolder {
         epochs.pop();
         let mut count = 0;
         for files in epochs {
-            let mut record = Record::open(&files)?;
+            let mut record = Record::of_events(&files.events)?;
             while let Some(entry) = record.next_entry()? {
-                let lines = entry.events.iter().filter_map(Event::readable);
+                let lines = entry.events.iter();
+                let lines =
+                    lines.filter_map(|event| event.log_record(files.epoch, entry.tick, 0.0));
                 count += lines.count();
             }
         }
@@ -475,16 +477,9 @@ impl Recorder {
         let mut lines = Vec::new();
         for line in record.lines() {
             self.summary.count(simulation, &line);
-            if let Some((source, kind, text)) = line.event.readable() {
-                lines.push(LogRecord {
-                    epoch: simulation.epoch(),
-                    tick: line.tick,
-                    time_s: simulation.time_s(line.tick),
-                    source,
-                    kind,
-                    text,
-                });
-            }
+            let time_s = simulation.time_s(line.tick);
+            let log_record = line.event.log_record(simulation.epoch(), line.tick, time_s);
+            lines.extend(log_record);
             self.add_event(&line)?;
         }
         self.events.flush()?;

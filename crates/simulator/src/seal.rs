@@ -3,7 +3,7 @@
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use config::FileError;
 use protocol::Tick;
@@ -68,12 +68,65 @@ pub struct Checked {
     pub incomplete_lines: usize,
 }
 
+/// The lines of a file of events, not decoded.
+pub(crate) struct RawLines {
+    path: PathBuf,
+    reader: BufReader<File>,
+}
+
+/// A line of a file.
+pub(crate) struct RawLine {
+    /// Its bytes, without its end.
+    pub(crate) bytes: Vec<u8>,
+    /// Whether it has an end. Otherwise the simulator was about to write it, or it is too long.
+    pub(crate) is_whole: bool,
+}
+
+impl RawLine {
+    /// Whether it is longer than any event.
+    pub(crate) fn is_too_long(&self) -> bool {
+        !self.is_whole && self.bytes.len() as u64 == MAX_LINE
+    }
+}
+
+impl RawLines {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read.
+    pub(crate) fn open(path: &Path) -> Result<Self, FileError> {
+        let file = File::open(path).map_err(|error| FileError::unreadable(path, &error))?;
+        Ok(Self {
+            path: path.to_owned(),
+            reader: BufReader::new(file),
+        })
+    }
+
+    /// The next line; `None` at the end of the file.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read.
+    pub(crate) fn next(&mut self) -> Result<Option<RawLine>, FileError> {
+        let mut bytes = Vec::new();
+        let count = (&mut self.reader)
+            .take(MAX_LINE)
+            .read_until(b'\n', &mut bytes)
+            .map_err(|error| FileError::unreadable(&self.path, &error))?;
+        if count == 0 {
+            return Ok(None);
+        }
+
+        let is_whole = bytes.pop_if(|byte| *byte == b'\n').is_some();
+        Ok(Some(RawLine { bytes, is_whole }))
+    }
+}
+
 /// Reads a file of events and compares it with its seals.
 ///
 /// # Errors
 /// [`FileError`] if the file cannot be read, or names the first lines that are damaged.
 pub fn check(path: &Path) -> Result<Checked, FileError> {
-    let file = File::open(path).map_err(|error| FileError::unreadable(path, &error))?;
+    let mut lines = RawLines::open(path)?;
     let mut checked = Checked {
         lines: 0,
         tick: 0,
@@ -81,17 +134,7 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
         incomplete_lines: 0,
     };
     let mut seal = Seal::default();
-    let mut reader = BufReader::new(file);
-    let mut bytes = Vec::new();
-    loop {
-        bytes.clear();
-        let count = (&mut reader)
-            .take(MAX_LINE)
-            .read_until(b'\n', &mut bytes)
-            .map_err(|error| FileError::unreadable(path, &error))?;
-        if count == 0 {
-            return Ok(checked);
-        }
+    while let Some(raw) = lines.next()? {
         if checked.has_end {
             return Err(damaged(
                 path,
@@ -101,25 +144,26 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
         }
 
         checked.incomplete_lines += 1;
-        if bytes.pop_if(|byte| *byte == b'\n').is_none() {
-            if count as u64 == MAX_LINE {
-                return Err(damaged(path, &checked, "the last of them is too long"));
-            }
+        if raw.is_too_long() {
+            return Err(damaged(path, &checked, "the last of them is too long"));
+        }
+        if !raw.is_whole {
             return Ok(checked); // A line that the simulator was about to write.
         }
-        let Ok(line) = serde_json::from_slice::<Line>(&bytes) else {
+        let Ok(line) = serde_json::from_slice::<Line>(&raw.bytes) else {
             return Err(damaged(path, &checked, "the last of them is not an event"));
         };
         if line.event.is_sealed() {
-            if seal.is_right(&bytes) != Some(true) {
+            if seal.is_right(&raw.bytes) != Some(true) {
                 return Err(damaged(path, &checked, "they are not what was written"));
             }
             checked.lines += std::mem::take(&mut checked.incomplete_lines);
             checked.tick = line.tick;
             checked.has_end = matches!(line.event, Event::End { .. });
         }
-        seal.add(&bytes);
+        seal.add(&raw.bytes);
     }
+    Ok(checked)
 }
 
 fn damaged(path: &Path, checked: &Checked, reason: &str) -> FileError {

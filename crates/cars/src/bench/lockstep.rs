@@ -182,31 +182,30 @@ fn as_processes(
     let endpoint = free_endpoint(workload.is_secured)?;
     let mut simulator = programs.command("cars-sim");
     simulator.arg(scenario).args(["--listen", &endpoint]);
-    secure(&mut simulator, certificates.as_deref(), "simulator");
+    secure(&mut simulator, certificates.as_ref(), "simulator");
 
     let mut commands = Vec::new();
     for (name, mut robot) in robots {
         robot.env("CARS_RUN", RUN).env("CARS_CONNECT", &endpoint);
-        secure(&mut robot, certificates.as_deref(), &name);
+        secure(&mut robot, certificates.as_ref(), &name);
         commands.push(robot);
     }
 
     execute(workload, &mut simulator, duration_s, commands)
 }
 
-/// Makes certificates for these robots; returns their folder.
+/// Makes certificates for these robots.
 fn make_certificates(
     workload: &Workload<'_>,
     robots: &[(String, Command)],
-) -> miette::Result<PathBuf> {
+) -> miette::Result<Certificates> {
     let mut names = Vec::new();
     for (name, _) in robots {
         names.push(RobotName::new(name).into_diagnostic()?);
     }
 
-    let folder = workload.scratch.join("certificates");
     let certificates = Certificates {
-        folder: folder.clone(),
+        folder: workload.scratch.join("certificates"),
         robots: names,
         hosts: Vec::new(),
         days: 1,
@@ -214,13 +213,13 @@ fn make_certificates(
         replaces: true,
     };
     certificates.make()?;
-    Ok(folder)
+    Ok(certificates)
 }
 
 /// Gives a process the configuration file with its certificate.
-fn secure(process: &mut Command, certificates: Option<&Path>, name: &str) {
-    if let Some(folder) = certificates {
-        process.env("CARS_ZENOH_CONFIG", folder.join(name).join("zenoh.json5"));
+fn secure(process: &mut Command, certificates: Option<&Certificates>, name: &str) {
+    if let Some(certificates) = certificates {
+        process.env("CARS_ZENOH_CONFIG", certificates.config_of(name));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Reads the states of a run's robots tick by tick, from its recording, or from its events if it has no recording.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -9,15 +9,13 @@ use config::Changes;
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{Parameters, Report};
 use protocol::{Epoch, Event, Line, RobotName, RunName, Tick};
-use recording::{RecordedTick, Recording};
+use recording::{Recording, Ticks};
 use serde::de::DeserializeOwned;
 use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
 use simulator::{RunFolder, Scenario};
 
 use super::episode::RobotState;
 
-/// Most ticks of a recording that are in memory.
-const TICKS_AT_ONCE: Tick = 64;
 /// Longest line of a record, bytes; a tick of a thousand robots that publish much takes a hundredth of it.
 const MAX_LINE_BYTES: u64 = 1 << 28;
 
@@ -48,8 +46,6 @@ pub(super) struct Reader {
     path: PathBuf,
     facts: Facts,
     source: Source,
-    /// The tick that must come next.
-    due: Tick,
     /// What the record lacks, for people.
     notes: Vec<String>,
 }
@@ -57,14 +53,17 @@ pub(super) struct Reader {
 /// What is read.
 enum Source {
     Recording(Box<Playback>),
-    Events { lines: Lines, replay: Replay },
+    Events {
+        lines: Lines,
+        replay: Replay,
+        /// The tick that must come next.
+        due: Tick,
+    },
 }
 
 /// A recording that is read from its beginning to its end.
 struct Playback {
-    recording: Recording,
-    /// Ticks that have been read from the file and come next.
-    ticks: VecDeque<RecordedTick>,
+    ticks: Ticks,
     /// The last report of each robot.
     reports: BTreeMap<RobotName, Report>,
 }
@@ -113,8 +112,7 @@ impl Reader {
             parameters: parameters(folder, &mut notes),
         };
         let playback = Playback {
-            recording,
-            ticks: VecDeque::new(),
+            ticks: Ticks::of(recording),
             reports: BTreeMap::new(),
         };
 
@@ -145,8 +143,12 @@ impl Reader {
             parameters: parameters(folder, &mut notes),
         };
 
-        let replay = Replay::default();
-        Self::begin(path, facts, Source::Events { lines, replay }, notes)
+        let source = Source::Events {
+            lines,
+            replay: Replay::default(),
+            due: 0,
+        };
+        Self::begin(path, facts, source, notes)
     }
 
     fn begin(
@@ -165,7 +167,6 @@ impl Reader {
             path,
             facts,
             source,
-            due: 0,
             notes,
         })
     }
@@ -198,22 +199,22 @@ impl Reader {
     /// If it cannot be decoded, or is another one than the next.
     pub(super) fn next(&mut self) -> miette::Result<Option<Snapshot>> {
         match &mut self.source {
-            Source::Recording(playback) => playback.next(&mut self.due),
-            Source::Events { lines, replay } => {
+            Source::Recording(playback) => playback.next(),
+            Source::Events { lines, replay, due } => {
                 let Some(snapshot) = next_of(lines, replay)? else {
                     return Ok(None);
                 };
-                if snapshot.tick != self.due {
+                if snapshot.tick != *due {
                     return Err(miette!(
                         "{}, line {}: tick {} where {} is due",
                         self.path.display(),
                         lines.number,
                         snapshot.tick,
-                        self.due
+                        due
                     ));
                 }
 
-                self.due += 1;
+                *due += 1;
                 Ok(Some(snapshot))
             }
         }
@@ -221,16 +222,11 @@ impl Reader {
 }
 
 impl Playback {
-    /// The next tick, which is tick `due`.
-    fn next(&mut self, due: &mut Tick) -> miette::Result<Option<Snapshot>> {
-        if self.ticks.is_empty() {
-            let read = self.recording.read(*due, *due + TICKS_AT_ONCE);
-            self.ticks = read.into_diagnostic()?.into();
-        }
-        let Some(mut tick) = self.ticks.pop_front() else {
+    /// The next tick; `None` after the last complete one.
+    fn next(&mut self) -> miette::Result<Option<Snapshot>> {
+        let Some(mut tick) = self.ticks.next_tick().into_diagnostic()? else {
             return Ok(None);
         };
-        *due += 1;
 
         self.reports.append(&mut tick.reports);
         let mut robots = Vec::new();

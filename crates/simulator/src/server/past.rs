@@ -36,7 +36,7 @@ impl Past {
         let mut record = None;
         let mut next = None;
         if files.events.exists() {
-            let mut events = Record::open(files)?;
+            let mut events = Record::of_events(&files.events)?;
             next = events.next_entry()?;
             record = Some(events);
         }
