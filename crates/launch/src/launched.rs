@@ -21,7 +21,7 @@ pub(super) struct Launched {
     pub(super) text: String,
     /// Simulated seconds per second; `None` is as fast as possible.
     pub(super) speed: Option<f64>,
-    /// Folder of certificates.
+    /// Absolute path of the folder of certificates that the command line named.
     pub(super) secure: Option<PathBuf>,
     /// Whether the simulator was allowed to listen without certificates where other machines can connect.
     pub(super) is_insecure: bool,

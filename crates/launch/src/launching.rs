@@ -190,15 +190,13 @@ impl Launch {
         let (folder, lock) = self.options.run.folder(&self.run, &self.scenario)?;
         drop(lock); // The simulator takes it.
         clear_logs(&folder);
-        let path = self.what.path();
-        let file =
-            std::path::absolute(path).map_err(|error| FileError::unreadable(path, &error))?;
+        let secure = self.options.secure.as_deref();
         let launched = Launched {
-            file,
+            file: absolute(self.what.path())?,
             is_roster: matches!(self.what, What::Roster(_)),
             text: self.file.source.text.clone(),
             speed: self.speed().0,
-            secure: self.options.secure.clone(),
+            secure: secure.map(absolute).transpose()?,
             is_insecure: self.options.is_insecure,
         };
         launched.write(&folder)?;
@@ -394,6 +392,11 @@ impl Launch {
         screen.finish();
         Ok(outcome)
     }
+}
+
+/// A path that holds in any folder: the run may be resumed from another one.
+fn absolute(path: &Path) -> Result<PathBuf, FileError> {
+    std::path::absolute(path).map_err(|error| FileError::unreadable(path, &error))
 }
 
 /// The certificates of a secured launch: those of the command line, or of the file.
