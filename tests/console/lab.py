@@ -107,7 +107,7 @@ class Launch:
             "CARS_LISTEN": self.endpoint,
         }
 
-        self.simulator = self.start("cars-sim", scenario, "--out", folder / "runs", "--paused", *options)
+        self.simulator = self.start("cars-sim", scenario, "--out", folder / "runs", "--paused", "--no-verdict", *options)
         self.robots = {name: self.start(f"cars-{name.lower()}", "--name", name) for name in robots}
         self.address = start_console(self.processes, environment=self.environment)
         eventually("the robots", lambda: (self.status() or {}).get("phase") == "ready")

@@ -55,8 +55,90 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     page.wait_for_timeout(300)
     assert abs(int(page.get_by_test_id("tick").inner_text()) - int(held)) <= 1
     expect(page.get_by_test_id("log")).to_contain_text("initialized, seed 2002")
+    verdicts = page.get_by_test_id("verdict")
+    expect(verdicts).to_have_count(4)
+    expect(verdicts.first).to_have_text("… open no robot overlaps another")
 
     page.get_by_test_id("speed").select_option("max")
     page.get_by_test_id("play").click()
     expect(page.get_by_test_id("tick")).to_have_text("200")
     expect(page.get_by_test_id("log")).to_contain_text("finished")
+    # What is decided by the end of the run shows at its last tick. A call is on its way then.
+    expect(verdicts.first).to_have_text("✓ pass no robot overlaps another")
+    expect(page.locator(".verdict.undecided")).to_have_text("? undecided a call is answered or escalated")
+    expect(page.get_by_test_id("log")).to_contain_text("pass: no robot overlaps another (it did not happen until tick 200")
+    page.screenshot(path=screenshots / "verdicts-1440x900-light.png")
+
+
+# What is hidden before pages are compared, because the other one does not have it: commands of an operator and the answers,
+# and what a recording is played with: the bar with its tick, and the marks of that tick in the charts. The bar at the top,
+# which controls a run, is not compared.
+NOT_RECORDED = ".panel .buttons, #notice"
+NOT_LIVE = "#scrub-bar, #bands .cursor, #chart .u-cursor-x"
+
+# By tab, what is compared while it is shown.
+SAME = {"log": ["#plan", "#panels", "[data-testid=log]"], "charts": ["#chart", "#bands"]}
+
+
+# A page that was painted part by part has other shades at the edges of round corners than one that was painted at once.
+REPAINT = """async () => {
+  const frame = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  for (const display of ["none", ""]) {
+    document.querySelector("#panels").style.display = display;
+    await frame();
+  }
+}"""
+
+
+def pixels(page, hidden):
+    """What can be seen of a run at its tick, by region."""
+    hide = "(hidden) => document.querySelectorAll(hidden).forEach((one) => { one.style.display = 'none'; })"
+    found = {}
+    for tab, regions in SAME.items():
+        page.get_by_test_id(f"tab-{tab}").click()
+        page.evaluate(hide, hidden)
+        page.locator("#zoom-all").click()
+        page.evaluate(REPAINT)
+        for region in regions:
+            found[region] = page.locator(region).screenshot()
+    return found
+
+
+def differing(live, recorded):
+    """The regions in which two pages differ."""
+    one = pixels(live, NOT_RECORDED)
+    other = pixels(recorded, NOT_LIVE)
+    return [region for region in one if one[region] != other[region]]
+
+
+def test_a_tick_has_the_same_pixels_live_and_recorded(launch, open_page, screenshots):
+    run = launch()
+    live = open_page(run.address, height=1500)
+    expect(live.get_by_test_id("tick")).to_have_text("0")
+    # The robots have turned to their tasks; Leguin has been commanded.
+    for tick in range(1, 41):
+        if tick == 30:
+            live.get_by_test_id("panel-Leguin").get_by_test_id("button-refill").click()
+            expect(live.get_by_test_id("message")).to_contain_text("refill")
+        live.get_by_test_id("btn-step").click()
+        expect(live.get_by_test_id("tick")).to_have_text(str(tick))
+
+    # What there is of a run that is held is written after a second.
+    def recording_of_all():
+        address = start_console(run.processes, "--recording", run.run_folder)
+        page = open_page(address, height=1500)
+        expect(page.get_by_test_id("scrub")).to_be_visible()
+        return page if page.get_by_test_id("scrub").get_attribute("max") == "40" else None
+
+    recorded = eventually("tick 40 in the recording", recording_of_all)
+    move(recorded, 40)
+    expect(recorded.get_by_test_id("tick")).to_have_text("40")
+
+    eventually("the same pixels", lambda: differing(live, recorded) == [])
+    live.screenshot(path=screenshots / "tick-40-live.png")
+    recorded.screenshot(path=screenshots / "tick-40-recorded.png")
+
+    # They are the pixels of this tick.
+    move(recorded, 39)
+    expect(recorded.get_by_test_id("tick")).to_have_text("39")
+    eventually("other pixels", lambda: {"#plan", "#panels"} <= set(differing(live, recorded)))

@@ -6,10 +6,9 @@ use std::process::ExitCode;
 
 use clap::Args;
 use config::{Changes, FileError};
-use lab::experiment::{Experiment, Options, is_experiment_file};
+use lab::experiment::{Experiment, Plan, Request, Robots, is_experiment_file};
 use lab::folder::recorded_epochs;
-use launch::{LaunchFile, is_launch_file};
-use miette::IntoDiagnostic;
+use launch::{LaunchFile, is_launch_file, scenario_file};
 use simulator::seal::{self, Checked};
 use simulator::{RunFolder, Scenario};
 use terminal::OutputError;
@@ -71,18 +70,21 @@ fn describe(path: &Path) -> miette::Result<String> {
 
 /// An experiment, every scenario of which has been read.
 fn describe_experiment(path: &Path) -> miette::Result<String> {
-    let experiment = Experiment::load(path)?;
-    experiment.check(&Options {
-        scenario: experiment.scenario.clone(),
-        seeds: experiment.seeds,
-        jobs: 1,
+    let mut experiment = Experiment::load(path)?;
+    experiment.scenario = scenario_file(&experiment.scenario)?;
+    let plan = Plan::new(&Request {
+        name: String::new(),
+        experiment,
         set: Vec::new(),
+        robots: Robots::Programs,
     })?;
 
+    let experiment = &plan.experiment;
     let arms = count(experiment.arms.len(), "arm", "arms");
-    let conditions = experiment.list_conditions().into_diagnostic()?;
-    let conditions = count(conditions.len(), "condition", "conditions");
-    Ok(format!("{arms}, {conditions}, {} seeds", experiment.seeds))
+    let conditions = count(plan.conditions().len(), "condition", "conditions");
+    let measures = count(experiment.measures.len(), "measure", "measures");
+    let seeds = experiment.seeds.len();
+    Ok(format!("{arms}, {conditions}, {seeds} seeds, {measures}"))
 }
 
 /// The record of a run: its events, those of earlier epochs, too.

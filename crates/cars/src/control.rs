@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, miette};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Command, Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
-use protocol::{Message, RobotName, RunName, decode, encode};
+use protocol::{Message, RobotName, RunName, Tick, decode, encode};
 use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
 use simulator::{RunFolder, Scenario};
 use std::path::PathBuf;
@@ -134,6 +134,11 @@ enum Request {
         #[arg(default_value_t = 1)]
         n: u64,
     },
+    /// Go to a tick of a replay, back or forward.
+    Seek {
+        /// The tick.
+        tick: Tick,
+    },
     /// End the run.
     Stop,
     /// Set simulated seconds per second.
@@ -195,6 +200,7 @@ impl Request {
             Self::Start => Control::Start,
             Self::Pause => Control::Pause,
             Self::Step { n } => Control::Step { n: *n },
+            Self::Seek { tick } => Control::Seek { tick: *tick },
             Self::Stop => Control::Stop,
             Self::Speed { factor } => Control::Speed { factor: factor.0 },
             Self::Late {
@@ -266,6 +272,9 @@ fn payload(reply: Reply) -> miette::Result<Vec<u8>> {
 /// The status of a run as lines of text.
 fn describe(status: &Status) -> String {
     let mut text = headline(status);
+    if let Some(run) = &status.replay_of {
+        text += &format!("a replay of run {run}\n");
+    }
     if status.pending_steps > 0 {
         text += &format!("{} steps are pending\n", status.pending_steps);
     }
@@ -374,6 +383,11 @@ pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
     let ControlAnswer::Done(status) = answer? else {
         return Err(miette!("the simulator does not answer with its status"));
     };
+    if let Some(run) = &status.replay_of {
+        return Err(miette!(
+            "refused: this is a replay of run {run}: its robots execute no commands"
+        ));
+    }
     if !status.robots.iter().any(|robot| robot.name == args.robot) {
         return Err(miette!(
             "refused: no robot of this run is called {}",
@@ -445,9 +459,14 @@ fn follow(run: &RunRef, past: &str) -> miette::Result<()> {
         })
         .into_diagnostic()?;
 
-    let all: Vec<&str> = past.lines().collect();
-    for line in all.iter().skip(all.len().saturating_sub(TAIL)) {
-        terminal::print_line(line)?;
+    // The past log of a replay is that of the recorded run, to its end.
+    let answer = ask(&bus, &keys, run, &Control::Status);
+    let is_replay = matches!(answer, Ok(ControlAnswer::Done(s)) if s.replay_of.is_some());
+    if !is_replay {
+        let all: Vec<&str> = past.lines().collect();
+        for line in all.iter().skip(all.len().saturating_sub(TAIL)) {
+            terminal::print_line(line)?;
+        }
     }
     while let Ok(Some(line)) = received.recv() {
         terminal::print_line(log_line(&line))?;

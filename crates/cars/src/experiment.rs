@@ -1,364 +1,449 @@
-//! `cars experiment`: plays experiments over many seeds and prints tables with confidence intervals.
+//! `cars experiment`: plays experiments over many seeds, in a folder that is resumed after any interruption, and prints tables
+//! with confidence intervals.
 
-use std::path::PathBuf;
+mod launcher;
+mod replay;
+mod tables;
+
+use std::ops::{Range, RangeInclusive};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use clap::{Args, Subcommand};
 use config::Override;
 use config::units::Time;
 use indicatif::{ProgressBar, ProgressStyle};
-use lab::experiment::{
-    Cell, Conditions, Contrast, Experiment, Factor, Kind, Measure, Options, Value,
-};
-use lab::statistics::MIN_SAMPLE;
+use lab::experiment::engine::{self, Options, Queue, WORKER};
+use lab::experiment::{Experiment, LaunchText, Plan, Provenance, Request, Results, Robots, Store};
+use launch::{is_launch_file, scenario_file};
 use miette::{IntoDiagnostic, miette};
-use tabled::builder::Builder;
-use tabled::settings::object::Columns;
-use tabled::settings::{Alignment, Style};
+use protocol::random::MAX_SEED;
+
+use self::launcher::launcher;
+use crate::submit::EngineArgs;
+
+/// Where the folders of experiments are made.
+const OUT: &str = "runs/experiments";
+/// Most runs at the same time.
+const MAX_JOBS: u64 = 1024;
+/// Fewest seeds of an option; an interval needs two.
+const MIN_SEEDS: u64 = 2;
+/// Most seeds of an option.
+const MAX_SEEDS: u64 = 100_000;
+/// Units that are named where there are more of them.
+const NAMED: usize = 10;
 
 /// `cars experiment`.
 #[derive(Debug, Args)]
 pub(crate) struct ExperimentArgs {
     #[command(subcommand)]
-    experiment: Which,
+    what: What,
 }
 
 #[derive(Debug, Subcommand)]
-enum Which {
-    /// Compare emotions with rules, with a timer, with neither, and with emotions of another run, under failures of messages,
-    /// of the refiller, and of the way between the robots.
-    Affect(AffectArgs),
-    /// Lose commands and compare teams with emotions, rules, a timer, or neither.
+enum What {
+    /// Play an experiment, or go on with it where it was interrupted: what has been played is not played again.
+    Run(RunArgs),
+    /// Have the units played by Slurm, Kubernetes or GNU parallel, on machines that all see the folder of the experiment.
     ///
-    /// The problem of Murphy, Lisetti et al. 2002: two robots that depend on each other deadlock when one message is
-    /// lost, unless something makes them act.
-    Deadlock(DeadlockArgs),
-    /// Block commands and queries between the two robots for a time and compare how the teams work on and recover.
-    Partition(PartitionArgs),
-    /// Play an experiment file.
-    Run(FileArgs),
+    /// An experiment is planned as by `cars experiment run`; the folder of one that has been planned may be given instead.
+    Submit(SubmitArgs),
+    /// Play certain units of an experiment that has been planned, as the jobs of a cluster do.
+    Unit(UnitArgs),
+    /// Write the tables and the estimates of the units that have been played.
+    Merge(MergeArgs),
+    /// Show how many units have been played, have failed, and are missing.
+    Status(StatusArgs),
+    /// Play one unit once more and record it as a run.
+    Replay(replay::ReplayArgs),
 }
 
-/// Options of all experiments.
+/// What is planned.
 #[derive(Debug, Args)]
-struct Common {
-    /// Scenario; without it, that of the experiment's file.
+struct PlanArgs {
+    /// An experiment file, or the name of an experiment that ships with the project, such as `deadlock`.
+    file: PathBuf,
+    /// Folder of the results; without it `runs/experiments/NAME`.
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Scenario or launch file; without it, that of the experiment's file.
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Number of runs of each arm and condition, with the seeds 1, 2, 3 and so on; without it, that of the experiment's file.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(MIN_SAMPLE..=100_000))]
-    seeds: Option<u64>,
+    /// Number of runs of each arm and condition, with the seeds 1, 2, 3 and so on, or a range of seeds such as `65..=128`;
+    /// without it, the seeds of the experiment's file.
+    #[arg(long, value_name = "N|A..=B", value_parser = parse_seeds)]
+    seeds: Option<RangeInclusive<u64>>,
     /// Simulated time of each run; without it, that of the experiment's file.
     #[arg(long, value_name = "TIME")]
     duration: Option<Time>,
-    /// Number of runs at the same time; without it the number of processors. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
-    jobs: Option<u64>,
     /// A change of the scenario in every arm, for example `guests.count=50`. It must not be one that an arm or a condition
     /// makes.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<Override>,
+    /// Launch every run as real processes, so that robots in any language take part. The results are the same.
+    #[arg(long)]
+    processes: bool,
+}
+
+/// `cars experiment run`.
+#[derive(Debug, Args)]
+struct RunArgs {
+    #[command(flatten)]
+    plan: PlanArgs,
+    /// Write the plan and play nothing: the units are played by `cars experiment unit`.
+    #[arg(long, conflicts_with_all = ["jobs", "json", "retry_failed"])]
+    plan_only: bool,
+    #[command(flatten)]
+    workers: Workers,
     /// Print JSON: every run, every estimate and every difference.
     #[arg(long)]
     json: bool,
 }
 
-/// `cars experiment affect`.
+/// `cars experiment submit`.
 #[derive(Debug, Args)]
-pub(crate) struct AffectArgs {
+struct SubmitArgs {
     #[command(flatten)]
-    common: Common,
+    plan: PlanArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
 }
 
-/// `cars experiment run`.
+/// `cars experiment unit`.
 #[derive(Debug, Args)]
-pub(crate) struct FileArgs {
-    /// Experiment file, such as those in `configs/experiments`.
-    file: PathBuf,
+struct UnitArgs {
+    /// Folder of the experiment.
+    folder: PathBuf,
+    /// Number of a unit, from 0, or a range such as `100..=199`, which may end after the last unit.
+    #[arg(value_name = "N|A..=B", value_parser = parse_units)]
+    units: RangeInclusive<usize>,
     #[command(flatten)]
-    common: Common,
+    workers: Workers,
 }
 
-/// `cars experiment deadlock`.
+/// How units are played.
 #[derive(Debug, Args)]
-pub(crate) struct DeadlockArgs {
-    /// Probabilities of losing a command.
-    #[arg(long, value_delimiter = ',', default_value = "0,0.1,0.25,0.5,1", value_parser = probability)]
-    loss: Vec<f64>,
-    #[command(flatten)]
-    common: Common,
+struct Workers {
+    /// Number of runs at the same time; without it the number of processors. The results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_JOBS))]
+    jobs: Option<u64>,
+    /// Play units that failed once more.
+    #[arg(long)]
+    retry_failed: bool,
 }
 
-/// `cars experiment partition`.
+/// `cars experiment merge`.
 #[derive(Debug, Args)]
-pub(crate) struct PartitionArgs {
-    /// Beginning of the partition.
-    #[arg(long, default_value = "120 s", value_name = "TIME")]
-    from: Time,
-    /// Durations of the partition, which ends within the run.
-    #[arg(
-        long,
-        value_delimiter = ',',
-        default_value = "0 s,60 s,120 s,240 s",
-        value_name = "TIMES"
-    )]
-    lasting: Vec<Time>,
-    #[command(flatten)]
-    common: Common,
+struct MergeArgs {
+    /// Folder of the experiment.
+    folder: PathBuf,
+    /// Print JSON: every run, every estimate and every difference.
+    #[arg(long)]
+    json: bool,
 }
 
-fn probability(text: &str) -> Result<f64, String> {
-    let value = text
-        .parse()
-        .ok()
-        .filter(|value| (0.0..=1.0).contains(value));
-    value.ok_or_else(|| format!("{text:?} is not a probability, a number from 0 to 1"))
+/// `cars experiment status`.
+#[derive(Debug, Args)]
+struct StatusArgs {
+    /// Folder of the experiment.
+    folder: PathBuf,
 }
 
-/// Runs an experiment and prints its estimates.
+fn parse_seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let count = text.parse().ok().map(|count: u64| 1..=count);
+    let range = count.or_else(|| parse_range(text));
+    let range = range.filter(|range| {
+        let count = range.end().saturating_add(1) - range.start();
+        (MIN_SEEDS..=MAX_SEEDS).contains(&count) && *range.end() <= MAX_SEED
+    });
+    range.ok_or_else(|| {
+        format!(
+            "{text:?} is not a number of seeds from {MIN_SEEDS} to {MAX_SEEDS}, nor a range of so many, such as \"65..=128\""
+        )
+    })
+}
+
+fn parse_units(text: &str) -> Result<RangeInclusive<usize>, String> {
+    let one = text.parse().ok().map(|unit: usize| unit..=unit);
+    let range = one.or_else(|| parse_range(text));
+    range.ok_or_else(|| {
+        format!("{text:?} is not the number of a unit, nor a range such as \"100..=199\"")
+    })
+}
+
+/// A range with its end, which is not before its begin.
+fn parse_range<T: FromStr + PartialOrd>(text: &str) -> Option<RangeInclusive<T>> {
+    let (first, last) = text.split_once("..=")?;
+    let first = first.parse().ok()?;
+    let last = last.parse().ok()?;
+    (first <= last).then_some(first..=last)
+}
+
+/// Plays experiments and shows their results.
 pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
-    let own_options = args.experiment.own_options();
-    let (mut experiment, common) = args.experiment.load()?;
-    let is_json = common.json;
-    let options = common.options(&mut experiment);
-    if let Err(error) = experiment.list_conditions() {
-        return Err(miette!(help = format!("change {own_options}"), "{error}"));
+    match args.what {
+        What::Run(args) => run(&args),
+        What::Submit(args) => submit(&args),
+        What::Unit(args) => play_units(&args),
+        What::Merge(args) => {
+            let results = Results::load(&args.folder)?;
+            conclude(&results, &args.folder, args.json)
+        }
+        What::Status(args) => status(&args.folder),
+        What::Replay(args) => replay::replay(args),
     }
+}
 
-    let style =
-        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?;
-    let bar = ProgressBar::new(experiment.runs(&options)?).with_style(style);
-    let outcomes = experiment.play(&options, &|| bar.inc(1))?;
-    bar.finish_and_clear();
-
-    let cells = experiment.estimate(&outcomes)?;
-    let contrasts = experiment.contrast(&outcomes);
-    let compared = experiment.compared(&options)?;
-    if is_json {
-        let all = serde_json::json!({
-            "compared": compared,
-            "runs": outcomes,
-            "estimates": cells,
-            "contrasts": contrasts,
-        });
-        let all = serde_json::to_string_pretty(&all).into_diagnostic()?;
-        terminal::data(format_args!("{all}\n"))?;
+fn run(args: &RunArgs) -> miette::Result<ExitCode> {
+    let (plan, folder) = args.plan.save()?;
+    if args.plan_only {
+        let units = plan.units();
+        terminal::note(format_args!("{units} units in {}", folder.display()));
         return Ok(ExitCode::SUCCESS);
     }
 
-    let table = render(&experiment, &cells);
-    terminal::print(format_args!("{compared}\n{table}\n"))?;
-    if let Some(contrast) = contrasts.first() {
-        let baseline = &contrast.baseline;
-        let table = render_contrasts(&experiment, &contrasts);
-        terminal::print(format_args!(
-            "\nDifference to \"{baseline}\", paired by seed: mean and 95 % confidence interval.\n\n{table}\n"
-        ))?;
-    }
+    let store = play(&plan, &folder, &args.workers, 0..plan.units())?;
+    conclude(&Results::of(plan, &store), &folder, args.json)
+}
+
+fn submit(args: &SubmitArgs) -> miette::Result<ExitCode> {
+    let (plan, folder) = if args.plan.file.is_dir() {
+        args.plan.check_folder()?;
+        (Plan::load(&args.plan.file)?, args.plan.file.clone())
+    } else {
+        args.plan.save()?
+    };
+    plan.check_program()?;
+    args.engine.submit(&plan, &folder)?;
     Ok(ExitCode::SUCCESS)
 }
 
-impl Which {
-    /// The options that decide about the conditions, in words.
-    fn own_options(&self) -> &'static str {
-        match self {
-            Self::Deadlock(_) => "--loss",
-            Self::Partition(_) => "--from, --lasting or --duration",
-            Self::Affect(_) | Self::Run(_) => "--duration",
+fn play_units(args: &UnitArgs) -> miette::Result<ExitCode> {
+    let plan = Plan::load(&args.folder)?;
+    plan.check_program()?;
+    plan.check()?;
+    let first = *args.units.start();
+    let end = plan.units().min(args.units.end().saturating_add(1));
+    if first >= end {
+        return Err(miette!(
+            "there is no unit {first}: the experiment in {} has the units 0 to {}",
+            args.folder.display(),
+            plan.units() - 1
+        ));
+    }
+
+    let store = play(&plan, &args.folder, &args.workers, first..end)?;
+    let mut results = Results::of(plan, &store);
+    results
+        .failures
+        .retain(|failure| (first..end).contains(&failure.unit));
+    name_failures(&results, &args.folder);
+    Ok(ExitCode::from(u8::from(!results.failures.is_empty())))
+}
+
+/// Shows how far an experiment has come.
+fn status(folder: &Path) -> miette::Result<ExitCode> {
+    let results = Results::load(folder)?;
+    terminal::print_line(format_args!(
+        "{} units: {} played, {} failed, {} missing",
+        results.plan.units(),
+        results.outcomes.len(),
+        results.failures.len(),
+        results.missing.len()
+    ))?;
+    name_defects(&results);
+    name_failures(&results, folder);
+    Ok(ExitCode::SUCCESS)
+}
+
+impl PlanArgs {
+    /// Plans the experiment and writes the plan into its folder.
+    fn save(&self) -> miette::Result<(Plan, PathBuf)> {
+        let request = self.request()?;
+        let folder = match &self.out {
+            Some(out) => out.clone(),
+            None => Path::new(OUT).join(&request.name),
+        };
+        let plan = Plan::new(&request)?;
+        plan.check()?;
+        for change in plan.changes_since(&folder)? {
+            terminal::note(change);
         }
+        plan.save(&folder)?;
+        Ok((plan, folder))
     }
 
-    /// The experiment with the changes of its own options.
-    fn load(self) -> miette::Result<(Experiment, Common)> {
-        match self {
-            Self::Affect(args) => Ok((shipped("affect")?, args.common)),
-            Self::Deadlock(args) => args.experiment(),
-            Self::Partition(args) => args.experiment(),
-            Self::Run(args) => Ok((Experiment::load(&args.file)?, args.common)),
+    /// Checks that nothing is to be changed in a folder that has been planned.
+    fn check_folder(&self) -> miette::Result<()> {
+        let is_changed = self.out.is_some()
+            || self.scenario.is_some()
+            || self.seeds.is_some()
+            || self.duration.is_some()
+            || !self.set.is_empty()
+            || self.processes;
+        if is_changed {
+            return Err(miette!(
+                help = "give the experiment's file with these options, and its folder as --out",
+                "{}: the experiment in this folder has been planned; options do not change it",
+                self.file.display()
+            ));
         }
+        Ok(())
     }
-}
 
-/// An experiment that ships with the project.
-fn shipped(name: &str) -> miette::Result<Experiment> {
-    let experiment = Experiment::shipped(name)?;
-    experiment.ok_or_else(|| miette!("no experiment {name} ships with the project"))
-}
-
-/// The factor of a shipped experiment.
-fn factor(experiment: &mut Experiment) -> miette::Result<&mut Factor> {
-    match &mut experiment.conditions {
-        Conditions::Factor(factor) => Ok(factor),
-        Conditions::Named(_) => Err(miette!("the experiment has no factor")),
-    }
-}
-
-impl DeadlockArgs {
-    fn experiment(self) -> miette::Result<(Experiment, Common)> {
-        let mut losses = self.loss;
-        losses.sort_by(f64::total_cmp);
-        let mut experiment = shipped("deadlock")?;
-        factor(&mut experiment)?.values = losses.into_iter().map(Value::Number).collect();
-        Ok((experiment, self.common))
-    }
-}
-
-impl PartitionArgs {
-    fn experiment(self) -> miette::Result<(Experiment, Common)> {
-        let mut experiment = shipped("partition")?;
-        let factor = factor(&mut experiment)?;
-        factor.begins_s = Some(self.from.0);
-        factor.values = Vec::new();
-        for lasting in self.lasting {
-            factor.values.push(Value::Time(lasting.0));
-        }
-        Ok((experiment, self.common))
-    }
-}
-
-impl Common {
-    /// The options of an experiment, whose duration they may change.
-    fn options(self, experiment: &mut Experiment) -> Options {
+    fn request(&self) -> miette::Result<Request> {
+        let mut experiment = load(&self.file)?;
         if let Some(duration) = self.duration {
             experiment.duration_s = duration.0;
         }
-        let jobs = match self.jobs {
-            Some(jobs) => jobs as usize,
-            None => std::thread::available_parallelism().map_or(1, usize::from),
+        if let Some(seeds) = &self.seeds {
+            experiment.seeds = seeds.clone().collect();
+        }
+        if let Some(scenario) = &self.scenario {
+            experiment.scenario.clone_from(scenario);
+        }
+
+        let launch = Some(experiment.scenario.clone());
+        let launch = launch.filter(|path| is_launch_file(path).unwrap_or(false));
+        experiment.scenario = scenario_file(&experiment.scenario)?;
+        let robots = match launch {
+            _ if !self.processes => Robots::InProcess,
+            Some(path) => Robots::Launched(LaunchText::read(&path)?),
+            None => Robots::Programs,
         };
-
-        Options {
-            scenario: self.scenario.unwrap_or_else(|| experiment.scenario.clone()),
-            seeds: self.seeds.unwrap_or(experiment.seeds),
-            jobs,
-            set: self.set,
-        }
+        let name = self.file.file_stem().unwrap_or_default();
+        Ok(Request {
+            name: name.to_string_lossy().into_owned(),
+            experiment,
+            set: self.set.clone(),
+            robots,
+        })
     }
 }
 
-/// The estimates as a table with one line for each arm under each condition.
-fn render(experiment: &Experiment, cells: &[Cell]) -> tabled::Table {
-    let mut head = vec![experiment.conditions.head().to_owned(), "arm".to_owned()];
-    for measure in &experiment.measures {
-        if let Some(column) = &measure.column {
-            head.push(column.clone());
-            if is_event(measure) {
-                head.push("median time to it, s".to_owned());
-            }
-        }
+/// The experiment in a file, or that of this name that ships with the project.
+fn load(file: &Path) -> miette::Result<Experiment> {
+    let name = file.to_str().filter(|_| !file.exists());
+    if let Some(name) = name
+        && let Some(experiment) = Experiment::shipped(name)?
+    {
+        return Ok(experiment);
     }
-
-    let mut rows = Vec::new();
-    for cell in cells {
-        let mut row = vec![cell.condition.clone(), cell.arm.clone()];
-        for measure in &experiment.measures {
-            if measure.column.is_none() {
-                continue;
-            }
-            match cell.times.get(&measure.name) {
-                Some(times) => {
-                    row.push(format!("{} of {}", times.events, times.n));
-                    row.push(times.to_string());
-                }
-                None => row.push(cell.measures[&measure.name].to_string()),
-            }
-        }
-        rows.push(row);
-    }
-    table(head, rows)
+    Ok(Experiment::load(file)?)
 }
 
-/// The differences to the baseline as a table; shares are in percentage points.
-fn render_contrasts(experiment: &Experiment, contrasts: &[Contrast]) -> tabled::Table {
-    let mut head = vec![experiment.conditions.head().to_owned(), "arm".to_owned()];
-    for measure in &experiment.measures {
-        if measure.contrast {
-            let column = measure.column.as_ref().unwrap_or(&measure.name);
-            let unit = if is_event(measure) {
-                ", % of the runs"
-            } else {
-                ""
-            };
-            head.push(format!("{column}{unit}"));
-        }
+/// Plays those of these units that have not been played.
+fn play(
+    plan: &Plan,
+    folder: &Path,
+    workers: &Workers,
+    units: Range<usize>,
+) -> miette::Result<Store> {
+    let jobs = match workers.jobs {
+        Some(jobs) => jobs as usize,
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let options = Options {
+        units,
+        jobs,
+        retries_failed: workers.retry_failed,
+    };
+    let mut store = Store::open(folder)?;
+    let mut queue = Queue::of(plan, &store, &options);
+    for damage in store.damages_of(plan, queue.units()) {
+        terminal::note(damage);
     }
-    head.push("n".to_owned());
+    let count = options.units.len();
+    let open = queue.units().len();
+    terminal::note(format_args!(
+        "{count} units: {} are there, {open} to play",
+        count - open
+    ));
 
-    let mut rows = Vec::new();
-    for contrast in contrasts {
-        let mut row = vec![contrast.condition.clone(), contrast.arm.clone()];
-        let mut n = 0;
-        for measure in &experiment.measures {
-            let Some(difference) = contrast.differences.get(&measure.name) else {
-                continue;
-            };
-            n = difference.n;
-            let scale = if is_event(measure) { 100.0 } else { 1.0 };
-            let mean = difference.mean * scale;
-            let half_width = difference.half_width * scale;
-            row.push(format!("{mean:+.1} \u{b1} {half_width:.1}"));
-        }
-        row.push(n.to_string());
-        rows.push(row);
-    }
-    table(head, rows)
+    be_quiet_about_units();
+    let style =
+        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?;
+    let bar = ProgressBar::new(open as u64).with_style(style);
+    let done = || bar.inc(1);
+    engine::play(
+        plan, folder, &mut store, &mut queue, &options, &launcher, &done,
+    )?;
+    bar.finish_and_clear();
+    Ok(store)
 }
 
-/// Whether a measure is an event that a run has or has not.
-fn is_event(measure: &Measure) -> bool {
-    matches!(measure.kind, Kind::Stalled(_))
+/// Prints no message where a unit panics: it becomes the reason of its failure.
+fn be_quiet_about_units() {
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if std::thread::current().name() != Some(WORKER) {
+            print(panic);
+        }
+    }));
 }
 
-/// A table whose first column names a condition in its first line only.
-fn table(head: Vec<String>, rows: Vec<Vec<String>>) -> tabled::Table {
-    let mut table = Builder::default();
-    table.push_record(head);
-    let mut above = String::new();
-    for mut row in rows {
-        if row[0] == above {
-            row[0].clear();
-        } else {
-            above.clone_from(&row[0]);
-        }
-        table.push_record(row);
+/// Writes the results into their folder and prints them. The exit status is 1 if a unit is missing, failed, or gave different
+/// runs.
+fn conclude(results: &Results, folder: &Path, is_json: bool) -> miette::Result<ExitCode> {
+    results.write(folder)?;
+    Provenance::here().write(folder)?;
+    if is_json {
+        tables::print_json(results)?;
+    } else {
+        tables::print(results)?;
     }
 
-    let mut table = table.build();
-    table
-        .with(Style::rounded())
-        .modify(Columns::new(2..), Alignment::right());
-    table
+    name_defects(results);
+    name_failures(results, folder);
+    let place = folder.display();
+    terminal::note(format_args!(
+        "results in {place}; `cars experiment replay {place} N` records the unit N as a run"
+    ));
+    let is_whole = results.missing.is_empty() && results.failures.is_empty();
+    let is_good = is_whole && results.conflicts.is_empty();
+    Ok(ExitCode::from(u8::from(!is_good)))
 }
 
-#[cfg(test)]
-mod tests {
-    use clap::Parser;
+/// Names what of the results is missing or cannot be trusted.
+fn name_defects(results: &Results) {
+    for damage in &results.damages {
+        terminal::note(damage);
+    }
+    if !results.missing.is_empty() {
+        terminal::note(format_args!(
+            "{} of {} units are missing, the first is {}",
+            results.missing.len(),
+            results.plan.units(),
+            results.missing[0]
+        ));
+    }
+    for unit in results.conflicts.iter().take(NAMED) {
+        let unit = results.plan.unit(*unit).describe();
+        terminal::note(format_args!(
+            "{unit} was played several times and gave different runs: a robot is not reproducible"
+        ));
+    }
+}
 
-    use super::*;
-
-    #[derive(Parser)]
-    struct Line {
-        #[command(flatten)]
-        args: ExperimentArgs,
+/// Names the units that failed, with their reasons.
+fn name_failures(results: &Results, folder: &Path) {
+    let failures = &results.failures;
+    if failures.is_empty() {
+        return;
     }
 
-    #[test]
-    fn the_defaults_of_the_command_line_are_those_of_the_files() {
-        for name in ["affect", "deadlock", "partition"] {
-            let line = Line::try_parse_from(["experiment", name]).unwrap();
-            let (mut played, common) = line.args.experiment.load().unwrap();
-            let options = common.options(&mut played);
-
-            let file = Experiment::shipped(name).unwrap().unwrap();
-            let duration_s = file.duration_s;
-            assert_eq!(
-                played.conditions.list(duration_s).unwrap(),
-                file.conditions.list(duration_s).unwrap(),
-                "{name}"
-            );
-            assert_eq!(played.duration_s, duration_s, "{name}");
-            assert_eq!(options.seeds, file.seeds, "{name}");
-            assert_eq!(options.scenario, file.scenario, "{name}");
-        }
+    terminal::note(format_args!(
+        "{} of {} units failed; --retry-failed plays them once more",
+        failures.len(),
+        results.plan.units()
+    ));
+    for failure in failures.iter().take(NAMED) {
+        let unit = results.plan.unit(failure.unit).describe();
+        terminal::note(format_args!("  {unit}: {}", failure.reason));
+    }
+    if failures.len() > NAMED {
+        let place = folder.join("runs.csv");
+        terminal::note(format_args!("  and others, see {}", place.display()));
     }
 }

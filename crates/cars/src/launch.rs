@@ -1,16 +1,21 @@
 //! `cars launch`: starts the processes of a launch file and supervises them to their end.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use config::units::Time;
 use launch::{Launch, LaunchOptions, Outcome, Planned, ProcessLink, What, code_of};
 use miette::miette;
+use protocol::RobotName;
+use protocol::messages::Verdict;
 use simulator::RunFolder;
 use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
+use crate::replay_robot::open;
 use crate::table;
 
 /// `cars launch`.
@@ -66,6 +71,32 @@ pub(crate) struct LaunchArgs {
     /// How long a process may take to exit before it is killed.
     #[arg(long, value_name = "TIME", default_value = "3 s")]
     grace: Time,
+    /// A robot that is not started, but played from the record of a run, for example `Leguin=latest`: it repeats what it did
+    /// then, while the others live.
+    #[arg(long = "replay-robot", value_name = "ROBOT=RUN", conflicts_with_all = ["export", "resume"])]
+    replayed: Vec<ReplayArg>,
+}
+
+/// A robot and the recorded run from which it is played.
+#[derive(Debug, Clone)]
+struct ReplayArg {
+    robot: RobotName,
+    run: PathBuf,
+}
+
+impl FromStr for ReplayArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (robot, run) = text
+            .split_once('=')
+            .ok_or_else(|| format!("{text:?} is not of the form ROBOT=RUN"))?;
+        let robot = RobotName::new(robot).map_err(|error| error.to_string())?;
+        Ok(Self {
+            robot,
+            run: PathBuf::from(run),
+        })
+    }
 }
 
 /// Launchers that `--export` writes for.
@@ -102,6 +133,7 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
 
 impl LaunchArgs {
     fn load(self) -> miette::Result<Launch> {
+        let replayed = self.replayed()?;
         let options = LaunchOptions {
             run: self.execution.options(),
             is_paused: self.paused,
@@ -114,6 +146,7 @@ impl LaunchArgs {
             secure: self.secure,
             is_insecure: self.insecure,
             grace: self.grace,
+            replayed,
         };
 
         match (self.resume, self.roster, self.file) {
@@ -125,6 +158,20 @@ impl LaunchArgs {
             (None, None, Some(file)) => Launch::load(What::File(file), options),
             (None, None, None) => Err(miette!("no file is given")),
         }
+    }
+}
+
+impl LaunchArgs {
+    /// The robots that are played from records, with the folders of these; they are looked into before anything starts.
+    fn replayed(&self) -> miette::Result<BTreeMap<RobotName, PathBuf>> {
+        let mut replayed = BTreeMap::new();
+        for ReplayArg { robot, run } in &self.replayed {
+            let folder = lab::folder::find(&self.execution.out, run)?;
+            let folder = folder.resolved()?;
+            open(folder.path(), robot)?;
+            replayed.insert(robot.clone(), folder.path().to_owned());
+        }
+        Ok(replayed)
     }
 }
 
@@ -145,9 +192,12 @@ fn print_plan(planned: Vec<Planned>) -> Result<(), OutputError> {
 
 /// Prints the summary of the run, or its failure; returns the exit status.
 fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> miette::Result<ExitCode> {
-    if !is_quiet && let Some(summary) = lab::folder::read_summary(folder)? {
+    let summary = lab::folder::read_summary(folder)?;
+    if let Some(summary) = &summary
+        && !is_quiet
+    {
         // A reader that has seen enough does not change how the run ended.
-        OutputError::unless_closed(table::print(&summary, folder.path()))?;
+        OutputError::unless_closed(table::print(summary, folder.path()))?;
     }
 
     if let Some(failure) = &outcome.failure {
@@ -157,6 +207,9 @@ fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> miette::Re
 
     match outcome.asked {
         Some(signal) => Ok(ExitCode::from(code_of(signal))),
-        None => Ok(ExitCode::SUCCESS),
+        None => {
+            let verdict = summary.map_or(Verdict::Pass, |summary| summary.verdict());
+            Ok(ExitCode::from(verdict.exit_status()))
+        }
     }
 }

@@ -4,17 +4,28 @@ mod bench;
 mod check;
 mod conform;
 mod control;
+mod diagram;
 mod emotionml;
 mod exec;
 mod execution;
+mod expect;
 mod experiment;
+mod export;
+mod fork;
+mod hunt;
 mod launch;
 mod net;
 mod new;
+mod output;
+mod replay;
+mod replay_robot;
+mod report;
 mod router;
 mod run;
 mod secure;
+mod submit;
 mod table;
+mod trace;
 mod verify;
 
 use std::process::ExitCode;
@@ -41,15 +52,25 @@ enum Subcommands {
     Launch(launch::LaunchArgs),
     /// Run a scenario, or that of a launch file, in this process.
     Run(run::RunArgs),
-    /// Play an experiment that ships with the project, over many seeds.
+    /// Play an experiment over many seeds, one that ships with the project or your own: run, unit, merge, status, replay.
     Experiment(experiment::ExperimentArgs),
+    /// Draw faults until an expectation of a scenario fails, and shrink them to a minimal scenario file.
+    ///
+    /// The exit status is 0 if nothing was found, and 1 if an expectation failed.
+    Hunt(hunt::HuntArgs),
     /// Check scenario and launch files without running anything.
     Check(check::CheckArgs),
     /// Execute a recorded run again in this process, and compare it with its record tick by tick.
     Verify(verify::VerifyArgs),
     /// Compare two recorded runs: the first difference, and how they go on.
     Diff(verify::DiffArgs),
-    /// Control a run in progress: init, start, pause, step, stop, speed, status.
+    /// Judge a recorded run by its expectations, or by those of another file; exit status 0 pass, 1 fail, 2 undecided.
+    Expect(expect::ExpectArgs),
+    /// Execute a recorded run again up to a tick, and let it go on with changes: `cars fork latest@240 --set …`.
+    Fork(fork::ForkArgs),
+    /// Show a recorded run to consoles and other observers as if it were in progress: start, pause, step, seek, speed.
+    Replay(replay::ReplayArgs),
+    /// Control a run in progress, or a replay: init, start, pause, step, stop, speed, status.
     Ctl(control::CtlArgs),
     /// Query a robot of a run in progress, for example `cars query Leguin emotion_state`.
     Query(control::QueryArgs),
@@ -57,6 +78,14 @@ enum Subcommands {
     Command(control::CommandArgs),
     /// Show the log of a run; `-f` follows one in progress.
     Log(control::LogArgs),
+    /// Export a run for other programs: tables as CSV or Parquet, a log for ShiViz.
+    Export(export::ExportArgs),
+    /// Export where the wall-clock time of a run went, as a trace that Perfetto and Chromium read.
+    Trace(trace::TraceArgs),
+    /// Draw the space-time diagram of a run: who commanded whom, what was lost, what the robots felt.
+    Diagram(diagram::DiagramArgs),
+    /// Write a report about runs as one HTML file: emotions and behaviors over time, transitions, occupancy, the network.
+    Report(report::ReportArgs),
     /// Export the emotions of the robots of a run as EmotionML 1.0.
     Emotionml(emotionml::EmotionmlArgs),
     /// Check a robot, written in any language, against the rules of the protocol.
@@ -77,6 +106,8 @@ enum Subcommands {
     },
     #[command(hide = true)]
     Child(exec::ChildArgs),
+    #[command(hide = true)]
+    ReplayRobot(replay_robot::ReplayRobotArgs),
     #[command(hide = true)]
     BenchRobot(robot::RobotArgs),
     #[command(hide = true)]
@@ -105,13 +136,21 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::New(args) => new::new(&args),
         Subcommands::Run(args) => run::run(args),
         Subcommands::Experiment(args) => experiment::experiment(args),
+        Subcommands::Hunt(args) => Ok(hunt::hunt(&args)),
         Subcommands::Check(args) => check::check(&args),
         Subcommands::Verify(args) => verify::verify(&args),
         Subcommands::Diff(args) => verify::diff(&args),
+        Subcommands::Expect(args) => expect::expect(&args),
+        Subcommands::Fork(args) => fork::fork(args),
+        Subcommands::Replay(args) => replay::replay(&args),
         Subcommands::Ctl(args) => control::ctl(&args),
         Subcommands::Query(args) => control::query(&args),
         Subcommands::Command(args) => control::command(&args),
         Subcommands::Log(args) => control::log(&args),
+        Subcommands::Export(args) => export::export(&args),
+        Subcommands::Trace(args) => trace::trace(&args),
+        Subcommands::Diagram(args) => diagram::diagram(&args),
+        Subcommands::Report(args) => report::report(&args),
         Subcommands::Emotionml(args) => emotionml::emotionml(args),
         Subcommands::Conform(args) => conform::conform(&args),
         Subcommands::Net(command) => net::net(command),
@@ -121,6 +160,7 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Completions { shell } => print_completions(shell),
 
         Subcommands::Child(args) => Ok(exec::child(&args)),
+        Subcommands::ReplayRobot(args) => replay_robot::take_part(&args),
         Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
         Subcommands::BenchEcho(args) => bench::tcp::echo(&args),
         Subcommands::BenchStar(args) => bench::star::router(&args),

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use miette::{IntoDiagnostic, miette};
+use lab::run::check_faults;
+use miette::IntoDiagnostic;
 use simulator::Scenario;
 
 use crate::execution::ExecutionArgs;
@@ -29,13 +30,7 @@ pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
     let options = args.execution.options();
     let file = launch::scenario_file(&args.file)?;
     let scenario = Scenario::load(&file, &options.changes())?;
-    if !scenario.faults.is_empty() {
-        let help = "play it with `cars launch`, or leave them out with --set 'fault=[]'";
-        return Err(miette!(
-            help = help,
-            "the scenario has faults of processes, and `cars run` starts no processes"
-        ));
-    }
+    check_faults(&scenario, 0)?;
 
     let run = options.run_name(&args.file).into_diagnostic()?;
     let (folder, _lock) = options.folder(&run, &scenario)?;
@@ -44,5 +39,5 @@ pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
     if !args.quiet {
         table::print(&summary, folder.path())?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(ExitCode::from(summary.verdict().exit_status()))
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lab::table::{HEAD, heading, held_up, rows};
+use lab::table::{HEAD, heading, held_up, rows, verdicts};
 use simulator::Summary;
 use tabled::builder::Builder;
 use tabled::settings::Style;
@@ -23,6 +23,9 @@ pub(crate) fn print(summary: &Summary, folder: &Path) -> Result<(), OutputError>
     let mut table = table.build();
     let table = table.with(Style::rounded());
     let mut text = format!("\n{heading}\n{table}");
+    for line in verdicts(&summary.expectations) {
+        text += &format!("\n{line}");
+    }
     for line in held_up(summary) {
         text += &format!("\n{line}");
     }

@@ -1,5 +1,6 @@
 //! `cars verify` and `cars diff`: recorded runs, executed again and compared.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -7,7 +8,7 @@ use clap::Args;
 use config::units::Time;
 use config::{FileError, Speed};
 use lab::diff::{Comparison, compare};
-use lab::folder::{find, recorded_epochs};
+use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::verify::{Verification, verify as verify_epoch};
 use launch::{Launch, LaunchOptions, RunOptions};
 use miette::{IntoDiagnostic, miette};
@@ -143,6 +144,7 @@ fn quiet_options(out: &Path) -> LaunchOptions {
         secure: None,
         is_insecure: false,
         grace: Time(GRACE_S),
+        replayed: BTreeMap::new(),
     }
 }
 
@@ -151,13 +153,9 @@ pub(crate) fn diff(args: &DiffArgs) -> miette::Result<ExitCode> {
     let mut last = Vec::new();
     for run in [&args.one, &args.other] {
         let folder = find(&args.out, run)?;
-        last.extend(recorded_epochs(&folder)?.pop());
+        last.push(recorded_epoch(&folder, None)?);
     }
-    let [one, other] = last.as_slice() else {
-        unreachable!("every record has an epoch");
-    };
-
-    let comparison = compare(one, other)?;
+    let comparison = compare(&last[0], &last[1])?;
     let text = if args.json {
         serde_json::to_string_pretty(&comparison).unwrap_or_default()
     } else {

@@ -85,7 +85,9 @@ impl Changes {
     pub fn apply(&self, source: &Source) -> Result<Source, FileError> {
         let mut root: toml::Table = source.parse()?;
         for change in &self.set {
-            root = change.apply(root)?;
+            root = change
+                .apply(root)
+                .map_err(|reason| FileError::new(format!("--set {reason}")))?;
         }
 
         if let Some(seed) = self.seed {
@@ -120,10 +122,14 @@ impl Override {
         parts.all(|(own, others)| own == others || is_index(own) != is_index(others))
     }
 
-    fn apply(&self, table: toml::Table) -> Result<toml::Table, FileError> {
+    /// The content of a file with the change.
+    ///
+    /// # Errors
+    /// The path, and why there is no place for it.
+    pub fn apply(&self, table: toml::Table) -> Result<toml::Table, String> {
         let mut root = toml::Value::Table(table);
         set(&mut root, &self.path, &self.value)
-            .map_err(|reason| FileError::new(format!("--set {}: {reason}", self.path.join("."))))?;
+            .map_err(|reason| format!("{}: {reason}", self.path.join(".")))?;
         match root {
             toml::Value::Table(table) => Ok(table),
             _ => unreachable!("a path has at least one part, so the root stays a table"),

@@ -84,13 +84,15 @@ mod tests {
             let mut child = shell.args(["-c", script]).process_group(0).spawn().unwrap();
             let group = Group(Pid::from_raw(i32::try_from(child.id()).unwrap()));
 
-            // A fresh process starts up first.
-            let mut looks = 0;
-            while group.is_idle() != is_idle && looks < 1000 {
-                looks += 1;
+            // A fresh process starts up first, and may pause while it does.
+            let mut found = group.is_idle();
+            for _ in 0..1000 {
+                if found == is_idle {
+                    break;
+                }
                 std::thread::sleep(Duration::from_millis(10));
+                found = group.is_idle();
             }
-            let found = group.is_idle();
 
             nix::sys::signal::killpg(group.0, nix::sys::signal::Signal::SIGKILL).unwrap();
             child.wait().unwrap();

@@ -5,6 +5,7 @@ import { Bands } from "./bands.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { Controls, renderAwaiting } from "./controls.js";
+import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
 import { LogView } from "./log.js";
 import { Notices } from "./notices.js";
@@ -16,6 +17,7 @@ import { SetupView } from "./setup.js";
 import { Store } from "./store.js";
 import { tabs } from "./tabs.js";
 import { Units } from "./units.js";
+import { renderVerdicts } from "./verdicts.js";
 import { Voice } from "./voice.js";
 
 /** @typedef {import("./types/messages.js").Control} Control */
@@ -73,7 +75,7 @@ async function sendCommand(to, command) {
 
 const isRecording = () => store.mode === "recording";
 const controls = new Controls(box("bar"), store, {
-  control: (control) => act(control, control.do === "init" ? "The next epoch is ready at tick 0." : ""),
+  control: (control) => act(control, control.do === "init" && !store.replayOf ? "The next epoch is ready at tick 0." : ""),
   speed: (factor) => {
     if (!isRecording()) return act({ do: "speed", factor });
     player.factor = factor;
@@ -106,6 +108,7 @@ const panels = new Panels(box("panels"), store, units, {
 const log = new LogView(box("panel-log"), store);
 const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, store);
 const bands = new Bands(box("bands"), store);
+const diagram = new DiagramView(box("panel-diagram"), player);
 const voice = new Voice(store);
 
 /** Marks a robot on the plan and among the panels, or removes its mark. @param {string | null} robot */
@@ -128,6 +131,7 @@ const tabList = tabs(box("tabs"), (name) => {
   setup.open(name === "setup");
   if (name === "log") log.shown();
   if (name === "charts") [charts, bands].forEach((view) => view.render());
+  if (name === "diagram") diagram.render();
 });
 
 // Views are rendered at most once per animation frame, and those with an expensive layout less often.
@@ -140,15 +144,19 @@ const views = new Map([
   ["panels", { every_ms: SELDOM_MS / 2, last_ms: 0, draw: () => panels.render() }],
   ["log", { every_ms: OFTEN_MS, last_ms: 0, draw: drawLog }],
   ["charts", { every_ms: SELDOM_MS, last_ms: 0, draw: drawCharts }],
+  ["diagram", { every_ms: OFTEN_MS, last_ms: 0, draw: () => openTab === "diagram" && diagram.render() }],
 ]);
 
 function drawBar() {
   controls.render();
   renderAwaiting(box("awaiting"), store);
+  renderVerdicts(box("verdicts"), store);
 
   if (isRecording()) renderScrub(box("scrub-bar"), player);
-  box("tab-setup").hidden = isRecording();
-  if (isRecording() && openTab === "setup") tabList.select("log");
+  const isPast = isRecording() || store.replayOf !== null;
+  box("tab-setup").hidden = isPast;
+  box("tab-diagram").hidden = !isRecording();
+  if (isPast && openTab === "setup") tabList.select("log");
   box("voice-label").hidden = isRecording();
 
   const isEmpty = store.frame === null && !isRecording() && !(store.isLive && store.status);
@@ -192,7 +200,7 @@ function markStale(...names) {
 }
 
 store.on("frame", () => setup.phase());
-store.on("frame", () => markStale("bar", "panels", "log", "charts"));
+store.on("frame", () => markStale("bar", "panels", "log", "charts", "diagram"));
 store.on("panel", () => markStale("panels"));
 store.on("log", () => markStale("log"));
 store.on("connection", () => markStale("bar", "panels", "log"));

@@ -2,7 +2,7 @@
 // Emotion and behavior of each robot over simulated time, a color per state.
 
 import { GUTTER_PX, MARGIN_PX } from "./charts.js";
-import { colorOf } from "./palette.js";
+import { stateClass } from "./palette.js";
 import { seconds } from "./units.js";
 import { html, nothing, render, svg } from "./vendor/lit-html.js";
 
@@ -46,7 +46,7 @@ export class Bands {
 
     render(
       states.size
-        ? html`<svg width=${width} height=${height} role="img" aria-label=${this.words()}>${rows}${this.now(x, height)}</svg>`
+        ? html`<svg class="cars-diagram" width=${width} height=${height} role="img" aria-label=${this.words()}>${rows}${this.now(x, height)}</svg>`
         : nothing,
       this.place,
     );
@@ -82,10 +82,11 @@ export class Bands {
 function block({ state, from_s, to_s }, x, y, kind, robot) {
   const left = x(from_s);
   const width = Math.max(1, x(to_s) - left - 0.5);
+  const color = stateClass(kind, state);
   const isRoomy = width > LETTER_PX * state.length + 8;
 
   return svg`
     <g class="band" data-state=${state}><title>${robot}, ${kind} ${state}, ${seconds(from_s)} to ${seconds(to_s)}</title>
-      <rect x=${left} y=${y} width=${width} height=${BAND_PX} rx="2" fill=${colorOf(kind, state)}></rect>
-      ${isRoomy ? svg`<text x=${left + 5} y=${y + 12}>${state}</text>` : nothing}</g>`;
+      <rect x=${left} y=${y} width=${width} height=${BAND_PX} rx="2" class=${color}></rect>
+      ${isRoomy ? svg`<text class="on-${color}" x=${left + 5} y=${y + 12}>${state}</text>` : nothing}</g>`;
 }

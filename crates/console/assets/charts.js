@@ -1,7 +1,7 @@
 // @ts-check
 // A state variable of the robots over simulated time.
 
-import { colorOf } from "./palette.js";
+import { robotColor } from "./palette.js";
 import { onThemeChange, readTheme } from "./theme.js";
 import { short } from "./units.js";
 import { html, render } from "./vendor/lit-html.js";
@@ -99,7 +99,7 @@ export class Charts {
     const index = this.pointed ?? shown;
 
     return [...(history.variables.get(this.variable) ?? [])].map(
-      ([robot, values]) => html`<li>${dot(colorOf("robot", robot))}${robot} <b>${short(values[index] ?? NaN, 3)}</b></li>`,
+      ([robot, values]) => html`<li>${dot(robotColor(robot))}${robot} <b>${short(values[index] ?? NaN, 3)}</b></li>`,
     );
   }
 
@@ -181,7 +181,7 @@ function options(variable, robots, width, height) {
       {},
       ...robots.map((robot) => ({
         label: `${robot} ${variable}`,
-        stroke: colorOf("robot", robot),
+        stroke: robotColor(robot),
         width: 1.75,
         points: { show: false },
       })),

@@ -163,6 +163,9 @@ export class Controls {
     } else if (!store.isConnected) {
       word = "console not reachable";
       tone = "bad";
+    } else if (store.isSimulatorPresent && store.replayOf) {
+      word = `replay of ${store.replayOf}`;
+      tone = "neutral";
     } else if (store.isSimulatorPresent) {
       word = "connected";
       tone = "good";

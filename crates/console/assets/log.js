@@ -12,7 +12,7 @@ const MOST_ROWS = 2000;
 const MOST_ROWS_READING = 4000;
 const NEAR_END_PX = 12;
 /** Every kind; the type check keeps the list complete. @type {Record<import("./types/messages.js").LogKind, true>} */
-const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, late: true };
+const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, verdict: true, late: true };
 const KINDS = Object.keys(ALL_KINDS);
 
 export class LogView {

@@ -1,31 +1,51 @@
 // @ts-check
-// Colors for names that the robots choose: the same name has the same color while the page is open.
+// Colors for names that the robots choose. A robot has the same color while the page is open. An emotion or a behavior has that of
+// the space-time diagrams, whose style sheet the server has from the crate `diagram`: `palette.rs` there has the same names.
 
-/**
- * Told apart by most eyes, in light and in dark (after the schemes of Tol, 2021, made calmer). Robots tend to begin with a
- * pleasant emotion, so that green comes first there and red late.
- */
-const COLORS = {
-  robot: ["#4477aa", "#d8902a", "#3a9d6e", "#8a6bbf", "#c2587f", "#3d9fb5", "#8a7a3a", "#808a96"],
-  emotion: ["#3a9d6e", "#4f86c0", "#d8922e", "#c9524a", "#8a6bbf", "#3d9fb5", "#a8763e", "#c2587f", "#7f8b3c", "#808a96"],
-  behavior: ["#5b77a8", "#8d74b8", "#3f98a8", "#a8805a", "#b36a92", "#76834a", "#6d7f8e", "#9a6a6a", "#5a8f7b", "#857a9c"],
+/** Told apart by most eyes, in light and in dark (after the schemes of Tol, 2021, made calmer). */
+const ROBOTS = ["#4477aa", "#d8902a", "#3a9d6e", "#8a6bbf", "#c2587f", "#3d9fb5", "#8a7a3a", "#808a96"];
+
+/** Names with a color of their own, and the number of all colors. The other colors are for other names. */
+const STATES = {
+  emotion: { names: ["HAPPY", "CONFIDENT", "CONCERNED", "FRUSTRATED", "ANGRY", "DISCOURAGED", "HOPEFUL"], colors: 15, prefix: "e" },
+  behavior: {
+    names: ["SERVE", "INTERCEPT", "EXCHANGE", "GO_BACK", "WAIT", "REFILL", "AWAIT_GO_HOME", "GO_HOME"],
+    colors: 14,
+    prefix: "b",
+  },
 };
 
 /** @type {Map<string, string>} */
 const given = new Map();
-const count = { robot: 0, emotion: 0, behavior: 0 };
 
-/**
- * @param {"robot" | "emotion" | "behavior"} kind
- * @param {string} name
- */
-export function colorOf(kind, name) {
-  const key = `${kind} ${name}`;
-  const known = given.get(key);
+/** @param {string} robot */
+export function robotColor(robot) {
+  const known = given.get(robot);
   if (known) return known;
 
-  const color = COLORS[kind][count[kind]++ % COLORS[kind].length];
-  given.set(key, color);
+  const color = ROBOTS[given.size % ROBOTS.length];
+  given.set(robot, color);
 
   return color;
+}
+
+/**
+ * The class of an area in the color of an emotion or a behavior; text on it has this class after `on-`.
+ * @param {"emotion" | "behavior"} kind
+ * @param {string} name
+ */
+export function stateClass(kind, name) {
+  const { names, colors, prefix } = STATES[kind];
+  const known = names.indexOf(name);
+  const index = known >= 0 ? known : names.length + (fnv1a(name) % (colors - names.length));
+
+  return `${prefix}${index}`;
+}
+
+/** FNV-1a, 32 bit, of the UTF-8 of a text. @param {string} text */
+function fnv1a(text) {
+  let hash = 0x811c9dc5;
+  for (const byte of new TextEncoder().encode(text)) hash = Math.imul(hash ^ byte, 0x01000193) >>> 0;
+
+  return hash;
 }

@@ -43,8 +43,9 @@ export class Panels {
   panel(robot, awaiting) {
     const { word, since, detail, tone } = presence(robot, awaiting);
     const { name } = robot;
-    const all = (this.store.panels.get(name) ?? generic(robot)).widgets;
-    const widgets = Array.isArray(all) ? all.slice(0, MOST_WIDGETS) : [];
+    const own = this.store.panels.get(name)?.widgets;
+    const all = Array.isArray(own) && own.length ? own : generic(robot).widgets;
+    const widgets = all.slice(0, MOST_WIDGETS);
     const [buttons, others] = split(widgets);
     const send = (/** @type {string} */ command) => this.actions.send(name, command);
 
@@ -60,7 +61,7 @@ export class Panels {
           <span>${this.units.speed(robot.speed_mps)}</span>
           ${robot.blocked ? html`<span class="blocked">blocked</span>` : nothing}</p>
         <div class="widgets">${others.map((widget) => drawWidget(widget, send))}</div>
-        ${buttons.length && this.store.mode === "live"
+        ${buttons.length && this.store.mode === "live" && !this.store.replayOf
           ? html`<div class="buttons" role="group" aria-label="Commands">${buttons.map((button) => drawWidget(button, send))}</div>`
           : nothing}
       </section>`;
@@ -77,7 +78,7 @@ function split(widgets) {
 }
 
 /**
- * The panel of a robot without one: its published state.
+ * The panel of a robot without one, or without widgets: its published state.
  * @param {RobotFrame} robot
  * @returns {Panel}
  */

@@ -118,10 +118,13 @@ export class Plan {
     this.aim();
     this.gestures.touch();
     const { context, theme } = this.pen;
+    // The same frame has the same pixels, whatever was painted before.
+    context.save();
     context.fillStyle = theme.outside;
     context.fillRect(0, 0, this.camera.width_px, this.camera.height_px);
     if (this.editor.draft) this.paintDraft(this.editor.draft);
     else if (this.motion.to) this.paintRun(this.motion.to, now_ms);
+    context.restore();
   }
 
   /**

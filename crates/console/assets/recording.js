@@ -8,6 +8,7 @@
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 /** @typedef {import("./types/messages.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
+/** @typedef {import("./types/messages.js").Standing} Standing */
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /**
  * What does not change; `ticks` is the last tick.
@@ -15,13 +16,14 @@
  *   obstacles: [number, number][], ticks: number}} RecordingHeader
  */
 /**
- * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], cuts: Cut[], awaiting: Awaited[]}} RecordedTick
+ * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], cuts: Cut[], awaiting: Awaited[],
+ *   expectations: Standing[]}} RecordedTick
  */
 /** A panel and the tick in which it arrived. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
 /** @typedef {{ticks: RecordedTick[], panels: RecordedPanel[], flights: Flight[], log: LogRecord[]}} Chunk */
 
-/** Ticks in a chunk. */
-const CHUNK = 128;
+/** Ticks in a chunk: few, because a seek waits for a whole one. */
+const CHUNK = 32;
 /** Most numbers of guests' places that are kept; the least recently used chunks are dropped first. */
 const MOST_NUMBERS = 12_000_000;
 /** Least time between two frames. */
@@ -171,6 +173,7 @@ export class Player {
       guests,
       flights,
       cuts: record.cuts,
+      expectations: record.expectations,
       robots: record.robots,
     };
   }

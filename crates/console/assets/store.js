@@ -180,6 +180,11 @@ export class Store {
     return isNextEpoch || (isLaterTick && frame.phase !== "running");
   }
 
+  /** Name of the recorded run of which this is a replay. */
+  get replayOf() {
+    return this.frame?.replay_of ?? this.status?.replay_of ?? null;
+  }
+
   get phase() {
     return this.frame?.phase ?? this.status?.phase ?? null;
   }

@@ -351,6 +351,7 @@ mod tests {
             duration_s: 100.0,
             tick_s: 1.0,
             seed: 1,
+            replay_of: None,
             speed: None,
             phase: Phase::Running,
             awaiting: Vec::new(),
@@ -361,6 +362,7 @@ mod tests {
             obstacles: Vec::new(),
             flights: vec![flight],
             cuts: Vec::new(),
+            expectations: Vec::new(),
         }
     }
 

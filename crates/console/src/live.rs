@@ -222,6 +222,9 @@ impl Live {
         // On one session the command arrives before this query: the answer means that the simulator has it.
         let answer = self.query(&Control::Status, REPLY_TIMEOUT)?;
         match &answer {
+            ControlAnswer::Done(status) if status.replay_of.is_some() => {
+                Err("this is a replay: its robots execute no commands".to_owned())
+            }
             ControlAnswer::Done(status) if status.robots.iter().all(|robot| robot.name != *to) => {
                 Err(format!("no robot of this run is called {to}"))
             }

@@ -5,6 +5,7 @@
 
 mod app;
 mod browser;
+mod diagrams;
 mod feed;
 mod guard;
 mod live;

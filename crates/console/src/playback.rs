@@ -3,17 +3,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use protocol::messages::{
-    Awaited, Cut, Fate, Flight, LogRecord, Panel, Presence, Report, RobotFrame,
-};
-use protocol::{Event, RobotName, Tick};
-use recording::{Header, PlacedRobot, RecordedTick, RecordingError};
+use protocol::messages::{Flight, LogRecord, Point, Presence};
+use protocol::{RobotName, Tick};
+use recording::{Header, Json, PlacedRobot, RawTick, RecordingError};
 use serde::Serialize;
+
+use crate::diagrams::{DiagramError, Diagrams, Window};
 
 /// Most ticks in one answer.
 pub(crate) const MAX_TICKS: u64 = 512;
-/// How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states.
-const PANEL_S: f64 = 1.0;
 /// Most bytes in one answer, as they are recorded; an answer has at least one tick.
 const MAX_BYTES: u64 = 32 << 20;
 
@@ -35,6 +33,7 @@ pub(crate) enum OpenError {
 #[derive(Debug)]
 pub(crate) struct Recording {
     file: recording::Recording,
+    diagrams: Diagrams,
 }
 
 /// The header of a recording, and its length.
@@ -46,33 +45,29 @@ pub(crate) struct Summary<'a> {
     ticks: Tick,
 }
 
-/// What happened in a range of ticks.
-#[derive(Debug, Default, Serialize)]
-pub(crate) struct Range {
-    ticks: Vec<ShownTick>,
-    /// Panels that arrived in these ticks, or within [`PANEL_S`] before them.
-    panels: Vec<ShownPanel>,
+/// What happened in a range of ticks, as a JSON object. Reports and panels are in it as they were recorded: to decode them and
+/// encode them again would take most of the time of a seek.
+#[derive(Debug, Default)]
+struct Range {
+    /// Elements of a list: each tick as a frame of a run in progress shows it.
+    ticks: List,
+    /// Panels that arrived in these ticks, or shortly before.
+    panels: List,
     flights: Vec<Flight>,
     log: Vec<LogRecord>,
 }
 
-/// A tick as a frame of a run in progress shows it.
-#[derive(Debug, Serialize)]
-struct ShownTick {
-    tick: Tick,
-    robots: Vec<RobotFrame>,
-    guests_mm: Vec<i64>,
-    cuts: Vec<Cut>,
-    /// Robots for which the clock was held.
-    awaiting: Vec<Awaited>,
-}
+/// The elements of a JSON list.
+#[derive(Debug, Default)]
+struct List(Vec<u8>);
 
-/// A panel with the tick in which it arrived.
-#[derive(Debug, Serialize)]
-struct ShownPanel {
-    tick: Tick,
-    robot: RobotName,
-    panel: Panel,
+/// A robot as a frame of a run in progress has it, without what its report states.
+#[derive(Serialize)]
+struct RobotHead<'a> {
+    name: &'a RobotName,
+    location: Point,
+    blocked: bool,
+    presence: Presence,
 }
 
 impl Recording {
@@ -92,7 +87,8 @@ impl Recording {
         if file.is_empty() {
             return Err(OpenError::Empty(path.display().to_string()));
         }
-        Ok(Self { file })
+        let diagrams = Diagrams::of(&file);
+        Ok(Self { file, diagrams })
     }
 
     /// Name of the run.
@@ -108,57 +104,57 @@ impl Recording {
         }
     }
 
-    /// What happened in `count` ticks from tick `from` on; fewer if the recording ends before, or if they are too much
-    /// for one answer.
+    /// What happened in `count` ticks from tick `from` on, as JSON; fewer if the recording ends before, or if they are too
+    /// much for one answer.
     ///
     /// # Errors
     /// [`RecordingError`] if the file is damaged.
-    pub(crate) fn range(&self, from: Tick, count: u64) -> Result<Range, RecordingError> {
+    pub(crate) fn range(&self, from: Tick, count: u64) -> Result<Vec<u8>, RecordingError> {
         let to = from.saturating_add(count.min(MAX_TICKS));
         let to = self.file.fitting(from, to, MAX_BYTES);
 
+        let header = self.file.header();
         let mut range = Range::default();
         let mut last_reports = BTreeMap::new();
-        for recorded in self.file.read(self.first_of_panels(from), to)? {
+        for recorded in self.file.read_raw(header.first_of_panels(from), to)? {
             let tick = recorded.tick();
             for (robot, panel) in &recorded.panels {
-                range.panels.push(ShownPanel {
-                    tick,
-                    robot: robot.clone(),
-                    panel: panel.clone(),
-                });
+                range.add_panel(tick, robot, panel);
             }
             if tick < from {
                 continue;
             }
 
             for event in &recorded.events {
-                range.flights.extend(flight(tick, event));
+                range.flights.extend(event.flight(tick));
             }
-            range.log.extend(recorded.log(self.file.header()));
-            range.ticks.push(self.shown(recorded, &mut last_reports)?);
+            range.log.extend(recorded.log(header));
+            self.add_tick(recorded, &mut last_reports, &mut range)?;
         }
-        Ok(range)
+        Ok(range.into_json())
     }
 
-    /// The first tick of which panels are shown in a tick.
-    fn first_of_panels(&self, tick: Tick) -> Tick {
-        let lifetime = (PANEL_S / self.file.header().tick_s).round().max(1.0) as Tick;
-        tick.saturating_sub(lifetime - 1)
+    /// The space-time diagram of a window, as SVG without its style sheet.
+    ///
+    /// # Errors
+    /// [`DiagramError`] if the file is damaged or the window has too much.
+    pub(crate) fn diagram(&self, window: Window) -> Result<String, DiagramError> {
+        self.diagrams.draw(&self.file, window)
     }
 
-    /// A tick as the page shows it. `last_reports` has the last report of each robot in the ticks before, as far as they
+    /// Adds a tick as the page shows it. `last_reports` has the last report of each robot in the ticks before, as far as they
     /// have been read.
-    fn shown(
+    fn add_tick(
         &self,
-        mut recorded: RecordedTick,
-        last_reports: &mut BTreeMap<RobotName, Report>,
-    ) -> Result<ShownTick, RecordingError> {
+        mut recorded: RawTick,
+        last_reports: &mut BTreeMap<RobotName, Json>,
+        range: &mut Range,
+    ) -> Result<(), RecordingError> {
         let tick = recorded.tick();
         last_reports.append(&mut recorded.reports);
 
-        let mut robots = Vec::new();
-        for robot in recorded.frame.robots {
+        let mut robots = List::default();
+        for robot in &recorded.frame.robots {
             let last_report = robot.missed.and_then(|missed| missed.last_report);
             if let Some(tick) = last_report
                 && !last_reports.contains_key(&robot.name)
@@ -168,62 +164,101 @@ impl Recording {
             }
             // A robot is shown from its first report on.
             if let Some(report) = last_reports.get(&robot.name) {
-                robots.push(robot_frame(robot, report));
+                robots.add_robot(robot, report);
             }
         }
 
-        Ok(ShownTick {
-            tick,
-            robots,
-            guests_mm: recorded.frame.guests_mm,
-            cuts: recorded.frame.cuts,
-            awaiting: recorded.wall.awaited,
-        })
+        range.ticks.add_object(&[
+            ("tick", &to_json(&tick)),
+            ("robots", &robots.into_json()),
+            ("guests_mm", &to_json(&recorded.frame.guests_mm)),
+            ("cuts", &to_json(&recorded.frame.cuts)),
+            (
+                "expectations",
+                &to_json(&recorded.frame.standings(&recorded.events)),
+            ),
+            // Robots for which the clock was held.
+            ("awaiting", &to_json(&recorded.wall.awaited)),
+        ]);
+        Ok(())
     }
 }
 
-/// A robot as a frame of a run in progress has it.
-fn robot_frame(robot: PlacedRobot, report: &Report) -> RobotFrame {
-    RobotFrame {
-        name: robot.name,
-        location: robot.location,
-        speed_mps: report.speed_mps,
-        direction_rad: report.direction_rad,
-        blocked: robot.blocked,
-        emotion_state: report.emotion_state.clone(),
-        behavior_state: report.behavior_state.clone(),
-        state_variables: report.state_variables.clone(),
-        generation: report.generation,
-        presence: match robot.missed {
-            Some(_) => Presence::Gone,
-            None => Presence::Here,
-        },
+impl Range {
+    /// Adds a panel with the tick in which it arrived.
+    fn add_panel(&mut self, tick: Tick, robot: &RobotName, panel: &Json) {
+        self.panels.add_object(&[
+            ("tick", &to_json(&tick)),
+            ("robot", &to_json(robot)),
+            ("panel", panel.as_bytes()),
+        ]);
+    }
+
+    fn into_json(self) -> Vec<u8> {
+        let mut range = List::default();
+        range.add_object(&[
+            ("ticks", &self.ticks.into_json()),
+            ("panels", &self.panels.into_json()),
+            ("flights", &to_json(&self.flights)),
+            ("log", &to_json(&self.log)),
+        ]);
+        range.0
     }
 }
 
-/// The fate of a command that an event states; `None` for other events.
-fn flight(tick: Tick, event: &Event) -> Option<Flight> {
-    let (from, to, seq, fate) = match event {
-        Event::CommandSent { from, to, seq, .. } => (from, to, seq, Fate::Sent),
-        Event::CommandDelivered { from, to, seq } => (from, to, seq, Fate::Delivered),
-        Event::CommandDropped { from, to, seq, .. } => (from, to, seq, Fate::Dropped),
-        _ => return None,
-    };
+impl List {
+    /// Adds an object with these fields, whose values are JSON.
+    fn add_object(&mut self, fields: &[(&str, &[u8])]) {
+        self.separate();
+        for (index, (name, value)) in fields.iter().enumerate() {
+            let before = if index == 0 { "{\"" } else { ",\"" };
+            self.0.extend_from_slice(before.as_bytes());
+            self.0.extend_from_slice(name.as_bytes());
+            self.0.extend_from_slice(b"\":");
+            self.0.extend_from_slice(value);
+        }
+        self.0.push(b'}');
+    }
 
-    Some(Flight {
-        tick,
-        from: from.clone(),
-        to: to.clone(),
-        seq: *seq,
-        command: command_text(event),
-        fate,
-    })
+    /// Adds a robot as a frame of a run in progress has it. The fields of such a frame that are not in its head have the same
+    /// names in its report.
+    fn add_robot(&mut self, robot: &PlacedRobot, report: &Json) {
+        let head = to_json(&RobotHead {
+            name: &robot.name,
+            location: robot.location,
+            blocked: robot.blocked,
+            presence: match robot.missed {
+                Some(_) => Presence::Gone,
+                None => Presence::Here,
+            },
+        });
+
+        self.separate();
+        self.0.push(b'{');
+        let stated = report.fields();
+        if !stated.is_empty() {
+            self.0.extend_from_slice(stated);
+            self.0.push(b',');
+        }
+        self.0.extend_from_slice(&head[1..]);
+    }
+
+    /// Separates the next element from the one before.
+    fn separate(&mut self) {
+        if !self.0.is_empty() {
+            self.0.push(b',');
+        }
+    }
+
+    fn into_json(self) -> Vec<u8> {
+        let mut list = self.0;
+        list.insert(0, b'[');
+        list.push(b']');
+        list
+    }
 }
 
-/// The text of a command, which only the event of its sending has.
-fn command_text(event: &Event) -> String {
-    match event {
-        Event::CommandSent { command, .. } => command.clone(),
-        _ => String::new(),
-    }
+fn to_json(value: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(value)
+        .unwrap_or_else(|error| unreachable!("what was recorded is JSON: {error}"))
 }

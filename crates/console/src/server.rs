@@ -24,6 +24,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::app::{App, Ending, Mode};
 use crate::browser;
+use crate::diagrams::{DiagramError, MAX_WINDOW_TICKS, Window};
 use crate::guard::{ENTRANCE, HEADERS, Refusal};
 use crate::playback::MAX_TICKS;
 
@@ -33,6 +34,9 @@ const MAX_CONNECTIONS: usize = 256;
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(20);
 /// Pause after a failed accept.
 const ACCEPT_RETRY: Duration = Duration::from_millis(100);
+
+/// The style sheet of diagrams, which is not a file: the crate that draws them has it.
+const DIAGRAM_STYLE: &str = "diagram.css";
 
 /// The files of the page.
 #[derive(Embed)]
@@ -49,9 +53,11 @@ fn routes(app: Arc<App>) -> Router {
             &format!("{page}assets/{{*path}}"),
             get(async |Path(path): Path<String>| asset(&path)),
         )
+        .route(&format!("{page}assets/{DIAGRAM_STYLE}"), get(diagram_style))
         .route(&format!("{page}ws"), get(socket))
         .route(&format!("{page}recording"), get(recording))
         .route(&format!("{page}recording/ticks"), get(ticks))
+        .route(&format!("{page}recording/diagram"), get(diagram))
         .fallback(async || not_found())
         .layer(from_fn_with_state(app.clone(), guard))
         .with_state(app)
@@ -238,9 +244,59 @@ fn read_ticks(app: &App, range: &TickRange) -> Response {
     };
 
     match recording.range(range.from, range.count) {
-        Ok(range) => json(&range),
+        Ok(range) => json_text(range),
         Err(error) => internal_error(&error),
     }
+}
+
+async fn diagram_style() -> Response {
+    (
+        [(CONTENT_TYPE, content_type(DIAGRAM_STYLE))],
+        ::diagram::style(),
+    )
+        .into_response()
+}
+
+async fn diagram(
+    State(app): State<Arc<App>>,
+    query: Result<Query<Window>, QueryRejection>,
+) -> Response {
+    let window = match query {
+        Ok(Query(window)) if window.is_valid() => window,
+        _ => return bad_window(),
+    };
+    if matches!(app.mode, Mode::Live(_)) {
+        return not_found();
+    }
+    let Some(_permit) = app.admit_read().await else {
+        return not_found();
+    };
+
+    let reader = app.clone();
+    let draw = tokio::task::spawn_blocking(move || draw_diagram(&reader, window));
+    draw.await.unwrap_or_else(|error| internal_error(&error))
+}
+
+/// Reads from the recording's files; blocks.
+fn draw_diagram(app: &App, window: Window) -> Response {
+    let Mode::Recording(recording) = &app.mode else {
+        return not_found();
+    };
+
+    match recording.diagram(window) {
+        Ok(svg) => ([(CONTENT_TYPE, content_type("diagram.svg"))], svg).into_response(),
+        Err(error @ DiagramError::TooMuch(_)) => {
+            (StatusCode::UNPROCESSABLE_ENTITY, format!("{error}\n")).into_response()
+        }
+        Err(DiagramError::Unreadable(error)) => internal_error(&error),
+    }
+}
+
+fn bad_window() -> Response {
+    let reason = format!(
+        "Request ?from=TICK&count=N&width=PX with N up to {MAX_WINDOW_TICKS} and PX from 300 to 4800.\n"
+    );
+    (StatusCode::BAD_REQUEST, reason).into_response()
 }
 
 fn bad_range() -> Response {
@@ -250,9 +306,13 @@ fn bad_range() -> Response {
 
 fn json(value: &impl serde::Serialize) -> Response {
     match serde_json::to_vec(value) {
-        Ok(text) => ([(CONTENT_TYPE, "application/json")], text).into_response(),
+        Ok(text) => json_text(text),
         Err(error) => internal_error(&error),
     }
+}
+
+fn json_text(text: Vec<u8>) -> Response {
+    ([(CONTENT_TYPE, "application/json")], text).into_response()
 }
 
 fn internal_error(error: &dyn Display) -> Response {

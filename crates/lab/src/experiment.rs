@@ -1,15 +1,31 @@
 //! Experiments: one scenario in several arms under several conditions over many seeds. An experiment is a file
-//! ([`Experiment::load`]); three ship with the project.
+//! ([`Experiment::load`]), of which some ship with the project. It is planned ([`Plan`]) into units, which are played on one
+//! machine or on many ([`engine`]) and kept in a folder ([`Store`]), whose results are read from there ([`Results`]).
 
 mod condition;
 mod contrast;
+pub mod engine;
+mod estimate;
 mod file;
-mod measure;
-mod play;
+mod follow;
+mod outcome;
+mod plan;
+mod processes;
+mod provenance;
+mod results;
 mod script;
+mod store;
+pub mod submit;
+mod unit;
 
 pub use condition::{Condition, ConditionError, Conditions, Factor, Value};
-pub use contrast::Contrast;
-pub use file::{Arm, Experiment, is_experiment_file};
-pub use measure::{Kind, Measure, MeasureError, Stalled};
-pub use play::{Cell, Options, Outcome};
+pub use contrast::{Contrast, Difference};
+pub use estimate::{Cell, Estimated};
+pub use file::{Arm, Experiment, MAX_UNITS, is_experiment_file};
+pub use outcome::{Measured, Outcome};
+pub use plan::{Key, LaunchText, PLAN, Plan, Program, Request, Robots, Unit};
+pub use processes::{Launcher, write_launch};
+pub use provenance::{Machine, Provenance};
+pub use results::{Failure, Results};
+pub use store::Store;
+pub use unit::{Played, Result};

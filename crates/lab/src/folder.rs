@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use config::FileError;
 use miette::{IntoDiagnostic, WrapErr, miette};
+use protocol::Epoch;
+use recording::Recording;
 use simulator::recorder::{LATEST, SUMMARY};
 use simulator::{EpochFiles, RunFolder, Summary};
 
@@ -47,6 +49,41 @@ pub fn recorded_epochs(folder: &RunFolder) -> Result<Vec<EpochFiles>, FileError>
         );
     }
     Ok(epochs)
+}
+
+/// The record of one epoch of a run; without a number, of the last one.
+///
+/// # Errors
+/// If the folder is not that of a run, or the run has no such epoch.
+pub fn recorded_epoch(folder: &RunFolder, number: Option<Epoch>) -> Result<EpochFiles, FileError> {
+    let mut epochs = recorded_epochs(folder)?;
+    let last = epochs.len();
+    let chosen = match number {
+        None => epochs.pop(),
+        Some(number) => epochs.into_iter().find(|files| files.epoch == number),
+    };
+    chosen.ok_or_else(|| {
+        FileError::new(format!(
+            "{} has no epoch {}, the last one is {last}",
+            folder.path().display(),
+            number.unwrap_or_default()
+        ))
+    })
+}
+
+/// The recording of an epoch.
+///
+/// # Errors
+/// [`FileError`] if there is none, or it cannot be read.
+pub fn recording(files: &EpochFiles) -> Result<Recording, FileError> {
+    let opened = Recording::open(&files.recording);
+    opened.map_err(|error| {
+        let error = FileError::new(error.to_string());
+        if files.recording.exists() {
+            return error;
+        }
+        error.with_help("a run is recorded unless its scenario has `frames = false` under [record]")
+    })
 }
 
 /// Reads the summary of a run; `None` if its simulator has not written one.

@@ -1,15 +1,28 @@
 //! Work with runs: executing a scenario in this process ([`run`]), reading a run's folder ([`folder`]), executing a recorded
 //! run again ([`verify`]) and comparing two runs ([`diff`]), repeating runs and comparing teams ([`experiment`],
-//! [`statistics`]), and presenting results ([`table`], [`emotionml`]).
+//! [`statistics`]), judging recorded runs ([`judge`]), presenting results ([`table`], [`mod@diagram`], [`report`]), exporting runs
+//! ([`export`], [`trace`], [`emotionml`]), letting them go on otherwise ([`fork`]), hunting for faults under which
+//! expectations fail ([`hunt`]), and playing single robots from their records ([`replayed`]).
 
+pub mod diagram;
 pub mod diff;
 pub mod emotionml;
 pub mod experiment;
+pub mod export;
 pub mod folder;
+pub mod fork;
+pub mod hunt;
+pub mod judge;
+pub mod moment;
 mod performance;
+mod reexecution;
+pub mod replayed;
+pub mod report;
 pub mod run;
+mod states;
 pub mod statistics;
 pub mod table;
+pub mod trace;
 pub mod verify;
 
 pub use performance::{Performance, performances};

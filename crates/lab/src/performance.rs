@@ -36,6 +36,7 @@ pub fn performances(
 
     // What robots do while all processes run.
     scenario.faults.clear();
+    scenario.changes.clear();
     let run = RunName::new("conform").into_diagnostic()?;
     play(scenario, &run, |simulation, record| {
         add_commands(&mut performances, record);

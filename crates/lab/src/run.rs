@@ -25,8 +25,7 @@ pub fn execute(
 ) -> miette::Result<Summary> {
     let mut recorder = None;
     let begun = Instant::now();
-    let mut opened = begun;
-    let simulation = play_with_robots(scenario, run, |local, record| {
+    let simulation = play_with_robots(scenario, run, |local, record, opened| {
         let simulation = &local.simulation;
         let recorder = match &mut recorder {
             Some(recorder) => recorder,
@@ -39,7 +38,6 @@ pub fn execute(
         if let Some(speed) = speed {
             wait_until(begun, simulation.time_s(simulation.tick()) / speed);
         }
-        opened = Instant::now();
         Ok(())
     })?;
 
@@ -49,7 +47,7 @@ pub fn execute(
 }
 
 /// What is observed of a tick for the recording: panels once a simulated second.
-fn observed(local: &Local, opened: Instant) -> Observed {
+pub(crate) fn observed(local: &Local, opened: Instant) -> Observed {
     let scenario = local.simulation.scenario();
     let panel_interval = (1.0 / scenario.tick_s).round().max(1.0) as Tick;
     let mut panels = BTreeMap::new();
@@ -81,29 +79,44 @@ pub fn play(
     run: &RunName,
     mut each: impl FnMut(&Simulation, &TickRecord) -> miette::Result<()>,
 ) -> miette::Result<Simulation> {
-    play_with_robots(scenario, run, |local, record| {
+    play_with_robots(scenario, run, |local, record, _| {
         each(&local.simulation, record)
     })
 }
 
-/// Plays a scenario as [`play`] does; `each` also sees the robots.
+/// Plays a scenario as [`play`] does; `each` also sees the robots, and when the tick was opened.
 fn play_with_robots(
     scenario: Scenario,
     run: &RunName,
-    mut each: impl FnMut(&Local, &TickRecord) -> miette::Result<()>,
+    mut each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
 ) -> miette::Result<Simulation> {
-    check_faults(&scenario)?;
+    check_faults(&scenario, 0)?;
     let mut local = Local::new(scenario, run)?;
+    let opened = Instant::now();
     let record = local.simulation.init(&mut local.robots).into_diagnostic()?;
-    each(&local, &record)?;
+    each(&local, &record, opened)?;
 
+    go_on(&mut local, run, each)?;
+    Ok(local.simulation)
+}
+
+/// Plays a scenario from the last complete tick to its end and calls `each` as [`play`] does.
+///
+/// # Errors
+/// As [`play`].
+pub(crate) fn go_on(
+    local: &mut Local,
+    run: &RunName,
+    mut each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
+) -> miette::Result<()> {
     while local.simulation.tick() < local.simulation.scenario().ticks {
+        let opened = Instant::now();
         local.carry_out_faults(run)?;
         let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
-        each(&local, &record)?;
+        each(local, &record, opened)?;
     }
-    each(&local, &local.simulation.end(End::Finished))?;
-    Ok(local.simulation)
+    let end = local.simulation.end(End::Finished);
+    each(local, &end, Instant::now())
 }
 
 /// A simulation and its robots in this process, before tick 0.
@@ -149,49 +162,68 @@ impl Local {
         })
     }
 
-    /// Carries out the crashes that the scenario has for the time before the next tick, and their ends.
+    /// Carries out the crashes that the scenario has for the time before the next tick, their ends, and restarts.
     ///
     /// # Errors
     /// If a robot that comes back is of a class that cannot run in this process.
     pub fn carry_out_faults(&mut self, run: &RunName) -> miette::Result<()> {
+        self.carry_out_faults_by(run, robots::make)
+    }
+
+    /// Carries out faults as [`Self::carry_out_faults`] does; `maker` makes the robots that come back.
+    ///
+    /// # Errors
+    /// As [`Self::carry_out_faults`].
+    pub fn carry_out_faults_by(&mut self, run: &RunName, maker: Maker) -> miette::Result<()> {
         let orders = self.simulation.faults_due();
         let lateness = self.simulation.scenario().lateness.clone();
         self.simulation
             .note_faults(&orders, |robot| lateness.of(robot));
 
         for order in orders {
-            let name = &order.robot;
             if order.begins {
-                self.robots.crash(name);
-                continue;
-            }
-
-            let mut robots = make_robots(self.simulation.scenario(), Path::new("the scenario"))?;
-            if let Some(robot) = robots.remove(name) {
-                let simulation = &self.simulation;
-                self.robots.bring_back(name, robot, |generation| {
-                    simulation.welcome(run, name, generation, None)
-                });
+                self.robots.crash(&order.robot);
+            } else {
+                self.start(&order.robot, run, maker)?;
             }
         }
+        for robot in self.simulation.restarts_due() {
+            self.robots.crash(&robot);
+            self.start(&robot, run, maker)?;
+        }
+        Ok(())
+    }
 
+    /// Starts a robot that has crashed, as a further incarnation.
+    fn start(&mut self, name: &RobotName, run: &RunName, maker: Maker) -> miette::Result<()> {
+        let scenario = self.simulation.scenario();
+        let mut robots = make_robots_by(scenario, Path::new("the scenario"), maker)?;
+        if let Some(robot) = robots.remove(name) {
+            let simulation = &self.simulation;
+            self.robots.bring_back(name, robot, |generation| {
+                simulation.welcome(run, name, generation, None)
+            });
+        }
         Ok(())
     }
 }
 
-/// Checks that the faults of a scenario can be played without processes: crashes without which the clock goes on, and that
-/// end by simulated time or not at all.
+/// Checks that the faults of a scenario that begin after a tick can be played without processes: crashes without which the
+/// clock goes on, and that end by simulated time or not at all.
 ///
 /// # Errors
 /// If there is another fault.
-pub fn check_faults(scenario: &Scenario) -> miette::Result<()> {
-    for fault in &scenario.faults {
+pub fn check_faults(scenario: &Scenario, after: Tick) -> miette::Result<()> {
+    let changed = scenario.changes.iter().flat_map(|change| &change.faults);
+    for fault in scenario.faults.iter().chain(changed) {
         let is_simulated = !matches!(fault.end, FaultEnd::After(_));
         let goes_on = scenario.lateness.of(&fault.robot) == OnLate::Continue;
-        if fault.kind != FaultKind::Crash || !is_simulated || !goes_on {
+        let is_played = fault.kind == FaultKind::Crash && is_simulated && goes_on;
+        if fault.at > after && !is_played {
             return Err(miette!(
-                help = "a crash with `until`, under on_late = \"continue\", can be played in one process",
-                "the fault of {} at tick {} needs a process",
+                help = "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash with `until`, under \
+                        on_late = \"continue\", can be played without a process",
+                "the fault of {} at tick {} needs a process of its own",
                 fault.robot,
                 fault.at
             ));
@@ -201,6 +233,9 @@ pub fn check_faults(scenario: &Scenario) -> miette::Result<()> {
     Ok(())
 }
 
+/// Makes a robot of a class; `None` if it makes no robots of that class.
+pub type Maker = fn(&str) -> Option<Box<dyn Robot>>;
+
 /// Creates the robots of a scenario by their classes; `file` is named in the error.
 ///
 /// # Errors
@@ -209,9 +244,21 @@ pub fn make_robots(
     scenario: &Scenario,
     file: &Path,
 ) -> miette::Result<BTreeMap<RobotName, Box<dyn Robot>>> {
+    make_robots_by(scenario, file, robots::make)
+}
+
+/// Creates the robots of a scenario as [`make_robots`] does; `maker` makes them.
+///
+/// # Errors
+/// As [`make_robots`].
+pub fn make_robots_by(
+    scenario: &Scenario,
+    file: &Path,
+    maker: Maker,
+) -> miette::Result<BTreeMap<RobotName, Box<dyn Robot>>> {
     let mut robots = BTreeMap::new();
     for (name, spec) in &scenario.robots {
-        let robot = robots::make(&spec.class).ok_or_else(|| {
+        let robot = maker(&spec.class).ok_or_else(|| {
             miette!(
                 help = "a robot of another kind runs as a process of its own: name it in a launch file and use `cars launch`",
                 "{}: robot {name} is of class {:?}, and only {} can run in this process",

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::End;
+use protocol::messages::{End, Verdict};
 use simulator::Summary;
-use simulator::summary::RobotSummary;
+use simulator::summary::{Judged, RobotSummary};
 
 /// Width of a full bar, characters.
 const BAR: usize = 10;
@@ -56,6 +56,21 @@ pub fn rows(summary: &Summary) -> Vec<[String; 5]> {
     }
 
     rows
+}
+
+/// A line for each expectation: its verdict, its name, and the reason unless it is met.
+#[must_use]
+pub fn verdicts(expectations: &BTreeMap<String, Judged>) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (name, judged) in expectations {
+        let verdict = judged.verdict.name();
+        let mut line = format!("{verdict:<9}  {name}");
+        if judged.verdict != Verdict::Pass {
+            line += &format!(": {}", judged.because);
+        }
+        lines.push(line);
+    }
+    lines
 }
 
 /// A line for each robot for which the clock waited long enough for a person to notice.

@@ -70,7 +70,8 @@ pub fn command(at_exit: AtExit, program: impl AsRef<OsStr>) -> Command {
 }
 
 /// This program, also where another build has replaced its file.
-pub(crate) fn own_program() -> PathBuf {
+#[must_use]
+pub fn own_program() -> PathBuf {
     if cfg!(target_os = "linux") {
         return PathBuf::from("/proc/self/exe");
     }

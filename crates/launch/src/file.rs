@@ -24,6 +24,8 @@ pub(crate) const CONSOLE: &str = "console";
 const CONSOLE_PROGRAM: &str = "cars-console";
 /// Program of the simulator, unless the file names another one.
 const SIMULATOR_PROGRAM: &str = "cars-sim";
+/// Class of a robot that is played from its record.
+const REPLAYED: &str = "Replayed";
 /// First wait before a restart, unless the file has another one.
 const BACKOFF: Duration = Duration::from_secs(1);
 
@@ -232,6 +234,38 @@ impl LaunchFile {
             self.source.check_named(span.clone(), &self.scenario)?;
         }
         Scenario::load(&self.scenario, changes).map_err(|error| error.named_by(&self.source.name))
+    }
+
+    /// Replaces the programs of robots by players of their records, which are in the folders of recorded runs.
+    ///
+    /// # Errors
+    /// [`FileError`] if there is no such robot, or it shares its process with others.
+    pub(crate) fn replay(
+        &mut self,
+        replayed: &BTreeMap<RobotName, PathBuf>,
+        scenario: &mut Scenario,
+    ) -> Result<(), FileError> {
+        for (robot, record) in replayed {
+            let mut processes = self.processes.iter_mut();
+            let process = processes.find(|process| process.robots.contains(robot));
+            let (Some(process), Some(spec)) = (process, scenario.robots.get_mut(robot)) else {
+                let text = format!("there is no robot {robot} to be played from a record");
+                return Err(FileError::new(text).with_help(roster(scenario)));
+            };
+            if process.robots.len() > 1 {
+                return Err(FileError::new(format!(
+                    "{robot} shares the process {} with other robots, and only a whole process can be played from a record",
+                    process.name
+                )));
+            }
+
+            let record = record.display().to_string();
+            let player = ["cars", "replay-robot", "--record", &record];
+            process.command = player.map(str::to_owned).to_vec();
+            process.is_extern = false;
+            REPLAYED.clone_into(&mut spec.class);
+        }
+        Ok(())
     }
 
     /// Checks that every robot of the scenario is run by exactly one process.

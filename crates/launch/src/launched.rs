@@ -1,9 +1,11 @@
 //! How a run was launched, in the run's folder, so that it can be resumed after its simulator or the machine was killed.
 
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use config::{FileError, Source};
+use protocol::RobotName;
 use serde::{Deserialize, Serialize};
 use simulator::recorder::LAUNCHED;
 use simulator::{RunFolder, Scenario};
@@ -25,6 +27,8 @@ pub(super) struct Launched {
     pub(super) secure: Option<PathBuf>,
     /// Whether the simulator was allowed to listen without certificates where other machines can connect.
     pub(super) is_insecure: bool,
+    /// Robots that were played from their records, with the absolute paths of the recorded runs.
+    pub(super) replayed: BTreeMap<RobotName, PathBuf>,
 }
 
 impl Launched {

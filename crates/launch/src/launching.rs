@@ -1,5 +1,6 @@
 //! A launch: from its file to the exit of its processes.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -62,6 +63,8 @@ pub struct LaunchOptions {
     pub is_insecure: bool,
     /// How long a process may take to exit before it is killed.
     pub grace: Time,
+    /// Robots that are played from their records, with the folders of the recorded runs.
+    pub replayed: BTreeMap<RobotName, PathBuf>,
 }
 
 /// A launch that has been read and checked.
@@ -107,9 +110,11 @@ impl Launch {
     /// # Errors
     /// [`FileError`] of the file or its scenario; a missing certificate of a secured run.
     pub fn load(what: What, options: LaunchOptions) -> miette::Result<Self> {
-        let (file, scenario) = what.load(&options.run.changes())?;
+        let (mut file, mut scenario) = what.load(&options.run.changes())?;
         file.check_robots(&scenario)?;
         let run = options.run.run_name(what.path()).into_diagnostic()?;
+        file.replay(&options.replayed, &mut scenario)?;
+        check_not_overwritten(&options.run.out.join(run.as_str()), &options.replayed)?;
         Self::of(what, file, scenario, run, options)
     }
 
@@ -140,14 +145,13 @@ impl Launch {
     /// [`FileError`] if it is not the folder of a run that was launched, or the run is in progress or has ended; a missing
     /// certificate of a secured run.
     pub fn resume(folder: &Path, mut options: LaunchOptions) -> miette::Result<Self> {
-        let path = folder
-            .canonicalize()
-            .map_err(|error| FileError::unreadable(folder, &error))?;
+        let folder = RunFolder::at(folder.to_owned()).resolved()?;
         // The simulator takes the lock and reads the record.
-        drop(RunFolder::at(path.clone()).reopen()?);
-        options.run.out = path.parent().unwrap_or(Path::new("")).to_owned();
+        drop(folder.reopen()?);
+        let out = folder.path().parent().unwrap_or(Path::new(""));
+        options.run.out = out.to_owned();
 
-        let mut launch = Self::again(&path, options)?;
+        let mut launch = Self::again(folder.path(), options)?;
         launch.is_resumed = true;
         Ok(launch)
     }
@@ -158,16 +162,14 @@ impl Launch {
     /// # Errors
     /// [`FileError`] if it is not the folder of a run that was launched; a missing certificate of a secured run.
     pub fn again(folder: &Path, mut options: LaunchOptions) -> miette::Result<Self> {
-        let path = folder
-            .canonicalize()
-            .map_err(|error| FileError::unreadable(folder, &error))?;
-        let folder = RunFolder::at(path.clone());
+        let folder = RunFolder::at(folder.to_owned());
         let launched = Launched::read(&folder)?;
-        let scenario = Scenario::load(&folder.file(SCENARIO), &Changes::default())?;
-        let file = launched.launch_file(&scenario)?;
+        let mut scenario = Scenario::load(&folder.file(SCENARIO), &Changes::default())?;
+        let mut file = launched.launch_file(&scenario)?;
+        file.replay(&launched.replayed, &mut scenario)?;
+        options.replayed = launched.replayed;
 
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let run = RunName::new(&name).into_diagnostic()?;
+        let run = folder.name()?;
         if options.run.speed.is_none() {
             options.run.speed = Some(Speed(launched.speed));
         }
@@ -198,6 +200,7 @@ impl Launch {
             speed: self.speed().0,
             secure: secure.map(absolute).transpose()?,
             is_insecure: self.options.is_insecure,
+            replayed: self.options.replayed.clone(),
         };
         launched.write(&folder)?;
         Ok(folder)
@@ -368,7 +371,7 @@ impl Launch {
             .into_diagnostic()?;
 
         let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.handle());
-        let has_faults = !self.scenario.faults.is_empty();
+        let has_faults = self.scenario.concerns_processes();
         let watch = Watch {
             run: self.run.clone(),
             endpoint: connectable(endpoint),
@@ -397,6 +400,21 @@ impl Launch {
 /// A path that holds in any folder: the run may be resumed from another one.
 fn absolute(path: &Path) -> Result<PathBuf, FileError> {
     std::path::absolute(path).map_err(|error| FileError::unreadable(path, &error))
+}
+
+/// Checks that no record from which a robot is played is in the folder of the new run.
+fn check_not_overwritten(
+    folder: &Path,
+    replayed: &BTreeMap<RobotName, PathBuf>,
+) -> Result<(), FileError> {
+    let Ok(folder) = folder.canonicalize() else {
+        return Ok(());
+    };
+    if replayed.values().any(|record| *record == folder) {
+        let text = format!("the launch would overwrite {}", folder.display());
+        return Err(FileError::new(text).with_help("give it another name by --run"));
+    }
+    Ok(())
 }
 
 /// The certificates of a secured launch: those of the command line, or of the file.

@@ -35,7 +35,7 @@ impl std::fmt::Display for NoState {
 /// The last two states of a robot, newest last. During a tick the other robots must see the state of the tick before,
 /// however far this robot already is.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct States<S> {
+pub struct States<S> {
     kept: Vec<(Epoch, Tick, S)>,
 }
 
@@ -47,7 +47,7 @@ impl<S> Default for States<S> {
 
 impl<S: Clone> States<S> {
     /// Adds the state of a tick; states may arrive in any order. The first one of a tick counts.
-    pub(crate) fn add(&mut self, epoch: Epoch, tick: Tick, state: S) {
+    pub fn add(&mut self, epoch: Epoch, tick: Tick, state: S) {
         let newest_epoch = self.kept.last().map_or(epoch, |(newest, _, _)| *newest);
         if epoch < newest_epoch {
             return;
@@ -65,12 +65,15 @@ impl<S: Clone> States<S> {
     }
 
     /// Forgets everything.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.kept.clear();
     }
 
     /// Answers a query.
-    pub(crate) fn answer(&self, query: StateQuery) -> Result<S, NoState> {
+    ///
+    /// # Errors
+    /// [`NoState`] if the state that it asks for is not one of the last two.
+    pub fn answer(&self, query: StateQuery) -> Result<S, NoState> {
         let (newest_epoch, newest_tick, newest) = self.kept.last().ok_or(NoState::NotYet)?;
         match query.epoch {
             Some(epoch) if epoch < *newest_epoch => return Err(NoState::Over),

@@ -4,7 +4,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::messages::{End, FaultKind, LogKind, LogRecord, Performative, Point};
+use crate::messages::{
+    End, Fate, FaultKind, Flight, LogKind, LogRecord, Performative, Point, Verdict,
+};
 use crate::name::RobotName;
 use crate::plain::escape_line;
 use crate::{Epoch, Generation, Seq, Tick};
@@ -170,12 +172,26 @@ pub enum Event {
         /// Whether it begins; else it is over.
         begins: bool,
     },
+    /// The scenario changes from this tick on.
+    Changed {
+        /// What is set, as `path=value`.
+        set: String,
+    },
     /// A robot wrote a line to the log.
     Say {
         /// Who.
         robot: RobotName,
         /// The line.
         text: String,
+    },
+    /// It is decided whether the run has done what its scenario expects of it.
+    Judged {
+        /// Name of the expectation.
+        expectation: String,
+        /// What is decided.
+        verdict: Verdict,
+        /// Why.
+        because: String,
     },
     /// The tick is complete.
     Tick {
@@ -243,6 +259,8 @@ pub enum Cause {
     Overflow,
     /// No robot of the roster has the name of the target.
     Unknown,
+    /// The scenario names this command as lost.
+    Scripted,
 }
 
 impl std::fmt::Display for Cause {
@@ -254,6 +272,7 @@ impl std::fmt::Display for Cause {
             Self::Missed => "because the robot missed the tick",
             Self::Overflow => "because too much arrives at once",
             Self::Unknown => "because there is no such robot",
+            Self::Scripted => "as the scenario has it",
         })
     }
 }
@@ -288,7 +307,9 @@ impl Event {
             Self::LinkCut { .. } => "link_cut",
             Self::LinkHealed { .. } => "link_healed",
             Self::Fault { .. } => "fault",
+            Self::Changed { .. } => "changed",
             Self::Say { .. } => "say",
+            Self::Judged { .. } => "judged",
             Self::Tick { .. } => "tick",
             Self::End { .. } => "end",
         }
@@ -311,6 +332,31 @@ impl Event {
             source,
             kind,
             text,
+        })
+    }
+
+    /// The command that the event is about, and its fate, as frames show it; `None` for other events.
+    #[must_use]
+    pub fn flight(&self, tick: Tick) -> Option<Flight> {
+        let (from, to, seq, command, fate) = match self {
+            Self::CommandSent {
+                from,
+                to,
+                seq,
+                command,
+                ..
+            } => (from, to, seq, command.as_str(), Fate::Sent),
+            Self::CommandDelivered { from, to, seq } => (from, to, seq, "", Fate::Delivered),
+            Self::CommandDropped { from, to, seq, .. } => (from, to, seq, "", Fate::Dropped),
+            _ => return None,
+        };
+        Some(Flight {
+            tick,
+            from: from.clone(),
+            to: to.clone(),
+            seq: *seq,
+            command: command.to_owned(),
+            fate,
         })
     }
 
@@ -430,7 +476,16 @@ impl Event {
                 LogKind::Network,
                 format!("messages from {from} to {to} pass again"),
             ),
+            Self::Changed { set } => simulator(LogKind::Run, format!("from now on {set}")),
             Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
+            Self::Judged {
+                expectation,
+                verdict,
+                because,
+            } => simulator(
+                LogKind::Verdict,
+                format!("{verdict}: {expectation} ({because})"),
+            ),
             Self::End { reason, digest, .. } => {
                 let how = match reason {
                     End::Finished => "finished",

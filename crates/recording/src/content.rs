@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{Awaited, Cut, LogRecord, Panel, Point, Report};
+use protocol::messages::{Awaited, Cut, LogRecord, Panel, Point, Report, Standing};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use schemars::JsonSchema;
+use serde::de::{Error, IgnoredAny};
 use serde::{Deserialize, Serialize};
 
 /// What does not change during the epoch.
@@ -66,6 +67,28 @@ pub struct RecordedTick {
     pub wall: Wall,
 }
 
+/// Everything that is recorded of one tick, of which nothing is copied: a [`RecordedTick`].
+#[derive(Debug, Clone)]
+pub struct TickView<'a> {
+    /// The field after the tick.
+    pub frame: &'a Frame,
+    /// The events of the tick, without seals.
+    pub events: &'a [Event],
+    /// The reports for this tick.
+    pub reports: BTreeMap<&'a RobotName, &'a Report>,
+    /// The newest panels.
+    pub panels: &'a BTreeMap<RobotName, Panel>,
+    /// Wall-clock times.
+    pub wall: &'a Wall,
+}
+
+impl TickView<'_> {
+    /// The lines of the log about this tick, which are made from its events.
+    pub(crate) fn log(&self, header: &Header) -> Vec<LogRecord> {
+        log(self.frame.tick, self.events, header)
+    }
+}
+
 impl RecordedTick {
     /// The tick.
     #[must_use]
@@ -73,17 +96,127 @@ impl RecordedTick {
         self.frame.tick
     }
 
+    /// The tick as it is recorded.
+    #[must_use]
+    pub fn view(&self) -> TickView<'_> {
+        TickView {
+            frame: &self.frame,
+            events: &self.events,
+            reports: self.reports.iter().collect(),
+            panels: &self.panels,
+            wall: &self.wall,
+        }
+    }
+
     /// The lines of the log about this tick, which are made from its events.
     #[must_use]
     pub fn log(&self, header: &Header) -> Vec<LogRecord> {
-        let tick = self.tick();
-        let time_s = tick as f64 * header.tick_s;
-        let mut lines = Vec::new();
-        for event in &self.events {
-            lines.extend(event.log_record(header.epoch, tick, time_s));
-        }
-        lines
+        log(self.tick(), &self.events, header)
     }
+}
+
+fn log(tick: Tick, events: &[Event], header: &Header) -> Vec<LogRecord> {
+    let time_s = tick as f64 * header.tick_s;
+    let mut lines = Vec::new();
+    for event in events {
+        lines.extend(event.log_record(header.epoch, tick, time_s));
+    }
+    lines
+}
+
+/// What is recorded of one tick, with reports and panels as they are in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawTick {
+    /// The field after the tick.
+    pub frame: Frame,
+    /// The events of the tick.
+    pub events: Vec<Event>,
+    /// The reports for this tick.
+    pub reports: BTreeMap<RobotName, Json>,
+    /// The newest panels.
+    pub panels: BTreeMap<RobotName, Json>,
+    /// Wall-clock times.
+    pub wall: Wall,
+}
+
+impl RawTick {
+    /// The tick.
+    #[must_use]
+    pub fn tick(&self) -> Tick {
+        self.frame.tick
+    }
+
+    /// The lines of the log about this tick.
+    #[must_use]
+    pub fn log(&self, header: &Header) -> Vec<LogRecord> {
+        log(self.tick(), &self.events, header)
+    }
+
+    /// Decodes reports and panels.
+    pub(crate) fn decode(self) -> Result<RecordedTick, serde_json::Error> {
+        let mut reports = BTreeMap::new();
+        for (robot, report) in self.reports {
+            reports.insert(robot, serde_json::from_slice(&report.0)?);
+        }
+        let mut panels = BTreeMap::new();
+        for (robot, panel) in self.panels {
+            panels.insert(robot, serde_json::from_slice(&panel.0)?);
+        }
+
+        Ok(RecordedTick {
+            frame: self.frame,
+            events: self.events,
+            reports,
+            panels,
+            wall: self.wall,
+        })
+    }
+}
+
+/// A JSON object, as it is in the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Json(Vec<u8>);
+
+impl Json {
+    /// Bytes of a message that have not been checked yet.
+    pub(crate) fn unchecked(bytes: &[u8]) -> Self {
+        Self(bytes.to_vec())
+    }
+
+    /// Checks that it is a JSON object.
+    pub(crate) fn check(&self) -> Result<(), serde_json::Error> {
+        let IgnoredAny = serde_json::from_slice(&self.0)?;
+        if self.0.trim_ascii().starts_with(b"{") {
+            Ok(())
+        } else {
+            Err(serde_json::Error::custom("not a JSON object"))
+        }
+    }
+
+    /// The fields of the object with the commas between them, without its braces.
+    #[must_use]
+    pub fn fields(&self) -> &[u8] {
+        let text = self.0.trim_ascii();
+        let end = text.len().saturating_sub(1);
+        text.get(1..end).unwrap_or_default().trim_ascii()
+    }
+
+    /// The text.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.0
+    }
+}
+
+/// What happened in a tick, without what the field and the robots were like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TickEvents {
+    /// The tick.
+    pub tick: Tick,
+    /// The events of the tick, in the order of `events.jsonl`, without seals. The last tick of a run also has its end.
+    pub events: Vec<Event>,
+    /// Robots for which the clock was held. Not reproducible.
+    pub awaited: Vec<Awaited>,
 }
 
 /// The field after a tick.
@@ -101,6 +234,33 @@ pub struct Frame {
     /// Robots that a robot could not query in the tick, by the robot that could not query them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub unreachable: BTreeMap<RobotName, Vec<RobotName>>,
+    /// How the expectations of the scenario stand, in its order. Those that are judged at the end of the run are open here: the
+    /// last tick has events about them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub expectations: Vec<Standing>,
+}
+
+impl Frame {
+    /// How the expectations of the scenario stand after the events of the tick, which may be the last one of the run.
+    #[must_use]
+    pub fn standings(&self, events: &[Event]) -> Vec<Standing> {
+        let mut standings = self.expectations.clone();
+        for event in events {
+            if let Event::Judged {
+                expectation,
+                verdict,
+                ..
+            } = event
+            {
+                let mut named = standings.iter_mut();
+                if let Some(standing) = named.find(|standing| standing.expectation == *expectation)
+                {
+                    standing.verdict = Some(*verdict);
+                }
+            }
+        }
+        standings
+    }
 }
 
 /// A robot in a [`Frame`]. What it does and feels is in its report.

@@ -13,7 +13,7 @@ use crate::damage::{Name, RecordingError};
 const RECORD_HEAD: u64 = 9;
 /// Bytes of the record at the end of a finished file.
 const FOOTER: u64 = RECORD_HEAD + 20;
-/// Longest record and largest chunk, bytes. A chunk ends after 1 MiB; one tick of thousands of robots can be longer.
+/// Longest record and largest chunk, bytes. A chunk ends after 256 KiB; one tick of thousands of robots can be longer.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// A file with its name and length.

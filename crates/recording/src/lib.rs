@@ -4,21 +4,25 @@
 //! The file is MCAP. Its times are simulated. Chunks end at the end of a tick, so a file that was cut off by a crash has
 //! complete ticks up to its last complete chunk.
 
-mod background;
 pub mod content;
 mod damage;
+mod encode;
+mod file;
 mod index;
 mod protobuf;
 mod read;
+mod shown;
 mod ticks;
 mod topic;
 mod viewers;
 mod write;
 
-pub use background::BackgroundWriter;
-pub use content::{Frame, Header, PlacedRobot, RecordedTick, Wall};
+pub use content::{
+    Frame, Header, Json, PlacedRobot, RawTick, RecordedTick, TickEvents, TickView, Wall,
+};
 pub use damage::RecordingError;
 pub use read::Recording;
+pub use shown::LastReports;
 pub use ticks::Ticks;
 pub use write::{WriteError, Writer};
 

@@ -6,14 +6,16 @@ use std::fs::File;
 use std::path::Path;
 
 use mcap::records::{Record, op};
-use protocol::messages::{Panel, Report};
-use protocol::{Line, RobotName, Tick};
+use protocol::{Event, Line, RobotName, Tick};
 use serde::de::DeserializeOwned;
 
-use crate::content::{Frame, Header, RecordedTick, Wall};
+use crate::content::{Frame, Header, Json, RawTick, RecordedTick, TickEvents, Wall};
 use crate::damage::{Name, RecordingError};
 use crate::index::{Bytes, Chunk};
 use crate::topic::Topic;
+
+/// Ticks that are read from the file in one go.
+pub(crate) const AT_ONCE: Tick = 64;
 
 /// The recording of an epoch. Only where its parts are is kept in memory.
 #[derive(Debug)]
@@ -47,9 +49,9 @@ struct Message<'a> {
 struct Partial {
     frame: Option<Frame>,
     wall: Option<Wall>,
-    events: Vec<protocol::Event>,
-    reports: BTreeMap<RobotName, Report>,
-    panels: BTreeMap<RobotName, Panel>,
+    events: Vec<Event>,
+    reports: BTreeMap<RobotName, Json>,
+    panels: BTreeMap<RobotName, Json>,
 }
 
 impl Recording {
@@ -119,29 +121,98 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`] if they cannot be read or are damaged.
     pub fn read(&self, from: Tick, to: Tick) -> Result<Vec<RecordedTick>, RecordingError> {
+        let mut ticks = Vec::new();
+        for (tick, chunk) in self.read_parts(from, to)? {
+            let tick = tick.decode().map_err(|error| self.damaged(chunk, &error))?;
+            ticks.push(tick);
+        }
+        Ok(ticks)
+    }
+
+    /// Reads ticks as [`Self::read`] does, and decodes neither reports nor panels.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if they cannot be read or are damaged.
+    pub fn read_raw(&self, from: Tick, to: Tick) -> Result<Vec<RawTick>, RecordingError> {
+        let mut ticks = Vec::new();
+        for (tick, chunk) in self.read_parts(from, to)? {
+            for message in tick.reports.values().chain(tick.panels.values()) {
+                message
+                    .check()
+                    .map_err(|error| self.damaged(chunk, &error))?;
+            }
+            ticks.push(tick);
+        }
+        Ok(ticks)
+    }
+
+    /// Reads ticks, each with its last chunk.
+    fn read_parts(
+        &self,
+        from: Tick,
+        to: Tick,
+    ) -> Result<Vec<(RawTick, &TickChunk)>, RecordingError> {
         let to = to.min(self.len());
         let mut ticks = Vec::new();
         let mut next = from;
         let mut partial: BTreeMap<Tick, Partial> = BTreeMap::new();
 
         for chunk in self.chunks_of(from, to) {
-            self.read_chunk(chunk, from, to, &mut partial)?;
+            self.read_chunk(chunk, from, to, |_| true, &mut partial)?;
             // A further chunk may go on with the last tick of this one.
             let complete = partial.split_off(&chunk.last);
             for (tick, parts) in std::mem::replace(&mut partial, complete) {
-                ticks.push(self.whole(tick, next, parts, chunk)?);
+                ticks.push((self.whole(tick, next, parts, chunk)?, chunk));
                 next += 1;
             }
         }
         if let Some(last) = self.chunks_of(from, to).last() {
             for (tick, parts) in partial {
-                ticks.push(self.whole(tick, next, parts, last)?);
+                ticks.push((self.whole(tick, next, parts, last)?, last));
                 next += 1;
             }
         }
 
         if next < to {
             return Err(self.bytes.name.no_such_tick(next, self.len()));
+        }
+        Ok(ticks)
+    }
+
+    /// Calls `each` with what happened in the ticks from `from` up to and excluding `to`, without frames, reports and panels, which are most
+    /// of a recording; fewer ticks if the recording ends before.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if it cannot be read or is damaged.
+    pub fn for_events(
+        &self,
+        from: Tick,
+        to: Tick,
+        mut each: impl FnMut(TickEvents),
+    ) -> Result<(), RecordingError> {
+        let to = to.min(self.len());
+        let mut next = from;
+        while next < to {
+            let end = to.min(next + AT_ONCE);
+            self.events(next, end)?.into_iter().for_each(&mut each);
+            next = end;
+        }
+        Ok(())
+    }
+
+    fn events(&self, from: Tick, to: Tick) -> Result<Vec<TickEvents>, RecordingError> {
+        let mut partial: BTreeMap<Tick, Partial> = BTreeMap::new();
+        for chunk in self.chunks_of(from, to) {
+            self.read_chunk(chunk, from, to, Topic::is_of_events, &mut partial)?;
+        }
+
+        let mut ticks = Vec::new();
+        for (tick, parts) in partial {
+            ticks.push(TickEvents {
+                tick,
+                events: parts.events,
+                awaited: parts.wall.unwrap_or_default().awaited,
+            });
         }
         Ok(ticks)
     }
@@ -167,12 +238,13 @@ impl Recording {
         self.chunks.get(begin..end).unwrap_or_default()
     }
 
-    /// Adds what a chunk has of a range of ticks.
+    /// Adds what a chunk has of a range of ticks, on the topics that are wanted.
     fn read_chunk(
         &self,
         chunk: &TickChunk,
         from: Tick,
         to: Tick,
+        is_wanted: fn(&Topic) -> bool,
         ticks: &mut BTreeMap<Tick, Partial>,
     ) -> Result<(), RecordingError> {
         let content = self.bytes.chunk(&chunk.chunk)?;
@@ -187,7 +259,9 @@ impl Recording {
             if !(from..to).contains(&tick) {
                 continue;
             }
-            if let Some(topic) = self.topics.get(&message.channel) {
+            if let Some(topic) = self.topics.get(&message.channel)
+                && is_wanted(topic)
+            {
                 let partial = ticks.entry(tick).or_default();
                 partial
                     .add(topic, message.json)
@@ -204,7 +278,7 @@ impl Recording {
         expected: Tick,
         parts: Partial,
         chunk: &TickChunk,
-    ) -> Result<RecordedTick, RecordingError> {
+    ) -> Result<RawTick, RecordingError> {
         let is_expected = tick == expected;
         let frame = parts
             .frame
@@ -212,7 +286,7 @@ impl Recording {
         let frame =
             frame.ok_or_else(|| self.damaged(chunk, &format!("tick {expected} is missing")))?;
 
-        Ok(RecordedTick {
+        Ok(RawTick {
             frame,
             events: parts.events,
             reports: parts.reports,
@@ -221,12 +295,12 @@ impl Recording {
         })
     }
 
-    /// The report of a robot for a tick; `None` if it has none.
+    /// The report of a robot for a tick, not decoded; `None` if it has none.
     ///
     /// # Errors
     /// [`RecordingError`] if it cannot be read or is damaged.
-    pub fn report(&self, robot: &RobotName, tick: Tick) -> Result<Option<Report>, RecordingError> {
-        let mut ticks = self.read(tick, tick.saturating_add(1))?;
+    pub fn report(&self, robot: &RobotName, tick: Tick) -> Result<Option<Json>, RecordingError> {
+        let mut ticks = self.read_raw(tick, tick.saturating_add(1))?;
         Ok(ticks.pop().and_then(|mut tick| tick.reports.remove(robot)))
     }
 
@@ -243,10 +317,10 @@ impl Partial {
             Topic::Wall => self.wall = Some(parse(json)?),
             Topic::Events => self.events.push(parse::<Line>(json)?.event),
             Topic::Report(robot) => {
-                self.reports.insert(robot.clone(), parse(json)?);
+                self.reports.insert(robot.clone(), Json::unchecked(json));
             }
             Topic::Panel(robot) => {
-                self.panels.insert(robot.clone(), parse(json)?);
+                self.panels.insert(robot.clone(), Json::unchecked(json));
             }
         }
         Ok(())

@@ -6,10 +6,7 @@ use protocol::Tick;
 
 use crate::content::RecordedTick;
 use crate::damage::RecordingError;
-use crate::read::Recording;
-
-/// Ticks that are read from the file in one go.
-const AT_ONCE: Tick = 64;
+use crate::read::{AT_ONCE, Recording};
 
 /// The ticks of a recording, one after the other.
 #[derive(Debug)]
@@ -32,21 +29,30 @@ impl Ticks {
         }
     }
 
+    /// Makes this tick the next one.
+    pub fn seek(&mut self, tick: Tick) {
+        self.unread = tick;
+        self.ahead.clear();
+    }
+
     /// The recording.
     #[must_use]
     pub fn recording(&self) -> &Recording {
         &self.recording
     }
 
-    /// The next tick; `None` after the last complete one.
+    /// The next tick; `None` after the last complete one. All ticks before one that is damaged can be read.
     ///
     /// # Errors
     /// [`RecordingError`] if it cannot be read or is damaged.
     pub fn next_tick(&mut self) -> Result<Option<RecordedTick>, RecordingError> {
         if self.ahead.is_empty() && self.unread < self.recording.len() {
             let to = self.unread.saturating_add(AT_ONCE);
-            self.ahead = self.recording.read(self.unread, to)?.into();
-            self.unread += self.ahead.len() as Tick;
+            let read = self.recording.read(self.unread, to);
+            // Damage further on does not keep the next tick from being read.
+            let read = read.or_else(|_| self.recording.read(self.unread, self.unread + 1))?;
+            self.unread += read.len() as Tick;
+            self.ahead = read.into();
         }
         Ok(self.ahead.pop_front())
     }

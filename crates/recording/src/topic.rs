@@ -53,6 +53,11 @@ impl fmt::Display for Topic {
 }
 
 impl Topic {
+    /// Whether what happened in a tick is on it.
+    pub(crate) fn is_of_events(&self) -> bool {
+        matches!(self, Self::Events | Self::Wall)
+    }
+
     /// Parses a topic; `None` for one of the channels that only viewers read.
     pub(crate) fn parse(topic: &str) -> Option<Self> {
         match topic {

@@ -4,7 +4,7 @@
 use protocol::RobotName;
 use protocol::messages::LogRecord;
 
-use crate::content::{Header, PlacedRobot, RecordedTick};
+use crate::content::{Header, PlacedRobot, TickView};
 use crate::protobuf::Protobuf;
 
 /// Frame of reference of everything: the origin is the corner of the field, x and y are its edges, in meters.
@@ -46,55 +46,53 @@ impl Schema {
 }
 
 /// The field and its obstacles, which stay.
-pub(crate) fn field(header: &Header) -> Protobuf {
+pub(crate) fn field(to: &mut Protobuf<'_>, header: &Header) {
+    to.message(2, |to| {
+        entity(to, 0, "field");
+        for [x, y] in &header.obstacles {
+            to.message(8, |to| {
+                cube(to, *x, *y, 0.0, header.body_m, [0.4, 0.4, 0.4]);
+            });
+        }
+        to.message(11, |to| outline(to, header));
+    });
+}
+
+fn outline(to: &mut Protobuf<'_>, header: &Header) {
     let [width, height] = header.field_m;
     let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
-    let mut outline = Protobuf::default()
-        .integer(1, LINE_LOOP)
-        .message(2, &pose(0.0, 0.0, 0.0, 0.0))
+    to.integer(1, LINE_LOOP)
+        .message(2, |to| pose(to, 0.0, 0.0, 0.0, 0.0))
         .double(3, header.body_m / 10.0);
     for (x, y) in corners {
-        outline = outline.message(5, &vector(x, y, 0.0));
+        to.message(5, |to| vector(to, x, y, 0.0));
     }
-    outline = outline.message(6, &color([0.5, 0.5, 0.5]));
-
-    let mut entity = entity(0, "field").message(11, &outline);
-    for [x, y] in &header.obstacles {
-        let cube = cube(*x, *y, 0.0, header.body_m, [0.4, 0.4, 0.4]);
-        entity = entity.message(8, &cube);
-    }
-    Protobuf::default().message(2, &entity)
+    to.message(6, |to| color(to, [0.5, 0.5, 0.5]));
 }
 
 /// The robots, each with its name, its emotion and its behavior.
-pub(crate) fn robots(header: &Header, tick: &RecordedTick, time_ns: u64) -> Protobuf {
-    let mut scene = Protobuf::default();
+pub(crate) fn robots(to: &mut Protobuf<'_>, header: &Header, tick: &TickView<'_>, time_ns: u64) {
     for (index, robot) in tick.frame.robots.iter().enumerate() {
         let at = robot.location;
+        let direction_rad = direction_rad(tick, robot);
         let color_of = ROBOT_COLORS[index % ROBOT_COLORS.len()];
-        let cube = cube(
-            at.x,
-            at.y,
-            direction_rad(tick, robot),
-            header.body_m,
-            color_of,
-        );
-        let label = Protobuf::default()
-            .message(1, &pose(at.x, at.y, header.body_m, 0.0))
-            .integer(2, 1)
-            .double(3, header.body_m / 2.0)
-            .message(5, &color([1.0, 1.0, 1.0]))
-            .text(6, &label(tick, &robot.name));
-
-        let entity = entity(time_ns, robot.name.as_str())
-            .message(8, &cube)
-            .message(13, &label);
-        scene = scene.message(2, &entity);
+        to.message(2, |to| {
+            entity(to, time_ns, robot.name.as_str());
+            to.message(8, |to| {
+                cube(to, at.x, at.y, direction_rad, header.body_m, color_of);
+            });
+            to.message(13, |to| {
+                to.message(1, |to| pose(to, at.x, at.y, header.body_m, 0.0))
+                    .integer(2, 1)
+                    .double(3, header.body_m / 2.0)
+                    .message(5, |to| color(to, [1.0, 1.0, 1.0]))
+                    .text(6, &label(tick, &robot.name));
+            });
+        });
     }
-    scene
 }
 
-fn label(tick: &RecordedTick, robot: &RobotName) -> String {
+fn label(tick: &TickView<'_>, robot: &RobotName) -> String {
     match tick.reports.get(robot) {
         Some(report) => format!(
             "{robot}\n{}\n{}",
@@ -105,60 +103,60 @@ fn label(tick: &RecordedTick, robot: &RobotName) -> String {
 }
 
 /// The guests.
-pub(crate) fn guests(guests_mm: &[i64], time_ns: u64) -> Protobuf {
-    let mut data = Vec::with_capacity(guests_mm.len() * 6);
-    for place in guests_mm.chunks_exact(2) {
-        for coordinate in [place[0], place[1], 0] {
-            data.extend_from_slice(&(coordinate as f32 / 1000.0).to_le_bytes());
-        }
-    }
-
-    let mut cloud = Protobuf::default()
-        .message(1, &timestamp(time_ns))
+pub(crate) fn guests(to: &mut Protobuf<'_>, guests_mm: &[i64], time_ns: u64) {
+    to.message(1, |to| timestamp(to, time_ns))
         .text(2, FIELD)
-        .message(3, &pose(0.0, 0.0, 0.0, 0.0))
+        .message(3, |to| pose(to, 0.0, 0.0, 0.0, 0.0))
         .fixed32(4, 3 * 4);
     for (name, offset) in [("x", 0), ("y", 4), ("z", 8)] {
-        let field = Protobuf::default()
-            .text(1, name)
-            .fixed32(2, offset)
-            .integer(3, FLOAT32);
-        cloud = cloud.message(5, &field);
+        to.message(5, |to| {
+            to.text(1, name).fixed32(2, offset).integer(3, FLOAT32);
+        });
     }
-    cloud.bytes(6, &data)
+    to.bytes(6, |bytes| {
+        for place in guests_mm.chunks_exact(2) {
+            for coordinate in [place[0], place[1], 0] {
+                bytes.extend_from_slice(&(coordinate as f32 / 1000.0).to_le_bytes());
+            }
+        }
+    });
 }
 
 /// The pose of a robot.
-pub(crate) fn robot_pose(tick: &RecordedTick, robot: &PlacedRobot, time_ns: u64) -> Protobuf {
+pub(crate) fn robot_pose(
+    to: &mut Protobuf<'_>,
+    tick: &TickView<'_>,
+    robot: &PlacedRobot,
+    time_ns: u64,
+) {
     let at = robot.location;
-    Protobuf::default()
-        .message(1, &timestamp(time_ns))
+    to.message(1, |to| timestamp(to, time_ns))
         .text(2, FIELD)
-        .message(3, &pose(at.x, at.y, 0.0, direction_rad(tick, robot)))
+        .message(3, |to| {
+            pose(to, at.x, at.y, 0.0, direction_rad(tick, robot));
+        });
 }
 
 /// The frame of reference of each robot, which has its name.
-pub(crate) fn transforms(tick: &RecordedTick, time_ns: u64) -> Protobuf {
-    let mut transforms = Protobuf::default();
+pub(crate) fn transforms(to: &mut Protobuf<'_>, tick: &TickView<'_>, time_ns: u64) {
     for robot in &tick.frame.robots {
-        let transform = Protobuf::default()
-            .message(1, &timestamp(time_ns))
-            .text(2, FIELD)
-            .text(3, robot.name.as_str())
-            .message(4, &vector(robot.location.x, robot.location.y, 0.0))
-            .message(5, &rotation(direction_rad(tick, robot)));
-        transforms = transforms.message(1, &transform);
+        let at = robot.location;
+        to.message(1, |to| {
+            to.message(1, |to| timestamp(to, time_ns))
+                .text(2, FIELD)
+                .text(3, robot.name.as_str())
+                .message(4, |to| vector(to, at.x, at.y, 0.0))
+                .message(5, |to| rotation(to, direction_rad(tick, robot)));
+        });
     }
-    transforms
 }
 
 /// A line of the log.
-pub(crate) fn log(line: &LogRecord, time_ns: u64) -> Protobuf {
-    Protobuf::default()
-        .message(1, &timestamp(time_ns))
+pub(crate) fn log(to: &mut Protobuf<'_>, line: &LogRecord, time_ns: u64) {
+    to.message(1, |to| timestamp(to, time_ns))
         .integer(2, INFO)
         .text(3, &line.text)
-        .text(4, &line.source)
+        .text(4, &line.source);
 }
 
 const LINE_LOOP: u64 = 1;
@@ -173,54 +171,45 @@ const ROBOT_COLORS: [[f64; 3]; 4] = [
 ];
 
 /// The direction of a robot; that of x for one without a report.
-fn direction_rad(tick: &RecordedTick, robot: &PlacedRobot) -> f64 {
+fn direction_rad(tick: &TickView<'_>, robot: &PlacedRobot) -> f64 {
     let report = tick.reports.get(&robot.name);
     report.map_or(0.0, |report| report.direction_rad)
 }
 
-/// An entity of a scene, which stays until another one with its id replaces it.
-fn entity(time_ns: u64, id: &str) -> Protobuf {
-    Protobuf::default()
-        .message(1, &timestamp(time_ns))
+/// The beginning of an entity of a scene, which stays until another one with its id replaces it.
+fn entity(to: &mut Protobuf<'_>, time_ns: u64, id: &str) {
+    to.message(1, |to| timestamp(to, time_ns))
         .text(2, FIELD)
-        .text(3, id)
+        .text(3, id);
 }
 
-fn cube(x: f64, y: f64, direction_rad: f64, side_m: f64, rgb: [f64; 3]) -> Protobuf {
+fn cube(to: &mut Protobuf<'_>, x: f64, y: f64, direction_rad: f64, side_m: f64, rgb: [f64; 3]) {
     let height_m = side_m * HEIGHT;
-    Protobuf::default()
-        .message(1, &pose(x, y, height_m / 2.0, direction_rad))
-        .message(2, &vector(side_m, side_m, height_m))
-        .message(3, &color(rgb))
+    to.message(1, |to| pose(to, x, y, height_m / 2.0, direction_rad))
+        .message(2, |to| vector(to, side_m, side_m, height_m))
+        .message(3, |to| color(to, rgb));
 }
 
-fn pose(x: f64, y: f64, z: f64, direction_rad: f64) -> Protobuf {
-    Protobuf::default()
-        .message(1, &vector(x, y, z))
-        .message(2, &rotation(direction_rad))
+fn pose(to: &mut Protobuf<'_>, x: f64, y: f64, z: f64, direction_rad: f64) {
+    to.message(1, |to| vector(to, x, y, z))
+        .message(2, |to| rotation(to, direction_rad));
 }
 
-fn vector(x: f64, y: f64, z: f64) -> Protobuf {
-    Protobuf::default().double(1, x).double(2, y).double(3, z)
+fn vector(to: &mut Protobuf<'_>, x: f64, y: f64, z: f64) {
+    to.double(1, x).double(2, y).double(3, z);
 }
 
 /// A rotation about the vertical, as a quaternion.
-fn rotation(direction_rad: f64) -> Protobuf {
-    Protobuf::default()
-        .double(3, libm::sin(direction_rad / 2.0))
-        .double(4, libm::cos(direction_rad / 2.0))
+fn rotation(to: &mut Protobuf<'_>, direction_rad: f64) {
+    to.double(3, libm::sin(direction_rad / 2.0))
+        .double(4, libm::cos(direction_rad / 2.0));
 }
 
-fn color([r, g, b]: [f64; 3]) -> Protobuf {
-    Protobuf::default()
-        .double(1, r)
-        .double(2, g)
-        .double(3, b)
-        .double(4, 1.0)
+fn color(to: &mut Protobuf<'_>, [r, g, b]: [f64; 3]) {
+    to.double(1, r).double(2, g).double(3, b).double(4, 1.0);
 }
 
-fn timestamp(time_ns: u64) -> Protobuf {
-    Protobuf::default()
-        .integer(1, time_ns / 1_000_000_000)
-        .integer(2, time_ns % 1_000_000_000)
+fn timestamp(to: &mut Protobuf<'_>, time_ns: u64) {
+    to.integer(1, time_ns / 1_000_000_000)
+        .integer(2, time_ns % 1_000_000_000);
 }

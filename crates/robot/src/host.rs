@@ -486,8 +486,8 @@ impl Host {
         if member.state.has_subscribers() {
             member.state.put(encode(answer.state.as_ref()))?;
         }
-        member.report.put(answer.report.to_vec())?;
 
+        // Before the report, which may complete the tick: the panel is recorded with the tick that it shows.
         let is_due = member
             .painted
             .is_none_or(|at| at.elapsed() >= PANEL_INTERVAL);
@@ -498,6 +498,7 @@ impl Host {
             member.painted = Some(Instant::now());
             member.panel.put(encode(&seat.panel()))?;
         }
+        member.report.put(answer.report.to_vec())?;
         Ok(())
     }
 
@@ -650,12 +651,8 @@ fn hear(shared: &Shared, own: &RobotName, other: &RobotName, key: &str, bytes: &
 /// Answers a query with a state, or with the one field of it that the key names.
 fn reply(query: &bus::Query, state: &PublicState) {
     let what = Keys::last_chunk(query.key());
-    if what == STATE {
-        query.reply(query.key(), encode(state));
-        return;
-    }
-    match state.answer(what) {
-        Some(answer) => query.reply(query.key(), encode(&answer)),
+    match state.reply(what) {
+        Some(reply) => query.reply(query.key(), reply),
         None => query.reply_err(&format!("there is no query called {what}")),
     }
 }

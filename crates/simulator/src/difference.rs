@@ -10,8 +10,8 @@ use serde_json::Value;
 
 use crate::record::Entry;
 
-/// Fields of a report that count processes, which the record does not compare.
-const NOT_COMPARED: &str = "generation";
+/// Fields of a report that count epochs and processes, which the record does not compare.
+const NOT_COMPARED: [&str; 2] = ["epoch", "generation"];
 
 /// Where two runs differ first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -175,6 +175,7 @@ fn is_environment(event: &Event) -> bool {
             | Event::CommandSent { .. }
             | Event::Say { .. }
             | Event::Missed { .. }
+            | Event::Judged { .. }
             | Event::Tick { .. }
     )
 }
@@ -188,7 +189,9 @@ fn robot_of(event: &Value) -> Option<RobotName> {
 fn report_to_json(report: &Report) -> Value {
     let mut json = to_json(report);
     if let Some(fields) = json.as_object_mut() {
-        fields.remove(NOT_COMPARED);
+        for field in NOT_COMPARED {
+            fields.remove(field);
+        }
     }
     json
 }

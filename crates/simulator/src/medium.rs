@@ -11,7 +11,7 @@ use protocol::random::{Stream, stream, unit};
 use protocol::{RobotName, Seq, Tick};
 
 use crate::scenario::Network;
-use crate::scenario::network::{Burst, Channel, ticks};
+use crate::scenario::network::{Burst, Channel, Counted, ticks};
 
 /// A command that a robot or the operator has sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -110,6 +110,8 @@ pub struct Medium {
     bursts: BTreeMap<(Kind, Pair), BurstState>,
     /// Links that are cut now.
     cut: BTreeMap<Pair, Scope>,
+    /// Number of commands sent so far, of those among which the scenario names single ones.
+    counts: BTreeMap<Counted, u64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -157,16 +159,33 @@ impl Medium {
     /// The network of a run with this seed, between these robots.
     #[must_use]
     pub fn new(seed: u64, tick_s: f64, network: Network, roster: Vec<RobotName>) -> Self {
-        Self {
+        let mut medium = Self {
             seed,
             tick_s,
-            network,
+            network: Network::default(),
             roster,
             sent: Vec::new(),
             arrivals: BTreeMap::new(),
             bursts: BTreeMap::new(),
             cut: BTreeMap::new(),
+            counts: BTreeMap::new(),
+        };
+        medium.count_for(&network);
+        medium.network = network;
+        medium
+    }
+
+    /// Counts from now on the commands among which a network names single ones. A network that takes effect in the middle of
+    /// a run is given at the beginning, because it names commands by their number in the run.
+    pub fn count_for(&mut self, network: &Network) {
+        for lost in &network.lost {
+            self.counts.entry(lost.counted.clone()).or_default();
         }
+    }
+
+    /// Replaces the rules of the network, from the next decision on. Commands under way stay under way.
+    pub fn set_network(&mut self, network: Network) {
+        self.network = network;
     }
 
     /// Accepts a command that was sent in the last tick.
@@ -189,7 +208,7 @@ impl Medium {
 
     /// Begins and ends partitions.
     fn update_cuts(&mut self, tick: Tick, events: &mut Vec<Event>) {
-        if self.network.partitions.is_empty() {
+        if self.network.partitions.is_empty() && self.cut.is_empty() {
             return;
         }
 
@@ -278,6 +297,11 @@ impl Medium {
             return;
         }
 
+        if self.is_named(&command) {
+            events.push(command.dropped(Cause::Scripted));
+            return;
+        }
+
         let to = command.to.clone();
         let from = command.from.clone();
         let seq = command.seq;
@@ -311,6 +335,20 @@ impl Medium {
         }
         let arrivals = self.arrivals.entry(until).or_default();
         arrivals.push((command, copies));
+    }
+
+    /// Counts a command; returns whether the scenario names it as lost.
+    fn is_named(&mut self, command: &SentCommand) -> bool {
+        let mut is_named = false;
+        for (counted, count) in &mut self.counts {
+            if !counted.contains(command) {
+                continue;
+            }
+            *count += 1;
+            let mut lost = self.network.lost.iter();
+            is_named |= lost.any(|lost| lost.counted == *counted && lost.number == *count);
+        }
+        is_named
     }
 
     /// The cause for which a message is lost, if it is. `drawn` is its random number.
@@ -408,6 +446,14 @@ impl Medium {
             });
         }
         cuts
+    }
+}
+
+impl Counted {
+    fn contains(&self, command: &SentCommand) -> bool {
+        let is_on_the_link = self.from == command.from && self.to == command.to;
+        let mut texts = self.text.iter();
+        is_on_the_link && texts.all(|text| *text == command.text.command)
     }
 }
 

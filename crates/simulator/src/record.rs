@@ -141,7 +141,9 @@ impl Record {
         };
         while let Some(Line { tick, mut event }) = self.next_line()? {
             let is_end = matches!(event, Event::End { .. });
-            if is_end {
+            // The end is of the last complete tick, and so is what is judged because of it.
+            let is_judged = matches!(event, Event::Judged { .. });
+            if is_end || (is_judged && entry.events.is_empty() && tick + 1 == self.tick) {
                 entry.tick = self.tick.saturating_sub(1);
             }
             if tick != entry.tick {

@@ -10,12 +10,10 @@ use std::time::{Duration, Instant};
 
 use config::FileError;
 use protocol::event::log_line;
-use protocol::messages::{Awaited, LogRecord, Panel};
+use protocol::messages::{Awaited, LogRecord, Panel, Report};
 use protocol::{Epoch, Event, Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
-use recording::{
-    BackgroundWriter, Frame, Header, PlacedRobot, RecordedTick, Wall, WriteError, Writer,
-};
+use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
 
 use crate::files::{EpochFiles, LOCK, check_log_name};
 use crate::record::Record;
@@ -47,6 +45,31 @@ impl RunFolder {
     #[must_use]
     pub fn at(path: PathBuf) -> Self {
         Self { path }
+    }
+
+    /// The folder itself, where the path is a link such as `latest`.
+    ///
+    /// # Errors
+    /// [`FileError`] if there is none.
+    pub fn resolved(&self) -> Result<Self, FileError> {
+        let path = self.path.canonicalize();
+        let path = path.map_err(|error| self.failed("find", &error))?;
+        Ok(Self { path })
+    }
+
+    /// The name of the run: that of its folder, also where the path is a link.
+    ///
+    /// # Errors
+    /// [`FileError`] if there is no folder, or it is not named like a run.
+    pub fn name(&self) -> Result<RunName, FileError> {
+        let path = self.resolved()?.path;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        RunName::new(&name).map_err(|error| {
+            FileError::new(format!(
+                "{} is not named like a run: {error}",
+                path.display()
+            ))
+        })
     }
 
     /// Makes the folder, removes the files of an earlier run with this name, and writes the resolved scenario.
@@ -134,7 +157,11 @@ impl RunFolder {
         Ok((lock, files))
     }
 
-    fn lock(&self) -> Result<RunLock, FileError> {
+    /// Takes the folder: while the lock is held, no other process writes a record into it.
+    ///
+    /// # Errors
+    /// [`FileError`] if another process has it.
+    pub fn lock(&self) -> Result<RunLock, FileError> {
         let file = File::create(self.file(LOCK)).map_err(|error| self.failed("lock", &error))?;
         file.try_lock().map_err(|_| {
             let path = self.path.display();
@@ -213,6 +240,18 @@ impl RunFolder {
             to.add(&line.map_err(|error| FileError::unreadable(&path, &error))?)?;
         }
         Ok(())
+    }
+
+    /// Writes a file of one line that others wait for: they see it whole or not at all.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be written.
+    pub fn write_line(&self, name: &str, line: &str) -> Result<(), FileError> {
+        let file = self.file(name);
+        let unfinished = file.with_extension("new");
+        let written = std::fs::write(&unfinished, format!("{line}\n"));
+        let written = written.and_then(|()| std::fs::rename(&unfinished, &file));
+        written.map_err(|error| FileError::new(format!("cannot write {}: {error}", file.display())))
     }
 
     /// A file of the folder.
@@ -339,7 +378,7 @@ pub struct Recorder {
     /// The lines of `events` so far.
     seal: Seal,
     log: Option<Lines>,
-    recording: Option<BackgroundWriter>,
+    recording: Option<Writer>,
     begun: Instant,
     /// Of the tick that is written next.
     observed: Option<Observed>,
@@ -420,9 +459,7 @@ impl Recorder {
             let path = folder.file(&format!("{RECORDING}{suffix}"));
             let scenario = simulation.scenario().to_toml()?;
             let writer = Writer::create(&path, &header(run, simulation), &scenario);
-            recording = Some(BackgroundWriter::start(
-                writer.map_err(|error| unrecordable(&error))?,
-            ));
+            recording = Some(writer.map_err(|error| unrecordable(&error))?);
         }
 
         Ok(Self {
@@ -474,6 +511,13 @@ impl Recorder {
         simulation: &Simulation,
         record: &TickRecord,
     ) -> Result<Vec<LogRecord>, FileError> {
+        // The events of the end belong to the last tick, which is recorded already. The recording is finished first: a record
+        // whose events have an end is whole.
+        let is_end = matches!(record.events.last(), Some(Event::End { .. }));
+        if is_end && let Some(recording) = self.recording.take() {
+            finish(recording, record).map_err(|error| unrecordable(&error))?;
+        }
+
         let mut lines = Vec::new();
         for line in record.lines() {
             self.summary.count(simulation, &line);
@@ -485,18 +529,6 @@ impl Recorder {
         self.events.flush()?;
         self.write_log(&lines)?;
 
-        // The event of the end belongs to the last tick, which is recorded already.
-        let end = record.events.last();
-        let end = end.filter(|event| matches!(event, Event::End { .. }));
-        if let Some(event) = end
-            && let Some(mut recording) = self.recording.take()
-        {
-            recording
-                .end(record.tick, event)
-                .map_err(|error| unrecordable(&error))?;
-            recording.finish().map_err(|error| unrecordable(&error))?;
-        }
-        let is_end = end.is_some();
         if self.recording.is_some() && !is_end {
             self.record_tick(simulation, record)?;
         }
@@ -513,16 +545,24 @@ impl Recorder {
         record: &TickRecord,
     ) -> Result<(), FileError> {
         let observed = self.observed.take();
-        let mut tick = recorded(simulation, record);
-        if let Some(observed) = observed {
-            tick.wall = wall(self.begun, &observed);
-            tick.panels = observed.panels;
-        }
+        let Some(recording) = &mut self.recording else {
+            return Ok(());
+        };
 
-        match &mut self.recording {
-            Some(recording) => recording.tick(tick).map_err(|error| unrecordable(&error)),
-            None => Ok(()),
+        let mut wall = Wall::default();
+        let mut panels = BTreeMap::new();
+        if let Some(observed) = observed {
+            wall = wall_times(self.begun, &observed);
+            panels = observed.panels;
         }
+        let tick = TickView {
+            frame: &frame(simulation, record),
+            events: &record.events,
+            reports: reports(simulation, record),
+            panels: &panels,
+            wall: &wall,
+        };
+        recording.tick(&tick).map_err(|error| unrecordable(&error))
     }
 
     fn add_event(&mut self, line: &Line) -> Result<(), FileError> {
@@ -620,6 +660,14 @@ fn superseded_prefix(file: &str) -> String {
     format!("{}-epoch", file.split('.').next().unwrap_or(file))
 }
 
+/// Ends a recording with the events of the end of the run.
+fn finish(mut recording: Writer, end: &TickRecord) -> Result<(), WriteError> {
+    for event in &end.events {
+        recording.end(end.tick, event)?;
+    }
+    recording.finish()
+}
+
 fn unwritable(path: &Path, error: &dyn std::fmt::Display) -> FileError {
     let place = path.display();
     FileError::new(format!("cannot write {place}: {error}")).with_help(format!(
@@ -650,42 +698,49 @@ fn header(run: &RunName, simulation: &Simulation) -> Header {
     }
 }
 
-fn recorded(simulation: &Simulation, record: &TickRecord) -> RecordedTick {
+/// The field after a tick.
+fn frame(simulation: &Simulation, record: &TickRecord) -> Frame {
     let mut robots = Vec::new();
-    let mut reports = BTreeMap::new();
     for name in simulation.names() {
         let last = simulation.report(name);
-        let report = last.filter(|report| report.tick == record.tick);
-        if let Some(report) = report {
-            reports.insert(name.clone(), report.clone());
-        }
+        let is_missed = last.is_none_or(|report| report.tick != record.tick);
         robots.push(PlacedRobot {
             name: name.clone(),
             location: simulation.location(name).unwrap_or_default(),
             blocked: simulation.is_blocked(name),
-            missed: report.is_none().then(|| Missed {
+            missed: is_missed.then(|| Missed {
                 last_report: last.map(|report| report.tick),
             }),
         });
     }
 
-    RecordedTick {
-        frame: Frame {
-            tick: record.tick,
-            robots,
-            guests_mm: guests_mm(simulation),
-            cuts: simulation.cuts(),
-            unreachable: simulation.unreachable().clone(),
-        },
-        events: record.events.clone(),
-        reports,
-        panels: BTreeMap::new(),
-        wall: Wall::default(),
+    Frame {
+        tick: record.tick,
+        robots,
+        guests_mm: guests_mm(simulation),
+        cuts: simulation.cuts(),
+        unreachable: simulation.unreachable().clone(),
+        expectations: simulation.standings(),
     }
 }
 
+/// The reports for a tick.
+fn reports<'a>(
+    simulation: &'a Simulation,
+    record: &TickRecord,
+) -> BTreeMap<&'a RobotName, &'a Report> {
+    let mut reports = BTreeMap::new();
+    for name in simulation.names() {
+        let last = simulation.report(name);
+        if let Some(report) = last.filter(|report| report.tick == record.tick) {
+            reports.insert(name, report);
+        }
+    }
+    reports
+}
+
 /// The times of a tick that is complete now.
-fn wall(begun: Instant, observed: &Observed) -> Wall {
+fn wall_times(begun: Instant, observed: &Observed) -> Wall {
     let since = |time: Instant| time.saturating_duration_since(begun).as_nanos() as u64;
     let reports = observed.reports.iter();
     Wall {
@@ -699,8 +754,9 @@ fn wall(begun: Instant, observed: &Observed) -> Wall {
 }
 
 fn guests_mm(simulation: &Simulation) -> Vec<i64> {
-    let mut guests_mm = Vec::new();
-    for guest in simulation.world().guests() {
+    let guests = simulation.world().guests();
+    let mut guests_mm = Vec::with_capacity(2 * guests.len());
+    for guest in guests {
         guests_mm.push((guest.x * 1000.0).round() as i64);
         guests_mm.push((guest.y * 1000.0).round() as i64);
     }

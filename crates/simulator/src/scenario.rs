@@ -1,8 +1,10 @@
 //! Scenarios. A file is read as written (module `raw`), then checked and converted ([`Scenario`]).
 
+pub mod change;
 mod checked;
 pub mod fault;
 pub mod network;
+mod over_time;
 mod placing;
 mod raw;
 mod setup;
@@ -11,12 +13,28 @@ use std::path::Path;
 
 pub use config::{Changes, Override};
 use config::{FileError, Source};
+use observe::Expectation;
+use protocol::RobotName;
 pub use protocol::messages::OnLate;
 
+pub use change::{Change, Parent};
 pub use checked::{DEFAULT_SEED, Lateness, MAX_GUESTS, Record, RobotSpec, Scenario, SyncPoint};
 pub(crate) use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use network::Network;
+
+/// Reads the expectations of a file, for a run with these robots. Other tables of the file are of no concern.
+///
+/// # Errors
+/// [`FileError`] with file, line and caret; if there are none.
+pub fn expectations(source: &Source, roster: &[RobotName]) -> Result<Vec<Expectation>, FileError> {
+    let file: raw::Expectations = source.parse()?;
+    let expectations = file.check(source, roster)?;
+    if expectations.is_empty() {
+        return Err(FileError::new(format!("{} has no [[expect]]", source.name)));
+    }
+    Ok(expectations)
+}
 
 impl Scenario {
     /// Reads, changes and checks a scenario file.
@@ -29,11 +47,14 @@ impl Scenario {
         // Parsed before it is changed, so that errors show the lines of the file.
         let raw: raw::Scenario = source.parse()?;
         if changes.is_empty() {
-            return raw.check(&source, folder);
+            return raw.check(&source, Some(folder));
         }
 
         let source = changes.apply(&source)?;
-        source.parse::<raw::Scenario>()?.check(&source, folder)
+        let raw: raw::Scenario = source.parse()?;
+        let mut scenario = raw.check(&source, Some(folder))?;
+        scenario.parent = None; // It is no fork of that run any more.
+        Ok(scenario)
     }
 
     /// Reads and checks the text of a scenario. Files that it names are relative to `folder`.
@@ -41,7 +62,7 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse(source: &Source, folder: &Path) -> Result<Self, FileError> {
-        source.parse::<raw::Scenario>()?.check(source, folder)
+        source.parse::<raw::Scenario>()?.check(source, Some(folder))
     }
 
     /// Reads and checks an untrusted text of a scenario, which must not name files.
@@ -49,10 +70,7 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse_alone(source: &Source) -> Result<Self, FileError> {
-        source
-            .parse::<raw::Scenario>()?
-            .refuse_files(source)?
-            .check(source, Path::new("."))
+        source.parse::<raw::Scenario>()?.check(source, None)
     }
 
     /// The scenario as a file without defaults, which gives the same run.

@@ -4,6 +4,8 @@
 //! One queue. Everything that can happen is an [`Event`], and one thread at a time works on them: the one on which an event
 //! arrives, or the server's own. Control is answered in the same way, also while the clock is held, because no work ever
 //! waits for a robot.
+//!
+//! A [`Replay`] is in the simulator's place, too, with a recording instead of a simulation.
 
 mod control;
 mod faults;
@@ -13,9 +15,12 @@ mod observers;
 mod orders;
 mod pace;
 mod past;
+mod player;
 mod process;
+mod replay;
 mod timers;
 mod watchdog;
 
 pub use past::Past;
 pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError};
+pub use replay::{Replay, ReplayError, ReplayOptions};

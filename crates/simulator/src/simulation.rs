@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use lockstep::{Exchange, Membership, Naming, Outcome, Sent};
+use observe::{Observation, RobotState, Watches};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, NEWS_FLAGS, News, OnLate, Performative,
-    Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables,
-    Welcome,
+    Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind, SensedRobot, Standing,
+    StateVariables, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
@@ -88,6 +89,8 @@ pub struct Simulation {
     /// Events between the last tick and the next.
     between: Vec<Event>,
     digest: Digest,
+    /// What the scenario expects of the run.
+    watches: Watches,
 }
 
 impl Simulation {
@@ -98,12 +101,15 @@ impl Simulation {
     pub fn new(scenario: Scenario, epoch: Epoch) -> Result<Self, HallError> {
         let world = World::new(&scenario.hall(), stream(scenario.seed, "guests"))?;
         let names = scenario.roster();
-        let medium = Medium::new(
+        let mut medium = Medium::new(
             scenario.seed,
             scenario.tick_s,
             scenario.network.clone(),
             names.clone(),
         );
+        for change in &scenario.changes {
+            medium.count_for(&change.network);
+        }
 
         Ok(Self {
             epoch,
@@ -127,6 +133,12 @@ impl Simulation {
             sent: BTreeMap::new(),
             between: Vec::new(),
             digest: Digest::default(),
+            watches: Watches::new(
+                &scenario.expectations,
+                scenario.tick_s,
+                scenario.body_m,
+                &scenario.roster(),
+            ),
             scenario,
         })
     }
@@ -186,6 +198,7 @@ impl Simulation {
     pub fn begin_tick(&mut self) -> Tick {
         self.now = self.tick + 1;
         self.events = std::mem::take(&mut self.between);
+        self.change_scenario();
 
         let verdicts = self.world.advance(&self.proposals());
         self.note_moves(&verdicts);
@@ -200,7 +213,23 @@ impl Simulation {
         self.now
     }
 
-    /// The second half of a tick: reports become events and are added to the digest.
+    /// What the scenario changes takes effect.
+    fn change_scenario(&mut self) {
+        let mut network = None;
+        for change in self.scenario.changes_at(self.now) {
+            network = Some(change.network.clone());
+            for set in &change.set {
+                self.events.push(Event::Changed {
+                    set: set.to_string(),
+                });
+            }
+        }
+        if let Some(network) = network {
+            self.medium.set_network(network);
+        }
+    }
+
+    /// The second half of a tick: reports become events and are added to the digest, and expectations are judged by them.
     pub fn end_tick(&mut self, outcome: Reports) -> TickRecord {
         self.note_membership(outcome.membership);
         self.note_deliveries(&outcome.reports);
@@ -214,6 +243,7 @@ impl Simulation {
         self.tick = self.now;
         self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
         self.digest.close(&digest);
+        self.judge();
         self.events.push(Event::Tick {
             digest: self.digest.to_string(),
             seal: None,
@@ -222,6 +252,35 @@ impl Simulation {
             tick: self.tick,
             events: std::mem::take(&mut self.events),
         }
+    }
+
+    /// Judges the expectations that are decided in the tick. The digest of the run does not depend on them.
+    fn judge(&mut self) {
+        if self.watches.is_empty() {
+            return;
+        }
+
+        let mut watches = std::mem::take(&mut self.watches);
+        let judged = watches.observe(&Observation {
+            tick: self.tick,
+            time_s: self.time_s(self.tick),
+            events: &self.events,
+            state: &|name| self.robot_state(name),
+        });
+        self.watches = watches;
+        self.events.extend(judged);
+    }
+
+    /// What a robot reported last, and where it stands; `None` before its first report.
+    #[must_use]
+    pub fn robot_state(&self, name: &RobotName) -> Option<RobotState<'_>> {
+        let report = self.reports.get(name)?;
+        Some(RobotState {
+            location: *self.stood_at.get(self.index(name)?)?,
+            state_variables: &report.state_variables,
+            emotion_state: &report.emotion_state,
+            behavior_state: &report.behavior_state,
+        })
     }
 
     fn note_reports(&mut self, mut reports: ReportsByName, digest: &mut TickDigest) {
@@ -319,10 +378,13 @@ impl Simulation {
 
     /// Composes the news of the tick in progress, which contain exceptions only.
     fn compose_news(&mut self, verdicts: &[Verdict]) {
+        let restarted = self.scenario.restarts_at(self.now);
         let mut all = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             let is_refused = !verdicts.is_empty() && self.blocked[index];
-            let is_corrected = is_refused || self.silent.contains(name);
+            // These know no proposal of theirs.
+            let is_new = self.silent.contains(name) || restarted.contains(name);
+            let is_corrected = is_refused || is_new;
             let news = News {
                 epoch: self.epoch,
                 tick: self.now,
@@ -494,7 +556,7 @@ impl Simulation {
     pub fn faults_due(&self) -> Vec<ProcessOrder> {
         let tick = self.tick + 1;
         let mut due = Vec::new();
-        for fault in &self.scenario.faults {
+        for fault in self.scenario.faults_at(tick) {
             if fault.at == tick {
                 due.push(fault.begin_order());
             }
@@ -503,6 +565,18 @@ impl Simulation {
             }
         }
         due
+    }
+
+    /// Robots that start again before the next tick, as further incarnations, because the scenario changes their parameters.
+    #[must_use]
+    pub fn restarts_due(&self) -> BTreeSet<RobotName> {
+        self.scenario.restarts_at(self.tick + 1)
+    }
+
+    /// The next tick that a robot that joins now runs.
+    fn next_tick(&self) -> Tick {
+        let has_begun = !self.stood_at.is_empty();
+        if has_begun { self.tick + 1 } else { 0 }
     }
 
     /// Records orders that are carried out before the next tick, as part of it. A robot whose process they stop, and without
@@ -543,17 +617,25 @@ impl Simulation {
         }
     }
 
-    /// The record of the end of the run.
+    /// The record of the end of the run, in which the expectations that are open are judged.
     #[must_use]
-    pub fn end(&self, reason: End) -> TickRecord {
+    pub fn end(&mut self, reason: End) -> TickRecord {
+        let mut events = self.watches.end(reason);
+        events.push(Event::End {
+            reason,
+            digest: self.digest.to_string(),
+            seal: None,
+        });
         TickRecord {
             tick: self.tick,
-            events: vec![Event::End {
-                reason,
-                digest: self.digest.to_string(),
-                seal: None,
-            }],
+            events,
         }
+    }
+
+    /// How the expectations of the scenario stand.
+    #[must_use]
+    pub fn standings(&self) -> Vec<Standing> {
+        self.watches.standings()
     }
 
     /// The welcome of a robot that joins; `None` if it is not in the roster. `open` is a report that an earlier incarnation
@@ -566,10 +648,10 @@ impl Simulation {
         generation: Generation,
         open: Option<&Report>,
     ) -> Option<Welcome> {
-        let spec = self.scenario.robots.get(name)?;
+        let parameters = self.scenario.parameters_at(name, self.next_tick())?;
         let index = self.index(name)?;
         let location = self.location(name)?;
-        let open_state = open.map(|report| public_state(report, location));
+        let open_state = open.map(|report| report.state(location));
         let last_state = self.last_state(name);
 
         Some(Welcome {
@@ -587,7 +669,7 @@ impl Simulation {
             sensing_range_m: self.scenario.sensing_range_m,
             location,
             roster: self.names.clone(),
-            parameters: spec.parameters.clone(),
+            parameters: parameters.clone(),
             news_flag: 1 << (index % NEWS_FLAGS),
             state_before: open_state.as_ref().and(last_state.clone()),
             last_state: open_state.or(last_state),
@@ -599,7 +681,7 @@ impl Simulation {
     pub fn last_state(&self, name: &RobotName) -> Option<PublicState> {
         let report = self.reports.get(name)?;
         let location = self.stood_at.get(self.index(name)?)?;
-        Some(public_state(report, *location))
+        Some(report.state(*location))
     }
 
     /// The name of a robot's random stream. The first incarnation in an epoch draws from the stream of its name; a later one
@@ -744,18 +826,4 @@ fn follow(last: Option<(Generation, u32)>, generation: Generation) -> (Generatio
     };
 
     (generation, incarnation)
-}
-
-/// The state that a report and a location publish to the other robots.
-fn public_state(report: &Report, location: Point) -> PublicState {
-    PublicState {
-        epoch: report.epoch,
-        tick: report.tick,
-        location,
-        speed_mps: report.speed_mps,
-        direction_rad: report.direction_rad,
-        state_variables: report.state_variables.clone(),
-        emotion_state: report.emotion_state.clone(),
-        behavior_state: report.behavior_state.clone(),
-    }
 }

@@ -5,7 +5,7 @@ mod network;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use protocol::messages::{End, StateVariables};
+use protocol::messages::{End, StateVariables, Verdict};
 use protocol::{Event, Line, RobotName, RunName, Tick};
 use serde::{Deserialize, Serialize};
 
@@ -37,12 +37,26 @@ pub struct Summary {
     /// Metrics of the network.
     #[serde(default)]
     pub network: NetworkSummary,
+    /// The verdicts on what the scenario expects of the run, by the names of the expectations.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub expectations: BTreeMap<String, Judged>,
     /// Wall-clock times; they differ from run to run.
     pub wall: Wall,
     #[serde(skip)]
     begun: Option<Instant>,
     #[serde(skip)]
     since: BTreeMap<RobotName, Since>,
+}
+
+/// A verdict on an expectation.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Judged {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The tick in which it was decided.
+    pub tick: Tick,
+    /// Why, in words.
+    pub because: String,
 }
 
 /// Metrics of one robot.
@@ -117,6 +131,7 @@ impl Summary {
             digest: String::new(),
             robots: robots.collect(),
             network: NetworkSummary::default(),
+            expectations: BTreeMap::new(),
             wall: Wall::default(),
             begun: None,
             since: BTreeMap::new(),
@@ -143,6 +158,18 @@ impl Summary {
                 generation: Some(_),
                 ..
             } => self.robot(robot).returns += 1,
+            Event::Judged {
+                expectation,
+                verdict,
+                because,
+            } => {
+                let judged = Judged {
+                    verdict: *verdict,
+                    tick: line.tick,
+                    because: because.clone(),
+                };
+                self.expectations.insert(expectation.clone(), judged);
+            }
             Event::End { reason, digest, .. } => {
                 self.end = Some(*reason);
                 self.digest.clone_from(digest);
@@ -169,6 +196,13 @@ impl Summary {
         let robot = self.robot(robot);
         add(&mut robot.behaviors_s, left, tick, tick_s);
         *robot.entered.entry(to.to_owned()).or_default() += 1;
+    }
+
+    /// The verdict on the run: the worst of its expectations. A run of which nothing is expected passes.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        let verdicts = self.expectations.values().map(|judged| judged.verdict);
+        verdicts.max().unwrap_or(Verdict::Pass)
     }
 
     /// Completes the summary at the end of the epoch.

@@ -365,9 +365,67 @@ fn a_person_at_the_console_is_not_on_the_robots_network() {
     assert!(decision.events.is_empty() && decision.delivered[&name("A")].len() == 1);
 }
 
+const LOSE_2_AND_5: &str =
+    "network.lose = [{ from = 'A', to = 'B', number = 2 }, { from = 'A', to = 'B', number = 5 }]";
+
+#[test]
+fn exactly_the_named_commands_are_lost() {
+    let decisions = play(LOSE_2_AND_5, 20, |tick, medium| {
+        medium.accept(command("A", "C", 100 + tick));
+        medium.accept(command("B", "A", tick));
+    });
+    assert_eq!(
+        lost(&decisions),
+        [(2, Cause::Scripted), (5, Cause::Scripted)]
+    );
+    assert_eq!(arrived(&decisions).len(), 18);
+}
+
+#[test]
+fn a_named_command_changes_nothing_of_the_fate_of_others() {
+    let chance = "network.commands = { loss = 0.3, duplication = 0.2 }";
+    let named = format!("{chance}\n{LOSE_2_AND_5}");
+    let mut by_chance = lost(&play(chance, 200, |_, _| ()));
+    let mut with_named = lost(&play(&named, 200, |_, _| ()));
+
+    by_chance.retain(|(seq, _)| ![2, 5].contains(seq));
+    with_named.retain(|(_, because)| *because != Cause::Scripted);
+    assert!(!by_chance.is_empty());
+    assert_eq!(with_named, by_chance);
+}
+
+#[test]
+fn commands_of_a_text_are_counted_on_their_own() {
+    let network = "[[network.lose]]\nfrom = 'A'\nto = 'B'\nnumber = 2\ntext = 'hurry'";
+    let decisions = play(network, 10, |tick, medium| {
+        let mut hurry = command("A", "B", 100 + tick);
+        hurry.text.command = "hurry".into();
+        medium.accept(hurry);
+    });
+    assert_eq!(lost(&decisions), [(102, Cause::Scripted)]);
+}
+
+#[test]
+fn a_command_is_counted_from_the_beginning_of_the_run() {
+    let mut medium = medium("");
+    let later = parse(LOSE_2_AND_5).unwrap().network;
+    medium.count_for(&later);
+
+    let mut decisions = BTreeMap::new();
+    for tick in 1..=10 {
+        if tick == 4 {
+            medium.set_network(later.clone());
+        }
+        medium.accept(command("A", "B", tick));
+        decisions.insert(tick + 1, medium.decide(tick + 1));
+    }
+    assert_eq!(lost(&decisions), [(5, Cause::Scripted)]);
+}
+
 #[test]
 fn impossible_networks_are_refused_where_they_stand() {
     let partition = |rest: &str| format!("[[network.partition]]\n{rest}");
+    let lose = |rest: &str| format!("[[network.lose]]\n{rest}");
 
     for (network, reason) in [
         ("network.commands.loss = 1.5".to_owned(), "from 0 to 1"),
@@ -415,6 +473,15 @@ fn impossible_networks_are_refused_where_they_stand() {
             partition("groups = [[\"A\"], [\"B\"]]\nfrom = \"5 s\"\ncuts = []"),
             "cuts nothing",
         ),
+        (lose("from = \"A\"\nto = \"Z\"\nnumber = 1"), "called Z"),
+        (
+            lose("from = \"operator\"\nto = \"A\"\nnumber = 1"),
+            "called operator",
+        ),
+        (
+            lose("from = \"A\"\nto = \"B\"\nnumber = 0"),
+            "counted from 1",
+        ),
     ] {
         let error = parse(&network).unwrap_err().in_words();
         assert!(
@@ -428,7 +495,9 @@ fn impossible_networks_are_refused_where_they_stand() {
 fn the_resolved_file_has_the_same_network() {
     let network = "[network]\ncommands = { loss = 0.25, duplication = 0.1, delay = \"1 s\", burst = { enter = 0.1, leave = 0.5 } }\n\
                    queries = { loss = 0.1 }\n[[network.link]]\nfrom = \"A\"\nto = \"B\"\ncommands = { loss = 1.0 }\n\
-                   [[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"7 s\"\none_way = true\ncuts = [\"queries\"]\n";
+                   [[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"7 s\"\none_way = true\ncuts = [\"queries\"]\n\
+                   [[network.lose]]\nfrom = \"A\"\nto = \"B\"\nnumber = 3\ntext = \"refill\"\n\
+                   [[network.lose]]\nfrom = \"B\"\nto = \"A\"\nnumber = 1\n";
     let scenario = parse(network).unwrap();
     let text = scenario.to_toml().unwrap();
     let again = Scenario::parse(

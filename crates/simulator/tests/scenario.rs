@@ -218,3 +218,171 @@ fn a_plain_roster_is_the_experiment_of_the_paper() {
     let error = shown(&simulator::roster::scenario_of(&bad).unwrap_err());
     assert!(error.contains("2 │ Le guin"), "{error}");
 }
+
+const TWO_ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"3 m\", \"3 m\"]\nparams = { wait = \"5 s\" }\n\
+                          [[robot]]\nname = \"B\"\nat = [\"9 m\", \"9 m\"]\n";
+
+fn with_changes(changes: &str) -> Result<Scenario, FileError> {
+    parse(&format!("{changes}\n{TWO_ROBOTS}"))
+}
+
+#[test]
+fn changes_are_in_effect_from_their_tick_on_and_one_builds_on_the_other() {
+    let scenario = with_changes(
+        "[[change]]\nat = \"20 s\"\nset = [\"network.commands.loss=0.0\"]\n\
+         [[change]]\nat = \"10 s\"\nset = [\"network.commands.loss=0.5\", \"network.queries.loss=0.25\", \"robot.A.params.wait=7 s\"]\n\
+         [parent]\nrun = \"first\"\ntick = 19\ndigest = \"abc\"\n",
+    )
+    .unwrap();
+    let resolved = parse(&scenario.to_toml().unwrap()).unwrap();
+
+    for scenario in [&scenario, &resolved] {
+        let loss = |tick| {
+            let network = scenario.network_at(tick);
+            (network.commands.loss, network.queries.loss)
+        };
+        assert_eq!([loss(0), loss(19)], [(0.0, 0.0); 2]);
+        assert_eq!([loss(20), loss(39)], [(0.5, 0.25); 2]);
+        assert_eq!(loss(40), (0.0, 0.25));
+
+        let a = "A".parse().unwrap();
+        let wait = |tick| scenario.parameters_at(&a, tick).unwrap()["wait"].clone();
+        assert_eq!([wait(19), wait(20), wait(41)], [5.0, 7.0, 7.0]);
+        let restarts = |tick| scenario.restarts_at(tick).into_iter().collect::<Vec<_>>();
+        assert_eq!(restarts(20), std::slice::from_ref(&a));
+        assert!(restarts(19).is_empty() && restarts(40).is_empty());
+        assert_eq!(scenario.parent.as_ref().unwrap().tick, 19);
+    }
+    assert_eq!(resolved.changes, scenario.changes);
+
+    let mut setup = scenario.setup();
+    setup.seed += 1;
+    let changed = scenario.with_setup(&setup).unwrap();
+    assert_eq!(changed.parent, None);
+    assert_eq!(changed.changes, scenario.changes);
+}
+
+#[test]
+fn a_robot_that_is_away_is_not_started_again_by_a_change() {
+    for (fault, restarts) in [
+        ("at = \"5 s\", until = \"10 s\"", false),
+        ("at = \"5 s\", until = \"9.5 s\"", true),
+        ("at = \"10 s\", until = \"12 s\"", false),
+        ("at = \"10.5 s\", until = \"12 s\"", true),
+        ("at = \"5 s\"", false),
+    ] {
+        let scenario = with_changes(&format!(
+            "on_late = \"continue\"\n[[fault]]\nrobot = \"A\"\ndo = \"crash\"\n{}\n\
+             [[change]]\nat = \"10 s\"\nset = [\"robot.A.params.wait=1\"]\n",
+            fault.replace(", ", "\n")
+        ));
+        let restarted = scenario.unwrap().restarts_at(20);
+        assert_eq!(restarted.len(), usize::from(restarts), "{fault}");
+    }
+}
+
+#[test]
+fn a_change_that_cannot_be_made_shows_its_place() {
+    for (set, line, reason) in [
+        ("seed=3", 1, "only the network, faults, and parameters"),
+        (
+            "guests.count=3",
+            1,
+            "only the network, faults, and parameters",
+        ),
+        ("robot.A.at=[\"4 m\", \"3 m\"]", 1, "only the network"),
+        ("robot.A.on_late=continue", 1, "only the network"),
+        ("robot.C.params.x=1", 3, "none of the 2 elements"),
+        ("change=[]", 3, "a further [[change]]"),
+        ("parent.tick=1", 3, "a further [[change]]"),
+        ("loss", 3, "not of the form path=value"),
+        ("fault=[]", 1, "a fault that begins before the change"),
+    ] {
+        let fault = "[[fault]]\nrobot = \"B\"\ndo = \"slow\"\nat = \"1 s\"\n";
+        let error = with_changes(&format!(
+            "[[change]]\nat = \"10 s\"\nset = ['{set}']\n{fault}"
+        ))
+        .unwrap_err();
+        let text = shown(&error);
+        assert!(text.contains(reason), "{set}: {text}");
+        assert!(
+            text.contains(&format!("hall.toml:{line}:")),
+            "{set}: {text}"
+        );
+    }
+
+    let error = with_changes("[[change]]\nat = \"0 s\"\nset = []\n").unwrap_err();
+    assert!(shown(&error).contains("from the first tick on"));
+    let error = with_changes("[[change]]\nat = \"3 s\"\nset = [\"network.commands.loss=2\"]\n");
+    let text = shown(&error.unwrap_err());
+    assert!(text.contains("its change at tick 6"), "{text}");
+    let many = "[[change]]\nat = \"1 s\"\nset = []\n".repeat(101);
+    let error = with_changes(&many).unwrap_err();
+    assert!(shown(&error).contains("more than 100 changes"));
+    assert!(with_changes(&"[[change]]\nat = \"1 s\"\nset = []\n".repeat(100)).is_ok());
+}
+
+#[test]
+fn an_untrusted_scenario_names_no_files_in_changes_either() {
+    let text = format!(
+        "[[change]]\nat = \"1 s\"\nset = ['robot.A.params_from=\"/dev/zero\"']\n{TWO_ROBOTS}"
+    );
+    let source = Source {
+        name: "loaded".into(),
+        text,
+    };
+    let error = Scenario::parse_alone(&source).unwrap_err();
+    assert!(shown(&error).contains("names a file"), "{}", shown(&error));
+}
+
+/// A scenario with robot A and these expectations.
+fn expecting(entries: &str) -> Result<Scenario, FileError> {
+    parse(&format!(
+        "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\n{entries}"
+    ))
+}
+
+#[test]
+fn expectations_are_kept_in_the_resolved_file() {
+    let entry = "[[expect]]\nname = \"it\"\nafter = { event = \"link_healed\", to = \"A\" }\neventually = [{ event = \"say\" }, { robot = \
+                 \"A\", variable = \"x\", above = 2 }]\nwithin = \"1 min\"\n";
+    let scenario = expecting(entry).unwrap();
+    assert_eq!(scenario.expectations.len(), 1);
+    let again = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(again.expectations, scenario.expectations);
+}
+
+#[test]
+fn expectations_of_other_robots_of_one_name_and_too_many_are_refused() {
+    let entry =
+        |name: &str| format!("[[expect]]\nname = \"{name}\"\nnever = {{ event = \"say\" }}\n");
+    let many: String = (0..64).map(|number| entry(&number.to_string())).collect();
+    assert_eq!(expecting(&many).unwrap().expectations.len(), 64);
+
+    for (entries, reason) in [
+        (many + &entry("64"), "more than 64 expectations"),
+        (
+            entry("it") + &entry("it"),
+            "a second expectation called \"it\"",
+        ),
+        (
+            "[[expect]]\nname = \"it\"\nnever = { event = \"say\", robot = \"B\" }\n".to_owned(),
+            "no robot of this scenario is called B",
+        ),
+    ] {
+        let error = shown(&expecting(&entries).unwrap_err());
+        assert!(error.contains(reason), "{error}");
+        assert!(error.contains("[[expect]]"), "{error}");
+    }
+}
+
+#[test]
+fn expectations_do_not_change_while_a_run_goes_on() {
+    let change = "[[change]]\nat = \"5 s\"\nset = [\"expect.0.name=other\"]\n";
+    let entry = "[[expect]]\nname = \"it\"\nnever = { event = \"say\" }\n";
+    let error = shown(&expecting(&format!("{change}{entry}")).unwrap_err());
+    assert!(
+        error.contains("only the network, faults, and parameters"),
+        "{error}"
+    );
+}

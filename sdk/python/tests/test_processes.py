@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from lab import EXAMPLES, PATIENCE_S, PYTHON, ROOT, Lab, assert_same
+from lab import EXAMPLES, EXPECTS_NOTHING, PATIENCE_S, PYTHON, ROOT, Lab, assert_same
 
 EMPTY_HALL = """
 seed = 1
@@ -28,7 +28,7 @@ def hall(*robots: str, duration: str = "100 s") -> str:
 
 def test_the_launch_file_of_the_project_plays(lab: Lab) -> None:
     out = ["--no-console", "-q", "--speed", "max", "--duration", "60 s", "--out", str(lab.folder), "--run", "shipped"]
-    lab.cars("launch", "launch/leguin_in_python.toml", *out)
+    lab.cars("launch", "launch/leguin_in_python.toml", *EXPECTS_NOTHING, *out)
     assert_same(lab.events("shipped"), lab.play("local", "hors_doeuvres.toml", "--duration", "60 s"))
 
 
@@ -64,7 +64,7 @@ def test_init_begins_the_same_run_anew(lab: Lab) -> None:
 
 def test_one_who_is_killed_comes_back_and_takes_over(lab: Lab) -> None:
     scenario = (ROOT / "configs/hors_doeuvres.toml").read_text().replace('"robots/', f'"{ROOT}/configs/robots/')
-    at = lab.simulator("back", scenario, "--paused")
+    at = lab.simulator("back", scenario, "--paused", "--no-verdict")
     ctl = ["--run", "back", "--connect", at["CARS_CONNECT"]]
     butler = lab.start([str(lab.programs / "cars-butler")], **at)
     first = lab.robot("leguin.py", **at)

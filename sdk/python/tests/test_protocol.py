@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import signal
 import subprocess
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +14,7 @@ from lab import EXAMPLES, PATIENCE_S, eventually
 from stage import Stage, flag, welcome
 
 from cars_robot import stream
+from cars_robot.link import LOOK_FOR_SIMULATOR_S
 
 Json = dict[str, Any]
 NAMED = {"joined": 1}
@@ -409,6 +412,18 @@ def test_a_signal_ends_it_cleanly(stage: Stage, number: signal.Signals, order_: 
     robot.send_signal(number)
     assert robot.wait(PATIENCE_S) == -number
     # The token was taken back before: a process that is killed is noticed as fast, but closes nothing.
+    stage.until_alive()
+
+
+def test_a_signal_that_wakes_no_main_thread_ends_it(stage: Stage) -> None:
+    """[end.sigterm] The system may give a signal to any thread, and a thread that is about to wait does not notice it."""
+    robot = begin(stage)
+    threads = [int(thread.name) for thread in Path(f"/proc/{robot.pid}/task").iterdir()]
+    other = max(thread for thread in threads if thread != robot.pid)
+    libc = ctypes.CDLL(None, use_errno=True)
+    assert libc.tgkill(robot.pid, other, signal.SIGTERM) == 0
+    # A robot that did not notice would look around after LOOK_FOR_SIMULATOR_S.
+    assert robot.wait(LOOK_FOR_SIMULATOR_S / 2) == -signal.SIGTERM
     stage.until_alive()
 
 

@@ -35,6 +35,20 @@ fn every_shipped_scenario_is_executed_again_with_the_same_result() {
     assert!(count >= 5, "{count}");
 }
 
+#[test]
+fn every_shipped_launch_of_these_robots_is_executed_again_with_the_same_result() {
+    let lab = Lab::new();
+    for name in ["hors_doeuvres", "partition", "three_robots"] {
+        let file = format!("launch/{name}.toml");
+        let args = ["launch", &file, "--no-console", "--speed", "max"];
+        lab.ok(&[&args[..], &["--duration", "60 s"]].concat());
+
+        let said = verify(&lab, name);
+        assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+        assert!(!said.contains("taken from the record"), "{said}");
+    }
+}
+
 /// The hall as processes, of which Leguin crashes and Butler hangs, both without holding the clock.
 const FAULTS: &str = r#"fault=[
     { robot = "Leguin", do = "crash", at = "10 s", until = "16 s" },

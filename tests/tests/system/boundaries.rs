@@ -11,6 +11,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("protocol", &[]),
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
+    ("diagram", &["protocol"]),
+    ("observe", &["config", "protocol"]),
+    ("report", &["diagram"]),
     ("bus", &["protocol"]),
     ("recording", &["protocol"]),
     ("terminal", &["protocol"]),
@@ -23,12 +26,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "bus",
             "config",
             "lockstep",
+            "observe",
             "protocol",
             "recording",
             "terminal",
         ],
     ),
-    ("console", &["bus", "protocol", "recording", "terminal"]),
+    (
+        "console",
+        &["bus", "diagram", "protocol", "recording", "terminal"],
+    ),
     ("conform", &["bus", "lockstep", "protocol"]),
     (
         "launch",
@@ -49,9 +56,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "robots",
             "affect",
             "config",
+            "diagram",
             "lockstep",
+            "observe",
             "protocol",
             "recording",
+            "report",
         ],
     ),
     (
@@ -170,7 +180,7 @@ fn one_file_names_the_middleware() {
 #[test]
 fn the_pure_crates_know_no_clock_no_network_and_no_files() {
     for (name, dependencies) in dependencies() {
-        if name == "world" || name == "affect" || name == "lockstep" {
+        if ["world", "affect", "lockstep", "diagram", "report"].contains(&name.as_str()) {
             for impure in ["tokio", "tracing", "zenoh", "clap", "nix"] {
                 assert!(
                     !dependencies.contains(impure),

@@ -522,12 +522,19 @@ fn check_undisturbed(lab: &Lab, run: &str, scenario: &Path) -> usize {
     disturbed.len()
 }
 
-/// A record without its last line, which states why the run ended.
+/// A record up to the end of its last tick: what follows depends on why the run ended.
 fn ticks(record: &[u8]) -> Vec<u8> {
-    let text = record.strip_suffix(b"\n").unwrap();
-    let end = text.iter().rposition(|byte| *byte == b'\n').unwrap();
+    let text = String::from_utf8_lossy(record);
+    let mut ticks = String::new();
+    let mut tick = String::new();
+    for line in text.split_inclusive('\n') {
+        tick += line;
+        if line.contains("\"event\":\"tick\"") {
+            ticks += &std::mem::take(&mut tick);
+        }
+    }
 
-    record[..=end].to_vec()
+    ticks.into_bytes()
 }
 
 /// Its link is cut when the next epoch begins: it misses tick 0 of it, and joins it later.

@@ -100,8 +100,10 @@ fn output_without_a_reader_or_without_room_is_no_panic() {
     let launch = "launch/hors_doeuvres.toml";
     let certificates = lab.out().join("certificates");
     let certificates = certificates.to_str().unwrap();
-    let short = ["--seeds", "8", "--duration", "20 s", "--loss", "0"];
-    let deadlock = [&["experiment", "deadlock"], short.as_slice()].concat();
+    let experiment = lab.out().join("experiment");
+    let experiment = experiment.to_str().unwrap();
+    let short = ["--seeds", "2", "--duration", "20 s", "-o", experiment];
+    let deadlock = [&["experiment", "run", "deadlock"], short.as_slice()].concat();
 
     for args in [
         vec!["check", launch],

@@ -13,9 +13,8 @@ use crate::report::Failure;
 use crate::script::{Script, Straight, play, seated, step};
 use crate::stage::{Options, Stage};
 
-/// A process ends within this time after SIGTERM. The page allows 2 s; on a machine under load a robot in Python took more
-/// than 5 s once, and one that does not end at all is found after any time.
-const END_PATIENCE: Duration = Duration::from_secs(15);
+/// A process ends within this time after SIGTERM. The page allows 2 s; signals and the kernel need some, too.
+const END_PATIENCE: Duration = Duration::from_secs(5);
 /// How long the robot is to wait for a simulator that is gone where it comes back, or where the wait is to end, seconds.
 const GONE_S: u32 = 2;
 /// The same where the wait is not to end.

@@ -39,6 +39,13 @@ export type Control =
       n: number;
     }
   | {
+      do: "seek";
+      /**
+       * The tick.
+       */
+      tick: number;
+    }
+  | {
       do: "stop";
     }
   | {
@@ -121,17 +128,18 @@ export type Reason =
  */
 export type Phase = "gathering" | "ready" | "running" | "paused" | "ended";
 /**
- * Whether a robot is there.
- */
-export type Presence = "here" | "gone" | "lost";
-/**
  * Name of a run; several runs can share a network.
  */
 export type RunName = string;
 /**
+ * Whether a robot is there.
+ */
+export type Presence = "here" | "gone" | "lost";
+/**
  * Kinds of log lines, to filter by.
  */
-export type LogKind = "run" | "membership" | "emotion" | "behavior" | "command" | "network" | "say" | "late";
+export type LogKind =
+  "run" | "membership" | "emotion" | "behavior" | "command" | "network" | "say" | "verdict" | "late";
 /**
  * One element of a panel.
  */
@@ -234,6 +242,10 @@ export type Tone = "good" | "neutral" | "warning" | "bad";
  * The facial expressions of the seed ("Emotion Components").
  */
 export type Face = "happy" | "sad" | "surprised" | "disgusted" | "angry" | "fearful" | "neutral";
+/**
+ * Whether a run has done what is expected of it. The worse is the greater.
+ */
+export type Verdict = "pass" | "undecided" | "fail";
 /**
  * What became of a command.
  */
@@ -357,6 +369,10 @@ export interface Status {
    */
   pending_steps: number;
   phase: Phase;
+  /**
+   * The recorded run of which this is a replay; none in a run in progress.
+   */
+  replay_of?: RunName | null;
   /**
    * The robots of the roster, by name.
    */
@@ -485,6 +501,10 @@ export interface WorldFrame {
    */
   epoch: number;
   /**
+   * How the expectations of the scenario stand, in its order.
+   */
+  expectations?: Standing[];
+  /**
    * Width and height of the field, meters.
    *
    * @minItems 2
@@ -504,6 +524,10 @@ export interface WorldFrame {
    */
   obstacles: [number, number][];
   phase: Phase;
+  /**
+   * The recorded run of which this is a replay; none in a run in progress.
+   */
+  replay_of?: RunName | null;
   /**
    * The robots, by name.
    */
@@ -544,6 +568,19 @@ export interface Cut {
    */
   queries: boolean;
   to: RobotName;
+}
+/**
+ * How an expectation of the scenario stands.
+ */
+export interface Standing {
+  /**
+   * Its name.
+   */
+  expectation: string;
+  /**
+   * The verdict; none while it is not decided.
+   */
+  verdict?: Verdict | null;
 }
 /**
  * A command on its way, as observers see it.

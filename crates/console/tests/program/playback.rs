@@ -93,7 +93,7 @@ fn recorded_tick(tick: u64) -> RecordedTick {
 fn write(file: &Path, ticks: impl IntoIterator<Item = RecordedTick>) {
     let mut writer = Writer::create(file, &header(), "").unwrap();
     for tick in ticks {
-        writer.tick(&tick).unwrap();
+        writer.tick(&tick.view()).unwrap();
     }
     writer.finish().unwrap();
 }
@@ -212,6 +212,67 @@ fn a_malformed_range_is_refused() {
         let answer = console.get(&format!("recording/ticks{query}"));
         assert_eq!(answer.status, 400, "{query}: {answer:?}");
         assert!(answer.body.contains("up to 512"), "{query}: {answer:?}");
+    }
+}
+
+#[test]
+fn a_diagram_has_the_window_and_what_began_before_it() {
+    let folder = run_folder(1200);
+    let console = open(folder.path());
+
+    // The same window is drawn alike whatever was read before.
+    let late = console.get("recording/diagram?from=1085&count=20&width=900");
+    assert_eq!(late.status, 200, "{late:?}");
+    assert_eq!(late.header("content-type"), "image/svg+xml");
+    for (from, first, last) in [
+        (0, 0, 19),
+        (1085, 1085, 1104),
+        (1195, 1195, 1199),
+        (9999, 1199, 1199),
+    ] {
+        let answer = console.get(&format!("recording/diagram?from={from}&count=20&width=900"));
+        let window = format!("data-from=\"{first}\" data-to=\"{last}\"");
+        assert!(answer.body.contains(&window), "{answer:?}");
+    }
+    let again = console.get("recording/diagram?from=1085&count=20&width=900");
+    assert_eq!(again.body, late.body);
+
+    // A command that was sent in tick 1080 and has not arrived is under way; the one of 1090 begins in the window.
+    assert!(
+        late.body
+            .contains("command 108: achieve “refill”; sent in tick 1080")
+    );
+    assert!(
+        late.body
+            .contains("command 109: achieve “refill”; sent in tick 1090")
+    );
+    assert!(
+        !late.body.contains("<style"),
+        "the page has the style sheet"
+    );
+    let style = console.get("assets/diagram.css");
+    assert_eq!(style.header("content-type"), "text/css; charset=utf-8");
+    assert!(style.body.contains(".cars-diagram .e0"));
+}
+
+#[test]
+fn a_malformed_window_is_refused() {
+    let folder = run_folder(3);
+    let console = open(folder.path());
+
+    for query in [
+        "",
+        "?from=0&count=1",
+        "?from=0&count=0&width=900",
+        "?from=0&count=4097&width=900",
+        "?from=0&count=1&width=299",
+        "?from=0&count=1&width=NaN",
+        "?from=-1&count=1&width=900",
+        "?from=0&count=1&width=900&queries=perhaps",
+    ] {
+        let answer = console.get(&format!("recording/diagram{query}"));
+        assert_eq!(answer.status, 400, "{query}: {answer:?}");
+        assert!(answer.body.contains("up to 4096"), "{query}: {answer:?}");
     }
 }
 
@@ -386,8 +447,9 @@ fn damage_is_reported_with_its_place_where_it_is_read() {
     std::fs::write(file(folder.path()), bytes).unwrap();
     let console = open(folder.path());
 
+    // A chunk has more than a hundred of these ticks.
     let mut answers = Vec::new();
-    for from in (0..20_000).step_by(500) {
+    for from in (0..20_000).step_by(100) {
         answers.push(console.get(&format!("recording/ticks?from={from}&count=1")));
     }
     let is_damaged = |body: &str| body.contains("run.mcap: damaged at byte ");

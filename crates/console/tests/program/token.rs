@@ -76,6 +76,7 @@ fn every_path_is_refused_without_the_token() {
             "ws",
             "recording",
             "recording/ticks?from=0&count=1",
+            "recording/diagram?from=0&count=1&width=900",
             "nothing",
             "//ws",
             "/",

@@ -135,7 +135,7 @@ impl Reader {
             folder.path().display()
         )];
         let facts = Facts {
-            run: name(folder)?,
+            run: folder.name()?,
             epoch: None,
             seed,
             tick_s,
@@ -312,14 +312,6 @@ impl Replay {
         };
         self.robots.entry(name).or_insert(empty)
     }
-}
-
-/// The name of a run is that of its folder.
-fn name(folder: &RunFolder) -> miette::Result<RunName> {
-    let path = folder.path().canonicalize().into_diagnostic()?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    RunName::new(&name)
-        .map_err(|error| miette!("{} is not named like a run: {error}", path.display()))
 }
 
 /// The parameters of each robot, from the scenario of the run if it can be read.

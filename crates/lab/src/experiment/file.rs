@@ -1,21 +1,54 @@
 //! The experiment file: read as written, then checked. Errors show the place in the file.
 
+use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use config::units::Time;
 use config::{FileError, Override, Source};
+use observe::expect::check_all;
+use observe::measure::check_name;
+use observe::{Expectation, Measure};
 use serde::Deserialize;
+use simulator::Scenario;
 use toml::Spanned;
 
-use super::condition::{Condition, ConditionError, Conditions, Factor, Value, parse};
-use super::measure::{Measure, RawMeasure};
-use crate::statistics::MIN_SAMPLE;
+use super::condition::{
+    Condition, ConditionError, Conditions, Factor, NAMED, Target, Value, check_apart, check_change,
+    check_levels, parse,
+};
 
-/// Experiments that ship with the project, by name.
-const SHIPPED: [(&str, &str); 3] = [
+/// Fewest runs of each arm under each condition; an interval needs two.
+const MIN_SEEDS: usize = 2;
+/// Most runs of an experiment.
+pub const MAX_UNITS: u64 = 1_000_000;
+/// Most factors.
+const MAX_FACTORS: usize = 8;
+/// Most values of a factor.
+const MAX_VALUES: usize = 1_000;
+/// Most measures.
+const MAX_MEASURES: usize = 200;
+/// Keys of results that are no measure and no factor.
+const RESERVED: [&str; 8] = [
+    NAMED,
+    "arm",
+    "baseline",
+    "digest",
+    "seed",
+    "times",
+    "times_s",
+    "yoked_to_seed",
+];
+
+/// Experiments that ship with the project, by path.
+const SHIPPED: [(&str, &str); 4] = [
     (
         "configs/experiments/affect.toml",
         include_str!("../../../../configs/experiments/affect.toml"),
+    ),
+    (
+        "configs/experiments/crowd.toml",
+        include_str!("../../../../configs/experiments/crowd.toml"),
     ),
     (
         "configs/experiments/deadlock.toml",
@@ -32,15 +65,15 @@ const SHIPPED: [(&str, &str); 3] = [
 pub struct Experiment {
     /// The question that the experiment answers.
     pub question: String,
-    /// The procedure in a sentence, in which `{from}` is replaced by the begin of the factor.
+    /// The procedure in a sentence, in which `{from}` is replaced by the begin of the factor; empty if there is none.
     pub procedure: String,
     /// The scenario that is changed.
     pub scenario: PathBuf,
-    /// Number of runs of each arm under each condition, with the seeds 1, 2, 3 and so on.
-    pub seeds: u64,
+    /// Seeds of the runs of each arm under each condition, each once.
+    pub seeds: Vec<u64>,
     /// Simulated time of each run, seconds.
     pub duration_s: f64,
-    /// The independent variable, the same for all arms.
+    /// The independent variables, the same for all arms.
     pub conditions: Conditions,
     /// The sets of changes that are compared.
     pub arms: Vec<Arm>,
@@ -48,6 +81,12 @@ pub struct Experiment {
     pub baseline: Option<String>,
     /// The numbers of each run.
     pub measures: Vec<Measure>,
+    /// What is expected of every run, beside what the scenario expects.
+    pub expectations: Vec<Expectation>,
+    /// Places of the expectations in the file, bytes.
+    expectation_spans: Vec<Range<usize>>,
+    /// The file, for errors that only the scenario shows.
+    source: Source,
 }
 
 /// A set of changes under comparison.
@@ -67,48 +106,69 @@ pub struct Arm {
 #[serde(deny_unknown_fields)]
 struct RawExperiment {
     question: String,
+    #[serde(default)]
     procedure: String,
-    scenario: PathBuf,
-    seeds: Spanned<u64>,
-    duration: Time,
+    scenario: Spanned<PathBuf>,
+    seeds: Spanned<RawSeeds>,
+    duration: Spanned<Time>,
     baseline: Option<Spanned<String>>,
-    factor: Option<Spanned<RawFactor>>,
+    #[serde(default, rename = "factor")]
+    factors: Vec<Spanned<RawFactor>>,
     #[serde(default, rename = "condition")]
     conditions: Vec<Spanned<RawCondition>>,
     #[serde(rename = "arm")]
-    arms: Vec<RawArm>,
+    arms: Spanned<Vec<RawArm>>,
     #[serde(rename = "measure")]
-    measures: Vec<Spanned<RawMeasure>>,
+    measures: Spanned<Vec<Measure>>,
+    #[serde(default, rename = "expect")]
+    expectations: Vec<Spanned<Expectation>>,
+}
+
+/// Seeds as written in the file.
+#[derive(Debug, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "seeds are a count such as 64, a list such as [3, 5, 8], or a range such as \"65..=128\""
+)]
+enum RawSeeds {
+    Count(u64),
+    List(Vec<u64>),
+    Range(String),
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawFactor {
-    name: String,
-    values: Vec<RawValue>,
-    begins: Option<Time>,
-    set: Vec<String>,
-    set_at_zero: Option<Vec<String>>,
+    name: Spanned<String>,
+    values: Spanned<Vec<Spanned<RawValue>>>,
+    begins: Option<Spanned<Time>>,
+    path: Option<Spanned<String>>,
+    set: Option<Spanned<Vec<String>>>,
+    set_at_zero: Option<Spanned<Vec<String>>>,
 }
 
 /// A value as written in the file.
 #[derive(Debug, Deserialize)]
 #[serde(
     untagged,
-    expecting = "a value is a number, or a time such as \"60 s\""
+    expecting = "a value is a number, a time such as \"60 s\", a text, true or false"
 )]
 enum RawValue {
+    Flag(bool),
+    Integer(i64),
     Number(f64),
-    Time(Time),
+    Text(String),
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawCondition {
-    name: String,
+    name: Spanned<String>,
+    #[serde(default)]
     what: String,
     from: Option<Time>,
     until: Option<Time>,
+    #[serde(default)]
     set: Vec<Spanned<String>>,
 }
 
@@ -116,7 +176,9 @@ struct RawCondition {
 #[serde(deny_unknown_fields)]
 struct RawArm {
     name: Spanned<String>,
+    #[serde(default)]
     what: String,
+    #[serde(default)]
     set: Vec<Spanned<String>>,
     yoked_to: Option<Spanned<String>>,
 }
@@ -127,7 +189,7 @@ struct RawArm {
 /// [`FileError`] if it cannot be read, or is not TOML.
 pub fn is_experiment_file(path: &Path) -> Result<bool, FileError> {
     let table: toml::Table = Source::read(path)?.parse()?;
-    Ok(table.contains_key("arm"))
+    Ok(table.contains_key("arm") || table.contains_key("question"))
 }
 
 impl Experiment {
@@ -137,7 +199,11 @@ impl Experiment {
     /// [`FileError`] with line and caret.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        Self::parse(&Source::read(path)?, folder)
+        let source = Source::read(path)?;
+        let raw: RawExperiment = source.parse()?;
+        let scenario = folder.join(raw.scenario.get_ref());
+        source.check_named(raw.scenario.span(), &scenario)?;
+        raw.check(source, folder)
     }
 
     /// An experiment that ships with the project; `None` if there is none of this name. Its scenario is relative to the
@@ -170,26 +236,7 @@ impl Experiment {
     /// [`FileError`] with line and caret.
     pub fn parse(source: &Source, folder: &Path) -> Result<Self, FileError> {
         let raw: RawExperiment = source.parse()?;
-
-        if *raw.seeds.get_ref() < MIN_SAMPLE {
-            let reason = format!("an experiment has at least {MIN_SAMPLE} seeds");
-            return Err(FileError::at(source, Some(raw.seeds.span()), &reason));
-        }
-
-        let duration_s = raw.duration.0;
-        let arms = parse_arms(source, raw.arms)?;
-        let baseline = raw.baseline.map(|name| known(source, &arms, name));
-        Ok(Self {
-            question: raw.question,
-            procedure: raw.procedure,
-            scenario: folder.join(raw.scenario),
-            seeds: raw.seeds.into_inner(),
-            duration_s,
-            conditions: parse_conditions(source, raw.factor, raw.conditions, duration_s)?,
-            baseline: baseline.transpose()?,
-            arms,
-            measures: parse_measures(source, raw.measures)?,
-        })
+        raw.check(source.clone(), folder)
     }
 
     /// The conditions of the experiment in the order of the table.
@@ -200,15 +247,54 @@ impl Experiment {
         self.conditions.list(self.duration_s)
     }
 
+    /// The scenario of an arm under a condition, with the expectations of the experiment.
+    ///
+    /// # Errors
+    /// [`FileError`] at a measure or an expectation that names a robot which the scenario does not have, or at an expectation
+    /// with the name of another one.
+    pub fn complete(&self, mut scenario: Scenario) -> Result<Scenario, FileError> {
+        self.check_robots(&scenario)?;
+
+        let own = scenario.expectations.len();
+        scenario.expectations.extend_from_slice(&self.expectations);
+        check_all(&scenario.expectations, &scenario.roster()).map_err(|wrong| {
+            let index = wrong.index.checked_sub(own);
+            let span = index.and_then(|index| self.expectation_spans.get(index).cloned());
+            FileError::at(&self.source, span, &wrong.to_string())
+        })?;
+        Ok(scenario)
+    }
+
+    fn check_robots(&self, scenario: &Scenario) -> Result<(), FileError> {
+        let roster: Vec<String> = scenario.roster().iter().map(ToString::to_string).collect();
+        for measure in &self.measures {
+            for robot in measure.robots() {
+                let is_operator = robot == protocol::RobotName::operator().as_str();
+                if !is_operator && !roster.iter().any(|name| name == robot) {
+                    let reason = format!(
+                        "the scenario has no robot \"{robot}\"; it has {}",
+                        roster.join(", ")
+                    );
+                    return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The file that it was read from.
+    #[must_use]
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
     /// The procedure in a sentence.
     #[must_use]
     pub fn explained(&self) -> String {
-        match &self.conditions {
-            Conditions::Factor(Factor {
-                begins_s: Some(from_s),
-                ..
-            }) => self.procedure.replace("{from}", &format!("{from_s} s")),
-            _ => self.procedure.clone(),
+        let factors = self.conditions.factors.iter();
+        match factors.filter_map(|factor| factor.begins_s).next() {
+            Some(from_s) => self.procedure.replace("{from}", &format!("{from_s} s")),
+            None => self.procedure.clone(),
         }
     }
 }
@@ -224,67 +310,173 @@ fn without_dots(path: &Path) -> PathBuf {
     short
 }
 
+/// The error of a part of the file.
+fn refuse(source: &Source, span: Range<usize>, reason: impl std::fmt::Display) -> FileError {
+    FileError::at(source, Some(span), &reason.to_string())
+}
+
+impl RawExperiment {
+    fn check(self, source: Source, folder: &Path) -> Result<Experiment, FileError> {
+        let duration_s = self.duration.get_ref().0;
+        if duration_s <= 0.0 {
+            let reason = "a run lasts for more than 0 s";
+            return Err(refuse(&source, self.duration.span(), reason));
+        }
+        let seeds_span = self.seeds.span();
+        let seeds = self.seeds.into_inner().list();
+        let seeds = seeds.map_err(|reason| refuse(&source, seeds_span.clone(), reason))?;
+
+        let conditions = parse_conditions(&source, self.factors, self.conditions, duration_s)?;
+        let arms = parse_arms(&source, self.arms, &conditions, duration_s)?;
+        let baseline = self.baseline.map(|name| known(&source, &arms, name));
+
+        let cells = conditions.count().saturating_mul(arms.len() as u64);
+        let units = cells.saturating_mul(seeds.len() as u64);
+        if units > MAX_UNITS {
+            let reason = format!(
+                "{} conditions, {} arms and {} seeds are more than {MAX_UNITS} runs",
+                conditions.count(),
+                arms.len(),
+                seeds.len()
+            );
+            return Err(refuse(&source, seeds_span, reason));
+        }
+        // Only now: there are not too many.
+        conditions
+            .list(duration_s)
+            .map_err(|error| FileError::at(&source, None, &error.to_string()))?;
+
+        let mut expectations = Vec::new();
+        let mut expectation_spans = Vec::new();
+        for expectation in self.expectations {
+            expectation_spans.push(expectation.span());
+            expectations.push(expectation.into_inner());
+        }
+
+        Ok(Experiment {
+            question: self.question,
+            procedure: self.procedure,
+            scenario: folder.join(self.scenario.into_inner()),
+            seeds,
+            duration_s,
+            measures: check_measures(&source, self.measures, &conditions)?,
+            expectations,
+            expectation_spans,
+            conditions,
+            baseline: baseline.transpose()?,
+            arms,
+            source,
+        })
+    }
+}
+
+impl RawSeeds {
+    fn list(self) -> Result<Vec<u64>, String> {
+        let seeds = match self {
+            Self::Count(count) => list_range(1, count)?,
+            Self::List(seeds) => seeds,
+            Self::Range(text) => {
+                let (first, last) = parse_range(&text)
+                    .ok_or_else(|| format!("\"{text}\" is not a range such as \"65..=128\""))?;
+                list_range(first, last)?
+            }
+        };
+
+        if seeds.len() < MIN_SEEDS {
+            return Err(format!("an experiment has at least {MIN_SEEDS} seeds"));
+        }
+        let mut seen = BTreeSet::new();
+        for seed in &seeds {
+            config::seed::check(*seed).map_err(|error| error.to_string())?;
+            if !seen.insert(seed) {
+                return Err(format!(
+                    "the seed {seed} is there twice: the same runs would count as independent ones"
+                ));
+            }
+        }
+        Ok(seeds)
+    }
+}
+
+fn parse_range(text: &str) -> Option<(u64, u64)> {
+    let (first, last) = text.split_once("..=")?;
+    let first = first.trim().parse().ok()?;
+    let last = last.trim().parse().ok()?;
+    (first <= last).then_some((first, last))
+}
+
+fn list_range(first: u64, last: u64) -> Result<Vec<u64>, String> {
+    if last - first.min(last) >= MAX_UNITS {
+        return Err(format!("an experiment has at most {MAX_UNITS} runs"));
+    }
+    Ok((first..=last).collect())
+}
+
 fn parse_conditions(
     source: &Source,
-    factor: Option<Spanned<RawFactor>>,
+    factors: Vec<Spanned<RawFactor>>,
     named: Vec<Spanned<RawCondition>>,
     duration_s: f64,
 ) -> Result<Conditions, FileError> {
-    let refuse =
-        |span, error: ConditionError| FileError::at(source, Some(span), &error.to_string());
-
-    let Some(factor) = factor else {
-        let mut conditions: Vec<Condition> = Vec::new();
-        for raw in named {
-            let span = raw.span();
-            let condition = raw.into_inner().check(source, span.clone())?;
-            let name = &condition.name;
-            if conditions.iter().any(|other| other.name == *name) {
-                return Err(refuse(span, ConditionError::Repeated(name.clone())));
-            }
-            condition
-                .check_time(duration_s)
-                .map_err(|error| refuse(span, error))?;
-            conditions.push(condition);
-        }
-        if conditions.is_empty() {
-            let reason = "an experiment has a [factor], or a [[condition]] or several";
-            return Err(FileError::at(source, None, reason));
-        }
-        return Ok(Conditions::Named(conditions));
-    };
-
-    if let Some(condition) = named.first() {
-        let reason = "an experiment has either a [factor] or conditions";
-        return Err(FileError::at(source, Some(condition.span()), reason));
+    let mut conditions = Conditions::default();
+    for raw in named {
+        let span = raw.span();
+        conditions.named.push(raw.into_inner().check(source)?);
+        check_levels(&conditions.named, duration_s).map_err(|error| refuse(source, span, error))?;
     }
-    let span = factor.span();
-    let conditions = Conditions::Factor(factor.into_inner().into());
-    conditions
-        .list(duration_s)
-        .map_err(|error| refuse(span, error))?;
+
+    let mut parts = vec![conditions.named.clone()];
+    let mut names = BTreeSet::new();
+    for raw in factors {
+        let span = raw.span();
+        if parts.len() > MAX_FACTORS {
+            let reason = format!("an experiment has at most {MAX_FACTORS} factors");
+            return Err(refuse(source, span, reason));
+        }
+
+        let name_span = raw.get_ref().name.span();
+        let values_span = raw.get_ref().values.span();
+        let factor = raw.into_inner().check(source, span.clone())?;
+        if !names.insert(factor.name.clone()) {
+            let reason = format!("there are two factors \"{}\"", factor.name);
+            return Err(refuse(source, name_span, reason));
+        }
+        let levels = factor
+            .levels(duration_s)
+            .map_err(|error| refuse(source, values_span, error))?;
+        for part in &parts {
+            check_apart(part, &levels).map_err(|error| refuse(source, span.clone(), error))?;
+        }
+        parts.push(levels);
+        conditions.factors.push(factor);
+    }
     Ok(conditions)
 }
 
 impl RawCondition {
-    fn check(self, source: &Source, span: std::ops::Range<usize>) -> Result<Condition, FileError> {
+    fn check(self, source: &Source) -> Result<Condition, FileError> {
+        let name = named(source, self.name)?;
         let time_s = match (self.from, self.until) {
             (None, None) => None,
             (Some(from), Some(until)) => Some((from.0, until.0)),
             _ => {
                 let reason = "a condition has both `from` and `until`, or lasts for the whole run";
-                return Err(FileError::at(source, Some(span), reason));
+                return Err(refuse(source, name.span(), reason));
             }
         };
 
         let mut set = Vec::new();
         for change in self.set {
+            let span = change.span();
             let parsed = parse(change.get_ref(), time_s)
-                .map_err(|error| FileError::at(source, Some(change.span()), &error.to_string()))?;
+                .and_then(|parsed| check_change(&parsed, &set).map(|()| parsed))
+                .map_err(|error| refuse(source, span, error))?;
             set.push(parsed);
         }
+        let name = name.into_inner();
         Ok(Condition {
-            name: self.name,
+            levels: vec![(NAMED.to_owned(), name.clone())],
+            name,
             what: self.what,
             set,
             time_s,
@@ -292,29 +484,128 @@ impl RawCondition {
     }
 }
 
-fn parse_arms(source: &Source, raw: Vec<RawArm>) -> Result<Vec<Arm>, FileError> {
+/// A name that can be printed in a table.
+fn named(source: &Source, name: Spanned<String>) -> Result<Spanned<String>, FileError> {
+    match check_name(name.get_ref()) {
+        Ok(()) => Ok(name),
+        Err(error) => Err(refuse(source, name.span(), error)),
+    }
+}
+
+impl RawFactor {
+    fn check(self, source: &Source, span: Range<usize>) -> Result<Factor, FileError> {
+        let name = named(source, self.name)?;
+        if RESERVED.contains(&name.get_ref().as_str()) {
+            let reason = format!("results have a column \"{}\" already", name.get_ref());
+            return Err(refuse(source, name.span(), reason));
+        }
+
+        let target = match (self.path, self.set) {
+            (Some(path), None) => {
+                if let Some(begins) = self.begins {
+                    let reason = "a factor with `begins` has `set`, in which `{from}` and `{until}` are replaced";
+                    return Err(refuse(source, begins.span(), reason));
+                }
+                if let Some(at_zero) = self.set_at_zero {
+                    let reason = "`set_at_zero` replaces `set`, and the factor has a `path`";
+                    return Err(refuse(source, at_zero.span(), reason));
+                }
+                if path.get_ref().contains('=') {
+                    let reason = "`path` names a value of the scenario, such as \"guests.count\"";
+                    return Err(refuse(source, path.span(), reason));
+                }
+                Target::Path(path.into_inner())
+            }
+            (None, Some(changes)) => Target::Set {
+                changes: changes.into_inner(),
+                at_zero: self.set_at_zero.map(Spanned::into_inner),
+            },
+            _ => {
+                let reason = "a factor has either `path` or `set`";
+                return Err(refuse(source, span, reason));
+            }
+        };
+
+        let values_span = self.values.span();
+        let raw = self.values.into_inner();
+        if raw.is_empty() || raw.len() > MAX_VALUES {
+            let reason = format!("a factor has 1 to {MAX_VALUES} values");
+            return Err(refuse(source, values_span, reason));
+        }
+        let mut values = Vec::new();
+        for value in raw {
+            let span = value.span();
+            let value = value.into_inner().check();
+            values.push(value.map_err(|reason| refuse(source, span, reason))?);
+        }
+
+        Ok(Factor {
+            name: name.into_inner(),
+            values,
+            begins_s: self.begins.map(|begins| begins.into_inner().0),
+            target,
+        })
+    }
+}
+
+impl RawValue {
+    fn check(self) -> Result<Value, String> {
+        match self {
+            Self::Flag(is_set) => Ok(Value::Flag(is_set)),
+            Self::Integer(number) => Ok(Value::Integer(number)),
+            Self::Number(number) if number.is_finite() => Ok(Value::Number(number)),
+            Self::Number(number) => Err(format!("{number} is not a finite number")),
+            Self::Text(text) => match check_name(&text) {
+                Ok(()) => Ok(Value::of_text(text)),
+                Err(error) => Err(error.to_string()),
+            },
+        }
+    }
+}
+
+fn parse_arms(
+    source: &Source,
+    raw: Spanned<Vec<RawArm>>,
+    conditions: &Conditions,
+    duration_s: f64,
+) -> Result<Vec<Arm>, FileError> {
+    if raw.get_ref().is_empty() {
+        let reason = "an experiment has at least one arm";
+        return Err(refuse(source, raw.span(), reason));
+    }
+
+    let mut done: Vec<Condition> = conditions.named.clone();
+    for factor in &conditions.factors {
+        let levels = factor.levels(duration_s);
+        done.extend(levels.map_err(|error| FileError::at(source, None, &error.to_string()))?);
+    }
+
     let mut arms: Vec<Arm> = Vec::new();
     let mut yokes = Vec::new();
-    for arm in raw {
-        let mut set = Vec::new();
+    for arm in raw.into_inner() {
+        let name = named(source, arm.name)?;
+        if arms.iter().any(|other| other.name == *name.get_ref()) {
+            let reason = format!("there are two arms \"{}\"", name.get_ref());
+            return Err(refuse(source, name.span(), reason));
+        }
+
+        let mut set: Vec<Override> = Vec::new();
         for change in arm.set {
-            let parsed = change
-                .get_ref()
-                .parse()
-                .map_err(|reason: String| FileError::at(source, Some(change.span()), &reason))?;
+            let span = change.span();
+            let parsed = change.get_ref().parse::<Override>();
+            let parsed = parsed.map_err(|reason| refuse(source, span.clone(), reason))?;
+            let others = done.iter().map(|condition| condition.set.as_slice());
+            for others in others.chain([set.as_slice()]) {
+                check_change(&parsed, others)
+                    .map_err(|error| refuse(source, span.clone(), error))?;
+            }
             set.push(parsed);
         }
 
-        let span = arm.name.span();
-        let name = arm.name.into_inner();
-        if arms.iter().any(|other| other.name == name) {
-            let reason = format!("there are two arms \"{name}\"");
-            return Err(FileError::at(source, Some(span), &reason));
-        }
         let yoked_to = arm.yoked_to.as_ref().map(|to| to.get_ref().clone());
         yokes.extend(arm.yoked_to);
         arms.push(Arm {
-            name,
+            name: name.into_inner(),
             what: arm.what,
             set,
             yoked_to,
@@ -327,7 +618,7 @@ fn parse_arms(source: &Source, raw: Vec<RawArm>) -> Result<Vec<Arm>, FileError> 
         let other = arms.iter().find(|arm| arm.name == name);
         if other.is_some_and(|other| other.yoked_to.is_some()) {
             let reason = format!("\"{name}\" is yoked itself, and has no emotions of its own");
-            return Err(FileError::at(source, Some(span), &reason));
+            return Err(refuse(source, span, reason));
         }
     }
     Ok(arms)
@@ -340,144 +631,38 @@ fn known(source: &Source, arms: &[Arm], name: Spanned<String>) -> Result<String,
     }
 
     let reason = format!("there is no arm \"{}\"", name.get_ref());
-    Err(FileError::at(source, Some(name.span()), &reason))
+    Err(refuse(source, name.span(), reason))
 }
 
-fn parse_measures(
+fn check_measures(
     source: &Source,
-    raw: Vec<Spanned<RawMeasure>>,
+    measures: Spanned<Vec<Measure>>,
+    conditions: &Conditions,
 ) -> Result<Vec<Measure>, FileError> {
-    let mut measures: Vec<Measure> = Vec::new();
-    for measure in raw {
-        let span = measure.span();
-        let checked = measure.into_inner().check();
-        let measure = checked
-            .map_err(|error| FileError::at(source, Some(span.clone()), &error.to_string()))?;
-        if measures.iter().any(|other| other.name == measure.name) {
-            let reason = format!("there are two measures \"{}\"", measure.name);
-            return Err(FileError::at(source, Some(span), &reason));
+    let span = measures.span();
+    let measures = measures.into_inner();
+    if measures.is_empty() || measures.len() > MAX_MEASURES {
+        let reason = format!("an experiment has 1 to {MAX_MEASURES} measures");
+        return Err(refuse(source, span, reason));
+    }
+
+    let mut names: BTreeSet<&str> = BTreeSet::from(RESERVED);
+    for factor in &conditions.factors {
+        names.insert(&factor.name);
+    }
+    for (index, measure) in measures.iter().enumerate() {
+        let name = &measure.name;
+        if measures[..index].iter().any(|other| other.name == *name) {
+            let reason = format!("there are two measures \"{name}\"");
+            return Err(refuse(source, measure.span(), reason));
         }
-        measures.push(measure);
+        if names.contains(name.as_str()) {
+            let reason = format!("results have a column \"{name}\" already");
+            return Err(refuse(source, measure.span(), reason));
+        }
     }
     Ok(measures)
 }
 
-impl From<RawFactor> for Factor {
-    fn from(raw: RawFactor) -> Self {
-        let mut values = Vec::new();
-        for value in raw.values {
-            values.push(match value {
-                RawValue::Number(number) => Value::Number(number),
-                RawValue::Time(time) => Value::Time(time.0),
-            });
-        }
-
-        Self {
-            name: raw.name,
-            values,
-            begins_s: raw.begins.map(|begins| begins.0),
-            set: raw.set,
-            set_at_zero: raw.set_at_zero,
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_shipped_experiments_can_be_played() {
-        for (name, conditions, arms) in [("affect", 9, 8), ("deadlock", 5, 5), ("partition", 4, 5)]
-        {
-            let experiment = Experiment::shipped(name).unwrap().unwrap();
-            let found = experiment.list_conditions().unwrap().len();
-            assert_eq!(found, conditions, "{name}");
-            assert_eq!(experiment.arms.len(), arms, "{name}");
-            let scenario = Path::new("configs/hors_doeuvres.toml");
-            assert_eq!(experiment.scenario, scenario, "{name}");
-        }
-        assert!(Experiment::shipped("none").unwrap().is_none());
-    }
-
-    /// Checks that each change of a shipped file is refused for its reason.
-    fn check_refused(name: &str, changes: &[(&str, &str, &str)]) {
-        let shipped = SHIPPED.iter().find(|(path, _)| path.contains(name));
-        let (path, text) = shipped.unwrap();
-        for (from, to, reason) in changes {
-            assert!(text.contains(from), "{from}");
-            let source = Source {
-                name: (*path).to_owned(),
-                text: text.replacen(from, to, 1),
-            };
-            let error = Experiment::parse(&source, Path::new("")).unwrap_err();
-            let error = error.in_words();
-            assert!(error.contains(reason), "{error:?} does not say {reason:?}");
-        }
-    }
-
-    #[test]
-    fn errors_show_the_reason() {
-        check_refused(
-            "deadlock",
-            &[
-                ("seeds = 32", "seeds = 2", "at least 8 seeds"),
-                ("question", "qestion", "unknown field"),
-                ("network.commands=", "network.commands", "path=value"),
-                ("params.resend=on", "params.resend", "path=value"),
-                ("when = \"during\"", "", "needs `when`"),
-                (
-                    "summary = \"robots.*.sent.*\"",
-                    "",
-                    "either `summary` or `entered`",
-                ),
-                (
-                    "values = [0,",
-                    "begins = \"1 s\"\nvalues = [0,",
-                    "lasts for a time",
-                ),
-                ("values = [0,", "values = [0.25,", "twice"),
-                (
-                    "[factor]",
-                    "[[condition]]\nname = \"\"\nwhat = \"\"\nset = []\n[factor]",
-                    "either a [factor] or conditions",
-                ),
-            ],
-        );
-        check_refused(
-            "affect",
-            &[
-                (
-                    "baseline = \"emotions\"",
-                    "baseline = \"x\"",
-                    "no arm \"x\"",
-                ),
-                (
-                    "yoked_to = \"emotions\"",
-                    "yoked_to = \"x\"",
-                    "no arm \"x\"",
-                ),
-                (
-                    "yoked_to = \"emotions\"",
-                    "yoked_to = \"yoked\"",
-                    "yoked itself",
-                ),
-                ("name = \"rules\"", "name = \"timer\"", "two arms \"timer\""),
-                ("name = \"served\"", "name = \"messages\"", "two measures"),
-                ("until = \"240 s\"\n", "", "both `from` and `until`"),
-                (
-                    "duration = \"600 s\"",
-                    "duration = \"100 s\"",
-                    "begins at 120 s",
-                ),
-                (
-                    "duration = \"600 s\"",
-                    "duration = \"200 s\"",
-                    "lasts until 240 s",
-                ),
-                ("\"Butler.served\"", "\"served\"", "not a state variable"),
-                ("for = \"120 s\"", "for = \"0 s\"", "more than zero"),
-            ],
-        );
-    }
-}
+mod tests;

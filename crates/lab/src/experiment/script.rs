@@ -4,9 +4,11 @@
 use std::collections::BTreeMap;
 
 use config::Override;
+use observe::Observation;
 use protocol::{Event, RobotName};
-use simulator::{Simulation, TickRecord};
 use toml::{Table, Value};
+
+use super::follow::Follow;
 
 /// Parameter of a robot that replaces its own emotions.
 const PARAMETER: &str = "script";
@@ -19,25 +21,27 @@ pub(super) struct Script {
     robots: BTreeMap<RobotName, Vec<Value>>,
 }
 
-impl Script {
+impl Follow for Script {
     /// Notes the emotions that begin in a tick, with their urgencies.
-    pub(super) fn tick(&mut self, simulation: &Simulation, record: &TickRecord) {
-        for event in &record.events {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        for event in observation.events {
             let Event::Emotion { robot, to, .. } = event else {
                 continue;
             };
-            let variables = simulation.state_variables(robot);
-            let urgency = variables.and_then(|variables| variables.get(URGENCY)?.as_f64());
+            let state = (observation.state)(robot);
+            let urgency = state.and_then(|state| state.state_variables.get(URGENCY)?.as_f64());
 
             let mut shown = Table::new();
-            shown.insert("at_s".to_owned(), simulation.time_s(record.tick).into());
+            shown.insert("at_s".to_owned(), observation.time_s.into());
             shown.insert("emotion".to_owned(), to.clone().into());
             shown.insert(URGENCY.to_owned(), urgency.unwrap_or(0.0).into());
             let entries = self.robots.entry(robot.clone()).or_default();
             entries.push(Value::Table(shown));
         }
     }
+}
 
+impl Script {
     /// The changes of a scenario that make its robots show these emotions.
     ///
     /// # Errors
@@ -46,8 +50,16 @@ impl Script {
         let mut changes = Vec::new();
         for (robot, shown) in &self.robots {
             let shown = Value::Array(shown.clone());
-            changes.push(format!("robot.{robot}.params.{PARAMETER}={shown}").parse()?);
+            changes.push(change(robot, &shown.to_string())?);
         }
         Ok(changes)
     }
+}
+
+/// The change of a scenario that makes a robot show these emotions, a list in TOML.
+///
+/// # Errors
+/// If the name of the robot cannot be part of a path.
+pub(super) fn change(robot: &RobotName, shown: &str) -> Result<Override, String> {
+    format!("robot.{robot}.params.{PARAMETER}={shown}").parse()
 }

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::limits::{few, finite, short};
+use super::limits::{counted, few, finite, short};
 use super::numbers::{Epoch, Generation, Tick};
 use super::point::Point;
 use crate::codec::{FieldError, Message};
@@ -37,6 +37,11 @@ pub enum Control {
     Step {
         /// How many.
         n: u64,
+    },
+    /// Show another tick of a recording, earlier or later. A run in progress refuses.
+    Seek {
+        /// The tick.
+        tick: Tick,
     },
     /// End the run.
     Stop,
@@ -78,6 +83,7 @@ impl Message for Control {
                 deadline_s: Some(deadline_s),
                 ..
             } => finite(*deadline_s, "deadline_s"),
+            Self::Seek { tick } => counted(*tick, "tick"),
             Self::Init {
                 setup: Some(setup), ..
             } => setup.check(),
@@ -294,6 +300,9 @@ pub struct Status {
     pub duration_s: f64,
     /// Seed of the epoch.
     pub seed: u64,
+    /// The recorded run of which this is a replay; none in a run in progress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub replay_of: Option<RunName>,
     /// What the simulator is doing.
     pub phase: Phase,
     /// Real-time factor; `null` is as fast as the barrier goes.

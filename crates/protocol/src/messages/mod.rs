@@ -17,8 +17,8 @@ pub use control::{
 pub use limits::{MAX_ENTRIES, MAX_TEXT_BYTES};
 pub use numbers::{Epoch, Generation, Seq, Tick};
 pub use observe::{
-    Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame, Tone,
-    Widget, WorldFrame,
+    Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame,
+    Standing, Tone, Verdict, Widget, WorldFrame,
 };
 pub use performative::Performative;
 pub use point::Point;

@@ -28,6 +28,9 @@ pub struct WorldFrame {
     pub tick_s: f64,
     /// Seed of the epoch.
     pub seed: u64,
+    /// The recorded run of which this is a replay; none in a run in progress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub replay_of: Option<RunName>,
     /// Real-time factor; `null` is as fast as the barrier goes.
     pub speed: Option<f64>,
     /// What the simulator is doing.
@@ -50,6 +53,9 @@ pub struct WorldFrame {
     /// Pairs of robots between which the medium lets nothing through now.
     #[serde(default)]
     pub cuts: Vec<Cut>,
+    /// How the expectations of the scenario stand, in its order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub expectations: Vec<Standing>,
 }
 
 /// Most commands that one frame shows.
@@ -96,6 +102,58 @@ pub struct Cut {
     pub commands: bool,
     /// Whether queries are cut.
     pub queries: bool,
+}
+
+/// Whether a run has done what is expected of it. The worse is the greater.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// It has.
+    Pass,
+    /// The run ended before that was certain.
+    Undecided,
+    /// It has not.
+    Fail,
+}
+
+impl Verdict {
+    /// The word for it, as in the record.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Undecided => "undecided",
+            Self::Fail => "fail",
+        }
+    }
+
+    /// The exit status of a program that has played or judged the run.
+    #[must_use]
+    pub fn exit_status(self) -> u8 {
+        match self {
+            Self::Pass => 0,
+            Self::Fail => 1,
+            Self::Undecided => 2,
+        }
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How an expectation of the scenario stands.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Standing {
+    /// Its name.
+    pub expectation: String,
+    /// The verdict; none while it is not decided.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
 }
 
 impl Message for WorldFrame {}
@@ -169,6 +227,8 @@ pub enum LogKind {
     Network,
     /// A robot said something.
     Say,
+    /// It was decided whether an expectation is met.
+    Verdict,
     /// The clock waits; wall-clock matter, not part of the run's record.
     Late,
 }

@@ -11,7 +11,8 @@ use super::limits::{MAX_TEXT_BYTES, counted, few, finite, short};
 use super::numbers::{Epoch, Tick};
 use super::performative::Performative;
 use super::point::Point;
-use crate::codec::{FieldError, Message};
+use crate::codec::{FieldError, Message, encode};
+use crate::keys::STATE;
 
 /// A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
 /// languages that do not tell them apart give the same run.
@@ -208,6 +209,15 @@ fn tell() -> Performative {
 impl Message for Answer {}
 
 impl PublicState {
+    /// The reply to the query called `what` ([`crate::keys::QUERIES`] or [`STATE`]), encoded; `None` if there is no such query.
+    #[must_use]
+    pub fn reply(&self, what: &str) -> Option<Vec<u8>> {
+        if what == STATE {
+            return Some(encode(self));
+        }
+        Some(encode(&self.answer(what)?))
+    }
+
     /// The answer to the query called `what` ([`crate::keys::QUERIES`]); `None` if there is no such query.
     #[must_use]
     pub fn answer(&self, what: &str) -> Option<Answer> {

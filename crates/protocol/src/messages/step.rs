@@ -304,6 +304,23 @@ pub struct Report {
     pub log: Vec<String>,
 }
 
+impl Report {
+    /// What the robot lets others know of itself by this report. `location` is where it stood in the tick.
+    #[must_use]
+    pub fn state(&self, location: Point) -> PublicState {
+        PublicState {
+            epoch: self.epoch,
+            tick: self.tick,
+            location,
+            speed_mps: self.speed_mps,
+            direction_rad: self.direction_rad,
+            state_variables: self.state_variables.clone(),
+            emotion_state: self.emotion_state.clone(),
+            behavior_state: self.behavior_state.clone(),
+        }
+    }
+}
+
 impl Message for Report {
     fn check(&self) -> Result<(), FieldError> {
         self.proposal.check("proposal")?;

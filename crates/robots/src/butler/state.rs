@@ -165,7 +165,9 @@ impl State {
         if self.valences.len() == SPARKLINE_LEN {
             self.valences.pop_front();
         }
-        self.valences.push_back(feeling.affect().signed());
+        // The curve is some tens of pixels high, and panels are recorded.
+        let valence = feeling.affect().signed();
+        self.valences.push_back((valence * 100.0).round() / 100.0);
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.

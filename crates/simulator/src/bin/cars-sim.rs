@@ -1,6 +1,6 @@
 //! `cars-sim`: the simulator process of one run.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use bus::endpoint::connectable;
@@ -8,7 +8,7 @@ use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
 use clap::Parser;
 use config::Speed;
 use config::units::Time;
-use miette::{IntoDiagnostic, WrapErr};
+use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::messages::End;
 use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
@@ -60,6 +60,10 @@ struct Args {
     /// and compared with it, and goes on from there.
     #[arg(long, conflicts_with_all = ["seed", "duration", "set"])]
     resume: bool,
+    /// Exit with 0 where the run is over, whatever the verdict on it. Without it a failed expectation is exit status 1, and an
+    /// undecided one 2.
+    #[arg(long)]
+    no_verdict: bool,
 }
 
 fn main() -> ExitCode {
@@ -70,14 +74,16 @@ fn main() -> ExitCode {
     bus::runtime::use_router_threads();
     terminal::print_diagnostics("warn,zenoh=error");
 
-    terminal::conclude(run(&args).map(|summary| exit_code(&summary)))
+    terminal::conclude(run(&args).map(|summary| exit_code(&summary, args.no_verdict)))
 }
 
-fn exit_code(summary: &Summary) -> ExitCode {
+fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
     if summary.end == Some(End::Aborted) {
         ExitCode::FAILURE
-    } else {
+    } else if no_verdict {
         ExitCode::SUCCESS
+    } else {
+        ExitCode::from(summary.verdict().exit_status())
     }
 }
 
@@ -112,13 +118,11 @@ fn run(args: &Args) -> miette::Result<Summary> {
     ctrlc::set_handler(move || send(Event::Terminate)).into_diagnostic()?;
 
     if let Some(file) = &args.operator_config {
-        write_line(
-            &folder.file(OPERATOR_CONFIG),
-            &std::path::absolute(file).into_diagnostic()?.display(),
-        )?;
+        let path = std::path::absolute(file).into_diagnostic()?;
+        folder.write_line(OPERATOR_CONFIG, &path.display().to_string())?;
     }
 
-    write_line(&folder.file(ENDPOINT), &connectable(&args.listen))?;
+    folder.write_line(ENDPOINT, &connectable(&args.listen))?;
     let outcome = server.run(scenario, &folder, past).into_diagnostic();
 
     for name in [ENDPOINT, OPERATOR_CONFIG]
@@ -146,14 +150,4 @@ fn open_folder(
 
     let (lock, files) = folder.reopen()?;
     Ok((lock, Some(Past::open(&files)?)))
-}
-
-/// Writes a file that others wait for: they see it whole or not at all.
-fn write_line(file: &Path, line: &dyn std::fmt::Display) -> miette::Result<()> {
-    let unfinished = file.with_extension("new");
-    let written = std::fs::write(&unfinished, format!("{line}\n"));
-    let written = written.and_then(|()| std::fs::rename(&unfinished, file));
-    written
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot write {}", file.display()))
 }

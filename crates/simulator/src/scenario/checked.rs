@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use observe::Expectation;
 use protocol::messages::{OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use world::{Field, Guests, Hall};
 
+use super::change::{Change, Parent};
 use super::fault::Fault;
 use super::network::Network;
 
@@ -57,8 +59,14 @@ pub struct Scenario {
     pub network: Network,
     /// Faults of the robots' processes in the order of their begins.
     pub faults: Vec<Fault>,
+    /// Changes during the run, in the order of their ticks.
+    pub changes: Vec<Change>,
+    /// What the run is expected to do.
+    pub expectations: Vec<Expectation>,
     /// Contents of the record.
     pub record: Record,
+    /// The run from which this one was forked.
+    pub parent: Option<Parent>,
 }
 
 /// Contents of the record beside events and summary.

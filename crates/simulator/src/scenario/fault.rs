@@ -32,6 +32,17 @@ impl Fault {
         self.order(false, None)
     }
 
+    /// Whether the process is gone or stopped before a tick, or takes part again from that tick on.
+    pub(crate) fn is_absence_at(&self, tick: Tick) -> bool {
+        let is_absence = matches!(self.kind, FaultKind::Crash | FaultKind::Hang);
+        let lasts = match self.end {
+            FaultEnd::At(end) => tick <= end,
+            FaultEnd::After(_) => tick == self.at,
+            FaultEnd::Never => true,
+        };
+        is_absence && self.at <= tick && lasts
+    }
+
     fn order(&self, begins: bool, for_s: Option<f64>) -> ProcessOrder {
         ProcessOrder {
             robot: self.robot.clone(),

@@ -14,6 +14,29 @@ pub struct Network {
     pub links: Vec<LinkRule>,
     /// Partitions of the network.
     pub partitions: Vec<Partition>,
+    /// Single commands that are lost.
+    pub lost: Vec<LostCommand>,
+}
+
+/// A single command that is lost, whatever chance decides. Commands are counted over the epoch, whatever incarnation of the
+/// sender sent them and whatever became of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LostCommand {
+    /// Which commands are counted.
+    pub counted: Counted,
+    /// Number of the lost one among them, from 1.
+    pub number: u64,
+}
+
+/// A set of commands.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Counted {
+    /// Their sender.
+    pub from: RobotName,
+    /// Their target.
+    pub to: RobotName,
+    /// Their text; `None` for all texts.
+    pub text: Option<String>,
 }
 
 /// Loss, duplication and delay of messages of one kind on a link.

@@ -1,5 +1,7 @@
 //! A scenario file as written. Unknown keys are refused; errors show the place in the file.
 
+mod change;
+mod expect;
 mod fault;
 mod network;
 mod range;
@@ -10,17 +12,22 @@ use std::path::{Path, PathBuf};
 
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, Source, seed};
+use observe::Expectation;
 use protocol::messages::{OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use world::Triangular;
 
+use change::{ChangeTable, ParentTable};
 use fault::FaultTable;
 use network::NetworkTable;
 use range::Range;
 use unplaced::unplaced;
 
+pub(super) use expect::Expectations;
+
+use super::change::Parent;
 use super::checked::{self, DEFAULT_SEED, Lateness, Record, RobotSpec};
 use super::placing;
 
@@ -45,6 +52,11 @@ pub(super) struct Scenario {
     record: Option<RecordTable>,
     #[serde(default, rename = "fault", skip_serializing_if = "Vec::is_empty")]
     faults: Vec<Spanned<FaultTable>>,
+    #[serde(default, rename = "change", skip_serializing_if = "Vec::is_empty")]
+    changes: Vec<Spanned<ChangeTable>>,
+    #[serde(default, rename = "expect", skip_serializing_if = "Vec::is_empty")]
+    expectations: Vec<Spanned<Expectation>>,
+    parent: Option<ParentTable>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
@@ -131,22 +143,12 @@ const LOSE_AFTER: u32 = 10;
 const SENSING_RANGE: Length = Length(1.8288);
 
 impl Scenario {
-    /// Refuses a scenario that names files, so that an untrusted text cannot make this process read them.
-    pub(super) fn refuse_files(self, source: &Source) -> Result<Self, FileError> {
-        for robot in &self.robots {
-            if robot.get_ref().params_from.is_some() {
-                let reason = "`params_from` names a file; write its parameters out under `params`";
-                return Err(FileError::at(source, Some(robot.span()), reason));
-            }
-        }
-        Ok(self)
-    }
-
-    /// Checks the scenario and fills in defaults. Files that it names are relative to `folder`.
+    /// Checks the scenario and fills in defaults. Files that it names are relative to `folder`; without one, which is for
+    /// untrusted texts, it must not name files.
     pub(super) fn check(
         self,
         source: &Source,
-        folder: &Path,
+        folder: Option<&Path>,
     ) -> Result<checked::Scenario, FileError> {
         let seed = self.seed(source)?;
         let tick_s = self.tick_s(source)?;
@@ -168,7 +170,9 @@ impl Scenario {
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, source)?;
-        let scenario = checked::Scenario {
+        let roster: Vec<RobotName> = robots.keys().cloned().collect();
+        let expectations = expect::check(self.expectations, &roster, source)?;
+        let mut scenario = checked::Scenario {
             seed,
             tick_s,
             ticks,
@@ -182,12 +186,18 @@ impl Scenario {
             robots,
             network,
             faults,
+            changes: Vec::new(),
+            expectations,
             record,
+            parent: self.parent.map(Parent::from),
         };
 
         // A hall that cannot be placed is refused before anything starts.
         placing::check(&scenario)
             .map_err(|error| FileError::at(source, guests_span, &error.to_string()))?;
+        scenario.changes = change::check(self.changes, &scenario, source, |changed| {
+            changed.parse::<Self>()?.check(changed, folder)
+        })?;
         Ok(scenario)
     }
 
@@ -316,7 +326,7 @@ fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError
 fn robots(
     raw: Vec<Spanned<Robot>>,
     source: &Source,
-    folder: &Path,
+    folder: Option<&Path>,
 ) -> Result<BTreeMap<RobotName, RobotSpec>, FileError> {
     let mut robots = BTreeMap::new();
     for entry in raw {
@@ -341,9 +351,13 @@ fn robots(
 }
 
 /// The specification of a robot. Its own parameters replace those of the file that it names.
-fn spec(robot: Robot, source: &Source, folder: &Path) -> Result<RobotSpec, FileError> {
+fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpec, FileError> {
     let mut parameters = Parameters::new();
     if let Some(file) = &robot.params_from {
+        let Some(folder) = folder else {
+            let reason = "`params_from` names a file; write its parameters out under `params`";
+            return Err(FileError::at(source, Some(file.span()), reason));
+        };
         let path = folder.join(file.get_ref());
         source.check_named(file.span(), &path)?;
         let read = Source::read(&path).and_then(|file| file.parse());
@@ -429,6 +443,9 @@ impl From<&checked::Scenario> for Scenario {
 
         let faults = scenario.faults.iter();
         let faults = faults.map(|fault| unplaced(FaultTable::of(fault, tick_s)));
+        let changes = scenario.changes.iter();
+        let changes = changes.map(|change| unplaced(ChangeTable::of(change, tick_s)));
+        let expectations = scenario.expectations.iter().cloned().map(unplaced);
         let obstacles = scenario.obstacles.iter();
         let obstacles = obstacles.map(|at| Obstacle { at: lengths(*at) });
         let robots = scenario.robots.iter();
@@ -449,6 +466,9 @@ impl From<&checked::Scenario> for Scenario {
             network: NetworkTable::of(&scenario.network, tick_s),
             record: Some(record),
             faults: faults.collect(),
+            changes: changes.collect(),
+            expectations: expectations.collect(),
+            parent: scenario.parent.as_ref().map(ParentTable::from),
             obstacles: obstacles.collect(),
             robots: robots.collect(),
         }

@@ -41,6 +41,7 @@ impl Scenario {
         let mut errors = Errors::default();
         let mut scenario = self.clone();
 
+        scenario.parent = None; // It is no fork of that run any more.
         scenario.seed = setup.seed;
         if let Err(error) = config::seed::check(setup.seed) {
             errors.add("seed", &error);

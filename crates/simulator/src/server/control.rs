@@ -1,6 +1,6 @@
-//! The CD-player buttons.
+//! Control: the CD-player buttons of the paper.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bus::Query;
 use protocol::messages::{
@@ -14,8 +14,9 @@ use crate::diagnostic::Source;
 use crate::scenario::{OnLate, Scenario};
 use crate::simulation::Simulation;
 
-/// Most ticks that one `step` may ask for.
-const MAX_STEPS: u64 = 1_000_000;
+/// Why a run in progress does not go to another tick.
+const NOT_SOUGHT: &str = "a run in progress cannot be sought: its ticks take place once, in order; `cars replay RUN` shows a \
+                          recorded run, which can";
 
 impl Server {
     /// People ask for something; they are answered at once.
@@ -70,25 +71,11 @@ impl Server {
     }
 
     fn act(&mut self, control: &Control) -> Result<(), String> {
-        let phase = self.pace.phase;
         match control {
-            Control::Start if matches!(phase, Phase::Ready | Phase::Paused | Phase::Running) => {
-                (self.pace.phase, self.pace.due) = (Phase::Running, Instant::now());
-            }
-            Control::Start if phase == Phase::Gathering => self.pace.starts_paused = false,
-            Control::Pause if matches!(phase, Phase::Running | Phase::Paused | Phase::Ready) => {
-                if phase == Phase::Running {
-                    self.pace.phase = Phase::Paused;
-                }
-                self.pace.pending_steps = 0;
-            }
-            Control::Pause if phase == Phase::Gathering => self.pace.starts_paused = true,
-            Control::Speed { factor } => {
-                if factor.is_some_and(|factor| factor <= 0.0) {
-                    return Err("a speed is more than zero; to hold the clock, pause".to_owned());
-                }
-                (self.pace.speed, self.pace.due) = (*factor, Instant::now());
-            }
+            Control::Start => self.pace.start()?,
+            Control::Pause => self.pace.pause()?,
+            Control::Speed { factor } => self.pace.set_speed(*factor)?,
+            Control::Seek { .. } => return Err(NOT_SOUGHT.to_owned()),
             Control::FaultsDone { epoch, tick } => self.orders.done(*epoch, *tick),
             Control::Late {
                 robot,
@@ -98,7 +85,6 @@ impl Server {
                 self.change_lateness(robot.as_ref(), *on_late, *deadline_s)?;
             }
             Control::Status => {}
-            Control::Start | Control::Pause => return Err(format!("the run is {phase}")),
             Control::Init { .. }
             | Control::Load { .. }
             | Control::Setup
@@ -167,20 +153,9 @@ impl Server {
     }
 
     fn on_step(&mut self, n: u64, query: Query, simulation: &Simulation) {
-        if !matches!(self.pace.phase, Phase::Ready | Phase::Paused) {
-            return refuse(
-                &query,
-                &format!("the run is {}; pause it to step", self.pace.phase),
-            );
+        if let Err(explanation) = self.pace.step(n) {
+            return refuse(&query, &explanation);
         }
-        if n == 0 || n > MAX_STEPS {
-            return refuse(&query, &format!("a step is 1 to {MAX_STEPS} ticks"));
-        }
-        if self.pace.pending_steps + n > MAX_STEPS {
-            return refuse(&query, "too many steps are pending already");
-        }
-        self.pace.phase = Phase::Paused;
-        self.pace.pending_steps += n;
         if self.barrier.is_announced() {
             return self.answer_status(&query, simulation);
         }
@@ -223,6 +198,7 @@ impl Server {
             time_s: simulation.time_s(simulation.tick()),
             duration_s: scenario.duration_s(),
             seed: scenario.seed,
+            replay_of: None,
             phase: self.pace.phase,
             speed: self.pace.speed,
             on_late: lateness.on_late,
@@ -313,7 +289,7 @@ fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
     Ok(loaded.with_roster_of(running)?)
 }
 
-fn answer_setup(query: &Query, scenario: &Scenario) {
+pub(super) fn answer_setup(query: &Query, scenario: &Scenario) {
     match scenario.to_toml() {
         Ok(text) => {
             let answer = SetupAnswer {
@@ -326,7 +302,7 @@ fn answer_setup(query: &Query, scenario: &Scenario) {
     }
 }
 
-fn refuse(query: &Query, explanation: &str) {
+pub(super) fn refuse(query: &Query, explanation: &str) {
     let answer = ControlAnswer::from(Refusal::from(explanation.to_owned()));
     query.reply(query.key(), encode(&answer));
 }

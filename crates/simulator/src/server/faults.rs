@@ -4,8 +4,8 @@
 use std::time::{Duration, Instant};
 
 use bus::BusError;
-use protocol::encode;
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
+use protocol::{RobotName, encode};
 
 use super::orders::Underway;
 use super::process::{REPEAT_AFTER, Server, Stage};
@@ -22,32 +22,47 @@ const LOOK: Duration = Duration::from_millis(20);
 const NUDGE: Duration = Duration::from_millis(100);
 
 impl Server {
-    /// Begins to have the faults carried out that are due before the next tick, if there are any.
+    /// Begins to have the faults carried out that are due before the next tick, and the restarts, if there are any.
     pub(super) fn order_faults(
         &mut self,
         simulation: &mut Simulation,
     ) -> Result<Option<Underway>, BusError> {
-        let orders = simulation.faults_due();
-        if orders.is_empty() {
-            return Ok(None);
-        }
-
+        let mut orders = simulation.faults_due();
         let lateness = self.barrier.lateness();
         simulation.note_faults(&orders, |robot| lateness.of(robot));
+
+        let mut then = Vec::new();
+        for robot in simulation.restarts_due() {
+            orders.push(restart_order(&robot, true));
+            then.push(restart_order(&robot, false));
+        }
+        Ok((!orders.is_empty()).then(|| self.underway(simulation, orders, then)))
+    }
+
+    /// Begins to have orders carried out, and then others.
+    fn underway(
+        &mut self,
+        simulation: &Simulation,
+        orders: Vec<ProcessOrder>,
+        then: Vec<ProcessOrder>,
+    ) -> Underway {
         for order in &orders {
             self.barrier.fault(&order.robot, order.lasting());
         }
+
+        self.orders.done = None;
         let now = Instant::now();
-        Ok(Some(Underway {
+        Underway {
             order: FaultOrder {
                 epoch: simulation.epoch(),
                 tick: simulation.tick() + 1,
                 orders,
             },
+            then,
             begun: now,
             put: None,
             nudged: now,
-        }))
+        }
     }
 
     /// Goes on with the order under way. Returns how long to wait before looking again; `None` when it is carried out.
@@ -78,7 +93,13 @@ impl Server {
             is_carried_out &= is_in_effect(&self.barrier, order);
         }
         if is_carried_out {
-            return Ok(None);
+            let then = std::mem::take(&mut underway.then);
+            if then.is_empty() {
+                return Ok(None);
+            }
+            let underway = self.underway(simulation, then, Vec::new());
+            self.stage = Stage::Faults(underway);
+            return Ok(Some(Duration::ZERO));
         }
         if is_done && underway.nudged.elapsed() > NUDGE {
             underway.nudged = Instant::now();
@@ -106,6 +127,16 @@ impl Server {
             );
         }
         Ok(Some(LOOK))
+    }
+}
+
+/// The order that kills the process of a robot that starts again, or the one that starts it.
+fn restart_order(robot: &RobotName, begins: bool) -> ProcessOrder {
+    ProcessOrder {
+        robot: robot.clone(),
+        kind: FaultKind::Crash,
+        begins,
+        for_s: None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is shown to those who watch. Nobody watching costs nothing, and no watcher can hold the clock.
+//! What observers see. Without observers it costs nothing, and no observer can hold the clock.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -7,15 +7,14 @@ use bus::{Bus, BusError, Publisher};
 use protocol::encode;
 use protocol::keys::Keys;
 use protocol::messages::{
-    Awaited, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, Presence, RobotFrame, Status,
-    WorldFrame,
+    Awaited, Flight, LogKind, LogRecord, MAX_FLIGHTS, Presence, RobotFrame, Status, WorldFrame,
 };
-use protocol::{Event, RobotName};
+use protocol::{Event, RobotName, Tick};
 
-use crate::simulation::{Simulation, TickRecord};
+use crate::simulation::Simulation;
 
 /// Pictures are for eyes: no more often than this.
-const FRAME_INTERVAL: Duration = Duration::from_millis(33);
+pub(super) const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 
 pub(super) struct Observers {
     world: Publisher,
@@ -44,24 +43,27 @@ impl Observers {
     }
 
     pub(super) fn frame(&mut self, simulation: &Simulation, status: &Status) {
-        self.painted = Instant::now();
-        let flights = std::mem::take(&mut self.flights);
-        show(
-            &self.world,
-            encode(&paint(simulation, status, flights.into())),
-        );
+        self.put(paint(simulation, status));
     }
 
-    /// Notes what the next frame tells of a tick.
-    pub(super) fn note(&mut self, record: &TickRecord) {
+    /// Forgets what the next frame would show of earlier ticks.
+    pub(super) fn forget(&mut self) {
+        self.flights.clear();
+    }
+
+    /// Puts a frame, with the flights since the one before.
+    pub(super) fn put(&mut self, mut frame: WorldFrame) {
+        self.painted = Instant::now();
+        frame.flights = std::mem::take(&mut self.flights).into();
+        show(&self.world, encode(&frame));
+    }
+
+    /// Notes what the next frame shows of the events of a tick.
+    pub(super) fn note(&mut self, tick: Tick, events: &[Event]) {
         if !self.world.has_subscribers() {
             return;
         }
-        for flight in record
-            .events
-            .iter()
-            .filter_map(|event| flight(record.tick, event))
-        {
+        for flight in events.iter().filter_map(|event| event.flight(tick)) {
             if self.flights.len() == MAX_FLIGHTS {
                 self.flights.pop_front();
             }
@@ -128,31 +130,8 @@ fn name_all(awaiting: &[Awaited]) -> String {
     awaiting.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// What an event says of a command; `None` if it is about something else.
-fn flight(tick: protocol::Tick, event: &Event) -> Option<Flight> {
-    let (from, to, seq, command, fate) = match event {
-        Event::CommandSent {
-            from,
-            to,
-            seq,
-            command,
-            ..
-        } => (from, to, *seq, command.as_str(), Fate::Sent),
-        Event::CommandDelivered { from, to, seq } => (from, to, *seq, "", Fate::Delivered),
-        Event::CommandDropped { from, to, seq, .. } => (from, to, *seq, "", Fate::Dropped),
-        _ => return None,
-    };
-    Some(Flight {
-        tick,
-        from: from.clone(),
-        to: to.clone(),
-        seq,
-        command: command.to_owned(),
-        fate,
-    })
-}
-
-fn paint(simulation: &Simulation, status: &Status, flights: Vec<Flight>) -> WorldFrame {
+/// The field now, without flights.
+fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
     let (world, scenario) = (simulation.world(), simulation.scenario());
     let robot = |name: &RobotName| {
         let report = simulation.report(name);
@@ -184,23 +163,31 @@ fn paint(simulation: &Simulation, status: &Status, flights: Vec<Flight>) -> Worl
         duration_s: status.duration_s,
         tick_s: scenario.tick_s,
         seed: status.seed,
+        replay_of: None,
         speed: status.speed,
         phase: status.phase,
         awaiting: status.awaiting.clone(),
         field_m: scenario.field_m,
         body_m: scenario.body_m,
         robots: simulation.names().iter().map(robot).collect(),
+        // In whole millimeters, as in the recording: a tick looks the same live and recorded.
         guests: world
             .guests()
             .iter()
-            .map(|guest| [guest.x, guest.y])
+            .map(|guest| [millimeters(guest.x), millimeters(guest.y)])
             .collect(),
         obstacles: world
             .obstacles()
             .iter()
             .map(|obstacle| [obstacle.x, obstacle.y])
             .collect(),
-        flights,
+        flights: Vec::new(),
         cuts: simulation.cuts(),
+        expectations: simulation.standings(),
     }
+}
+
+/// A length in meters, rounded to whole millimeters.
+fn millimeters(length_m: f64) -> f64 {
+    (length_m * 1000.0).round() / 1000.0
 }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use bus::Publisher;
-use protocol::messages::FaultOrder;
+use protocol::messages::{FaultOrder, ProcessOrder};
 use protocol::{Epoch, Tick};
 
 /// Orders to the launcher.
@@ -32,6 +32,8 @@ impl Orders {
 /// An order that is being carried out.
 pub(super) struct Underway {
     pub(super) order: FaultOrder,
+    /// What is ordered when it has been carried out.
+    pub(super) then: Vec<ProcessOrder>,
     pub(super) begun: Instant,
     /// When it was put last; `None` while no launcher subscribes.
     pub(super) put: Option<Instant>,

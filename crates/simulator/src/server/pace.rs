@@ -9,6 +9,9 @@ use protocol::messages::Phase;
 /// A paced clock that has fallen behind by more than this does not try to catch up.
 const MAX_BEHIND: Duration = Duration::from_millis(500);
 
+/// Most ticks that one `step` may ask for.
+const MAX_STEPS: u64 = 1_000_000;
+
 /// The pace of the clock.
 pub(super) struct Pace {
     pub(super) phase: Phase,
@@ -53,6 +56,62 @@ impl Pace {
 
     pub(super) fn end(&mut self) {
         self.phase = Phase::Ended;
+    }
+
+    /// Lets the clock run, at once or when the robots have joined.
+    pub(super) fn start(&mut self) -> Result<(), String> {
+        match self.phase {
+            Phase::Ready | Phase::Paused | Phase::Running => {
+                self.phase = Phase::Running;
+                self.due = Instant::now();
+            }
+            Phase::Gathering => self.starts_paused = false,
+            Phase::Ended => return Err(format!("the run is {}", self.phase)),
+        }
+        Ok(())
+    }
+
+    /// Holds the clock after the current tick. Steps that are pending are given up.
+    pub(super) fn pause(&mut self) -> Result<(), String> {
+        match self.phase {
+            Phase::Ready | Phase::Paused | Phase::Running => {
+                if self.phase == Phase::Running {
+                    self.phase = Phase::Paused;
+                }
+                self.pending_steps = 0;
+            }
+            Phase::Gathering => self.starts_paused = true,
+            Phase::Ended => return Err(format!("the run is {}", self.phase)),
+        }
+        Ok(())
+    }
+
+    /// Changes the speed from now on.
+    pub(super) fn set_speed(&mut self, speed: Option<f64>) -> Result<(), String> {
+        if speed.is_some_and(|speed| speed <= 0.0) {
+            return Err("a speed is more than zero; to hold the clock, pause".to_owned());
+        }
+
+        self.speed = speed;
+        self.due = Instant::now();
+        Ok(())
+    }
+
+    /// Grants `n` ticks of a clock that is held.
+    pub(super) fn step(&mut self, n: u64) -> Result<(), String> {
+        if !matches!(self.phase, Phase::Ready | Phase::Paused) {
+            return Err(format!("the run is {}; pause it to step", self.phase));
+        }
+        if n == 0 || n > MAX_STEPS {
+            return Err(format!("a step is 1 to {MAX_STEPS} ticks"));
+        }
+        if self.pending_steps + n > MAX_STEPS {
+            return Err("too many steps are pending already".to_owned());
+        }
+
+        self.phase = Phase::Paused;
+        self.pending_steps += n;
+        Ok(())
     }
 
     /// Who is to be told that a tick is reached.

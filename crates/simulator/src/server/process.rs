@@ -564,7 +564,7 @@ impl Server {
     ) -> Result<(), Interrupt> {
         self.blame_culprits();
         let record = simulation.end_tick(outcome);
-        self.observers.note(&record);
+        self.observers.note(record.tick, &record.events);
         self.watchdog.note(Some(Doing::Record));
         if self.observing.is_on {
             recorder.observe(self.observing.take(record.tick, self.waiting_since));
@@ -684,10 +684,11 @@ impl Server {
     fn record_end(
         &mut self,
         end: End,
-        simulation: &Simulation,
+        simulation: &mut Simulation,
         mut recorder: Recorder,
     ) -> Result<Summary, FileError> {
-        let lines = recorder.write(simulation, &simulation.end(end))?;
+        let record = simulation.end(end);
+        let lines = recorder.write(simulation, &record)?;
         self.observers.log(&lines);
         self.observers.frame(simulation, &self.status(simulation));
 

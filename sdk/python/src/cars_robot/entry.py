@@ -81,6 +81,8 @@ class _Signals:
         self.stop: Callable[[], None] = lambda: None
         self._came: int | None = None
         self._before = {}
+        self._wakers: tuple[int, int] | None = None
+        """What was told of signals before, and what is told of them now."""
         if threading.current_thread() is threading.main_thread():
             self._before = {number: signal.signal(number, signal.SIG_DFL) for number in self.CAUGHT}
 
@@ -89,8 +91,21 @@ class _Signals:
 
     def catch(self) -> None:
         """From now on there is something to take back."""
+        if not self._before:
+            return
+        reader, writer = os.pipe()
+        os.set_blocking(writer, False)
+        self._wakers = (signal.set_wakeup_fd(writer, warn_on_full_buffer=False), writer)
+        threading.Thread(target=self._wake, args=(reader,), name="signals", daemon=True).start()
         for number in self._before:
             signal.signal(number, self._on_signal)
+
+    def _wake(self, reader: int) -> None:
+        # Python runs a handler on the main thread when that wakes. One that is about to wait, or whose signal went to
+        # another thread, does not wake by the signal.
+        while os.read(reader, 1):
+            self.stop()
+        os.close(reader)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._came = number
@@ -103,6 +118,10 @@ class _Signals:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
             signal.signal(number, signal.SIG_DFL if self._came else handler)
+        if self._wakers is not None:
+            before, writer = self._wakers
+            signal.set_wakeup_fd(before)
+            os.close(writer)
         if self._came is not None:
             sys.stdout.flush()
             sys.stderr.flush()

@@ -10,13 +10,15 @@ use toml::Spanned;
 use world::Triangular;
 
 use super::super::checked::RobotSpec;
-use super::super::network::{Burst, Channel, LinkRule, Network, Partition, ticks};
+use super::super::network::{
+    Burst, Channel, Counted, LinkRule, LostCommand, Network, Partition, ticks,
+};
 use super::range::Range;
 use super::unplaced::unplaced;
 
 /// Longest delay of a command, ticks.
 const MAX_DELAY_TICKS: u64 = 1000;
-/// Most links and partitions.
+/// Most links, partitions and lost commands.
 const MAX_ENTRIES: usize = 10_000;
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -28,6 +30,8 @@ pub(super) struct NetworkTable {
     links: Vec<Spanned<LinkTable>>,
     #[serde(default, rename = "partition", skip_serializing_if = "Vec::is_empty")]
     partitions: Vec<Spanned<PartitionTable>>,
+    #[serde(default, rename = "lose", skip_serializing_if = "Vec::is_empty")]
+    lost: Vec<LoseTable>,
 }
 
 #[derive(Debug, Default, Deserialize, Serialize)]
@@ -73,6 +77,15 @@ struct PartitionTable {
     cuts: Option<Vec<Cuts>>,
 }
 
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct LoseTable {
+    from: Spanned<RobotName>,
+    to: Spanned<RobotName>,
+    number: Spanned<u64>,
+    text: Option<String>,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Cuts {
@@ -100,8 +113,9 @@ pub(super) fn check(
 
     let span = Some(raw.span());
     let raw = raw.into_inner();
-    if raw.links.len().max(raw.partitions.len()) > MAX_ENTRIES {
-        let text = "more than 10000 links or partitions";
+    let entries = raw.links.len().max(raw.partitions.len());
+    if entries.max(raw.lost.len()) > MAX_ENTRIES {
+        let text = "more than 10000 links, partitions or lost commands";
         return Err(FileError::at(source, span, text));
     }
 
@@ -120,6 +134,9 @@ pub(super) fn check(
     }
     for partition in raw.partitions {
         network.partitions.push(checker.partition(partition)?);
+    }
+    for lost in raw.lost {
+        network.lost.push(checker.lost(lost)?);
     }
     Ok(network)
 }
@@ -144,6 +161,23 @@ impl Checker<'_> {
             queries: self.queries(raw.queries)?,
             from: self.known(raw.from)?,
             to: self.known(raw.to)?,
+        })
+    }
+
+    fn lost(&self, raw: LoseTable) -> Result<LostCommand, FileError> {
+        let number = *raw.number.get_ref();
+        if number == 0 {
+            let reason = "commands are counted from 1";
+            return Err(self.refuse(raw.number.span(), reason));
+        }
+
+        Ok(LostCommand {
+            counted: Counted {
+                from: self.known(raw.from)?,
+                to: self.known(raw.to)?,
+                text: raw.text,
+            },
+            number,
         })
     }
 
@@ -274,6 +308,7 @@ impl NetworkTable {
             queries: Some(unplaced(network.queries.into())),
             links: links.map(unplaced).collect(),
             partitions: partitions.map(unplaced).collect(),
+            lost: network.lost.iter().map(LoseTable::from).collect(),
         }))
     }
 }
@@ -286,6 +321,17 @@ impl From<&LinkRule> for LinkTable {
             to: unplaced(link.to.clone()),
             commands: link.commands.map(channel),
             queries: link.queries.map(channel),
+        }
+    }
+}
+
+impl From<&LostCommand> for LoseTable {
+    fn from(lost: &LostCommand) -> Self {
+        Self {
+            from: unplaced(lost.counted.from.clone()),
+            to: unplaced(lost.counted.to.clone()),
+            number: unplaced(lost.number),
+            text: lost.counted.text.clone(),
         }
     }
 }

@@ -1,0 +1,65 @@
+//! `cars expect`: judges a recorded run.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use config::{Changes, Source};
+use lab::folder::{find, recorded_epoch};
+use lab::judge::judge;
+use lab::table::verdicts;
+use miette::miette;
+use protocol::Epoch;
+use protocol::messages::Verdict;
+use simulator::Scenario;
+use simulator::recorder::LATEST;
+use simulator::scenario::expectations;
+
+/// `cars expect`.
+#[derive(Debug, Args)]
+pub(crate) struct ExpectArgs {
+    /// Name or folder of a run; without it the latest run.
+    #[arg(default_value = LATEST)]
+    run: PathBuf,
+    /// A file with the expectations, any file with `[[expect]]`; without it those of the run's scenario.
+    #[arg(long, value_name = "FILE")]
+    expectations: Option<PathBuf>,
+    /// The epoch; without it the last one.
+    #[arg(long, value_name = "N")]
+    epoch: Option<Epoch>,
+    /// Where run folders are made.
+    #[arg(long, default_value = "runs", value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Judges a recorded run. The exit status is that of the verdict.
+pub(crate) fn expect(args: &ExpectArgs) -> miette::Result<ExitCode> {
+    let folder = find(&args.out, &args.run)?;
+    let files = recorded_epoch(&folder, args.epoch)?;
+    let scenario = Scenario::load(&files.scenario, &Changes::default())?;
+    let expected = match &args.expectations {
+        Some(file) => expectations(&Source::read(file)?, &scenario.roster())?,
+        None => scenario.expectations.clone(),
+    };
+    if expected.is_empty() {
+        return Err(miette!(
+            help = "name a file that has [[expect]] with --expectations",
+            "the scenario of the run expects nothing"
+        ));
+    }
+
+    let judged = judge(&files, &scenario, &expected)?;
+    for line in verdicts(&judged.expectations) {
+        terminal::print_line(line)?;
+    }
+    if !judged.has_end {
+        terminal::note(format_args!(
+            "note: the record goes to tick {}, and has no end of the run",
+            judged.tick
+        ));
+    }
+
+    let worst = judged.expectations.values().map(|judged| judged.verdict);
+    let verdict = worst.max().unwrap_or(Verdict::Pass);
+    Ok(ExitCode::from(verdict.exit_status()))
+}

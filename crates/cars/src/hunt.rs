@@ -1,0 +1,228 @@
+//! `cars hunt`: draws fault plans until an expectation fails, and shrinks what it finds to a scenario file.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use config::units::Time;
+use config::{Changes, Override};
+use indicatif::{ProgressBar, ProgressStyle};
+use lab::hunt::{
+    Budget, Coverage, Feature, Finding, Kind, Options, Progress, Report, Subject, hunt as go,
+};
+use miette::IntoDiagnostic;
+use protocol::random::MAX_SEED;
+use terminal::OutputError;
+
+/// Time for which a hunt draws plans if neither a time nor a number of plans is given, seconds.
+const DEFAULT_S: f64 = 60.0;
+/// Set by Ctrl-C: the hunt ends with what it has found.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// `cars hunt`.
+#[derive(Debug, Args)]
+pub(crate) struct HuntArgs {
+    /// A scenario file, or a launch file, whose scenario is hunted in. It needs `[[expect]]`.
+    file: PathBuf,
+    /// Draw plans for this time of wall clock, for example "60 s", which is the default.
+    #[arg(long = "for", value_name = "TIME", conflicts_with = "plans")]
+    time: Option<Time>,
+    /// Draw this number of plans. The same seed and number of plans give the same result.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    plans: Option<u64>,
+    /// Seed of the plans; the scenario keeps its own.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=MAX_SEED))]
+    seed: u64,
+    /// Number of runs at the same time; without it the number of processors. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
+    jobs: Option<u64>,
+    /// Kinds of faults that are drawn, for example `lose,crash`; without it all: lose, loss, burst, delay, duplication,
+    /// partition, one-way, crash, wall, crowd.
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    kinds: Vec<Kind>,
+    /// Longest time of a fault, in simulated time. Walls and crowds are there for the whole run.
+    #[arg(long, value_name = "TIME", default_value = "60 s")]
+    longest: Time,
+    /// Name of an expectation to check; without it all are. Can be given several times.
+    #[arg(long, value_name = "NAME")]
+    expect: Vec<String>,
+    /// Most runs to shrink a finding.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    shrink_runs: u64,
+    /// A change of the scenario, for example `robot.Butler.params.policy=neither`.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    set: Vec<Override>,
+    /// Where scenario files of findings are written.
+    #[arg(long, short, default_value = "hunt", value_name = "DIR")]
+    out: PathBuf,
+    /// Print JSON: findings and coverage.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Hunts; the exit status is 1 if something was found, and 2 if the hunt cannot be made.
+pub(crate) fn hunt(args: &HuntArgs) -> ExitCode {
+    match play(args) {
+        Ok(report) if report.findings.is_empty() => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
+        Err(error) => {
+            terminal::note(format_args!("Error: {error:?}"));
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn play(args: &HuntArgs) -> miette::Result<Report> {
+    let file = launch::scenario_file(&args.file)?;
+    let changes = Changes {
+        set: args.set.clone(),
+        ..Changes::default()
+    };
+    let subject = Subject::load(&file, &changes)?;
+    ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed)).into_diagnostic()?;
+
+    if subject.scenario.expectations.is_empty() {
+        terminal::note(
+            "The scenario expects nothing ([[expect]]): only robots that fail will be found.",
+        );
+    }
+    let options = args.options();
+    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}").into_diagnostic()?;
+    let bar = ProgressBar::new_spinner().with_style(style);
+    let begun = Instant::now();
+    let report = go(&subject, &options, &mut |progress| match progress {
+        Progress::Played(plans, features) => {
+            bar.set_message(format!("{plans} plans, {features} features"));
+            bar.tick();
+        }
+        Progress::Found(finding) => bar.suspend(|| {
+            let elapsed_s = begun.elapsed().as_secs_f64();
+            terminal::note(format_args!(
+                "plan {} fails after {elapsed_s:.1} s: {}",
+                finding.plan, finding.expectation
+            ));
+        }),
+        Progress::Shrunk(finding) => bar.suspend(|| {
+            let elapsed_s = begun.elapsed().as_secs_f64();
+            let runs = finding.shrink_runs;
+            terminal::note(format_args!(
+                "shrunk by {runs} runs after {elapsed_s:.1} s: {}",
+                finding.file.display()
+            ));
+        }),
+    })?;
+    bar.finish_and_clear();
+
+    let printed = if args.json {
+        let json = serde_json::to_string_pretty(&report).into_diagnostic()?;
+        terminal::data(format_args!("{json}\n"))
+    } else {
+        terminal::print(in_words(&report))
+    };
+    OutputError::unless_closed(printed)?;
+    Ok(report)
+}
+
+impl HuntArgs {
+    fn options(&self) -> Options<'static> {
+        let budget = match (self.plans, self.time) {
+            (Some(plans), _) => Budget::Plans(plans),
+            (None, time) => {
+                let time_s = time.map_or(DEFAULT_S, |time| time.0);
+                Budget::Time(Duration::try_from_secs_f64(time_s).unwrap_or(Duration::MAX))
+            }
+        };
+        let jobs = match self.jobs {
+            Some(jobs) => jobs as usize,
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+        };
+        let kinds = if self.kinds.is_empty() {
+            Kind::ALL.to_vec()
+        } else {
+            self.kinds.clone()
+        };
+
+        Options {
+            seed: self.seed,
+            budget,
+            jobs,
+            kinds,
+            longest_s: self.longest.0,
+            expect: self.expect.iter().cloned().collect::<BTreeSet<String>>(),
+            shrink_runs: self.shrink_runs,
+            out: self.out.clone(),
+            stop: &STOP,
+        }
+    }
+}
+
+/// The report for people.
+fn in_words(report: &Report) -> String {
+    let mut text = coverage_in_words(&report.coverage);
+    let scenario = report.scenario.display();
+    text += &format!(
+        "\n{} plans of seed {} in {scenario}, {} ticks.",
+        report.plans, report.seed, report.ticks
+    );
+    if report.not_set_up > 0 {
+        text += &format!(" {} of them could not be set up.", report.not_set_up);
+    }
+
+    text += "\n";
+    for expectation in &report.expectations {
+        let mut findings = report.findings.iter();
+        if !findings.any(|finding| finding.expectation == *expectation) {
+            text += &format!("not seen to fail: {expectation}\n");
+        }
+    }
+    for finding in &report.findings {
+        text += &finding_in_words(finding);
+    }
+    if report.not_shrunk > 0 {
+        let not_shrunk = report.not_shrunk;
+        text += &format!("{not_shrunk} further failures were not shrunk: there are too many\n");
+    }
+    text
+}
+
+fn finding_in_words(finding: &Finding) -> String {
+    let mut text = format!("FAILS: {} ({})\n", finding.expectation, finding.because);
+    for fault in &finding.faults {
+        text += &format!("  {fault}\n");
+    }
+    text += &format!(
+        "  found by plan {}, seen in {} plans\n",
+        finding.plan, finding.plans
+    );
+    if !finding.is_minimal {
+        text += "  not minimal: more --shrink-runs may make it smaller\n";
+    }
+    text + &format!("  cars run {}\n", finding.file.display())
+}
+
+fn coverage_in_words(coverage: &Coverage) -> String {
+    let mut faults = Vec::new();
+    let mut others = String::new();
+    for (feature, plans) in coverage.features() {
+        let line = match feature {
+            Feature::Fault { kind } => {
+                faults.push(format!("{} {plans}", kind.name()));
+                continue;
+            }
+            Feature::Message { link, text, fate } => {
+                format!("{} -> {}: {text}: {fate}", link.from, link.to)
+            }
+            Feature::QueryLost { link } => format!("{} -> {}: query lost", link.from, link.to),
+            Feature::Behavior { robot, from, to } => format!("{robot}: {from} -> {to}"),
+            Feature::Emotion { robot, from, to } => format!("{robot} feels: {from} -> {to}"),
+        };
+        others += &format!("{plans:>8}  {line}\n");
+    }
+    format!(
+        "plans  in which it occurred\n{others}\nkinds of faults, in plans: {}\n",
+        faults.join(", ")
+    )
+}

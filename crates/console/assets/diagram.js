@@ -1,0 +1,202 @@
+// @ts-check
+// The space-time diagram of a recording: the server draws a window of it, a click seeks.
+
+import { html, nothing, render } from "./vendor/lit-html.js";
+
+/** Ticks of the first window. */
+const FIRST_TICKS = 120;
+const LEAST_TICKS = 15;
+/** The most that the server draws. */
+const MOST_TICKS = 4096;
+const LEAST_WIDTH_PX = 300;
+const MOST_WIDTH_PX = 4800;
+const SVG = "http://www.w3.org/2000/svg";
+
+export class DiagramView {
+  /**
+   * @param {HTMLElement} place
+   * @param {import("./recording.js").Player} player
+   */
+  constructor(place, player) {
+    this.player = player;
+    this.from = 0;
+    this.ticks = FIRST_TICKS;
+    this.hasQueries = false;
+    /** The tick of playback when the window was last rendered. */
+    this.followed = -1;
+    /** The window that is shown or requested. */
+    this.shown = "";
+    this.reason = "";
+    /** Points of the scale: pixels from the left, tick. @type {[number, number][]} */
+    this.knots = [];
+
+    this.bar = place.appendChild(document.createElement("div"));
+    this.bar.className = "log-bar";
+    this.picture = place.appendChild(document.createElement("div"));
+    this.picture.className = "diagram";
+    this.picture.dataset.testid = "diagram";
+    this.picture.addEventListener("click", (event) => this.seek(event));
+    new ResizeObserver(() => this.render()).observe(this.picture);
+  }
+
+  get last() {
+    return this.player.last;
+  }
+
+  /** Shows the window, which follows the tick of playback. */
+  render() {
+    const { clientWidth } = this.picture;
+    if (!this.player.header || clientWidth === 0) return;
+
+    const { tick } = this.player;
+    const isOutside = tick < this.from || tick >= this.from + this.ticks;
+    // A window that was moved is ahead of playback, which follows.
+    if (tick !== this.followed && isOutside) this.begin(tick - Math.floor(this.ticks / 4));
+    this.followed = tick;
+    this.renderBar();
+    this.request(Math.min(MOST_WIDTH_PX, Math.max(LEAST_WIDTH_PX, clientWidth - 16)));
+    this.mark();
+  }
+
+  /** Begins the window with a tick, as far as the run has one. @param {number} tick */
+  begin(tick) {
+    this.from = Math.max(0, Math.min(tick, this.last + 1 - this.ticks));
+  }
+
+  /** Moves the window, and playback with it. @param {number} ticks */
+  move(ticks) {
+    const before = this.from;
+    this.begin(this.from + ticks);
+    const tick = Math.min(this.last, Math.max(0, this.player.tick + this.from - before));
+    this.player.isPlaying = false;
+    this.player.seek(tick);
+    this.render();
+  }
+
+  /** Makes the window longer or shorter; the tick of playback stays in it. @param {number} factor */
+  zoom(factor) {
+    const share = (this.player.tick - this.from) / this.ticks;
+    this.ticks = Math.round(Math.min(MOST_TICKS, Math.max(LEAST_TICKS, this.ticks * factor)));
+    this.begin(Math.round(this.player.tick - share * this.ticks));
+    this.render();
+  }
+
+  renderBar() {
+    const toggle = (/** @type {Event} */ event) => {
+      this.hasQueries = /** @type {HTMLInputElement} */ (event.target).checked;
+      this.render();
+    };
+    const half = Math.max(1, Math.floor(this.ticks / 2));
+    const end = Math.min(this.last, this.from + this.ticks - 1);
+
+    render(
+      html`
+        <button type="button" data-testid="diagram-previous" ?disabled=${this.from === 0} @click=${() => this.move(-half)}>Earlier</button>
+        <button type="button" data-testid="diagram-next" ?disabled=${end >= this.last} @click=${() => this.move(half)}>Later</button>
+        <button type="button" data-testid="diagram-in" aria-label="Shorter time" ?disabled=${this.ticks <= LEAST_TICKS}
+          @click=${() => this.zoom(0.5)}>+</button>
+        <button type="button" data-testid="diagram-out" aria-label="Longer time" ?disabled=${this.ticks > this.last || this.ticks >= MOST_TICKS}
+          @click=${() => this.zoom(2)}>−</button>
+        <label class="check"><input type="checkbox" data-testid="diagram-queries" .checked=${this.hasQueries} @change=${toggle} /><span>Lost queries</span></label>
+        ${this.reason ? html`<span class="muted" role="status">${this.reason}</span>` : nothing}`,
+      this.bar,
+    );
+  }
+
+  /** Fetches the window, unless it is shown already or has been requested. @param {number} width */
+  async request(width) {
+    const query = new URLSearchParams({
+      from: String(this.from),
+      count: String(this.ticks),
+      width: String(Math.floor(width)),
+      queries: String(this.hasQueries),
+    });
+    const wanted = query.toString();
+    if (wanted === this.shown) return;
+    this.shown = wanted;
+
+    const { svg, reason } = await fetchDiagram(query);
+    // Another window has been requested since.
+    if (wanted !== this.shown) return;
+    this.reason = reason;
+    this.renderBar();
+    if (svg) this.show(svg);
+  }
+
+  /** @param {SVGSVGElement} svg */
+  show(svg) {
+    this.picture.replaceChildren(svg);
+    this.knots = (svg.dataset.scale ?? "").split(", ").map((knot) => {
+      const [x, tick] = knot.split(" ").map(Number);
+      return [x, tick];
+    });
+
+    this.cursor = svg.appendChild(document.createElementNS(SVG, "line"));
+    this.cursor.setAttribute("class", "cursor");
+    this.cursor.setAttribute("y1", "24");
+    this.cursor.setAttribute("y2", String(svg.height.baseVal.value));
+    this.mark();
+  }
+
+  /** Marks the tick of playback. */
+  mark() {
+    const x = String(along(this.knots, 1, 0, this.player.tick));
+    this.cursor?.setAttribute("x1", x);
+    this.cursor?.setAttribute("x2", x);
+  }
+
+  /** Seeks the tick of what is clicked, or the tick at that place. @param {MouseEvent} event */
+  seek(event) {
+    const svg = this.picture.querySelector("svg");
+    const target = /** @type {Element} */ (event.target);
+    if (!svg?.contains(target)) return;
+
+    const thing = target.closest("[data-tick]");
+    // Bands are long: the place in them counts.
+    const isBand = thing?.matches(".emotion, .behavior, .partition, .fault, .absence, .gap") ?? true;
+    const box = svg.getBoundingClientRect();
+    const x = ((event.clientX - box.left) * svg.viewBox.baseVal.width) / box.width;
+    const tick = isBand ? Math.floor(along(this.knots, 0, 1, x)) : Number(thing?.getAttribute("data-tick"));
+
+    this.player.isPlaying = false;
+    this.player.seek(Math.min(this.last, Math.max(0, tick)));
+  }
+}
+
+/**
+ * @param {URLSearchParams} query
+ * @returns {Promise<{svg: SVGSVGElement | null, reason: string}>}
+ */
+async function fetchDiagram(query) {
+  const url = new URL("recording/diagram", location.href);
+  url.search = query.toString();
+
+  try {
+    const answer = await fetch(url);
+    const text = await answer.text();
+    if (!answer.ok) return { svg: null, reason: text || answer.statusText };
+
+    const root = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
+    if (root instanceof SVGSVGElement) return { svg: document.importNode(root, true), reason: "" };
+    return { svg: null, reason: "The diagram is not SVG." };
+  } catch (error) {
+    return { svg: null, reason: `The diagram cannot be read: ${error instanceof Error ? error.message : error}` };
+  }
+}
+
+/**
+ * The value of a piecewise linear function.
+ * @param {[number, number][]} knots
+ * @param {0 | 1} of index of the argument in a knot
+ * @param {0 | 1} to index of the value in a knot
+ * @param {number} at
+ */
+function along(knots, of, to, at) {
+  for (let i = 1; i < knots.length; i += 1) {
+    const [before, after] = [knots[i - 1], knots[i]];
+    if (at > after[of] && i + 1 < knots.length) continue;
+    const share = (Math.min(after[of], Math.max(before[of], at)) - before[of]) / (after[of] - before[of]);
+    return before[to] + share * (after[to] - before[to]);
+  }
+  return 0;
+}

@@ -1,0 +1,102 @@
+//! Space-time diagrams of a recorded run. What is in progress at the beginning of a window is known from all events before it,
+//! so it is kept for some ticks once it has been read.
+
+use std::sync::{Mutex, PoisonError};
+
+use diagram::{Diagram, Options, State, TooMuch};
+use protocol::Tick;
+use recording::{Recording, RecordingError};
+use serde::Deserialize;
+
+/// Most ticks in a diagram.
+pub(crate) const MAX_WINDOW_TICKS: u64 = 4096;
+/// Ticks from one state that is kept to the next.
+const KEPT_TICKS: Tick = 512;
+/// Least and most width of a diagram, pixels.
+const WIDTHS_PX: std::ops::RangeInclusive<f64> = 300.0..=4800.0;
+
+/// A window, as the query string of a request states it.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub(crate) struct Window {
+    /// The first tick.
+    pub(crate) from: Tick,
+    /// Number of ticks.
+    pub(crate) count: u64,
+    /// Most width, pixels.
+    pub(crate) width: f64,
+    /// Whether lost queries are drawn.
+    #[serde(default)]
+    pub(crate) queries: bool,
+}
+
+impl Window {
+    /// Whether the request is within its limits.
+    pub(crate) fn is_valid(&self) -> bool {
+        (1..=MAX_WINDOW_TICKS).contains(&self.count) && WIDTHS_PX.contains(&self.width)
+    }
+}
+
+/// Why there is no diagram.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum DiagramError {
+    /// The file is damaged.
+    #[error(transparent)]
+    Unreadable(#[from] RecordingError),
+    /// The window has too much.
+    #[error("{0}: show a shorter time")]
+    TooMuch(#[from] TooMuch),
+}
+
+/// The states that are kept: before tick 0, before tick [`KEPT_TICKS`] and so on, as far as was needed.
+#[derive(Debug)]
+pub(crate) struct Diagrams {
+    states: Mutex<Vec<State>>,
+}
+
+impl Diagrams {
+    /// Those of a recording that has not been read yet.
+    pub(crate) fn of(file: &Recording) -> Self {
+        let first = State::new(&file.header().robots);
+        Self {
+            states: Mutex::new(vec![first]),
+        }
+    }
+
+    /// The diagram of a window, which ends with the last tick of the recording at the latest.
+    ///
+    /// # Errors
+    /// [`DiagramError`] if the file is damaged or the window has too much.
+    pub(crate) fn draw(&self, file: &Recording, window: Window) -> Result<String, DiagramError> {
+        let from = window.from.min(file.len().saturating_sub(1));
+        let to = from.saturating_add(window.count).min(file.len());
+        let options = Options {
+            queries: window.queries,
+            max_width_px: window.width,
+            has_style: false,
+            ..Options::default()
+        };
+
+        let state = self.state_before(file, from)?;
+        let mut diagram = Diagram::new(state, file.header().tick_s, from, options);
+        file.for_events(from, to, |tick| {
+            diagram.tick(tick.tick, &tick.events, &tick.awaited);
+        })?;
+        Ok(diagram.to_svg()?)
+    }
+
+    /// What is in progress before a tick of the recording.
+    fn state_before(&self, file: &Recording, tick: Tick) -> Result<State, RecordingError> {
+        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = usize::try_from(tick / KEPT_TICKS).unwrap_or(usize::MAX);
+        let index = kept.min(states.len() - 1);
+        let mut state = states[index].clone();
+
+        file.for_events(index as Tick * KEPT_TICKS, tick, |tick| {
+            state.skip(tick.tick, &tick.events);
+            if tick.tick + 1 == states.len() as Tick * KEPT_TICKS {
+                states.push(state.clone());
+            }
+        })?;
+        Ok(state)
+    }
+}

@@ -1,0 +1,125 @@
+//! The space-time diagram of a run, as one SVG text: robots are lanes, time is to scale in ticks, commands are slanted lines.
+//!
+//! Pure: events of ticks go in ([`Diagram::tick`]), text comes out ([`Diagram::to_svg`]). The same events give the same bytes.
+//! What was in progress when the window began is known from the events before it ([`State`]).
+
+mod axis;
+mod bands;
+mod commands;
+mod draw;
+mod items;
+mod labels;
+mod lanes;
+mod legend;
+pub mod markup;
+mod options;
+pub mod palette;
+mod picture;
+mod scale;
+mod shading;
+mod state;
+mod style;
+mod words;
+
+use protocol::messages::Awaited;
+use protocol::{Event, Tick};
+
+use draw::draw;
+use items::{HeldUp, Items};
+use picture::Window;
+
+pub use options::Options;
+pub use state::State;
+pub use style::style;
+pub use words::{shortened, width_px};
+
+/// Most things in a diagram: bands, commands, marks. A picture with this many has about 4 MB.
+pub const MOST_ITEMS: usize = 12_000;
+
+/// The window has more things than can be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the window has {items} bands, commands and marks, and a diagram has at most {MOST_ITEMS}")]
+pub struct TooMuch {
+    /// Number of things in the window.
+    pub items: usize,
+}
+
+/// The diagram of a window of ticks.
+#[derive(Debug, Clone)]
+pub struct Diagram {
+    state: State,
+    tick_s: f64,
+    from: Tick,
+    /// The last tick of the window so far.
+    to: Tick,
+    options: Options,
+    items: Items,
+    /// Number of things beyond [`MOST_ITEMS`], which are not kept.
+    beyond: usize,
+    /// Whether the run ended with the last tick of the window.
+    has_end: bool,
+}
+
+impl Diagram {
+    /// A diagram of no tick yet. `state` is that after the tick before `from`; a tick lasts `tick_s` simulated seconds.
+    #[must_use]
+    pub fn new(state: State, tick_s: f64, from: Tick, options: Options) -> Self {
+        Self {
+            state,
+            tick_s,
+            from,
+            to: from,
+            options,
+            items: Items::default(),
+            beyond: 0,
+            has_end: false,
+        }
+    }
+
+    /// Adds what happened in a tick. `awaited` are the robots for which the clock was held.
+    pub fn tick(&mut self, tick: Tick, events: &[Event], awaited: &[Awaited]) {
+        self.to = self.to.max(tick);
+        let mut items = Items::default();
+
+        for event in events {
+            let is_shown = self.options.queries || !matches!(event, Event::QueryLost { .. });
+            if is_shown {
+                self.state.apply(tick, event, &mut items);
+            }
+            self.has_end |= matches!(event, Event::End { .. });
+        }
+        for awaited in awaited {
+            items.held_up.push(HeldUp {
+                tick,
+                awaited: awaited.clone(),
+            });
+        }
+
+        if self.items.count() <= MOST_ITEMS {
+            self.items.append(items);
+        } else {
+            self.beyond += items.count();
+        }
+    }
+
+    /// The picture.
+    ///
+    /// # Errors
+    /// [`TooMuch`] if the window has more than [`MOST_ITEMS`] things.
+    pub fn to_svg(&self) -> Result<String, TooMuch> {
+        let mut items = self.items.clone();
+        self.state.add_unfinished(&mut items);
+        let count = items.count() + self.beyond;
+        if count > MOST_ITEMS {
+            return Err(TooMuch { items: count });
+        }
+
+        let window = Window {
+            from: self.from,
+            to: self.to,
+            tick_s: self.tick_s,
+            has_end: self.has_end,
+        };
+        Ok(draw(self.state.robots(), &items, window, &self.options))
+    }
+}

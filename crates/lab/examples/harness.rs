@@ -1,0 +1,124 @@
+//! What an experiment costs beside its simulation: runs of the hall with all that an experiment does for each of them, and the
+//! same runs in a bare loop, in turn. Processor time is compared, so that other programs at work matter little.
+//!
+//!     cargo run --release -p lab --example harness -- [ROUNDS]
+
+#![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
+
+use config::Changes;
+use lab::experiment::engine::{self, Options, Queue};
+use lab::experiment::{Experiment, Plan, Request, Robots, Store};
+use lab::run::Local;
+use lab::statistics::Estimate;
+use miette::{IntoDiagnostic, miette};
+use protocol::RunName;
+use simulator::Scenario;
+
+/// Runs of each round.
+const RUNS: u64 = 24;
+/// Rounds, unless the command line names another number.
+const ROUNDS: usize = 20;
+
+fn main() -> miette::Result<()> {
+    let rounds = std::env::args()
+        .nth(1)
+        .map_or(Ok(ROUNDS), |text| text.parse());
+    let rounds: usize = rounds.into_diagnostic()?;
+    let mut experiment = Experiment::shipped("deadlock")?.ok_or_else(|| miette!("not there"))?;
+    experiment.seeds = (1..=RUNS).collect();
+    let scenario = experiment.scenario.clone();
+    let plan = Plan::new(&Request {
+        name: "harness".to_owned(),
+        experiment,
+        set: Vec::new(),
+        robots: Robots::InProcess,
+    })?;
+
+    let mut bare = Vec::new();
+    let mut measured = Vec::new();
+    let mut costs = Vec::new();
+    for round in 0..=rounds {
+        let bare_s = play_bare(&scenario)?;
+        let measured_s = play(&plan)?;
+        // The first round warms the machine up.
+        if round > 0 {
+            bare.push(RUNS as f64 / bare_s);
+            measured.push(RUNS as f64 / measured_s);
+            costs.push((measured_s / bare_s - 1.0) * 100.0);
+        }
+    }
+
+    let runs = |rates: &[f64]| format!("{} runs of 600 s per second and core", Estimate::of(rates));
+    println!("bare loop:  {}", runs(&bare));
+    println!("experiment: {}", runs(&measured));
+    println!(
+        "cost: {} %, {rounds} rounds of {RUNS} runs",
+        Estimate::of(&costs)
+    );
+    Ok(())
+}
+
+/// Processor time of this process so far, also of threads that have ended, seconds.
+fn processor_s() -> miette::Result<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").into_diagnostic()?;
+    let fields = stat.rsplit_once(')').map_or("", |(_, fields)| fields);
+    // proc(5): utime and stime are fields 14 and 15, in clock ticks of 10 ms; the first one here is the third.
+    let mut ticks = 0.0;
+    for field in fields.split_whitespace().skip(11).take(2) {
+        ticks += field.parse::<f64>().into_diagnostic()?;
+    }
+    Ok(ticks / 100.0)
+}
+
+/// Seconds for the runs in a loop without anything else: the arm "emotions" without loss.
+fn play_bare(scenario: &std::path::Path) -> miette::Result<f64> {
+    let run = RunName::new("bare").into_diagnostic()?;
+    let begun_s = processor_s()?;
+    for seed in 1..=RUNS {
+        let mut set = Vec::new();
+        for change in [
+            "robot.Butler.params.policy=emotion",
+            "robot.Leguin.params.policy=emotion",
+            "robot.Butler.params.resend=on",
+            "network.commands={ loss = 0.0 }",
+        ] {
+            set.push(change.parse().map_err(|reason| miette!("{reason}"))?);
+        }
+        let changes = Changes {
+            seed: Some(seed),
+            duration_s: Some(600.0),
+            set,
+        };
+        let mut local = Local::new(Scenario::load(scenario, &changes)?, &run)?;
+        local.simulation.init(&mut local.robots).into_diagnostic()?;
+        while local.simulation.tick() < local.simulation.scenario().ticks {
+            local.simulation.step(&mut local.robots).into_diagnostic()?;
+        }
+    }
+    Ok(processor_s()? - begun_s)
+}
+
+/// Seconds for the same runs as the first units of an experiment, from an empty folder to the last line.
+fn play(plan: &Plan) -> miette::Result<f64> {
+    let folder = tempfile::tempdir().into_diagnostic()?;
+    let options = Options {
+        units: 0..RUNS as usize,
+        jobs: 1,
+        retries_failed: false,
+    };
+    let begun_s = processor_s()?;
+    plan.save(folder.path())?;
+    let mut store = Store::open(folder.path())?;
+    let mut queue = Queue::of(plan, &store, &options);
+    let no_launcher = || unreachable!("robots are in this process");
+    engine::play(
+        plan,
+        folder.path(),
+        &mut store,
+        &mut queue,
+        &options,
+        &no_launcher,
+        &|| {},
+    )?;
+    Ok(processor_s()? - begun_s)
+}

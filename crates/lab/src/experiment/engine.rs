@@ -1,0 +1,211 @@
+//! Plays the units of an experiment that have not been played, on this machine.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use config::FileError;
+use miette::miette;
+use xxhash_rust::xxh3::xxh3_64;
+
+use super::plan::{Plan, Unit};
+use super::processes::Launcher;
+use super::store::Store;
+use super::unit;
+use crate::export::draft::unwritable;
+
+/// Name of the threads that play units.
+pub const WORKER: &str = "units";
+/// How often other processes' units are read.
+const REFRESH: Duration = Duration::from_secs(2);
+/// File that the first of several processes on a folder locks.
+const LOCK: &str = "first.lock";
+
+/// What is played, and how.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Numbers of the units.
+    pub units: Range<usize>,
+    /// Number of units at the same time; the results do not depend on it.
+    pub jobs: usize,
+    /// Whether units that failed are played again.
+    pub retries_failed: bool,
+}
+
+/// Units to be played in the order of their numbers.
+#[derive(Debug)]
+pub struct Queue {
+    units: Vec<usize>,
+    next: AtomicUsize,
+}
+
+/// What the workers share.
+struct Shared<'a> {
+    plan: &'a Plan,
+    queue: &'a Queue,
+    retries_failed: bool,
+    launcher: Launcher<'a>,
+    store: Mutex<Current<'a>>,
+}
+
+struct Current<'a> {
+    store: &'a mut Store,
+    refreshed: Instant,
+    error: Option<FileError>,
+}
+
+impl Queue {
+    /// The units that have not been played. Of units that are the same run, it has the first.
+    #[must_use]
+    pub fn of(plan: &Plan, store: &Store, options: &Options) -> Self {
+        let mut units = Vec::new();
+        let mut keys = BTreeSet::new();
+        for number in options.units.clone() {
+            let unit = plan.unit(number);
+            let is_open = is_open(store, &unit, options.retries_failed);
+            if is_open && keys.insert(unit.key) {
+                units.push(number);
+            }
+        }
+        Self {
+            units,
+            next: AtomicUsize::new(0),
+        }
+    }
+
+    /// The numbers of the units.
+    #[must_use]
+    pub fn units(&self) -> &[usize] {
+        &self.units
+    }
+
+    fn next(&self) -> Option<usize> {
+        let place = self.next.fetch_add(1, Ordering::Relaxed);
+        self.units.get(place).copied()
+    }
+}
+
+/// Plays the units of a queue, and calls `done` after each. Several processes may do so on one folder at the same time: each
+/// leaves out what it sees that another one has played.
+///
+/// # Errors
+/// If a unit cannot be noted. That a unit fails is noted, and is no error.
+pub fn play(
+    plan: &Plan,
+    folder: &Path,
+    store: &mut Store,
+    queue: &mut Queue,
+    options: &Options,
+    launcher: Launcher<'_>,
+    done: &(impl Fn() + Sync),
+) -> miette::Result<()> {
+    let _first = first(folder, queue)?;
+    let shared = Shared {
+        plan,
+        queue,
+        retries_failed: options.retries_failed,
+        launcher,
+        store: Mutex::new(Current {
+            store,
+            refreshed: Instant::now(),
+            error: None,
+        }),
+    };
+    std::thread::scope(|scope| {
+        let mut workers = Vec::new();
+        for _ in 0..options.jobs.min(shared.queue.units.len()) {
+            let worker = std::thread::Builder::new().name(WORKER.to_owned());
+            let worker = worker.spawn_scoped(scope, || shared.work(done));
+            workers.push(worker.map_err(|error| miette!("no thread can be started: {error}"))?);
+        }
+        for worker in workers {
+            if worker.join().is_err() {
+                return Err(miette!(
+                    "a worker panicked; the message of the panic is above"
+                ));
+            }
+        }
+        Ok(())
+    })?;
+
+    let current = shared.store.into_inner();
+    let current = current.unwrap_or_else(PoisonError::into_inner);
+    if let Some(error) = current.error {
+        return Err(error.into());
+    }
+    current.store.refresh()?;
+    Ok(())
+}
+
+/// Whether a unit is to be played.
+fn is_open(store: &Store, unit: &Unit<'_>, retries_failed: bool) -> bool {
+    match store.get(unit.key) {
+        None => true,
+        Some(Ok(_)) => false,
+        Some(Err(_)) => retries_failed,
+    }
+}
+
+/// Locks the folder for the first process on it. A further one begins elsewhere in the queue, so that they rarely play the same
+/// unit at the same time; if they do, both give the same.
+fn first(folder: &Path, queue: &mut Queue) -> Result<Option<File>, FileError> {
+    if queue.units.is_empty() {
+        return Ok(None);
+    }
+
+    let path = folder.join(LOCK);
+    let file = File::create(&path).map_err(|error| unwritable(&path, &error))?;
+    if file.try_lock().is_ok() {
+        return Ok(Some(file));
+    }
+
+    let begin = xxh3_64(&std::process::id().to_le_bytes()) as usize % queue.units.len();
+    queue.units.rotate_left(begin);
+    Ok(None)
+}
+
+impl Shared<'_> {
+    /// Plays units until the queue is empty, or a unit cannot be noted.
+    fn work(&self, done: &impl Fn()) {
+        while let Some(number) = self.queue.next() {
+            let unit = self.plan.unit(number);
+            match self.is_open(&unit) {
+                None => return,
+                Some(false) => {}
+                Some(true) => {
+                    let result = self.plan.play(&unit, self.launcher);
+                    self.note(&unit, result);
+                }
+            }
+            done();
+        }
+    }
+
+    /// Whether a unit is still to be played; `None` after an error.
+    fn is_open(&self, unit: &Unit<'_>) -> Option<bool> {
+        let mut current = self.store.lock().unwrap_or_else(PoisonError::into_inner);
+        if current.error.is_some() {
+            return None;
+        }
+
+        if current.refreshed.elapsed() >= REFRESH {
+            current.refreshed = Instant::now();
+            if let Err(error) = current.store.refresh() {
+                current.error = Some(error);
+                return None;
+            }
+        }
+        Some(is_open(current.store, unit, self.retries_failed))
+    }
+
+    fn note(&self, unit: &Unit<'_>, result: unit::Result) {
+        let mut current = self.store.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Err(error) = current.store.add(unit.key, result) {
+            current.error.get_or_insert(error);
+        }
+    }
+}

@@ -1,0 +1,523 @@
+//! Tests of experiment files: what is read, and what is refused, where and why.
+
+use super::*;
+
+#[test]
+fn the_shipped_experiments_can_be_played() {
+    for (name, conditions, arms) in [
+        ("affect", 9, 8),
+        ("crowd", 9, 3),
+        ("deadlock", 5, 5),
+        ("partition", 4, 5),
+    ] {
+        let experiment = Experiment::shipped(name).unwrap().unwrap();
+        let found = experiment.list_conditions().unwrap().len();
+        assert_eq!(found, conditions, "{name}");
+        assert_eq!(experiment.arms.len(), arms, "{name}");
+        let scenario = Path::new("configs/hors_doeuvres.toml");
+        assert_eq!(experiment.scenario, scenario, "{name}");
+    }
+    assert!(Experiment::shipped("none").unwrap().is_none());
+}
+
+/// An experiment with everything that can be wrong.
+const GOOD: &str = r#"
+question = "?"
+scenario = "../hors_doeuvres.toml"
+duration = "600 s"
+seeds = 16
+baseline = "one"
+
+[[condition]]
+name = "crash"
+from = "120 s"
+until = "180 s"
+set = ['fault=[{ robot = "Leguin", do = "crash", at = "{from}", until = "{until}" }]']
+
+[[condition]]
+name = "none"
+
+[[factor]]
+name = "guests"
+values = [10, 20]
+path = "guests.count"
+
+[[factor]]
+name = "cut"
+values = ["0 s", "60 s"]
+begins = "200 s"
+set = ['network.partition=[{ from = "{from}", until = "{until}" }]']
+set_at_zero = ["network.partition=[]"]
+
+[[arm]]
+name = "one"
+set = ["robot.Butler.params.policy=emotion"]
+
+[[arm]]
+name = "two"
+yoked_to = "one"
+
+[[measure]]
+name = "served"
+variable = { robot = "Butler", name = "served", as = "end" }
+
+[[measure]]
+name = "exchanges"
+count = { event = "behavior", robot = "Butler", to = "EXCHANGE" }
+when = "after"
+
+[[expect]]
+name = "exchange"
+eventually = { robot = "Butler", behavior = "EXCHANGE" }
+within = "60 s"
+"#;
+
+fn parse(text: &str) -> Result<Experiment, FileError> {
+    let source = Source {
+        name: "experiment.toml".to_owned(),
+        text: text.to_owned(),
+    };
+    Experiment::parse(&source, Path::new("configs/experiments"))
+}
+
+#[test]
+fn conditions_and_factors_make_a_grid() {
+    let experiment = parse(GOOD).unwrap();
+    let conditions = experiment.list_conditions().unwrap();
+    assert_eq!(conditions.len(), 8);
+    assert_eq!(conditions[1].name, "crash, guests 10, cut 60 s");
+    assert_eq!(conditions[1].set[1].to_string(), "guests.count=10");
+    assert_eq!(conditions[1].time_s, Some((120.0, 260.0)));
+    assert_eq!(experiment.explained(), "");
+}
+
+#[test]
+fn seeds_are_a_count_a_list_or_a_range() {
+    for (text, seeds) in [
+        ("3", vec![1, 2, 3]),
+        ("[3, 5, 8]", vec![3, 5, 8]),
+        ("\"65..=67\"", vec![65, 66, 67]),
+    ] {
+        let text = GOOD.replace("seeds = 16", &format!("seeds = {text}"));
+        assert_eq!(parse(&text).unwrap().seeds, seeds);
+    }
+}
+
+/// A file with one mistake: what of [`GOOD`] is replaced, by what, what the line of the error contains, and its reason.
+type Wrong<'a> = (&'a str, &'a str, &'a str, &'a str);
+
+const WRONG: [Wrong<'_>; 53] = [
+    ("question", "qestion", "qestion", "unknown field"),
+    ("question = \"?\"", "", "", "missing field `question`"),
+    (
+        "duration = \"600 s\"",
+        "duration = 600",
+        "duration",
+        "a time such as",
+    ),
+    (
+        "duration = \"600 s\"",
+        "duration = \"0 s\"",
+        "duration",
+        "more than 0 s",
+    ),
+    (
+        "duration = \"600 s\"",
+        "duration = \"100 s\"",
+        "[[condition]]",
+        "begins at 120 s",
+    ),
+    (
+        "duration = \"600 s\"",
+        "duration = \"150 s\"",
+        "[[condition]]",
+        "lasts until 180 s",
+    ),
+    (
+        "duration = \"600 s\"",
+        "duration = \"250 s\"",
+        "values = [\"0 s\"",
+        "lasts until 260 s",
+    ),
+    ("seeds = 16", "seeds = 1", "seeds", "at least 2 seeds"),
+    ("seeds = 16", "seeds = -3", "seeds", "a count such as 64"),
+    (
+        "seeds = 16",
+        "seeds = [3, 5, 3]",
+        "seeds",
+        "the seed 3 is there twice",
+    ),
+    ("seeds = 16", "seeds = []", "seeds", "at least 2 seeds"),
+    (
+        "seeds = 16",
+        "seeds = \"5..9\"",
+        "seeds",
+        "not a range such as",
+    ),
+    (
+        "seeds = 16",
+        "seeds = \"9..=5\"",
+        "seeds",
+        "not a range such as",
+    ),
+    (
+        "seeds = 16",
+        "seeds = [1, 9007199254740993]",
+        "seeds",
+        "2^53",
+    ),
+    (
+        "seeds = 16",
+        "seeds = \"1..=9007199254740991\"",
+        "seeds",
+        "at most 1000000 runs",
+    ),
+    (
+        "seeds = 16",
+        "seeds = 70000",
+        "seeds",
+        "8 conditions, 2 arms and 70000 seeds are more than 1000000 runs",
+    ),
+    (
+        "baseline = \"one\"",
+        "baseline = \"x\"",
+        "baseline",
+        "no arm \"x\"",
+    ),
+    (
+        "until = \"180 s\"\n",
+        "",
+        "name = \"crash\"",
+        "both `from` and `until`",
+    ),
+    (
+        "until = \"180 s\"",
+        "until = \"100 s\"",
+        "[[condition]]",
+        "ends before it begins",
+    ),
+    (
+        "name = \"none\"",
+        "name = \"crash\"",
+        "[[condition]]",
+        "\"crash\" is there twice",
+    ),
+    (
+        "name = \"none\"",
+        "name = \"\"",
+        "name = \"\"",
+        "1 to 100 bytes",
+    ),
+    (
+        "name = \"none\"",
+        "name = \"none\"\nset = [\"x={until}\"]",
+        "x={until}",
+        "the condition has none",
+    ),
+    (
+        "name = \"none\"",
+        "name = \"none\"\nset = [\n\"guests={}\",\n\"guests.count=1\"]",
+        "guests.count=1",
+        "set the same value",
+    ),
+    (
+        "name = \"none\"",
+        "name = \"none\"\nset = [\"guests={}\"]",
+        "[[factor]]",
+        "`guests={}` and `guests.count=10` set the same value",
+    ),
+    (
+        "path = \"guests.count\"",
+        "",
+        "[[factor]]",
+        "either `path` or `set`",
+    ),
+    (
+        "path = \"guests.count\"",
+        "path = \"guests.count\"\nset = []",
+        "[[factor]]",
+        "either `path` or `set`",
+    ),
+    (
+        "path = \"guests.count\"",
+        "path = \"guests.count\"\nbegins = \"1 s\"",
+        "begins = \"1 s\"",
+        "with `begins` has `set`",
+    ),
+    (
+        "path = \"guests.count\"",
+        "path = \"guests.count\"\nset_at_zero = []",
+        "set_at_zero",
+        "the factor has a `path`",
+    ),
+    (
+        "path = \"guests.count\"",
+        "path = \"guests.count=1\"",
+        "path",
+        "names a value",
+    ),
+    (
+        "path = \"guests.count\"",
+        "path = \"guests..count\"",
+        "values",
+        "is empty",
+    ),
+    (
+        "path = \"guests.count\"",
+        "set = [\"guests.count=5\"]",
+        "values",
+        "the same changes",
+    ),
+    (
+        "values = [10, 20]",
+        "values = [10, 10.0]",
+        "values",
+        "\"10\" is there twice",
+    ),
+    (
+        "values = [10, 20]",
+        "values = []",
+        "values",
+        "1 to 1000 values",
+    ),
+    (
+        "values = [10, 20]",
+        "values = [10, nan]",
+        "values",
+        "not a finite number",
+    ),
+    (
+        "values = [10, 20]",
+        "values = [10, [20]]",
+        "values",
+        "a value is a number",
+    ),
+    (
+        "[\"0 s\", \"60 s\"]",
+        "[\"0 s\", 60]",
+        "values",
+        "60 is not a time",
+    ),
+    (
+        "name = \"cut\"",
+        "name = \"guests\"",
+        "name",
+        "two factors \"guests\"",
+    ),
+    (
+        "name = \"cut\"",
+        "name = \"arm\"",
+        "name",
+        "a column \"arm\" already",
+    ),
+    (
+        "set_at_zero = [\"network.partition=[]\"]",
+        "set_at_zero = [\"guests.count=7\"]",
+        "[[factor]]",
+        "set the same value",
+    ),
+    (
+        "network.partition=[{",
+        "network.partition[{",
+        "values",
+        "path=value",
+    ),
+    (
+        "params.policy=emotion",
+        "params.policy",
+        "params.policy",
+        "path=value",
+    ),
+    (
+        "\"robot.Butler.params.policy=emotion\"",
+        "\"guests.count=3\"",
+        "guests.count=3",
+        "set the same value",
+    ),
+    (
+        "name = \"two\"",
+        "name = \"one\"",
+        "name",
+        "two arms \"one\"",
+    ),
+    (
+        "yoked_to = \"one\"",
+        "yoked_to = \"x\"",
+        "yoked_to",
+        "no arm \"x\"",
+    ),
+    (
+        "yoked_to = \"one\"",
+        "yoked_to = \"two\"",
+        "yoked_to",
+        "yoked itself",
+    ),
+    (
+        "name = \"served\"",
+        "name = \"exchanges\"",
+        "count",
+        "two measures",
+    ),
+    (
+        "name = \"served\"",
+        "name = \"guests\"",
+        "variable",
+        "a column \"guests\" already",
+    ),
+    (
+        "name = \"served\"",
+        "name = \"seed\"",
+        "variable",
+        "a column \"seed\" already",
+    ),
+    (
+        "as = \"end\"",
+        "as = \"last\"",
+        "as = \"last\"",
+        "unknown variant `last`",
+    ),
+    (
+        "event = \"behavior\"",
+        "event = \"behaviour\"",
+        "count",
+        "no event \"behaviour\"",
+    ),
+    (
+        "to = \"EXCHANGE\" }",
+        "too = \"EXCHANGE\" }",
+        "count",
+        "no field `too`",
+    ),
+    (
+        "within = \"60 s\"",
+        "",
+        "[[expect]]",
+        "`eventually` needs a time",
+    ),
+    (
+        "count = {",
+        "summary = \"ticks\"\ncount = {",
+        "[[measure]]",
+        "exactly one of",
+    ),
+];
+
+#[test]
+fn errors_show_line_and_reason() {
+    assert!(parse(GOOD).is_ok());
+    for (from, to, line, reason) in WRONG {
+        let text = GOOD.replacen(from, to, 1);
+        assert_ne!(text, GOOD, "{from}");
+        let error = parse(&text).unwrap_err().in_words();
+        assert!(
+            error.contains(reason),
+            "{to}: {error:?} does not contain {reason:?}"
+        );
+
+        let number = error
+            .strip_prefix("line ")
+            .and_then(|rest| rest.split_once(':'));
+        let number: usize = number.unwrap().0.parse().unwrap();
+        let found = text.lines().nth(number - 1).unwrap_or_default();
+        assert!(
+            found.contains(line),
+            "{to}: {error:?} is shown at {found:?}"
+        );
+    }
+}
+
+#[test]
+fn robots_that_the_scenario_does_not_have_are_shown() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let scenario = Scenario::load(
+        &root.join("configs/hors_doeuvres.toml"),
+        &config::Changes::default(),
+    );
+    let mut scenario = scenario.unwrap();
+    let complete = parse(GOOD).unwrap().complete(scenario.clone()).unwrap();
+    assert_eq!(complete.expectations.last().unwrap().name, "exchange");
+
+    for (from, to) in [
+        ("{ robot = \"Butler\", name", "{ robot = \"Buttler\", name"),
+        (
+            "event = \"behavior\", robot = \"Butler\"",
+            "event = \"behavior\", robot = \"Buttler\"",
+        ),
+    ] {
+        let text = GOOD.replace(from, to);
+        let error = parse(&text)
+            .unwrap()
+            .complete(scenario.clone())
+            .unwrap_err();
+        let line = text
+            .lines()
+            .position(|line| line.contains("Buttler"))
+            .unwrap()
+            + 1;
+        let expected =
+            format!("line {line}: the scenario has no robot \"Buttler\"; it has Butler, Leguin");
+        assert_eq!(error.in_words(), expected);
+    }
+
+    let text = GOOD.replace(
+        "eventually = { robot = \"Butler\"",
+        "eventually = { robot = \"Buttler\"",
+    );
+    let error = parse(&text)
+        .unwrap()
+        .complete(scenario.clone())
+        .unwrap_err();
+    let error = error.in_words();
+    assert!(
+        error.contains("no robot of this scenario is called Buttler"),
+        "{error}"
+    );
+
+    scenario.expectations = parse(GOOD).unwrap().expectations;
+    let error = parse(GOOD).unwrap().complete(scenario).unwrap_err();
+    let error = error.in_words();
+    assert!(
+        error.contains("a second expectation called \"exchange\""),
+        "{error}"
+    );
+}
+
+/// The blocks of TOML in the page about experiment files.
+fn blocks_of_the_page() -> Vec<&'static str> {
+    let page = include_str!("../../../../../docs/experiment-files.md");
+    let blocks = page.split("```toml\n").skip(1);
+    blocks
+        .filter_map(|block| block.split("```").next())
+        .collect()
+}
+
+#[test]
+fn every_example_of_the_page_is_good() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let blocks = blocks_of_the_page();
+    assert!(blocks.len() > 10);
+
+    // The first one is a whole file; the others are parts of one.
+    for block in &blocks[1..] {
+        let mut text = "question = '?'\nscenario = 'x'\nduration = '600 s'\nseeds = 2\n\
+                        [[arm]]\nname = 'emotions'\n"
+            .to_owned();
+        if !block.contains("[[measure]]") {
+            text += "[[measure]]\nname = 'ticks'\nsummary = 'ticks'\n";
+        }
+        text += block;
+
+        let experiment = parse(&text).unwrap_or_else(|error| panic!("{block}: {error:?}"));
+        for condition in experiment.list_conditions().unwrap() {
+            for arm in &experiment.arms {
+                let changes = config::Changes {
+                    set: [condition.set.clone(), arm.set.clone()].concat(),
+                    ..config::Changes::default()
+                };
+                let scenario = Scenario::load(&root.join("configs/hors_doeuvres.toml"), &changes);
+                let complete = scenario.and_then(|scenario| experiment.complete(scenario));
+                assert!(complete.is_ok(), "{block}: {:?}", complete.err());
+            }
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! What follows the run of a unit, and what is left at its end.
+
+use std::collections::BTreeMap;
+
+use miette::IntoDiagnostic;
+use observe::Observation;
+use simulator::Summary;
+
+/// Follows a run tick by tick.
+pub(super) trait Follow {
+    /// Takes a tick, or the end of the run, into account.
+    fn observe(&mut self, observation: &Observation<'_>);
+}
+
+/// A run that has ended.
+pub(super) struct Ended {
+    /// Digest of the run.
+    pub(super) digest: String,
+    /// Its summary.
+    pub(super) summary: serde_json::Value,
+    /// The verdicts about expectations, by name.
+    pub(super) verdicts: BTreeMap<String, String>,
+}
+
+impl Ended {
+    /// The end of a run by its summary.
+    ///
+    /// # Errors
+    /// If a number of the summary is not finite.
+    pub(super) fn of(summary: &Summary) -> miette::Result<Self> {
+        let mut verdicts = BTreeMap::new();
+        for (name, judged) in &summary.expectations {
+            verdicts.insert(name.clone(), judged.verdict.name().to_owned());
+        }
+        Ok(Self {
+            digest: summary.digest.clone(),
+            summary: serde_json::to_value(summary).into_diagnostic()?,
+            verdicts,
+        })
+    }
+}

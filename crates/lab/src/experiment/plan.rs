@@ -1,0 +1,672 @@
+//! The plan of an experiment: its units, in one fixed order, each with an identity that depends on nothing else in the file.
+//!
+//! A plan is one file with all that its units need, so that a process on another machine plays them from it alone.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use config::{Changes, FileError, Override, Source};
+use miette::{IntoDiagnostic, WrapErr, miette};
+use serde::{Deserialize, Serialize};
+use simulator::Scenario;
+use xxhash_rust::xxh3::Xxh3;
+
+use super::condition::Condition;
+use super::file::{Arm, Experiment};
+use super::script;
+use crate::export::draft::{Draft, unwritable};
+
+/// The plan in the folder of an experiment.
+pub const PLAN: &str = "plan.json";
+/// The experiment file as it was planned, for people.
+const FILE: &str = "experiment.toml";
+
+/// What the options of an experiment set, instead of a change of the scenario.
+const OWN_OPTIONS: [&str; 2] = ["seed", "duration"];
+
+/// An experiment and what its options change.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Name of the experiment.
+    pub name: String,
+    /// The experiment, with the scenario, the duration and the seeds of its options.
+    pub experiment: Experiment,
+    /// Further changes of the scenario in every arm.
+    pub set: Vec<Override>,
+    /// How its units are played.
+    pub robots: Robots,
+}
+
+/// How the robots of a unit run. The run is the same.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Robots {
+    /// In the process that plays the unit.
+    InProcess,
+    /// As processes of their own: the programs of the project, by their classes.
+    Programs,
+    /// As the processes of a launch file.
+    Launched(LaunchText),
+}
+
+/// The units of an experiment.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The experiment, with the duration and the seeds of its options.
+    pub experiment: Experiment,
+    conditions: Vec<Condition>,
+    written: Written,
+    cells: Vec<Cell>,
+}
+
+/// `plan.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Written {
+    name: String,
+    program: Program,
+    units: usize,
+    duration_s: f64,
+    seeds: Vec<u64>,
+    set: Vec<String>,
+    /// Digest of what is measured.
+    measures: String,
+    /// Text of the experiment file.
+    file: String,
+    robots: Robots,
+    /// Conditions and arms in the order of the units: the units of a cell are its seeds.
+    cells: Vec<WrittenCell>,
+}
+
+/// An arm under a condition.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct WrittenCell {
+    condition: String,
+    arm: String,
+    /// The scenario with all changes, without a seed.
+    scenario: String,
+}
+
+/// A launch file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LaunchText {
+    /// Its folder, where its relative paths begin.
+    pub folder: PathBuf,
+    /// Its text.
+    pub text: String,
+}
+
+/// The program that plays the units: another one may give other runs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Program {
+    /// Its version.
+    pub version: String,
+    /// The commit that it was built from, if it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub commit: Option<String>,
+}
+
+/// An arm under a condition, as it is played.
+#[derive(Debug, Clone)]
+struct Cell {
+    /// Digest of all that its units have in common.
+    content: u128,
+    /// The cell whose emotions its robots show.
+    yoked_to: Option<usize>,
+    /// Its scenario with the seed of the first unit that was played.
+    scenario: OnceLock<Scenario>,
+}
+
+/// The identity of a unit: units of one key are the same run and are measured alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Key(u128);
+
+/// One run of an experiment.
+#[derive(Debug, Clone, Copy)]
+pub struct Unit<'a> {
+    /// Its number in the plan, from 0.
+    pub number: usize,
+    /// Its identity.
+    pub key: Key,
+    /// Its condition.
+    pub condition: &'a Condition,
+    /// Its arm.
+    pub arm: &'a Arm,
+    /// Its seed.
+    pub seed: u64,
+    /// The cell and the seed of the run whose emotions its robots show.
+    pub(super) yoke: Option<(usize, u64)>,
+    pub(super) cell: usize,
+}
+
+impl Program {
+    /// This program.
+    #[must_use]
+    pub fn this() -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: option_env!("CARS_COMMIT").map(str::to_owned),
+        }
+    }
+}
+
+impl std::fmt::Display for Program {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.commit {
+            Some(commit) => write!(f, "{} ({commit})", self.version),
+            None => f.write_str(&self.version),
+        }
+    }
+}
+
+impl std::fmt::Display for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:032x}", self.0)
+    }
+}
+
+impl std::str::FromStr for Key {
+    type Err = std::num::ParseIntError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        u128::from_str_radix(text, 16).map(Self)
+    }
+}
+
+impl Unit<'_> {
+    /// The seed of the run whose emotions its robots show.
+    #[must_use]
+    pub fn yoked_to_seed(&self) -> Option<u64> {
+        self.yoke.map(|(_, seed)| seed)
+    }
+
+    /// Names the unit for people.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        format!(
+            "unit {} (condition \"{}\", arm \"{}\", seed {})",
+            self.number, self.condition.name, self.arm.name, self.seed
+        )
+    }
+}
+
+impl Plan {
+    /// Plans an experiment.
+    ///
+    /// # Errors
+    /// If a condition cannot be played, two of the changes set the same value, or a scenario cannot be used.
+    pub fn new(request: &Request) -> miette::Result<Self> {
+        let experiment = &request.experiment;
+        check_own_options(&request.set)?;
+        let conditions = list_conditions(experiment)?;
+
+        let mut cells = Vec::new();
+        for condition in &conditions {
+            for arm in &experiment.arms {
+                cells.push(WrittenCell {
+                    condition: condition.name.clone(),
+                    arm: arm.name.clone(),
+                    scenario: scenario_of(request, condition, arm)?,
+                });
+            }
+        }
+
+        let mut set = Vec::new();
+        for change in &request.set {
+            set.push(change.to_string());
+        }
+        let written = Written {
+            name: request.name.clone(),
+            program: Program::this(),
+            units: cells.len() * experiment.seeds.len(),
+            duration_s: experiment.duration_s,
+            seeds: experiment.seeds.clone(),
+            set,
+            measures: digest_of_measures(experiment),
+            file: experiment.source().text.clone(),
+            robots: request.robots.clone(),
+            cells,
+        };
+        Self::of(written, experiment.clone())
+    }
+
+    /// Reads the plan in the folder of an experiment.
+    ///
+    /// # Errors
+    /// If there is none, it cannot be read, or it was made by a program that measures otherwise.
+    pub fn load(folder: &Path) -> miette::Result<Self> {
+        let Some(written) = read(folder)? else {
+            return Err(miette!(
+                help = "make one with `cars experiment run`",
+                "{} is not the folder of an experiment: it has no {PLAN}",
+                folder.display()
+            ));
+        };
+
+        let path = folder.join(PLAN);
+        let source = Source {
+            name: path.display().to_string(),
+            text: written.file.clone(),
+        };
+        let mut experiment = Experiment::parse(&source, Path::new(""))?;
+        experiment.duration_s = written.duration_s;
+        experiment.seeds.clone_from(&written.seeds);
+        Self::of(written, experiment).wrap_err_with(|| format!("{}", path.display()))
+    }
+
+    fn of(written: Written, experiment: Experiment) -> miette::Result<Self> {
+        let conditions = list_conditions(&experiment)?;
+        let arms = &experiment.arms;
+        let are_all_there = written.cells.len() == conditions.len() * arms.len();
+        if !are_all_there || written.units != written.cells.len() * written.seeds.len() {
+            return Err(miette!("the plan is not that of its experiment"));
+        }
+
+        let mut cells = Vec::new();
+        for (index, cell) in written.cells.iter().enumerate() {
+            let condition = &conditions[index / arms.len()];
+            let arm = &arms[index % arms.len()];
+            if cell.condition != condition.name || cell.arm != arm.name {
+                return Err(miette!("the plan is not that of its experiment"));
+            }
+
+            let mut content = Xxh3::new();
+            add_text(&mut content, &written.program.to_string());
+            add_text(&mut content, &written.measures);
+            add_text(&mut content, &format!("{:?}", condition.time_s));
+            add_text(&mut content, &cell.scenario);
+            if let Robots::Launched(launch) = &written.robots {
+                add_text(&mut content, &launch.text);
+            }
+            let mut yoked_to = None;
+            if let Some(other) = &arm.yoked_to {
+                let arm = arms.iter().position(|arm| arm.name == *other);
+                let arm = arm.ok_or_else(|| miette!("the arm of the yoke is missing"))?;
+                let other = index / arms.len() * arms.len() + arm;
+                add_text(&mut content, &written.cells[other].scenario);
+                yoked_to = Some(other);
+            }
+            cells.push(Cell {
+                content: content.digest128(),
+                yoked_to,
+                scenario: OnceLock::new(),
+            });
+        }
+        Ok(Self {
+            experiment,
+            conditions,
+            written,
+            cells,
+        })
+    }
+
+    /// Checks that this program plays its units as the one that made the plan.
+    ///
+    /// # Errors
+    /// If it is another program.
+    pub fn check_program(&self) -> miette::Result<()> {
+        let this = Program::this();
+        if this != self.written.program {
+            return Err(miette!(
+                help = "plan it again with `cars experiment run`",
+                "the experiment was planned by cars {}, and this is cars {this}",
+                self.written.program
+            ));
+        }
+        Ok(())
+    }
+
+    /// Writes the plan into the folder of the experiment, which is made if it does not exist.
+    ///
+    /// # Errors
+    /// If the folder has other content, or a file cannot be written.
+    pub fn save(&self, folder: &Path) -> miette::Result<()> {
+        if !folder.join(PLAN).exists() && has_files(folder) {
+            return Err(miette!(
+                help = "choose another folder with -o, or move it away",
+                "{} is there and is not the folder of an experiment",
+                folder.display()
+            ));
+        }
+
+        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+        let mut text = serde_json::to_string_pretty(&self.written).into_diagnostic()?;
+        text.push('\n');
+        write(&folder.join(PLAN), &text)?;
+        write(&folder.join(FILE), &self.written.file)?;
+        Ok(())
+    }
+
+    /// What of the plan that was in the folder before has changed, so that its units are played again: a sentence each.
+    ///
+    /// # Errors
+    /// If the plan that is there cannot be read.
+    pub fn changes_since(&self, folder: &Path) -> miette::Result<Vec<String>> {
+        let Some(before) = read(folder)? else {
+            return Ok(Vec::new());
+        };
+
+        let now = &self.written;
+        let mut changes = Vec::new();
+        if before.program != now.program {
+            changes.push(format!(
+                "the program is {} and was {}: every unit is another one",
+                now.program, before.program
+            ));
+        }
+        if before.measures != now.measures {
+            changes.push("the measures have changed: every unit is another one".to_owned());
+        }
+        let mut changed = Vec::new();
+        for cell in &now.cells {
+            let mut others = before.cells.iter();
+            let other =
+                others.find(|other| other.condition == cell.condition && other.arm == cell.arm);
+            if other.is_some_and(|other| other.scenario != cell.scenario) {
+                changed.push(cell);
+            }
+        }
+        if let Some((first, others)) = changed.split_first() {
+            changes.push(format!(
+                "the scenario of the arm \"{}\" under the condition \"{}\" has changed, and that of {} others",
+                first.arm,
+                first.condition,
+                others.len()
+            ));
+        }
+        Ok(changes)
+    }
+
+    /// Name of the experiment.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.written.name
+    }
+
+    /// The program that plays the units.
+    #[must_use]
+    pub fn program(&self) -> &Program {
+        &self.written.program
+    }
+
+    /// How the robots of its units run.
+    #[must_use]
+    pub fn robots(&self) -> &Robots {
+        &self.written.robots
+    }
+
+    /// The conditions, in the order of the units.
+    #[must_use]
+    pub fn conditions(&self) -> &[Condition] {
+        &self.conditions
+    }
+
+    /// Number of units.
+    #[must_use]
+    pub fn units(&self) -> usize {
+        self.written.units
+    }
+
+    /// A unit by its number, which must be less than [`Self::units`].
+    #[must_use]
+    pub fn unit(&self, number: usize) -> Unit<'_> {
+        let seeds = &self.written.seeds;
+        let arms = &self.experiment.arms;
+        let cell = number / seeds.len();
+        let place = number % seeds.len();
+        let seed = seeds[place];
+        let mut key = Xxh3::new();
+        key.update(&self.cells[cell].content.to_le_bytes());
+        key.update(&seed.to_le_bytes());
+
+        let mut yoke = None;
+        if let Some(other) = self.cells[cell].yoked_to {
+            let next = seeds[(place + 1) % seeds.len()];
+            key.update(&next.to_le_bytes());
+            yoke = Some((other, next));
+        }
+        Unit {
+            number,
+            key: Key(key.digest128()),
+            condition: &self.conditions[cell / arms.len()],
+            arm: &arms[cell % arms.len()],
+            seed,
+            yoke,
+            cell,
+        }
+    }
+
+    /// Describes the runs, the arms and the conditions, for people.
+    #[must_use]
+    pub fn compared(&self) -> String {
+        let experiment = &self.experiment;
+        let file = experiment.scenario.file_name().unwrap_or_default();
+        let mut text = format!(
+            "{}: {} runs of {} s for each line, {}. Runs with the same seed begin alike\n\
+             and have the same chance in every arm. {}\n\
+             Mean and 95 % confidence interval over the seeds.\n\n",
+            file.display(),
+            experiment.seeds.len(),
+            experiment.duration_s,
+            describe_seeds(&experiment.seeds),
+            experiment.explained(),
+        );
+
+        let mut named = Vec::new();
+        for arm in &experiment.arms {
+            named.push((&arm.name, &arm.what));
+        }
+        for condition in &self.conditions {
+            if !condition.what.is_empty() {
+                named.push((&condition.name, &condition.what));
+            }
+        }
+        let width = named.iter().map(|(name, _)| name.len()).max();
+        let width = width.unwrap_or_default();
+        for (name, what) in named {
+            text += &format!("  {name:<width$}  {what}\n");
+        }
+
+        for measure in &experiment.measures {
+            if let Some(meaning) = measure.explained() {
+                text += &format!("\n{meaning}\n");
+            }
+        }
+        text
+    }
+
+    /// The scenario of a cell with a seed and further changes.
+    ///
+    /// # Errors
+    /// If the scenario cannot be used with them.
+    pub(super) fn scenario(
+        &self,
+        cell: usize,
+        seed: u64,
+        set: Vec<Override>,
+    ) -> Result<Scenario, FileError> {
+        let known = self.cells[cell].scenario.get();
+        if let Some(known) = known.filter(|_| set.is_empty()) {
+            let mut scenario = known.clone();
+            scenario.seed = seed;
+            return Ok(scenario);
+        }
+
+        let written = &self.written.cells[cell];
+        let source = Source {
+            name: format!(
+                "the scenario of the arm \"{}\" under the condition \"{}\"",
+                written.arm, written.condition
+            ),
+            text: written.scenario.clone(),
+        };
+        let changes = Changes {
+            seed: Some(seed),
+            duration_s: None,
+            set,
+        };
+        let scenario = Scenario::parse(&changes.apply(&source)?, Path::new(""))?;
+        if changes.set.is_empty() {
+            // Two threads read the same.
+            let _known = self.cells[cell].scenario.set(scenario.clone());
+        }
+        Ok(scenario)
+    }
+}
+
+impl LaunchText {
+    /// Reads a launch file.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let source = Source::read(path)?;
+        let folder = std::path::absolute(path.parent().unwrap_or(Path::new("")))
+            .map_err(|error| FileError::unreadable(path, &error))?;
+        Ok(Self {
+            folder,
+            text: source.text,
+        })
+    }
+}
+
+/// Whether a folder has files. Drafts that a killed process left, whose names begin with a point, are none.
+fn has_files(folder: &Path) -> bool {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names = entries.map(|entry| entry.file_name());
+    names.any(|name| !name.to_string_lossy().starts_with('.'))
+}
+
+/// Reads the plan of a folder; `None` if it has none.
+fn read(folder: &Path) -> miette::Result<Option<Written>> {
+    let path = folder.join(PLAN);
+    if !path.exists() {
+        return Ok(None);
+    }
+
+    let text = Source::read(&path)?.text;
+    let written = serde_json::from_str(&text)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{} is not a plan of this version of cars", path.display()))?;
+    Ok(Some(written))
+}
+
+/// Writes a file that is seen whole or not at all.
+pub(super) fn write(path: &Path, text: &str) -> Result<(), FileError> {
+    let mut draft = Draft::create(path)?;
+    draft
+        .write_all(text.as_bytes())
+        .map_err(|error| unwritable(path, &error))?;
+    draft.publish()?;
+    Ok(())
+}
+
+fn list_conditions(experiment: &Experiment) -> miette::Result<Vec<Condition>> {
+    let conditions = experiment.list_conditions();
+    conditions.map_err(|error| miette!("{error}"))
+}
+
+fn check_own_options(set: &[Override]) -> miette::Result<()> {
+    for change in set {
+        let option = change.top();
+        if OWN_OPTIONS.contains(&option) {
+            return Err(miette!(
+                help = "use --seeds and --duration",
+                "--set {change} would have no effect: the {option} of a run is the experiment's"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The scenario of an arm under a condition, without a seed.
+fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> miette::Result<String> {
+    let experiment = &request.experiment;
+    let sources = [
+        ("the option --set".to_owned(), request.set.as_slice()),
+        (format!("the arm \"{}\"", arm.name), &arm.set),
+        (
+            format!("the condition \"{}\"", condition.name),
+            &condition.set,
+        ),
+    ];
+    check_overlaps(&sources)?;
+
+    let mut set = Vec::new();
+    for (_, changes) in &sources {
+        set.extend_from_slice(changes);
+    }
+    let changes = Changes {
+        seed: experiment.seeds.first().copied(),
+        duration_s: Some(experiment.duration_s),
+        set,
+    };
+    let scenario = Scenario::load(&experiment.scenario, &changes);
+    let scenario = scenario.and_then(|scenario| experiment.complete(scenario));
+    let scenario = scenario.map_err(|error| {
+        let (arm, condition) = (&arm.name, &condition.name);
+        miette::Report::new(error).wrap_err(format!("arm \"{arm}\", condition \"{condition}\""))
+    })?;
+
+    if arm.yoked_to.is_some() {
+        let mut yoke = Vec::new();
+        for robot in scenario.robots.keys() {
+            yoke.push(script::change(robot, "[]").map_err(|reason| miette!("{reason}"))?);
+        }
+        let yoke = (format!("the yoke of \"{}\"", arm.name), yoke.as_slice());
+        for source in sources {
+            check_overlaps(&[source, yoke.clone()])?;
+        }
+    }
+
+    let mut table: toml::Table = toml::from_str(&scenario.to_toml()?).into_diagnostic()?;
+    table.remove("seed");
+    toml::to_string(&table).into_diagnostic()
+}
+
+/// Checks that no two of these sources set the same value: one would silently override the other.
+fn check_overlaps(sources: &[(String, &[Override])]) -> miette::Result<()> {
+    for (index, (name, changes)) in sources.iter().enumerate() {
+        for (other, others) in &sources[index + 1..] {
+            for change in *changes {
+                if let Some(overridden) = others.iter().find(|own| own.overlaps(change)) {
+                    return Err(miette!(
+                        help = "an experiment sets each value in one place",
+                        "{name} sets {change}, and {other} sets {overridden}"
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Names the seeds: the first and the last of them where they follow each other.
+fn describe_seeds(seeds: &[u64]) -> String {
+    let is_range = seeds.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    if let (true, [first, .., last]) = (is_range, seeds) {
+        return format!("seeds {first} to {last}");
+    }
+
+    let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+    format!("seeds {}", seeds.join(", "))
+}
+
+/// Digest of what is measured, without what is only shown.
+fn digest_of_measures(experiment: &Experiment) -> String {
+    let mut text = String::new();
+    for measure in &experiment.measures {
+        let _infallible = writeln!(text, "{:?} {:?}", measure.name, measure.kind);
+    }
+
+    let mut hash = Xxh3::new();
+    hash.update(text.as_bytes());
+    format!("{:032x}", hash.digest128())
+}
+
+/// Adds a text to a digest, with its length, so that different pairs of adjacent texts have different digests.
+fn add_text(hash: &mut Xxh3, text: &str) {
+    hash.update(&(text.len() as u64).to_le_bytes());
+    hash.update(text.as_bytes());
+}

@@ -1,0 +1,274 @@
+//! The results of an experiment: what was measured in each of its units, and the tables and estimates of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+use std::path::Path;
+
+use config::FileError;
+use miette::IntoDiagnostic;
+use serde::{Deserialize, Serialize};
+
+use super::contrast::Contrast;
+use super::estimate::Cell;
+use super::outcome::Outcome;
+use super::plan::Plan;
+use super::store::Store;
+use crate::export::draft::{Draft, unwritable};
+use crate::export::sheet::{Column, Format, Sheet, Type, Value};
+
+/// Name of the tables with a row for each unit.
+const RUNS: &str = "runs";
+/// The estimates.
+const RESULTS: &str = "results.json";
+
+/// A unit that could not be played to its end.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Number of the unit in the plan, from 0.
+    pub unit: usize,
+    /// Name of the condition.
+    pub condition: String,
+    /// Name of the arm.
+    pub arm: String,
+    /// Seed of the run.
+    pub seed: u64,
+    /// The reason.
+    pub reason: String,
+}
+
+/// The results of an experiment, in the order of its units.
+#[derive(Debug)]
+pub struct Results {
+    /// The plan, with the experiment.
+    pub plan: Plan,
+    /// The units that were played.
+    pub outcomes: Vec<Outcome>,
+    /// The units that could not be played.
+    pub failures: Vec<Failure>,
+    /// Numbers of the units that have not been played yet.
+    pub missing: Vec<usize>,
+    /// Lines of files that are not as they were written, for people: each with its unit, if that has to be played again.
+    pub damages: Vec<String>,
+    /// Numbers of units that were played several times and gave different runs.
+    pub conflicts: Vec<usize>,
+}
+
+/// `results.json`.
+#[derive(Debug, Serialize)]
+struct Written<'a> {
+    name: &'a str,
+    question: &'a str,
+    units: usize,
+    missing: usize,
+    failures: &'a [Failure],
+    estimates: Vec<Cell>,
+    contrasts: Vec<Contrast>,
+}
+
+impl Results {
+    /// Reads the results in the folder of an experiment.
+    ///
+    /// # Errors
+    /// If it is not the folder of an experiment, or a file cannot be read.
+    pub fn load(folder: &Path) -> miette::Result<Self> {
+        let plan = Plan::load(folder)?;
+        let store = Store::open(folder)?;
+        Ok(Self::of(plan, &store))
+    }
+
+    /// The results of the units that have been played.
+    #[must_use]
+    pub fn of(plan: Plan, store: &Store) -> Self {
+        let mut outcomes = Vec::new();
+        let mut failures = Vec::new();
+        let mut missing = Vec::new();
+        let mut conflicts = Vec::new();
+        for number in 0..plan.units() {
+            let unit = plan.unit(number);
+            match store.get(unit.key) {
+                None => missing.push(number),
+                Some(Ok(played)) => outcomes.push(Outcome::of(&unit, played)),
+                Some(Err(reason)) => failures.push(Failure {
+                    unit: number,
+                    condition: unit.condition.name.clone(),
+                    arm: unit.arm.name.clone(),
+                    seed: unit.seed,
+                    reason: reason.clone(),
+                }),
+            }
+            if store.conflicts().contains(&unit.key) {
+                conflicts.push(number);
+            }
+        }
+
+        let damages = store.damages_of(&plan, &missing);
+        Self {
+            plan,
+            outcomes,
+            failures,
+            missing,
+            damages,
+            conflicts,
+        }
+    }
+
+    /// Writes the tables and the estimates into the folder of the experiment. The same results give the same bytes.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self, folder: &Path) -> miette::Result<()> {
+        let mut drafts = self.tables(folder)?;
+        let path = folder.join(RESULTS);
+        let mut draft = Draft::create(&path)?;
+        let written = Written {
+            name: self.plan.name(),
+            question: &self.plan.experiment.question,
+            units: self.plan.units(),
+            missing: self.missing.len(),
+            failures: &self.failures,
+            estimates: self.plan.experiment.estimate(&self.outcomes),
+            contrasts: self.plan.experiment.contrast(&self.outcomes),
+        };
+        let text = serde_json::to_string_pretty(&written).into_diagnostic()?;
+        writeln!(draft, "{text}").map_err(|error| unwritable(&path, &error))?;
+
+        drafts.push(draft);
+        for draft in drafts {
+            draft.publish()?;
+        }
+        Ok(())
+    }
+
+    /// The tables with a row for each unit.
+    fn tables(&self, folder: &Path) -> Result<Vec<Draft>, FileError> {
+        let columns = Columns::of(self);
+        let formats = [Format::Csv, Format::Parquet];
+        let mut sheet = Sheet::create(folder, RUNS, &formats, columns.all.clone())?;
+        let mut outcomes = self.outcomes.iter().peekable();
+        let mut failures = self.failures.iter().peekable();
+        for number in 0..self.plan.units() {
+            if let Some(outcome) = outcomes.next_if(|outcome| outcome.unit == number) {
+                sheet.add(columns.row(outcome))?;
+            } else if let Some(failure) = failures.next_if(|failure| failure.unit == number) {
+                let unit = self.plan.unit(number);
+                let mut row = columns.unit(number, &unit.condition.levels);
+                row.push(("condition", failure.condition.as_str().into()));
+                row.push(("arm", failure.arm.as_str().into()));
+                row.push(("seed", failure.seed.into()));
+                row.push(("failed", failure.reason.as_str().into()));
+                sheet.add(row)?;
+            }
+        }
+        sheet.finish()
+    }
+}
+
+/// The columns of the table of units.
+struct Columns {
+    all: Vec<Column>,
+    /// Columns of factors, by the names of the factors.
+    levels: BTreeMap<String, Column>,
+    /// Columns of measures: the number, and whether it is censored.
+    measures: BTreeMap<String, (String, Option<String>)>,
+    /// Columns of verdicts.
+    verdicts: BTreeMap<String, String>,
+}
+
+impl Columns {
+    fn of(results: &Results) -> Self {
+        let mut columns = Self {
+            all: Vec::new(),
+            levels: BTreeMap::new(),
+            measures: BTreeMap::new(),
+            verdicts: BTreeMap::new(),
+        };
+        columns.add("unit", Type::Integer);
+        columns.add("condition", Type::Text);
+        let conditions = results.plan.conditions();
+        for (name, _) in conditions.iter().flat_map(|condition| &condition.levels) {
+            if !columns.levels.contains_key(name) {
+                let of = columns.add_named(name, "factor", type_of(results, name));
+                columns.levels.insert(name.clone(), of);
+            }
+        }
+        columns.add("arm", Type::Text);
+        columns.add("seed", Type::Integer);
+        columns.add("yoked_to_seed", Type::Integer);
+        columns.add("failed", Type::Text);
+        columns.add("digest", Type::Text);
+
+        for measure in &results.plan.experiment.measures {
+            let number = columns.add_named(&measure.name, "measure", Type::Real).name;
+            let mut censored = None;
+            if measure.is_time() {
+                let name = format!("{number}_censored");
+                censored = Some(columns.add_named(&name, "measure", Type::Flag).name);
+            }
+            let names = (number, censored);
+            columns.measures.insert(measure.name.clone(), names);
+        }
+        let verdicts = results.outcomes.iter().flat_map(|run| run.verdicts.keys());
+        for name in BTreeSet::from_iter(verdicts) {
+            let column = columns.add_named(name, "verdict", Type::Text).name;
+            columns.verdicts.insert(name.clone(), column);
+        }
+        columns
+    }
+
+    fn add(&mut self, name: &str, of: Type) -> Column {
+        let column = Column::new(name, of);
+        self.all.push(column.clone());
+        column
+    }
+
+    /// Adds a column whose name the experiment gives, which may be that of another column.
+    fn add_named(&mut self, name: &str, kind: &str, of: Type) -> Column {
+        let mut unique = name.to_owned();
+        while self.all.iter().any(|column| column.name == unique) {
+            unique = format!("{unique} ({kind})");
+        }
+        self.add(&unique, of)
+    }
+
+    /// The cells that all units have.
+    fn unit(&self, number: usize, levels: &[(String, String)]) -> Vec<(&str, Value<'_>)> {
+        let mut row = vec![("unit", Value::from(number as u64))];
+        for (name, level) in levels {
+            let column = &self.levels[name];
+            let level = match (column.of, level.parse()) {
+                (Type::Real, Ok(number)) => Value::Real(number),
+                _ => level.clone().into(),
+            };
+            row.push((&column.name, level));
+        }
+        row
+    }
+
+    fn row<'a>(&'a self, outcome: &'a Outcome) -> Vec<(&'a str, Value<'a>)> {
+        let mut row = self.unit(outcome.unit, &outcome.levels);
+        row.push(("condition", outcome.condition.as_str().into()));
+        row.push(("arm", outcome.arm.as_str().into()));
+        row.push(("seed", outcome.seed.into()));
+        row.push(("yoked_to_seed", outcome.yoked_to_seed.into()));
+        row.push(("digest", outcome.digest.as_str().into()));
+        for (name, measured) in &outcome.measures {
+            let (number, censored) = &self.measures[name];
+            row.push((number, measured.value.into()));
+            if let Some(censored) = censored {
+                row.push((censored, measured.is_censored.into()));
+            }
+        }
+        for (name, verdict) in &outcome.verdicts {
+            row.push((&self.verdicts[name], verdict.as_str().into()));
+        }
+        row
+    }
+}
+
+/// The values of a factor: numbers, if all of them are.
+fn type_of(results: &Results, factor: &str) -> Type {
+    let conditions = results.plan.conditions().iter();
+    let mut levels = conditions.flat_map(|condition| &condition.levels);
+    let are_numbers = levels.all(|(name, level)| name != factor || level.parse::<f64>().is_ok());
+    if are_numbers { Type::Real } else { Type::Text }
+}

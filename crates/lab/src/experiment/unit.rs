@@ -1,0 +1,205 @@
+//! Plays one unit of an experiment and takes its measures.
+
+use std::collections::BTreeMap;
+use std::panic::AssertUnwindSafe;
+
+use config::Override;
+use miette::{IntoDiagnostic, miette};
+use observe::{Measured, Observation, Probe};
+use protocol::RunName;
+use serde::{Deserialize, Serialize};
+use simulator::{Scenario, Summary};
+
+use super::follow::{Ended, Follow};
+use super::plan::{Plan, Robots, Unit};
+use super::processes::{self, Launcher};
+use super::script::Script;
+use crate::run::{check_faults, make_robots, play};
+
+/// The run of a unit, of which nothing is recorded.
+const RUN: &str = "experiment";
+
+/// What a unit gives: its measures, or the reason why it has none.
+pub type Result = std::result::Result<Played, String>;
+
+/// What was measured in a unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Played {
+    /// Digest of the run.
+    pub digest: String,
+    /// The measures, by name.
+    pub measures: BTreeMap<String, Measured>,
+    /// The verdicts about expectations, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub verdicts: BTreeMap<String, String>,
+}
+
+/// The measures of a run, by name.
+struct Gauge<'a>(Vec<(&'a str, Probe<'a>)>);
+
+impl Plan {
+    /// Checks that every arm can be played under every condition.
+    ///
+    /// # Errors
+    /// If a scenario has robots or faults that need processes, and there are none.
+    pub fn check(&self) -> miette::Result<()> {
+        if *self.robots() != Robots::InProcess {
+            return Ok(());
+        }
+
+        let arms = self.experiment.arms.len();
+        let seed = self.unit(0).seed;
+        for cell in 0..self.conditions().len() * arms {
+            let scenario = self.scenario(cell, seed, Vec::new())?;
+            check_faults(&scenario, 0)?;
+            make_robots(&scenario, &self.experiment.scenario)?;
+        }
+        Ok(())
+    }
+
+    /// Plays a unit and takes its measures. A robot that panics is the failure of its unit.
+    ///
+    /// # Errors
+    /// The reason why the unit cannot be played to its end, for people.
+    pub fn play(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> Result {
+        caught(|| self.measure(unit, launcher))
+    }
+
+    /// The scenario of a unit. That of a yoked unit takes the run whose emotions its robots show, which is played for it: so
+    /// units do not depend on each other.
+    ///
+    /// # Errors
+    /// If the scenario cannot be used, or that run cannot be played.
+    pub fn scenario_of(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> miette::Result<Scenario> {
+        let Some((cell, seed)) = unit.yoke else {
+            return Ok(self.scenario(unit.cell, unit.seed, Vec::new())?);
+        };
+
+        let other = self.scenario(cell, seed, Vec::new())?;
+        let mut script = Script::default();
+        self.follow(other, launcher, &mut script)?;
+        let script: Vec<Override> = script.changes().map_err(|reason| miette!("{reason}"))?;
+        Ok(self.scenario(unit.cell, unit.seed, script)?)
+    }
+
+    fn measure(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> miette::Result<Played> {
+        let condition_s = unit.condition.time_s;
+        let condition_s = condition_s.unwrap_or((0.0, self.experiment.duration_s));
+        let mut gauge = Gauge(Vec::new());
+        for measure in &self.experiment.measures {
+            let probe = Probe::new(measure, condition_s);
+            gauge.0.push((&measure.name, probe));
+        }
+
+        let scenario = self.scenario_of(unit, launcher)?;
+        let ended = self.follow(scenario, launcher, &mut gauge)?;
+        let mut measures = BTreeMap::new();
+        for (name, probe) in gauge.0 {
+            let measured = probe.measured(&ended.summary).into_diagnostic()?;
+            if !measured.value.is_finite() {
+                return Err(miette!("the measure \"{name}\" is not a finite number"));
+            }
+            measures.insert(name.to_owned(), measured);
+        }
+        Ok(Played {
+            digest: ended.digest,
+            measures,
+            verdicts: ended.verdicts,
+        })
+    }
+
+    /// Plays a scenario to its end.
+    fn follow(
+        &self,
+        scenario: Scenario,
+        launcher: Launcher<'_>,
+        follower: &mut impl Follow,
+    ) -> miette::Result<Ended> {
+        match self.robots() {
+            Robots::InProcess => follow_in_process(scenario, follower),
+            Robots::Programs => processes::follow(scenario, None, launcher, follower),
+            Robots::Launched(launch) => {
+                processes::follow(scenario, Some(launch), launcher, follower)
+            }
+        }
+    }
+}
+
+fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::Result<Ended> {
+    let run = RunName::new(RUN).into_diagnostic()?;
+    let mut summary = None;
+    let simulation = play(scenario, &run, |simulation, record| {
+        let summary = summary.get_or_insert_with(|| Summary::begin(&run, simulation));
+        for line in record.lines() {
+            summary.count(simulation, &line);
+        }
+        follower.observe(&Observation {
+            tick: record.tick,
+            time_s: simulation.time_s(record.tick),
+            events: &record.events,
+            state: &|robot| simulation.robot_state(robot),
+        });
+        Ok(())
+    })?;
+
+    let mut summary = summary.ok_or_else(|| miette!("the run has not begun"))?;
+    summary.finish(&simulation);
+    Ended::of(&summary)
+}
+
+impl Follow for Gauge<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        for (_, probe) in &mut self.0 {
+            probe.observe(observation);
+        }
+    }
+}
+
+/// What comes of a unit, whose robots may panic.
+fn caught(measure: impl FnOnce() -> miette::Result<Played>) -> Result {
+    // Nothing that it has changed is used after a panic.
+    match std::panic::catch_unwind(AssertUnwindSafe(measure)) {
+        Ok(Ok(played)) => Ok(played),
+        Ok(Err(error)) => Err(in_words(&error)),
+        Err(panic) => Err(format!("a robot panicked: {}", message_of(panic.as_ref()))),
+    }
+}
+
+/// An error as one line, with its causes.
+fn in_words(error: &miette::Report) -> String {
+    let mut causes = Vec::new();
+    for cause in error.chain() {
+        causes.push(cause.to_string());
+    }
+    causes.join(": ")
+}
+
+/// The message of a panic.
+fn message_of(panic: &(dyn std::any::Any + Send)) -> &str {
+    if let Some(text) = panic.downcast_ref::<&str>() {
+        return text;
+    }
+    panic
+        .downcast_ref::<String>()
+        .map_or("no message", String::as_str)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_the_reason_of_a_failure() {
+        assert_eq!(
+            caught(|| panic!("no way out")),
+            Err("a robot panicked: no way out".to_owned())
+        );
+        let number = 7;
+        assert_eq!(
+            caught(|| panic!("{number} ways out")),
+            Err("a robot panicked: 7 ways out".to_owned())
+        );
+        let error = miette!("inner").wrap_err("outer");
+        assert_eq!(caught(|| Err(error)), Err("outer: inner".to_owned()));
+    }
+}

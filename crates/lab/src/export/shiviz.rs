@@ -1,0 +1,149 @@
+//! A log for ShiViz (<https://bestchai.bitbucket.io/shiviz>): what robots did, in the order that commands impose on it.
+//!
+//! The first line is the regular expression by which ShiViz reads an event, the second one that of the line before each epoch.
+//! Hosts are the robots and, if it sent commands, the operator. The vector clock of a host counts its events; a command that
+//! arrives brings the clock of its sending. A command that was lost is sent and never received.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+use config::FileError;
+use protocol::plain::escape_line;
+use protocol::{Event, RobotName, Seq, Tick};
+use simulator::EpochFiles;
+use simulator::record::{Entry, Record};
+
+use super::draft::{Draft, unwritable};
+
+/// How an event is read.
+const EVENT: &str = r"^(?<host>\S+) (?<clock>\{[^}]*\}) (?<tick>\d+) (?<event>.*)$";
+/// How the line before an epoch is read.
+const EPOCH: &str = r"^=== epoch (?<trace>\d+) ===$";
+
+/// How many events of each host an event knows of, itself included. Hosts without any are left out.
+type Clock = BTreeMap<RobotName, u64>;
+
+/// Writes the log of some epochs.
+///
+/// # Errors
+/// [`FileError`] if a record cannot be read, or the file cannot be written.
+pub(super) fn write(epochs: &[EpochFiles], path: &Path) -> Result<Draft, FileError> {
+    let mut draft = Draft::create(path)?;
+    write_line(&mut draft, EVENT)?;
+    write_line(&mut draft, EPOCH)?;
+    for files in epochs {
+        write_line(&mut draft, &format!("=== epoch {} ===", files.epoch))?;
+        let mut record = Record::of_events(&files.events)?;
+        let mut hosts = Hosts::default();
+        while let Some(entry) = record.next_entry()? {
+            for line in hosts.lines(&entry) {
+                write_line(&mut draft, &line)?;
+            }
+        }
+    }
+    Ok(draft)
+}
+
+fn write_line(draft: &mut Draft, line: &str) -> Result<(), FileError> {
+    writeln!(draft, "{line}").map_err(|error| unwritable(draft.path(), &error))
+}
+
+/// The hosts of an epoch.
+#[derive(Default)]
+struct Hosts {
+    clocks: BTreeMap<RobotName, Clock>,
+    /// Commands that may still arrive, by sender and number.
+    in_flight: BTreeMap<(RobotName, Seq), Sent>,
+}
+
+/// A command on its way.
+struct Sent {
+    clock: Clock,
+    command: String,
+}
+
+impl Hosts {
+    /// The lines of a tick.
+    fn lines(&mut self, entry: &Entry) -> Vec<String> {
+        let mut lines = Vec::new();
+        let mut over = Vec::new();
+        for event in &entry.events {
+            match event {
+                Event::CommandSent {
+                    from,
+                    to,
+                    seq,
+                    command,
+                    ..
+                } => {
+                    lines.push(self.line(from, entry.tick, &format!("sends {to}: {command}")));
+                    let sent = Sent {
+                        clock: self.clocks[from].clone(),
+                        command: command.clone(),
+                    };
+                    self.in_flight.insert((from.clone(), *seq), sent);
+                }
+                Event::CommandDelivered { from, to, seq } => {
+                    let text = self.receive(from, to, *seq);
+                    lines.push(self.line(to, entry.tick, &text));
+                    // A command that was doubled arrives once more in this tick.
+                    over.push((from.clone(), *seq));
+                }
+                Event::CommandDropped { from, seq, .. } => over.push((from.clone(), *seq)),
+                _ => {
+                    if let Some((robot, text)) = own_event(event) {
+                        lines.push(self.line(robot, entry.tick, &text));
+                    }
+                }
+            }
+        }
+
+        for command in over {
+            self.in_flight.remove(&command);
+        }
+        lines
+    }
+
+    /// Takes the clock of a command over. Returns the text of its arrival.
+    fn receive(&mut self, from: &RobotName, to: &RobotName, seq: Seq) -> String {
+        let Some(sent) = self.in_flight.get(&(from.clone(), seq)) else {
+            return format!("receives command {seq} of {from}");
+        };
+
+        let clock = self.clocks.entry(to.clone()).or_default();
+        for (host, count) in &sent.clock {
+            let known = clock.entry(host.clone()).or_default();
+            *known = (*known).max(*count);
+        }
+        format!("receives from {from}: {}", sent.command)
+    }
+
+    /// The line of an event of a host, which its clock counts.
+    fn line(&mut self, host: &RobotName, tick: Tick, text: &str) -> String {
+        let clock = self.clocks.entry(host.clone()).or_default();
+        *clock.entry(host.clone()).or_default() += 1;
+
+        let clock = serde_json::to_string(clock)
+            .unwrap_or_else(|error| unreachable!("a clock is always JSON: {error}"));
+        format!("{host} {clock} {tick} {}", escape_line(text))
+    }
+}
+
+/// A robot's event that is about no command.
+fn own_event(event: &Event) -> Option<(&RobotName, String)> {
+    let named = match event {
+        Event::Joined {
+            robot,
+            generation: Some(generation),
+            ..
+        } => (robot, format!("is back as incarnation {generation}")),
+        Event::Joined { robot, .. } => (robot, "takes part".to_owned()),
+        Event::Lost { robot } => (robot, "is lost".to_owned()),
+        Event::Emotion { robot, to, .. } => (robot, format!("emotion {to}")),
+        Event::Behavior { robot, to, .. } => (robot, format!("behavior {to}")),
+        Event::Say { robot, text } => (robot, format!("says: {text}")),
+        _ => return None,
+    };
+    Some(named)
+}

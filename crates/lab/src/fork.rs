@@ -1,0 +1,186 @@
+//! Forks: a recorded run is executed again up to a tick, and goes on from there with changes.
+
+use std::time::Instant;
+
+use config::{Changes, FileError, Override, Source};
+use miette::{IntoDiagnostic, miette};
+use protocol::{Event, RobotName, RunName, Tick};
+use simulator::difference::between;
+use simulator::record::{Entry, Record};
+use simulator::scenario::Parent;
+use simulator::{EpochFiles, Recorder, RunFolder, Scenario, Summary};
+
+use crate::reexecution::Reexecution;
+use crate::run::{check_faults, go_on, observed};
+
+/// Tables of a scenario that hold for the whole run and can be other ones in a fork.
+const OF_THE_RUN: [&str; 2] = ["duration", "record"];
+
+/// What a fork is of, and what it changes.
+#[derive(Debug)]
+pub struct Fork<'a> {
+    /// Name of the recorded run.
+    pub parent: &'a RunName,
+    /// The record of one of its epochs.
+    pub files: &'a EpochFiles,
+    /// The last tick that both have.
+    pub tick: Tick,
+    /// What is changed from the next tick on; `duration` and what is below `record` hold for the whole fork.
+    pub set: Vec<Override>,
+    /// Another duration, simulated seconds.
+    pub duration_s: Option<f64>,
+}
+
+impl Fork<'_> {
+    /// The scenario of the fork: that of the recorded run, with the changes as a `[[change]]`.
+    ///
+    /// # Errors
+    /// If the record has no such tick, or a change cannot be made.
+    pub fn scenario(&self) -> miette::Result<Scenario> {
+        let parent = Parent {
+            run: self.parent.clone(),
+            tick: self.tick,
+            digest: self.digest()?,
+        };
+        let mut changes = Changes {
+            duration_s: self.duration_s,
+            ..Changes::default()
+        };
+        let mut set = Vec::new();
+        for change in &self.set {
+            if OF_THE_RUN.contains(&change.top()) {
+                changes.set.push(change.clone());
+            } else {
+                set.push(toml::Value::String(change.to_string()));
+            }
+        }
+
+        let before = Scenario::load(&self.files.scenario, &Changes::default())?;
+        let source = changes.apply(&Source::read(&self.files.scenario)?)?;
+        let mut content: toml::Table = source.parse()?;
+        content.insert("parent".to_owned(), parent_table(&parent));
+        if !set.is_empty() {
+            let at_s = (self.tick + 1) as f64 * before.tick_s;
+            add_change(&mut content, at_s, set);
+        }
+        let source = Source {
+            name: format!("{} (forked)", self.files.scenario.display()),
+            text: toml::to_string(&content).into_diagnostic()?,
+        };
+        let folder = self.files.scenario.parent().unwrap_or("".as_ref());
+        let scenario = Scenario::parse(&source, folder)?;
+
+        if scenario.ticks <= self.tick {
+            return Err(miette!(
+                help = "fork it earlier, or give a longer --duration",
+                "the run ends at tick {}: nothing is left after tick {}",
+                scenario.ticks,
+                self.tick
+            ));
+        }
+        check_faults(&scenario, self.tick)?;
+        Ok(scenario)
+    }
+
+    /// Digest of the recorded run at the tick.
+    fn digest(&self) -> miette::Result<String> {
+        let mut record = Record::of_events(&self.files.events)?;
+        let mut last = None;
+        while let Some(entry) = record.next_entry()? {
+            if let Some(Event::Tick { digest, .. }) = entry.events.last()
+                && entry.tick == self.tick
+            {
+                return Ok(digest.clone());
+            }
+            last = Some(entry.tick);
+        }
+
+        let events = self.files.events.display();
+        Err(match last {
+            Some(last) => miette!("{events} ends at tick {last}, before tick {}", self.tick),
+            None => miette!("{events} has no complete tick"),
+        })
+    }
+
+    /// Executes the fork and records it in a folder that [`RunFolder::create`] made for its scenario.
+    ///
+    /// # Errors
+    /// If the recorded run cannot be executed again with the same result, a robot cannot go on in this process, a robot ends
+    /// the run, or the record cannot be written.
+    pub fn execute(
+        &self,
+        scenario: Scenario,
+        run: &RunName,
+        folder: &RunFolder,
+    ) -> miette::Result<Summary> {
+        let mut record = Record::open(self.files)?;
+        let mut again = Reexecution::new(scenario, 1)?;
+        let mut recorder = Recorder::begin(folder, run, &again.local.simulation)?;
+        loop {
+            let opened = Instant::now();
+            let recorded = record.next_entry()?;
+            let recorded = recorded.ok_or_else(|| miette!("the record has become shorter"))?;
+            let executed = again.play(&recorded)?;
+            recorder.observe(observed(&again.local, opened));
+            recorder.write(&again.local.simulation, &executed.record)?;
+            check_same(&recorded, &executed.into_entry())?;
+            if recorded.tick == self.tick {
+                break;
+            }
+        }
+
+        if let Some(robot) = again.scripted.first() {
+            return Err(cannot_go_on(robot));
+        }
+        let mut local = again.local;
+        go_on(&mut local, run, |local, record, opened| {
+            recorder.observe(observed(local, opened));
+            recorder.write(&local.simulation, record)?;
+            Ok(())
+        })?;
+        Ok(recorder.finish(&local.simulation)?)
+    }
+}
+
+fn parent_table(parent: &Parent) -> toml::Value {
+    let mut table = toml::Table::new();
+    table.insert("run".to_owned(), parent.run.to_string().into());
+    let tick = i64::try_from(parent.tick).unwrap_or(i64::MAX);
+    table.insert("tick".to_owned(), tick.into());
+    table.insert("digest".to_owned(), parent.digest.clone().into());
+    table.into()
+}
+
+fn add_change(content: &mut toml::Table, at_s: f64, set: Vec<toml::Value>) {
+    let mut change = toml::Table::new();
+    change.insert("at".to_owned(), format!("{at_s} s").into());
+    change.insert("set".to_owned(), set.into());
+
+    let changes = content
+        .entry("change")
+        .or_insert_with(|| toml::Value::Array(Vec::new()));
+    if let toml::Value::Array(changes) = changes {
+        changes.push(change.into());
+    }
+}
+
+fn check_same(recorded: &Entry, executed: &Entry) -> Result<(), FileError> {
+    let Some(difference) = between(recorded, executed) else {
+        return Ok(());
+    };
+
+    Err(FileError::new(format!(
+        "the run cannot be forked: executed again, it differs from its record at {difference} (recorded: {}; executed: {})",
+        difference.value(0),
+        difference.value(1)
+    ))
+    .with_help("`cars verify` compares the whole run with its record"))
+}
+
+fn cannot_go_on(robot: &RobotName) -> miette::Report {
+    miette!(
+        help = "a run is forked in one process; robots in other languages, and robots that went on after a tick that they had \
+                missed, have a state that only their processes knew",
+        "{robot} cannot go on: it cannot be executed in this process"
+    )
+}

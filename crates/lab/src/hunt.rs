@@ -1,0 +1,439 @@
+//! Hunts: plans of faults are drawn from a seed and played, until an expectation fails; the plan is then shrunk to a minimal
+//! scenario file.
+//!
+//! The result depends on the scenario, the seed and the number of plans only: plans are drawn in batches of a fixed size, each
+//! from a stream of its own, and are guided by what the batches before have reached.
+
+mod case;
+mod cause;
+mod coverage;
+mod draw;
+mod fault;
+mod file;
+mod parallel;
+mod shrink;
+mod trial;
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use miette::{IntoDiagnostic, WrapErr, miette};
+use protocol::Tick;
+use protocol::random::{stream, unit};
+use serde::Serialize;
+
+pub use case::Case;
+pub use cause::{Cause, Sign};
+pub use coverage::{Coverage, Fate, Feature};
+pub use draw::Ground;
+pub use fault::{Effect, Kind, Link, Messages, PlannedFault, Span};
+pub use shrink::{Bounds, Shrunk, World, shrink};
+pub use trial::{Failure, Played, RUNS, SentMessage, Subject, Trial};
+
+use file::Heading;
+
+/// Number of plans that are drawn at a time. What they reach guides the plans after them.
+const BATCH: u64 = 16;
+/// Most findings of a hunt. Further plans that fail are only counted.
+const MAX_FINDINGS: usize = 20;
+
+/// How long a hunt lasts.
+#[derive(Debug, Clone, Copy)]
+pub enum Budget {
+    /// This number of plans.
+    Plans(u64),
+    /// New plans are drawn for this time.
+    Time(Duration),
+}
+
+/// Options of a hunt.
+#[derive(Debug)]
+pub struct Options<'a> {
+    /// Seed of the plans.
+    pub seed: u64,
+    /// How long it lasts.
+    pub budget: Budget,
+    /// Number of runs at the same time; the result does not depend on it.
+    pub jobs: usize,
+    /// Kinds of faults that are drawn.
+    pub kinds: Vec<Kind>,
+    /// Longest time of a fault that does not last for the whole run, simulated seconds.
+    pub longest_s: f64,
+    /// Expectations that are checked; empty for all.
+    pub expect: BTreeSet<String>,
+    /// Most runs to shrink a finding.
+    pub shrink_runs: u64,
+    /// Folder of the files of findings.
+    pub out: PathBuf,
+    /// Set to end the hunt with what it has found.
+    pub stop: &'a AtomicBool,
+}
+
+/// What a hunt reports while it goes on.
+#[derive(Debug)]
+pub enum Progress<'a> {
+    /// A batch of plans was played: the number of plans so far, and of features.
+    Played(u64, usize),
+    /// An expectation has failed; its file is written, and its plan will be shrunk.
+    Found(&'a Finding),
+    /// The plan is shrunk.
+    Shrunk(&'a Finding),
+}
+
+/// A failing expectation, and the plan under which it fails.
+#[derive(Debug, Clone, Serialize)]
+pub struct Finding {
+    /// Name of the expectation.
+    pub expectation: String,
+    /// Why it fails in the run of the case.
+    pub because: String,
+    /// Simulated time at which that is certain, seconds.
+    pub time_s: f64,
+    /// Number of the plan, from 1.
+    pub plan: u64,
+    /// The faults of the plan as it was drawn.
+    pub drawn: Vec<PlannedFault>,
+    /// The case, shrunk as far as it is.
+    pub case: Case,
+    /// What its faults do.
+    pub cause: Cause,
+    /// Number of plans in whose runs the expectation fails and this cause occurs, too.
+    pub plans: u64,
+    /// The faults of the case in words.
+    pub faults: Vec<String>,
+    /// Number of runs that shrinking took.
+    pub shrink_runs: u64,
+    /// Whether nothing can be left out of the case.
+    pub is_minimal: bool,
+    /// Its scenario file.
+    pub file: PathBuf,
+}
+
+/// The result of a hunt.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// The scenario.
+    pub scenario: PathBuf,
+    /// Seed of the plans.
+    pub seed: u64,
+    /// Number of plans that were played.
+    pub plans: u64,
+    /// Number of plans that could not be set up, because bodies did not fit into the hall.
+    pub not_set_up: u64,
+    /// Number of ticks of all plans, without those of shrinking.
+    pub ticks: Tick,
+    /// Expectations that were checked.
+    pub expectations: BTreeSet<String>,
+    /// What was found, one for each cause for which an expectation fails.
+    pub findings: Vec<Finding>,
+    /// Number of plans that failed and were not shrunk, because there were too many findings already.
+    pub not_shrunk: u64,
+    /// What happened in the runs.
+    pub coverage: Coverage,
+}
+
+/// A hunt in progress.
+struct Hunt<'a> {
+    subject: &'a Subject,
+    options: &'a Options<'a>,
+    ground: Ground,
+    /// Expectations that are checked.
+    wanted: BTreeSet<String>,
+    /// Plans that reached something new.
+    corpus: Vec<Vec<PlannedFault>>,
+    report: Report,
+}
+
+/// Hunts in a scenario.
+///
+/// # Errors
+/// If the scenario fails without faults, nothing can be drawn for it, or a file cannot be written.
+pub fn hunt(
+    subject: &Subject,
+    options: &Options<'_>,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> miette::Result<Report> {
+    let baseline = subject.play(&Case::default(), &BTreeSet::new())?;
+    let wanted = wanted(subject, &baseline, &options.expect)?;
+    let ground = Ground::new(
+        &subject.scenario,
+        &baseline,
+        &options.kinds,
+        options.longest_s,
+    );
+    if ground.kinds().is_empty() {
+        return Err(miette!(
+            help = "allow further kinds by --kinds",
+            "{}: none of these kinds of faults can occur in this scenario",
+            subject.file.display()
+        ));
+    }
+    std::fs::create_dir_all(&options.out)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot make the folder {}", options.out.display()))?;
+
+    let mut hunt = Hunt {
+        subject,
+        options,
+        ground,
+        report: Report {
+            scenario: subject.file.clone(),
+            seed: options.seed,
+            plans: 0,
+            not_set_up: 0,
+            ticks: 0,
+            expectations: wanted.clone(),
+            findings: Vec::new(),
+            not_shrunk: 0,
+            coverage: Coverage::default(),
+        },
+        wanted,
+        corpus: Vec::new(),
+    };
+    hunt.go(progress)?;
+    Ok(hunt.report)
+}
+
+/// The expectations that a hunt checks. None of them fails without faults.
+fn wanted(
+    subject: &Subject,
+    baseline: &Played,
+    expect: &BTreeSet<String>,
+) -> miette::Result<BTreeSet<String>> {
+    let file = subject.file.display();
+    let names: Vec<&str> = baseline.expectations.iter().map(String::as_str).collect();
+    if let Some(unknown) = expect.difference(&baseline.expectations).next() {
+        return Err(miette!(
+            help = format!("there are: {}", names.join("; ")),
+            "{file} has no expectation \"{unknown}\""
+        ));
+    }
+
+    let wanted = if expect.is_empty() {
+        baseline.expectations.clone()
+    } else {
+        expect.clone()
+    };
+    for (name, failure) in &baseline.failed {
+        if wanted.contains(name) {
+            let others: Vec<String> = wanted
+                .iter()
+                .filter(|other| !baseline.failed.contains_key(*other))
+                .map(|other| format!("--expect {other:?}"))
+                .collect();
+            return Err(miette!(
+                help = format!(
+                    "a hunt looks for faults under which a run fails that passes without them. Hunt for the others: {}",
+                    others.join(" ")
+                ),
+                "{file} fails without any fault: \"{name}\", {}",
+                failure.because
+            ));
+        }
+    }
+    Ok(wanted)
+}
+
+impl Hunt<'_> {
+    fn go(&mut self, progress: &mut dyn FnMut(Progress<'_>)) -> miette::Result<()> {
+        let begun = Instant::now();
+        while !self.is_stopped() {
+            let first = self.report.plans;
+            let count = match self.options.budget {
+                Budget::Plans(plans) => (plans - first).min(BATCH),
+                Budget::Time(time) if begun.elapsed() < time => BATCH,
+                Budget::Time(_) => 0,
+            };
+            if count == 0 {
+                return Ok(());
+            }
+
+            let cases = self.draw(first, count);
+            let (subject, wanted) = (self.subject, &self.wanted);
+            let played = parallel::all(&cases, self.options.jobs, self.options.stop, |case| {
+                subject.play(case, wanted)
+            });
+            let failures = self.note(first, cases, played);
+            let features = self.report.coverage.features().count();
+            progress(Progress::Played(self.report.plans, features));
+            for (plan, case, played) in failures {
+                self.note_failures(plan, &case, &played, progress)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.options.stop.load(Ordering::Relaxed)
+    }
+
+    /// The plans after the first ones.
+    fn draw(&self, first: u64, count: u64) -> Vec<Case> {
+        let mut cases = Vec::new();
+        for plan in first + 1..=first + count {
+            let mut chance = stream(self.options.seed, &format!("hunt/{plan}"));
+            let is_mutated = !self.corpus.is_empty() && unit(&mut chance) < 0.5;
+            let faults = if is_mutated {
+                let place = draw::below(self.corpus.len(), &mut chance);
+                self.ground.mutate(&self.corpus[place], &mut chance)
+            } else {
+                self.ground.draw(&mut chance)
+            };
+            cases.push(Case::of(faults));
+        }
+        cases
+    }
+
+    /// Adds the runs of a batch to the report; returns those in which an expectation failed, with the numbers of the plans.
+    fn note(
+        &mut self,
+        first: u64,
+        cases: Vec<Case>,
+        results: Vec<Option<miette::Result<Played>>>,
+    ) -> Vec<(u64, Case, Played)> {
+        let mut failures = Vec::new();
+        for (index, (case, result)) in cases.into_iter().zip(results).enumerate() {
+            let Some(result) = result else {
+                continue;
+            };
+            self.report.plans += 1;
+            let Ok(mut played) = result else {
+                self.report.not_set_up += 1;
+                continue;
+            };
+
+            self.report.ticks += played.ticks;
+            let features = std::mem::take(&mut played.features);
+            if self.report.coverage.add(features) > 0 {
+                self.corpus.push(case.faults.clone());
+            }
+            if !played.failed.is_empty() {
+                failures.push((first + index as u64 + 1, case, played));
+            }
+        }
+        failures
+    }
+
+    /// Counts, or writes and shrinks, what failed in the run of a plan.
+    fn note_failures(
+        &mut self,
+        plan: u64,
+        case: &Case,
+        played: &Played,
+        progress: &mut dyn FnMut(Progress<'_>),
+    ) -> miette::Result<()> {
+        let signs = Cause::of_plan(case, played);
+        for name in played.failed.keys() {
+            if !self.wanted.contains(name) {
+                continue;
+            }
+            if let Some(known) = self.known(name, &signs) {
+                known.plans += 1;
+            } else if self.report.findings.len() >= MAX_FINDINGS {
+                self.report.not_shrunk += 1;
+            } else {
+                self.find(name, plan, case, played, progress)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The finding whose cause is among these signs.
+    fn known(&mut self, name: &str, signs: &Cause) -> Option<&mut Finding> {
+        let mut findings = self.report.findings.iter_mut();
+        findings.find(|known| known.expectation == name && known.cause.is_part_of(signs))
+    }
+
+    /// Writes what failed in the run of a plan, shrinks it, and writes it again.
+    fn find(
+        &mut self,
+        name: &str,
+        plan: u64,
+        case: &Case,
+        played: &Played,
+        progress: &mut dyn FnMut(Progress<'_>),
+    ) -> miette::Result<()> {
+        let drawn = self.finding(name, plan, case, played);
+        self.write(&drawn, played, "It is not shrunk.")?;
+        progress(Progress::Found(&drawn));
+        let world = World {
+            roster: self.subject.scenario.roster(),
+            guests: self.subject.scenario.guests.count,
+        };
+        let bounds = Bounds {
+            runs: self.options.shrink_runs,
+            jobs: self.options.jobs,
+            stop: self.options.stop,
+        };
+        let (case, played) = (case.clone(), played.clone());
+        let shrunk = shrink(self.subject, name, case, played, &world, bounds);
+
+        let mut finding = self.finding(name, plan, &shrunk.case, &shrunk.played);
+        if let Some(known) = self.known(name, &finding.cause) {
+            known.plans += 1;
+            return std::fs::remove_file(&drawn.file).into_diagnostic();
+        }
+        finding.drawn = drawn.drawn;
+        finding.shrink_runs = shrunk.runs;
+        finding.is_minimal = shrunk.is_minimal;
+        let runs = shrunk.runs;
+        let sentence = if shrunk.is_minimal {
+            format!("It was shrunk by {runs} runs: nothing can be left out.")
+        } else {
+            format!("It was shrunk by {runs} runs; more may make it smaller.")
+        };
+        self.write(&finding, &shrunk.played, &sentence)?;
+        self.check_file(&finding)?;
+        progress(Progress::Shrunk(&finding));
+        self.report.findings.push(finding);
+        Ok(())
+    }
+
+    fn finding(&self, name: &str, plan: u64, case: &Case, played: &Played) -> Finding {
+        let tick_s = self.subject.scenario.tick_s;
+        let failure = &played.failed[name];
+        let faults = case.faults.iter().map(|fault| fault.in_words(tick_s));
+        let file = file::name(&self.subject.file, name, self.options.seed, plan);
+        Finding {
+            expectation: name.to_owned(),
+            because: failure.because.clone(),
+            time_s: failure.tick as f64 * tick_s,
+            plan,
+            drawn: case.faults.clone(),
+            case: case.clone(),
+            cause: Cause::of_faults(case, played),
+            plans: 1,
+            faults: faults.collect(),
+            shrink_runs: 0,
+            is_minimal: false,
+            file: self.options.out.join(file),
+        }
+    }
+
+    fn write(&self, finding: &Finding, played: &Played, shrunk: &str) -> miette::Result<()> {
+        let heading = Heading {
+            expectation: &finding.expectation,
+            seed: self.options.seed,
+            plan: finding.plan,
+            shrunk,
+        };
+        file::write(&finding.file, self.subject, &finding.case, played, heading)
+    }
+
+    /// Plays the file of a finding as written.
+    fn check_file(&self, finding: &Finding) -> miette::Result<()> {
+        let name = &finding.expectation;
+        let written = self.subject.of_file(&finding.file)?;
+        let played = written.play(&Case::default(), &BTreeSet::from([name.clone()]))?;
+        if played.failed.contains_key(name) {
+            return Ok(());
+        }
+        Err(miette!(
+            "\"{name}\" fails under plan {}, and does not fail in the file {}: this is a defect of the hunt",
+            finding.plan,
+            finding.file.display()
+        ))
+    }
+}

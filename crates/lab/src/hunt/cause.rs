@@ -1,0 +1,78 @@
+//! What the faults of a case do, by which findings are told apart.
+
+use std::collections::BTreeSet;
+
+use protocol::RobotName;
+use serde::Serialize;
+
+use super::case::Case;
+use super::fault::{Kind, Link, PlannedFault};
+use super::trial::{Played, SentMessage};
+
+/// What the faults of a case do.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Cause(BTreeSet<Sign>);
+
+/// One thing that faults do.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sign {
+    /// A command with this text is lost on this link.
+    Lost {
+        /// The link.
+        link: Link,
+        /// The text.
+        text: String,
+    },
+    /// This robot crashes.
+    Crashed(RobotName),
+    /// There is a fault of this kind.
+    Fault(Kind),
+}
+
+impl Cause {
+    /// What the faults of a shrunk case do, each of which is needed.
+    pub(super) fn of_faults(case: &Case, played: &Played) -> Self {
+        let mut signs = BTreeSet::new();
+        for fault in &case.faults {
+            match fault {
+                PlannedFault::Lose { link, number } => {
+                    let mut sent = played.sent.iter();
+                    let message =
+                        sent.find(|message| message.link == *link && message.number == *number);
+                    signs.extend(message.map(lost));
+                }
+                PlannedFault::Crash { robot, .. } => {
+                    signs.insert(Sign::Crashed(robot.clone()));
+                }
+                other => {
+                    signs.insert(Sign::Fault(other.kind()));
+                }
+            }
+        }
+        Self(signs)
+    }
+
+    /// All that the faults of a plan did in its run.
+    pub(super) fn of_plan(case: &Case, played: &Played) -> Self {
+        let mut cause = Self::of_faults(case, played);
+        for message in &played.sent {
+            if message.is_lost {
+                cause.0.insert(lost(message));
+            }
+        }
+        cause
+    }
+
+    /// Whether the other faults do all of this, too.
+    pub(super) fn is_part_of(&self, other: &Self) -> bool {
+        self.0.is_subset(&other.0)
+    }
+}
+
+fn lost(message: &SentMessage) -> Sign {
+    Sign::Lost {
+        link: message.link.clone(),
+        text: message.text.clone(),
+    }
+}

@@ -1,0 +1,122 @@
+//! What happened in the runs of a hunt, and in how many of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use protocol::RobotName;
+use protocol::event::Cause;
+use serde::Serialize;
+
+use super::fault::{Kind, Link};
+
+/// Most features that are told apart, because robots choose the texts of commands and states.
+const MAX_FEATURES: usize = 10_000;
+
+/// Something that can happen in a run.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(tag = "feature", rename_all = "snake_case")]
+pub enum Feature {
+    /// The plan has a fault of this kind.
+    Fault {
+        /// The kind.
+        kind: Kind,
+    },
+    /// A command had this fate.
+    Message {
+        /// The link.
+        link: Link,
+        /// Its text.
+        text: String,
+        /// What became of it.
+        fate: Fate,
+    },
+    /// A query could not be made by chance.
+    QueryLost {
+        /// Who asks whom.
+        link: Link,
+    },
+    /// A robot changed its behavior.
+    Behavior {
+        /// The robot.
+        robot: RobotName,
+        /// The behavior before.
+        from: String,
+        /// The behavior after.
+        to: String,
+    },
+    /// A robot changed its emotion.
+    Emotion {
+        /// The robot.
+        robot: RobotName,
+        /// The emotion before.
+        from: String,
+        /// The emotion after.
+        to: String,
+    },
+}
+
+/// What became of a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// It arrived.
+    Delivered,
+    /// It was delayed.
+    Delayed,
+    /// It arrived twice.
+    Duplicated,
+    /// It was lost.
+    Dropped(Cause),
+}
+
+/// The features of a hunt, with the number of plans in whose runs each occurred.
+#[derive(Debug, Clone, Default)]
+pub struct Coverage {
+    counts: BTreeMap<Feature, u64>,
+}
+
+/// One row of the coverage, as JSON.
+#[derive(Debug, Serialize)]
+struct Row<'a> {
+    #[serde(flatten)]
+    feature: &'a Feature,
+    plans: u64,
+}
+
+impl Coverage {
+    /// Adds the features of a run; returns how many of them are new.
+    pub(super) fn add(&mut self, features: BTreeSet<Feature>) -> usize {
+        let before = self.counts.len();
+        for feature in features {
+            if self.counts.len() < MAX_FEATURES || self.counts.contains_key(&feature) {
+                *self.counts.entry(feature).or_default() += 1;
+            }
+        }
+        self.counts.len() - before
+    }
+
+    /// The features, with the number of plans in whose runs each occurred.
+    pub fn features(&self) -> impl Iterator<Item = (&Feature, u64)> {
+        self.counts.iter().map(|(feature, count)| (feature, *count))
+    }
+}
+
+impl Serialize for Coverage {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let rows = self.counts.iter();
+        serializer.collect_seq(rows.map(|(feature, plans)| Row {
+            feature,
+            plans: *plans,
+        }))
+    }
+}
+
+impl std::fmt::Display for Fate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Delivered => f.write_str("delivered"),
+            Self::Delayed => f.write_str("delayed"),
+            Self::Duplicated => f.write_str("duplicated"),
+            Self::Dropped(because) => write!(f, "lost {because}"),
+        }
+    }
+}

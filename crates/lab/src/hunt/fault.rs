@@ -1,0 +1,322 @@
+//! The faults of a plan: what each is, in types and in words.
+
+use protocol::messages::Point;
+use protocol::{RobotName, Tick};
+use serde::Serialize;
+
+/// Steps of a probability: files do not show digits that mean nothing.
+const CHANCE_STEPS: f64 = 100.0;
+
+/// A kind of faults that a hunt draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// One command is lost.
+    Lose,
+    /// Messages are lost by chance.
+    Loss,
+    /// Messages are lost by chance in bursts.
+    Burst,
+    /// Commands are delayed.
+    Delay,
+    /// Commands arrive twice by chance.
+    Duplication,
+    /// No messages pass between two groups of robots.
+    Partition,
+    /// No messages pass from one group of robots to another.
+    OneWay,
+    /// A robot crashes and comes back.
+    Crash,
+    /// A row of obstacles stands in the way.
+    Wall,
+    /// There are more guests.
+    Crowd,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 10] = [
+        Self::Lose,
+        Self::Loss,
+        Self::Burst,
+        Self::Delay,
+        Self::Duplication,
+        Self::Partition,
+        Self::OneWay,
+        Self::Crash,
+        Self::Wall,
+        Self::Crowd,
+    ];
+
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lose => "lose",
+            Self::Loss => "loss",
+            Self::Burst => "burst",
+            Self::Delay => "delay",
+            Self::Duplication => "duplication",
+            Self::Partition => "partition",
+            Self::OneWay => "one-way",
+            Self::Crash => "crash",
+            Self::Wall => "wall",
+            Self::Crowd => "crowd",
+        }
+    }
+}
+
+impl std::str::FromStr for Kind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::ALL.into_iter().find(|kind| kind.name() == text);
+        named.ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|kind| kind.name()).collect();
+            format!("a hunt draws {}", names.join(", "))
+        })
+    }
+}
+
+/// A time of a run, ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Span {
+    /// First tick of the fault.
+    pub from: Tick,
+    /// First tick after the fault; it may be after the end of the run.
+    pub until: Tick,
+}
+
+/// A directed link between two robots.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Link {
+    /// The sender.
+    pub from: RobotName,
+    /// The target.
+    pub to: RobotName,
+}
+
+/// The messages that a fault of the network concerns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Messages {
+    /// Commands.
+    Commands,
+    /// Queries.
+    Queries,
+}
+
+impl Messages {
+    /// Its name in scenario files.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Commands => "commands",
+            Self::Queries => "queries",
+        }
+    }
+}
+
+/// What the network does to messages by chance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Effect {
+    /// Messages are lost with this probability, in hundredths.
+    Loss(u64),
+    /// Bursts, in which all is lost, begin and end at a tick with these probabilities, in hundredths.
+    Burst(u64, u64),
+    /// Commands are up to this much late, seconds.
+    Delay(u64),
+    /// Commands arrive twice with this probability, in hundredths.
+    Duplication(u64),
+}
+
+/// A fault of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "fault", rename_all = "snake_case")]
+pub enum PlannedFault {
+    /// One command is lost.
+    Lose {
+        /// The link.
+        link: Link,
+        /// Number of the command among those on the link, from 1.
+        number: u64,
+    },
+    /// The network does something by chance.
+    Channel {
+        /// Only on this link; `None` for all.
+        link: Option<Link>,
+        /// The messages that it concerns.
+        of: Messages,
+        /// What happens to them.
+        effect: Effect,
+        /// When.
+        span: Span,
+    },
+    /// A partition of two groups.
+    Partition {
+        /// The first group.
+        one: Vec<RobotName>,
+        /// The second group.
+        other: Vec<RobotName>,
+        /// Whether only messages from the first to the second group are cut.
+        one_way: bool,
+        /// What is cut, at least one.
+        cuts: Vec<Messages>,
+        /// When.
+        span: Span,
+    },
+    /// A robot crashes, and is back at the end of the time.
+    Crash {
+        /// The robot.
+        robot: RobotName,
+        /// When.
+        span: Span,
+    },
+    /// Further fixed obstacles.
+    Wall {
+        /// Their centers, meters.
+        at: Vec<Point>,
+    },
+    /// Another number of guests.
+    Crowd {
+        /// The number.
+        guests: usize,
+    },
+}
+
+impl PlannedFault {
+    /// Its kind.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Lose { .. } => Kind::Lose,
+            Self::Channel { effect, .. } => match effect {
+                Effect::Loss(_) => Kind::Loss,
+                Effect::Burst(..) => Kind::Burst,
+                Effect::Delay(_) => Kind::Delay,
+                Effect::Duplication(_) => Kind::Duplication,
+            },
+            Self::Partition { one_way: true, .. } => Kind::OneWay,
+            Self::Partition { .. } => Kind::Partition,
+            Self::Crash { .. } => Kind::Crash,
+            Self::Wall { .. } => Kind::Wall,
+            Self::Crowd { .. } => Kind::Crowd,
+        }
+    }
+
+    /// The fault in a roster without a robot; `None` if nothing of it is left.
+    pub(super) fn without(&self, robot: &RobotName) -> Option<Self> {
+        let has = |link: &Link| link.from == *robot || link.to == *robot;
+        let is_gone = match self {
+            Self::Lose { link, .. } => has(link),
+            Self::Channel { link, .. } => link.as_ref().is_some_and(has),
+            Self::Crash { robot: own, .. } => own == robot,
+            Self::Partition { .. } | Self::Wall { .. } | Self::Crowd { .. } => false,
+        };
+        if is_gone {
+            return None;
+        }
+
+        let mut fault = self.clone();
+        if let Self::Partition { one, other, .. } = &mut fault {
+            one.retain(|name| name != robot);
+            other.retain(|name| name != robot);
+            if one.is_empty() || other.is_empty() {
+                return None;
+            }
+        }
+        Some(fault)
+    }
+
+    /// The fault in words, for people; times in simulated seconds.
+    #[must_use]
+    pub fn in_words(&self, tick_s: f64) -> String {
+        match self {
+            Self::Lose { link, number } => {
+                format!("command {number} from {} to {} is lost", link.from, link.to)
+            }
+            Self::Channel {
+                link,
+                of,
+                effect,
+                span,
+            } => {
+                let effect = effect.in_words(*of, link.as_ref());
+                format!("{effect}, {}", span.in_words(tick_s))
+            }
+            Self::Partition {
+                one,
+                other,
+                one_way,
+                cuts,
+                span,
+            } => {
+                let cuts: Vec<&str> = cuts.iter().map(|of| of.name()).collect();
+                let cuts = cuts.join(" and ");
+                let span = span.in_words(tick_s);
+                let one = names(one);
+                let other = names(other);
+                if *one_way {
+                    format!("no {cuts} pass from {one} to {other}, {span}")
+                } else {
+                    format!("no {cuts} pass between {one} and {other}, {span}")
+                }
+            }
+            Self::Crash { robot, span } => {
+                format!("{robot} is crashed, {}", span.in_words(tick_s))
+            }
+            Self::Wall { at } => {
+                let mut places = Vec::new();
+                for at in at {
+                    places.push(format!("{:.2} m, {:.2} m", at.x, at.y));
+                }
+                format!("further obstacles stand at {}", places.join("; "))
+            }
+            Self::Crowd { guests } => format!("there are {guests} guests"),
+        }
+    }
+}
+
+impl Effect {
+    fn in_words(self, of: Messages, link: Option<&Link>) -> String {
+        let mut messages = of.name().to_owned();
+        if let Some(Link { from, to }) = link {
+            messages += &format!(" from {from} to {to}");
+        }
+
+        match self {
+            Self::Loss(chance) => format!("{chance} % of the {messages} are lost"),
+            Self::Burst(enter, leave) => format!(
+                "{messages} are lost in bursts, which begin with {enter} % and end with {leave} % at a tick"
+            ),
+            Self::Delay(most_s) => format!("{messages} are up to {most_s} s late"),
+            Self::Duplication(chance) => format!("{chance} % of the {messages} arrive twice"),
+        }
+    }
+}
+
+impl Span {
+    fn in_words(self, tick_s: f64) -> String {
+        format!(
+            "from {} until {}",
+            seconds(self.from, tick_s),
+            seconds(self.until, tick_s)
+        )
+    }
+}
+
+fn names(robots: &[RobotName]) -> String {
+    let names: Vec<&str> = robots.iter().map(RobotName::as_str).collect();
+    names.join(", ")
+}
+
+/// A simulated time as scenario files have it.
+pub(super) fn seconds(ticks: Tick, tick_s: f64) -> String {
+    let micros = (ticks as f64 * tick_s * 1e6).round();
+    format!("{} s", micros / 1e6)
+}
+
+/// A probability from hundredths.
+pub(super) fn chance(hundredths: u64) -> f64 {
+    hundredths as f64 / CHANCE_STEPS
+}

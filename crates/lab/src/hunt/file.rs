@@ -1,0 +1,201 @@
+//! The scenario file of a finding.
+
+use std::io::Write;
+use std::path::{Component, Path, PathBuf};
+
+use miette::{IntoDiagnostic, WrapErr};
+use protocol::name::MAX_NAME_LEN;
+use protocol::plain::escape_line;
+use toml::Value;
+
+use super::case::Case;
+use super::fault::PlannedFault;
+use super::trial::{Played, Subject};
+
+/// What the file of a finding tells beside its case.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Heading<'a> {
+    /// The expectation that fails.
+    pub expectation: &'a str,
+    /// Seed of the hunt.
+    pub seed: u64,
+    /// Number of the plan.
+    pub plan: u64,
+    /// How far the plan is shrunk, in a sentence.
+    pub shrunk: &'a str,
+}
+
+/// Writes the scenario file of a finding by renaming, so that a file of this name is always complete.
+pub(super) fn write(
+    path: &Path,
+    subject: &Subject,
+    case: &Case,
+    played: &Played,
+    heading: Heading<'_>,
+) -> miette::Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut content = subject.content_of(case)?;
+    rename_parameter_files(&mut content, &subject.folder, folder)?;
+
+    let mut text = comment(path, subject, case, played, heading);
+    text += &toml::to_string(&content).into_diagnostic()?;
+    let place = || format!("cannot write {}", path.display());
+    let mut file = tempfile::NamedTempFile::new_in(folder)
+        .into_diagnostic()
+        .wrap_err_with(place)?;
+    file.write_all(text.as_bytes())
+        .into_diagnostic()
+        .wrap_err_with(place)?;
+    file.as_file().sync_all().into_diagnostic()?;
+    file.persist(path).into_diagnostic().wrap_err_with(place)?;
+    Ok(())
+}
+
+fn comment(
+    path: &Path,
+    subject: &Subject,
+    case: &Case,
+    played: &Played,
+    heading: Heading<'_>,
+) -> String {
+    let tick_s = subject.scenario.tick_s;
+    let scenario = subject.file.display().to_string();
+    let mut lines = vec![format!("Expectation that fails: {}", heading.expectation)];
+    if let Some(failure) = played.failed.get(heading.expectation) {
+        lines.push(failure.because.clone());
+    }
+
+    lines.push(String::new());
+    lines.push(format!("It fails in {scenario} with:"));
+    for fault in &case.faults {
+        lines.push(format!("- {}", described(fault, played, tick_s)));
+    }
+    for robot in &case.without {
+        lines.push(format!(
+            "{robot} does not take part: the robot is not needed for it."
+        ));
+    }
+    if let Some(guests) = case.guests {
+        lines.push(format!("{guests} guests suffice."));
+    }
+
+    lines.push(String::new());
+    lines.push(format!(
+        "Found by plan {} of `cars hunt` with the seed {}. {}",
+        heading.plan, heading.seed, heading.shrunk
+    ));
+    let file = path.display();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    lines.push(String::new());
+    lines.push(format!(
+        "    cars run {file} --run {stem}    # fails again, with exit status 1"
+    ));
+    lines.push(format!("    cars diagram runs/{stem} -o {stem}.svg"));
+    lines.push(format!("    cars-console --recording runs/{stem}"));
+
+    let mut text = String::new();
+    for line in lines {
+        text += format!("# {}", escape_line(&line)).trim_end();
+        text += "\n";
+    }
+    text + "\n"
+}
+
+/// A fault in words, with the text of the message that it loses.
+fn described(fault: &PlannedFault, played: &Played, tick_s: f64) -> String {
+    let words = fault.in_words(tick_s);
+    let PlannedFault::Lose { link, number } = fault else {
+        return words;
+    };
+    let mut sent = played.sent.iter();
+    match sent.find(|message| message.link == *link && message.number == *number) {
+        Some(message) => format!(
+            "{words}: \"{}\", sent at {} s",
+            message.text,
+            message.tick as f64 * tick_s
+        ),
+        None => words,
+    }
+}
+
+/// Makes the names of parameter files relative to the folder of the new file.
+fn rename_parameter_files(content: &mut toml::Table, from: &Path, to: &Path) -> miette::Result<()> {
+    let robots = content.get_mut("robot").and_then(Value::as_array_mut);
+    for robot in robots.into_iter().flatten() {
+        let Some(file) = robot.get_mut("params_from") else {
+            continue;
+        };
+        let Some(name) = file.as_str() else {
+            continue;
+        };
+        let path = from.join(name).canonicalize().into_diagnostic()?;
+        let folder = to.canonicalize().into_diagnostic()?;
+        *file = relative(&path, &folder).display().to_string().into();
+    }
+    Ok(())
+}
+
+/// A path relative to a folder; both are absolute.
+fn relative(path: &Path, folder: &Path) -> PathBuf {
+    let path: Vec<Component<'_>> = path.components().collect();
+    let folder: Vec<Component<'_>> = folder.components().collect();
+    let mut shared = 0;
+    while shared < path.len() && path.get(shared) == folder.get(shared) {
+        shared += 1;
+    }
+
+    let mut relative = PathBuf::new();
+    for _ in shared..folder.len() {
+        relative.push("..");
+    }
+    relative.extend(&path[shared..]);
+    relative
+}
+
+/// The name of the file of a finding, without its folder. Without its extension it can be the name of a run.
+pub(super) fn name(scenario: &Path, expectation: &str, seed: u64, plan: u64) -> String {
+    let stem = scenario.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = legal(&stem, |c| c == '_' || c == '-');
+    let expectation = legal(&expectation.to_ascii_lowercase(), |_| false);
+    let mut name = format!("{stem}-{expectation}");
+    let number = format!("-{seed}-{plan}");
+    name.truncate(MAX_NAME_LEN.saturating_sub(number.len()));
+    format!("{name}{number}.toml")
+}
+
+/// The letters and digits of a text, and what else is allowed; the rest becomes single hyphens.
+fn legal(text: &str, is_allowed: fn(char) -> bool) -> String {
+    let words = text.split(|c: char| !c.is_ascii_alphanumeric() && !is_allowed(c));
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    words.join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_made_relative() {
+        for (path, folder, expected) in [
+            ("/a/b/c.toml", "/a/b", "c.toml"),
+            ("/a/b/c.toml", "/a/hunt", "../b/c.toml"),
+            ("/b/c.toml", "/a/hunt", "../../b/c.toml"),
+        ] {
+            assert_eq!(
+                relative(Path::new(path), Path::new(folder)),
+                Path::new(expected)
+            );
+        }
+    }
+
+    #[test]
+    fn names_of_files_are_names_of_runs() {
+        let name = name(Path::new("configs/hall.toml"), "No robot: ../stalls!", 7, 9);
+        assert_eq!(name, "hall-no-robot-stalls-7-9.toml");
+
+        let long = super::name(Path::new("a ä.toml"), &"word ".repeat(50), 1 << 52, 1 << 40);
+        let stem = long.strip_suffix(".toml").unwrap();
+        assert!(stem.starts_with("a-word-word"), "{stem}");
+        assert!(protocol::RunName::new(stem).is_ok(), "{stem}");
+    }
+}

@@ -1,0 +1,641 @@
+//! Shrinking: from a case in which an expectation fails to a smaller one in which the same expectation fails.
+//!
+//! Faults are replaced by the single messages that they lost, left out by delta debugging (Zeller and Hildebrandt 2002), and
+//! weakened; robots, guests and the end of the run are left out. Only a case that was played, and in which the expectation
+//! failed, is taken. A smaller scenario is taken only if the expectation does not fail in it without faults: otherwise what
+//! is missing in it would be the cause.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use protocol::{RobotName, Tick};
+
+use super::case::Case;
+use super::fault::{Effect, Messages, PlannedFault, Span};
+use super::parallel::first;
+use super::trial::{Played, Trial};
+
+/// Least time of a fault, ticks.
+const LEAST_TICKS: Tick = 2;
+
+/// What bounds the shrinking of one case.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds<'a> {
+    /// Most runs.
+    pub runs: u64,
+    /// Number of runs at the same time; the result does not depend on it.
+    pub jobs: usize,
+    /// Set to end with the smallest case so far.
+    pub stop: &'a AtomicBool,
+}
+
+/// A case that was shrunk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shrunk {
+    /// The smallest case that was found.
+    pub case: Case,
+    /// Its run, in which the expectation fails.
+    pub played: Played,
+    /// Number of runs that it took.
+    pub runs: u64,
+    /// Whether no step makes it smaller. If not, the runs did not suffice.
+    pub is_minimal: bool,
+}
+
+/// Shrinks a case in whose run the expectation `name` failed. The scenario has these robots, and this number of guests.
+pub fn shrink(
+    trial: &dyn Trial,
+    name: &str,
+    case: Case,
+    played: Played,
+    world: &World,
+    bounds: Bounds<'_>,
+) -> Shrunk {
+    let mut shrinker = Shrinker {
+        trial,
+        name,
+        wanted: BTreeSet::from([name.to_owned()]),
+        world,
+        bounds,
+        best: case,
+        played,
+        runs: 0,
+    };
+    let is_minimal = shrinker.shrink();
+    Shrunk {
+        case: shrinker.best,
+        played: shrinker.played,
+        runs: shrinker.runs,
+        is_minimal,
+    }
+}
+
+/// What can be left out of a scenario.
+#[derive(Debug, Clone, Default)]
+pub struct World {
+    /// The robots.
+    pub roster: Vec<RobotName>,
+    /// The number of guests.
+    pub guests: usize,
+}
+
+struct Shrinker<'a> {
+    trial: &'a dyn Trial,
+    name: &'a str,
+    wanted: BTreeSet<String>,
+    world: &'a World,
+    bounds: Bounds<'a>,
+    /// The smallest case so far in which the expectation fails.
+    best: Case,
+    /// Its run.
+    played: Played,
+    runs: u64,
+}
+
+impl Shrinker<'_> {
+    /// Shrinks until no step makes the case smaller; returns whether that was reached.
+    fn shrink(&mut self) -> bool {
+        self.shorten();
+        loop {
+            let before = self.best.clone();
+            self.make_concrete();
+            self.remove_faults();
+            self.weaken_faults();
+            self.remove_robots();
+            self.remove_guests();
+            self.shorten();
+            if self.is_over() {
+                return false;
+            }
+            if self.best == before {
+                return true;
+            }
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.runs >= self.bounds.runs || self.bounds.stop.load(Ordering::Relaxed)
+    }
+
+    /// Takes the first of these cases in which the expectation fails; returns its place. The order decides, not which run
+    /// ends first.
+    fn take_first(&mut self, cases: Vec<Case>) -> Option<usize> {
+        let mut cases = cases;
+        cases.retain(|case| *case != self.best);
+        let left = self.bounds.runs.saturating_sub(self.runs);
+        cases.truncate(usize::try_from(left).unwrap_or(usize::MAX));
+
+        let found = first(&cases, self.bounds.jobs, self.bounds.stop, |case| {
+            self.failing(case)
+        });
+        self.runs += match &found {
+            Some((place, _)) => *place as u64 + 1,
+            None => cases.len() as u64,
+        };
+        let (place, played) = found?;
+        self.best = cases.swap_remove(place);
+        self.played = played;
+        Some(place)
+    }
+
+    /// The run of a case, if the expectation fails in it because of its faults.
+    fn failing(&self, case: &Case) -> Option<Played> {
+        let played = self.trial.play(case, &self.wanted).ok()?;
+        if !played.failed.contains_key(self.name) {
+            return None;
+        }
+        if case.has_world_of(&self.best) {
+            return Some(played);
+        }
+
+        let without = self
+            .trial
+            .play(&case.with_faults(Vec::new()), &self.wanted)
+            .ok()?;
+        let is_cause = !without.failed.contains_key(self.name);
+        is_cause.then_some(played)
+    }
+
+    /// Ends the run where the expectation has failed.
+    fn shorten(&mut self) {
+        let Some(failure) = self.played.failed.get(self.name) else {
+            return;
+        };
+        let mut case = self.best.clone();
+        case.ticks = Some(failure.tick.max(1));
+        self.take_first(vec![case]);
+    }
+
+    /// Replaces faults by the single messages that were lost in the run: all faults, or one of them.
+    fn make_concrete(&mut self) {
+        let mut lost = Vec::new();
+        for message in &self.played.sent {
+            let fault = PlannedFault::Lose {
+                link: message.link.clone(),
+                number: message.number,
+            };
+            if message.is_lost && !self.best.faults.contains(&fault) {
+                lost.push(fault);
+            }
+        }
+        if lost.is_empty() {
+            return;
+        }
+
+        let mut named = Vec::new();
+        for fault in &self.best.faults {
+            if matches!(fault, PlannedFault::Lose { .. }) {
+                named.push(fault.clone());
+            }
+        }
+        named.extend(lost.iter().cloned());
+        let mut cases = vec![self.best.with_faults(named)];
+        for (index, fault) in self.best.faults.iter().enumerate() {
+            if matches!(fault, PlannedFault::Lose { .. }) {
+                continue;
+            }
+            let mut faults = self.best.faults.clone();
+            faults.splice(index..=index, lost.iter().cloned());
+            cases.push(self.best.with_faults(faults));
+        }
+        self.take_first(cases);
+    }
+
+    /// Delta debugging: leaves out faults until each that is left is needed.
+    fn remove_faults(&mut self) {
+        let mut pieces = 2;
+        while self.best.faults.len() > 1 && !self.is_over() {
+            let count = self.best.faults.len();
+            pieces = pieces.min(count);
+            let mut cases = Vec::new();
+            for piece in 0..pieces {
+                let begin = piece * count / pieces;
+                let end = (piece + 1) * count / pieces;
+                cases.push(self.best.with_faults(self.best.faults[begin..end].to_vec()));
+            }
+            if pieces > 2 {
+                for piece in 0..pieces {
+                    let begin = piece * count / pieces;
+                    let end = (piece + 1) * count / pieces;
+                    let mut faults = self.best.faults.clone();
+                    faults.drain(begin..end);
+                    cases.push(self.best.with_faults(faults));
+                }
+            }
+
+            match self.take_first(cases) {
+                Some(place) if place < pieces => pieces = 2,
+                Some(_) => pieces = (pieces - 1).max(2),
+                None if pieces == count => return,
+                None => pieces = (2 * pieces).min(count),
+            }
+        }
+    }
+
+    /// Weakens one fault after the other, as long as the expectation fails.
+    fn weaken_faults(&mut self) {
+        let mut index = 0;
+        while index < self.best.faults.len() && !self.is_over() {
+            let mut cases = Vec::new();
+            for weaker in weaker(&self.best.faults[index], self.world.guests) {
+                let mut faults = self.best.faults.clone();
+                faults[index] = weaker;
+                cases.push(self.best.with_faults(faults));
+            }
+            if self.take_first(cases).is_none() {
+                index += 1;
+            }
+        }
+    }
+
+    fn remove_robots(&mut self) {
+        for robot in &self.world.roster {
+            if self.best.without.contains(robot) || self.is_over() {
+                continue;
+            }
+            let mut case = self.best.clone();
+            case.without.insert(robot.clone());
+            case.faults = Vec::new();
+            for fault in &self.best.faults {
+                case.faults.extend(fault.without(robot));
+            }
+            if !case.faults.is_empty() {
+                self.take_first(vec![case]);
+            }
+        }
+    }
+
+    fn remove_guests(&mut self) {
+        let mut faults = self.best.faults.iter();
+        if faults.any(|fault| matches!(fault, PlannedFault::Crowd { .. })) {
+            return; // Weakening that fault leaves guests out.
+        }
+
+        while !self.is_over() {
+            let guests = self.best.guests.unwrap_or(self.world.guests);
+            let mut cases = Vec::new();
+            for fewer in [0, guests / 8, guests / 4, guests / 2, guests * 3 / 4] {
+                let mut case = self.best.clone();
+                case.guests = Some(fewer);
+                if fewer < guests && !cases.contains(&case) {
+                    cases.push(case);
+                }
+            }
+            if self.take_first(cases).is_none() {
+                return;
+            }
+        }
+    }
+}
+
+/// Weaker faults in the place of a fault, the weakest first. Each is smaller by a measure that cannot fall for ever.
+fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
+    let mut all = Vec::new();
+    match fault {
+        PlannedFault::Lose { .. } => {}
+        PlannedFault::Channel {
+            link,
+            of,
+            effect,
+            span,
+        } => {
+            let with = |effect, span| PlannedFault::Channel {
+                link: link.clone(),
+                of: *of,
+                effect,
+                span,
+            };
+            for span in shorter(*span) {
+                all.push(with(*effect, span));
+            }
+            if let Some(effect) = weaker_effect(*effect) {
+                all.push(with(effect, *span));
+            }
+        }
+        PlannedFault::Partition { .. } => all = weaker_partitions(fault),
+        PlannedFault::Crash { robot, span } => {
+            for span in shorter(*span) {
+                let robot = robot.clone();
+                all.push(PlannedFault::Crash { robot, span });
+            }
+        }
+        PlannedFault::Wall { at } => {
+            for left_out in 0..at.len() {
+                let mut at = at.clone();
+                at.remove(left_out);
+                if !at.is_empty() {
+                    all.push(PlannedFault::Wall { at });
+                }
+            }
+        }
+        PlannedFault::Crowd { guests: count } => {
+            for share in [4, 2] {
+                let fewer = guests + count.saturating_sub(guests) / share;
+                if fewer < *count && fewer > guests {
+                    all.push(PlannedFault::Crowd { guests: fewer });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// A shorter partition, one of a single direction, and one of a single kind of messages.
+fn weaker_partitions(fault: &PlannedFault) -> Vec<PlannedFault> {
+    let PlannedFault::Partition {
+        one,
+        other,
+        one_way,
+        cuts,
+        span,
+    } = fault
+    else {
+        return Vec::new();
+    };
+
+    let mut all = Vec::new();
+    for span in shorter(*span) {
+        all.push(partition(one, other, *one_way, cuts, span));
+    }
+    if !one_way {
+        all.push(partition(one, other, true, cuts, *span));
+        all.push(partition(other, one, true, cuts, *span));
+    }
+    if cuts.len() > 1 {
+        for of in cuts {
+            all.push(partition(one, other, *one_way, &[*of], *span));
+        }
+    }
+    all
+}
+
+fn partition(
+    one: &[RobotName],
+    other: &[RobotName],
+    one_way: bool,
+    cuts: &[Messages],
+    span: Span,
+) -> PlannedFault {
+    PlannedFault::Partition {
+        one: one.to_vec(),
+        other: other.to_vec(),
+        one_way,
+        cuts: cuts.to_vec(),
+        span,
+    }
+}
+
+fn weaker_effect(effect: Effect) -> Option<Effect> {
+    let half = |amount: u64| (amount > 1).then_some(amount / 2);
+    Some(match effect {
+        Effect::Loss(chance) => Effect::Loss(half(chance)?),
+        Effect::Burst(enter, leave) => Effect::Burst(half(enter)?, leave),
+        Effect::Delay(most_s) => Effect::Delay(half(most_s)?),
+        Effect::Duplication(chance) => Effect::Duplication(half(chance)?),
+    })
+}
+
+/// Shorter times: the second half and the first half of a time, and what is left without its first and its last part.
+fn shorter(span: Span) -> Vec<Span> {
+    let lasting = span.until - span.from;
+    let mut all = Vec::new();
+    for part in [lasting / 2, lasting / 8, 1] {
+        if part == 0 || lasting.saturating_sub(part) < LEAST_TICKS {
+            continue;
+        }
+        all.push(Span {
+            from: span.from + part,
+            until: span.until,
+        });
+        all.push(Span {
+            from: span.from,
+            until: span.until - part,
+        });
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicU64;
+
+    use proptest::prelude::*;
+
+    use super::super::fault::Link;
+    use super::super::trial::{Failure, SentMessage};
+    use super::*;
+
+    const NAME: &str = "all is well";
+
+    /// A run that fails if it has all the messages of one of the sets among those lost.
+    struct Synthetic {
+        causes: Vec<BTreeSet<u64>>,
+        played: AtomicU64,
+    }
+
+    fn lose(number: u64) -> PlannedFault {
+        PlannedFault::Lose {
+            link: link(),
+            number,
+        }
+    }
+
+    fn link() -> Link {
+        Link {
+            from: RobotName::new("A").unwrap(),
+            to: RobotName::new("B").unwrap(),
+        }
+    }
+
+    fn numbers(case: &Case) -> BTreeSet<u64> {
+        let mut numbers = BTreeSet::new();
+        for fault in &case.faults {
+            match fault {
+                PlannedFault::Lose { number, .. } => _ = numbers.insert(*number),
+                // Any other fault loses the messages 0 to 9 while it lasts.
+                PlannedFault::Crash { span, .. } => {
+                    numbers.extend((0..10).filter(|n| (span.from..span.until).contains(n)));
+                }
+                _ => {}
+            }
+        }
+        numbers
+    }
+
+    impl Synthetic {
+        fn of(causes: &[&[u64]]) -> Self {
+            Self {
+                causes: causes
+                    .iter()
+                    .map(|set| set.iter().copied().collect())
+                    .collect(),
+                played: AtomicU64::new(0),
+            }
+        }
+
+        fn fails(&self, lost: &BTreeSet<u64>) -> bool {
+            self.causes.iter().any(|cause| cause.is_subset(lost))
+        }
+    }
+
+    impl Trial for Synthetic {
+        fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+            self.played.fetch_add(1, Ordering::Relaxed);
+            let lost = numbers(case);
+            let mut played = Played::default();
+            for number in 0..10 {
+                played.sent.push(SentMessage {
+                    tick: number,
+                    link: link(),
+                    number,
+                    text: String::new(),
+                    is_lost: lost.contains(&number),
+                });
+            }
+            if self.fails(&lost) {
+                let failure = Failure {
+                    tick: 10,
+                    because: String::new(),
+                };
+                played.failed.insert(NAME.to_owned(), failure);
+            }
+            Ok(played)
+        }
+    }
+
+    fn shrunk(trial: &Synthetic, case: Case, runs: u64, jobs: usize) -> Shrunk {
+        let played = trial.play(&case, &BTreeSet::new()).unwrap();
+        assert!(played.failed.contains_key(NAME), "it fails before");
+        let bounds = Bounds {
+            runs,
+            jobs,
+            stop: &AtomicBool::new(false),
+        };
+        shrink(trial, NAME, case, played, &World::default(), bounds)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Whatever the causes: the result fails, no fault of it can be left out, and jobs do not change it.
+        #[test]
+        fn the_result_is_minimal_and_fails(
+            causes in prop::collection::vec(prop::collection::btree_set(0_u64..30, 1..5), 1..4),
+            more in prop::collection::btree_set(0_u64..30, 0..20),
+            jobs in 2..5_usize,
+        ) {
+            let mut all = more;
+            all.extend(causes[0].iter());
+            let trial = Synthetic { causes, played: AtomicU64::new(0) };
+            let case = Case::of(all.into_iter().map(lose).collect());
+            let one = shrunk(&trial, case.clone(), 10_000, 1);
+
+            prop_assert!(one.is_minimal);
+            prop_assert!(trial.fails(&numbers(&one.case)));
+            for index in 0..one.case.faults.len() {
+                let mut faults = one.case.faults.clone();
+                faults.remove(index);
+                let fewer = Case::of(faults);
+                prop_assert!(!trial.fails(&numbers(&fewer)), "{fewer:?} fails, too");
+            }
+
+            let other = shrunk(&trial, case, 10_000, jobs);
+            prop_assert_eq!(one, other);
+        }
+
+        /// However few runs are allowed, the result fails, and no more runs are counted than allowed.
+        #[test]
+        fn a_result_within_bounds_fails(runs in 0_u64..40, cause in prop::collection::btree_set(0_u64..30, 1..4)) {
+            let trial = Synthetic { causes: vec![cause], played: AtomicU64::new(0) };
+            let case = Case::of((0..30).map(lose).collect());
+            let one = shrunk(&trial, case, runs, 1);
+            prop_assert!(trial.fails(&numbers(&one.case)));
+            prop_assert!(one.runs <= runs);
+        }
+    }
+
+    #[test]
+    fn a_crash_becomes_the_message_that_it_lost() {
+        let trial = Synthetic::of(&[&[7]]);
+        let crash = PlannedFault::Crash {
+            robot: RobotName::new("A").unwrap(),
+            span: Span { from: 2, until: 9 },
+        };
+        let result = shrunk(&trial, Case::of(vec![lose(1), crash]), 10_000, 2);
+        assert_eq!(result.case.faults, [lose(7)]);
+    }
+
+    #[test]
+    fn a_fault_that_no_message_replaces_becomes_short() {
+        struct Absent;
+        impl Trial for Absent {
+            fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+                let mut played = Played::default();
+                for fault in &case.faults {
+                    if let PlannedFault::Crash { span, .. } = fault
+                        && span.from <= 55
+                        && span.until >= 60
+                    {
+                        let failure = Failure {
+                            tick: 60,
+                            because: String::new(),
+                        };
+                        played.failed.insert(NAME.to_owned(), failure);
+                    }
+                }
+                Ok(played)
+            }
+        }
+
+        let crash = |from, until| PlannedFault::Crash {
+            robot: RobotName::new("A").unwrap(),
+            span: Span { from, until },
+        };
+        let case = Case::of(vec![lose(1), crash(10, 300)]);
+        let played = Absent.play(&case, &BTreeSet::new()).unwrap();
+        let bounds = Bounds {
+            runs: 10_000,
+            jobs: 2,
+            stop: &AtomicBool::new(false),
+        };
+        let result = shrink(&Absent, NAME, case, played, &World::default(), bounds);
+        assert_eq!(result.case.faults, [crash(55, 60)]);
+        assert_eq!(result.case.ticks, Some(60));
+    }
+
+    /// A scenario that fails without faults is no smaller case of one in which a fault is the cause.
+    #[test]
+    fn what_is_left_of_the_scenario_does_not_fail_by_itself() {
+        struct Lonely;
+        impl Trial for Lonely {
+            fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+                let mut played = Played::default();
+                let is_lonely = !case.without.is_empty();
+                if is_lonely || case.faults.contains(&lose(3)) {
+                    let failure = Failure {
+                        tick: 5,
+                        because: String::new(),
+                    };
+                    played.failed.insert(NAME.to_owned(), failure);
+                }
+                Ok(played)
+            }
+        }
+
+        let case = Case::of(vec![lose(3), lose(4)]);
+        let played = Lonely.play(&case, &BTreeSet::new()).unwrap();
+        let bounds = Bounds {
+            runs: 10_000,
+            jobs: 1,
+            stop: &AtomicBool::new(false),
+        };
+        let world = World {
+            roster: vec![RobotName::new("C").unwrap()],
+            guests: 100,
+        };
+        let result = shrink(&Lonely, NAME, case, played, &world, bounds);
+        assert_eq!(result.case.faults, [lose(3)]);
+        assert_eq!(result.case.without, BTreeSet::new());
+        assert_eq!(result.case.guests, Some(0));
+    }
+}

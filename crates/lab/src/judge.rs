@@ -1,0 +1,140 @@
+//! A recorded run is judged by expectations, its own or others. Nothing is executed again.
+
+use std::collections::BTreeMap;
+
+use config::FileError;
+use miette::miette;
+use observe::{Expectation, Observation, Watches};
+use protocol::messages::End;
+use protocol::{Event, Tick};
+use recording::{Recording, Ticks};
+use simulator::record::{Entry, Record};
+use simulator::summary::Judged;
+use simulator::{EpochFiles, Scenario};
+
+use crate::states::LastStates;
+
+/// What came of a recorded run.
+#[derive(Debug, Default)]
+pub struct Verdicts {
+    /// The verdicts by the names of the expectations.
+    pub expectations: BTreeMap<String, Judged>,
+    /// The last tick that was judged.
+    pub tick: Tick,
+    /// Whether the record has the end of the run. What was open without one is undecided.
+    pub has_end: bool,
+}
+
+/// Judges a recorded epoch of a scenario.
+///
+/// # Errors
+/// If the record cannot be read, or has no reports and the expectations need them.
+pub fn judge(
+    files: &EpochFiles,
+    scenario: &Scenario,
+    expectations: &[Expectation],
+) -> miette::Result<Verdicts> {
+    let mut record = Record::of_events(&files.events)?;
+    let mut recorded = States::open(files, expectations)?;
+    let roster = scenario.roster();
+    let mut watches = Watches::new(expectations, scenario.tick_s, scenario.body_m, &roster);
+    let mut verdicts = Verdicts::default();
+
+    while let Some(entry) = record.next_entry()? {
+        if let Some(Event::End { reason, .. }) = entry.events.last() {
+            verdicts.has_end = true;
+            verdicts.note(&watches.end(*reason));
+            return Ok(verdicts);
+        }
+        if let Some(states) = &mut recorded
+            && !states.advance()?
+        {
+            break;
+        }
+        verdicts.tick = entry.tick;
+        let judged = observe(&mut watches, &entry, recorded.as_ref(), scenario.tick_s);
+        verdicts.note(&judged);
+    }
+
+    verdicts.note(&watches.end(End::Aborted));
+    Ok(verdicts)
+}
+
+fn observe(
+    watches: &mut Watches,
+    entry: &Entry,
+    recorded: Option<&States>,
+    tick_s: f64,
+) -> Vec<Event> {
+    watches.observe(&Observation {
+        tick: entry.tick,
+        time_s: entry.tick as f64 * tick_s,
+        events: &entry.events,
+        state: &|robot| recorded.and_then(|states| states.last.of(robot)),
+    })
+}
+
+impl Verdicts {
+    fn note(&mut self, judged: &[Event]) {
+        for event in judged {
+            if let Event::Judged {
+                expectation,
+                verdict,
+                because,
+            } = event
+            {
+                let judged = Judged {
+                    verdict: *verdict,
+                    tick: self.tick,
+                    because: because.clone(),
+                };
+                self.expectations.insert(expectation.clone(), judged);
+            }
+        }
+    }
+}
+
+/// What robots reported last, tick by tick, from a recording.
+struct States {
+    ticks: Ticks,
+    last: LastStates,
+}
+
+impl States {
+    /// Opens the recording, if the expectations need it.
+    fn open(files: &EpochFiles, expectations: &[Expectation]) -> miette::Result<Option<Self>> {
+        let mut needing = expectations.iter().filter(|one| one.needs_states());
+        let Some(first) = needing.next() else {
+            return Ok(None);
+        };
+        if !files.recording.exists() {
+            return Err(miette!(
+                help = "a run is recorded unless its scenario has `frames = false` under [record]",
+                "{} is not there, and \"{}\" depends on what robots reported",
+                files.recording.display(),
+                first.name
+            ));
+        }
+
+        let recording = Recording::open(&files.recording).map_err(|error| unreadable(&error))?;
+        Ok(Some(Self {
+            ticks: Ticks::of(recording),
+            last: LastStates::default(),
+        }))
+    }
+
+    /// Goes on to the next tick. Returns whether the recording has it.
+    fn advance(&mut self) -> miette::Result<bool> {
+        let next = self.ticks.next_tick();
+        let Some(tick) = next.map_err(|error| unreadable(&error))? else {
+            return Ok(false);
+        };
+
+        self.last.note(tick.reports, tick.frame.robots);
+        Ok(true)
+    }
+}
+
+fn unreadable(error: &recording::RecordingError) -> FileError {
+    FileError::new(error.to_string())
+}

@@ -1,0 +1,15 @@
+//! Reports for people: one HTML file about runs ([`of_runs`]) or about an experiment ([`of_experiment`]), which opens without a
+//! network and prints as a paper.
+
+mod answer;
+mod course;
+mod experiment;
+mod facts;
+mod figures;
+mod limits;
+mod runs;
+mod study;
+mod words;
+
+pub use experiment::of_experiment;
+pub use runs::{MOST_RUNS, of_runs};

@@ -1,0 +1,243 @@
+//! The answer to the question of an experiment: what the comparisons show, and what they do not.
+
+use std::collections::BTreeMap;
+
+use observe::Measure;
+use report::{Part, decimals_for, fixed};
+
+use super::study::{Study, is_shown, label};
+use crate::experiment::{Contrast, Difference};
+use crate::statistics::Bootstrapped;
+
+/// Most comparisons that a sentence names.
+const MOST_NAMED: usize = 8;
+
+/// What all comparisons show, in one or two sentences.
+pub(super) fn lead(study: &Study<'_>) -> Vec<Part> {
+    let all = study.contrasts.len();
+    let Some(first) = study.contrasts.first() else {
+        return vec![Part::text(
+            "No arms are compared: the experiment has no baseline, or no measure with `contrast = true`, or no seed was played in both arms. Its estimates are below.",
+        )];
+    };
+
+    let mut parts = Vec::new();
+    let shown = study
+        .contrasts
+        .iter()
+        .filter(|contrast| is_shown(contrast))
+        .count();
+    parts.push(Part::text(format!("Of {all} comparisons with the arm ")));
+    parts.push(Part::strong(&first.baseline));
+    parts.push(Part::text(format!(
+        ", {shown} show a difference after Holm's correction: "
+    )));
+    let mut counts = Vec::new();
+    for measure in study.measures() {
+        let contrasts = study.contrasts_of(measure);
+        if !contrasts.is_empty() {
+            let shown = contrasts
+                .iter()
+                .filter(|contrast| is_shown(contrast))
+                .count();
+            counts.push(format!(
+                "{shown} of {} in {}",
+                contrasts.len(),
+                label(measure)
+            ));
+        }
+    }
+    parts.push(Part::text(format!("{}.", counts.join(", "))));
+    parts
+}
+
+/// What the comparisons in a measure show: a sentence for each arm and direction, and what is not shown.
+pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Vec<Part>> {
+    let contrasts = study.contrasts_of(measure);
+    let mut shown: BTreeMap<(usize, bool), Vec<&Contrast>> = BTreeMap::new();
+    let mut others = 0;
+    for contrast in &contrasts {
+        if !is_shown(contrast) {
+            others += 1;
+            continue;
+        }
+        let arm = study.arms.iter().position(|arm| arm.name == contrast.arm);
+        let Some(arm) = arm else {
+            continue;
+        };
+        let is_more = direction(&contrast.difference) > 0.0;
+        shown.entry((arm, is_more)).or_default().push(contrast);
+    }
+
+    let mut sentences = Vec::new();
+    for ((_, is_more), contrasts) in &shown {
+        sentences.push(sentence(study, measure, contrasts, *is_more));
+    }
+    if others > 0 {
+        sentences.push(not_shown(measure, &contrasts, others));
+    }
+    sentences
+}
+
+/// Which way an arm differs from the baseline: above 0 if its numbers are larger, or its event comes later or in fewer runs.
+fn direction(difference: &Difference) -> f64 {
+    match difference {
+        Difference::Number { mean, .. } => mean.value,
+        Difference::Time {
+            restricted_mean_s, ..
+        } => restricted_mean_s.value,
+    }
+}
+
+fn sentence(
+    study: &Study<'_>,
+    measure: &Measure,
+    contrasts: &[&Contrast],
+    is_more: bool,
+) -> Vec<Part> {
+    let Some(first) = contrasts.first() else {
+        return Vec::new();
+    };
+    let how = match (measure.is_time(), is_more) {
+        (false, true) => "is higher than with",
+        (false, false) => "is lower than with",
+        (true, true) => "comes later or in fewer runs than with",
+        (true, false) => "comes earlier or in more runs than with",
+    };
+    let mut parts = vec![
+        Part::text("With "),
+        Part::strong(&first.arm),
+        Part::text(format!(", {} {how} ", label(measure))),
+        Part::strong(&first.baseline),
+        Part::text(": "),
+    ];
+    let mut named = Vec::new();
+    for contrast in contrasts.iter().take(MOST_NAMED) {
+        let heading = study.heading_of(&contrast.condition);
+        let under = if heading.is_empty() {
+            String::new()
+        } else {
+            format!("{heading} ")
+        };
+        named.push(format!("{under}({})", numbers(contrast)));
+    }
+    let mut text = named.join("; ");
+    if contrasts.len() > MOST_NAMED {
+        text += &format!(
+            "; and {} more, which are in the table",
+            contrasts.len() - MOST_NAMED
+        );
+    }
+    parts.push(Part::text(text + "."));
+    parts
+}
+
+/// The difference with its interval, n and p.
+fn numbers(contrast: &Contrast) -> String {
+    let difference = match &contrast.difference {
+        Difference::Number { mean, .. } => with_interval(mean, 1.0, ""),
+        Difference::Time { share, .. } => with_interval(share, 100.0, " points"),
+    };
+    format!(
+        "{difference}, n = {}, {}",
+        contrast.n,
+        p_value(contrast.p_holm)
+    )
+}
+
+/// A difference with its sign and its interval.
+fn with_interval(difference: &Bootstrapped, factor: f64, unit: &str) -> String {
+    let bounds = difference.interval.bounds();
+    let width = bounds.map_or(difference.value, |(low, high)| high - low);
+    let decimals = decimals_for(width * factor * 5.0);
+    let value = signed(difference.value * factor, decimals);
+    match bounds {
+        Some((low, high)) => format!(
+            "{value}{unit} [{}, {}]",
+            signed(low * factor, decimals),
+            signed(high * factor, decimals)
+        ),
+        None => format!("{value}{unit}, the same in every pair"),
+    }
+}
+
+fn signed(value: f64, decimals: usize) -> String {
+    let text = fixed(value, decimals);
+    match text.strip_prefix('-') {
+        Some(positive) => format!("−{positive}"),
+        None if text.bytes().all(|byte| matches!(byte, b'0' | b'.')) => text,
+        None => format!("+{text}"),
+    }
+}
+
+/// A p value as it is printed.
+pub(super) fn p_value(p: f64) -> String {
+    if p < 0.001 {
+        return "p < 0.001".to_owned();
+    }
+    format!("p = {p:.3}")
+}
+
+fn not_shown(measure: &Measure, contrasts: &[&Contrast], others: usize) -> Vec<Part> {
+    let all = contrasts.len();
+    let what = if others == all {
+        format!(
+            "In none of the {all} comparisons do the data show a difference in {}",
+            label(measure)
+        )
+    } else {
+        format!(
+            "In the other {others} of {all} comparisons the data do not show a difference in {}",
+            label(measure)
+        )
+    };
+    let mut text = format!(
+        "{what}: p is not below 0.05 after the correction{}. This is no evidence that there is none; the intervals show how large one \
+         could be.",
+        with_zero(contrasts)
+    );
+
+    let pairs = contrasts
+        .iter()
+        .map(|contrast| contrast.n)
+        .max()
+        .unwrap_or(0);
+    if !measure.is_time() && least_p(pairs) * all as f64 >= 0.05 {
+        text += &format!(
+            " With {pairs} pairs no difference can be shown in any of {all} comparisons: play more seeds."
+        );
+    }
+    vec![Part::text(text)]
+}
+
+/// How many of the differences that are not shown have an interval with zero in it.
+fn with_zero(contrasts: &[&Contrast]) -> String {
+    let mut count = 0;
+    let mut all = 0;
+    for contrast in contrasts.iter().filter(|contrast| !is_shown(contrast)) {
+        let difference = match &contrast.difference {
+            Difference::Number { mean, .. } => mean,
+            Difference::Time {
+                restricted_mean_s, ..
+            } => restricted_mean_s,
+        };
+        all += 1;
+        let bounds = difference.interval.bounds();
+        let bounds = bounds.unwrap_or((difference.value, difference.value));
+        count += usize::from(bounds.0 <= 0.0 && bounds.1 >= 0.0);
+    }
+    if count == all {
+        ", and every interval includes zero".to_owned()
+    } else {
+        format!(", and {count} of {all} intervals include zero")
+    }
+}
+
+/// The smallest p value of a sign-flip test of so many pairs.
+fn least_p(pairs: usize) -> f64 {
+    let mut p = 2.0;
+    for _ in 0..pairs {
+        p /= 2.0;
+    }
+    p
+}

@@ -1,0 +1,402 @@
+//! The report of an experiment.
+
+use std::path::Path;
+
+use miette::{IntoDiagnostic, miette};
+use observe::Measure;
+use protocol::RunName;
+use report::{Cell, Column, Figure, Page, Part, State, Table};
+use simulator::RunFolder;
+
+use super::answer::{lead, sentences};
+use super::course::{diagram_lines, run_panel};
+use super::facts::RunFacts;
+use super::figures::{Shown, differences, distributions, estimates, heat_maps, survival, verdicts};
+use super::study::{Study, label};
+use super::words::{counted, quoted};
+use crate::experiment::{Outcome, Provenance, Results, Robots};
+use crate::folder::recorded_epoch;
+use crate::run::execute;
+
+/// Units that are named one by one where there are more of them.
+const MOST_NAMED: usize = 10;
+
+/// No further measure is shown on a page with this many bytes.
+const MOST_BYTES_OF_MEASURES: usize = 3_000_000;
+
+/// Writes the report of the experiment in a folder, as HTML.
+///
+/// # Errors
+/// If it is not the folder of an experiment, none of its units has been played, or a file cannot be read.
+pub fn of_experiment(folder: &Path) -> miette::Result<String> {
+    let results = Results::load(folder)?;
+    if results.outcomes.is_empty() {
+        return Err(miette!(
+            help = "play it with `cars experiment run`",
+            "no unit of the experiment in {} has been played",
+            folder.display()
+        ));
+    }
+    let provenance = Provenance::load(folder)?;
+    let study = Study::of(&results);
+
+    let mut page = Page::new("Experiment report", &results.plan.experiment.question);
+    page.lead(&lead(&study));
+    write_answer(&mut page, &study);
+    write_design(&mut page, &study);
+    let mut left_out = Vec::new();
+    for measure in study.measures() {
+        if page.size() > MOST_BYTES_OF_MEASURES {
+            left_out.push(label(measure));
+            continue;
+        }
+        write_measure(&mut page, &study, measure);
+    }
+    if !left_out.is_empty() {
+        page.remark(&[Part::text(format!(
+            "So that this page stays small, charts and tables of these measures are left out: {}.",
+            left_out.join(", ")
+        ))]);
+    }
+    if let Some(figure) = verdicts(&study) {
+        page.section("Expectations");
+        page.figure(&figure);
+    }
+    write_examples(&mut page, &study, folder);
+    write_reproduction(&mut page, &study, folder, provenance.as_ref());
+    Ok(page.finish())
+}
+
+fn write_answer(page: &mut Page, study: &Study<'_>) {
+    page.section("Answer");
+    let results = study.results;
+    let all = results.plan.units();
+    if !results.missing.is_empty() {
+        page.remark(&[Part::text(format!(
+            "Only {} of {all} runs have been played: these results are preliminary.",
+            results.outcomes.len()
+        ))]);
+    }
+    if !results.failures.is_empty() {
+        page.remark(&[Part::text(format!(
+            "{} could not be played to the end and have no numbers: the results are those of the others.",
+            counted(results.failures.len(), "run")
+        ))]);
+    }
+
+    for measure in study.measures() {
+        let sentences = sentences(study, measure);
+        if !sentences.is_empty() {
+            page.heading(label(measure));
+            page.list(&sentences);
+        }
+    }
+}
+
+fn write_design(page: &mut Page, study: &Study<'_>) {
+    page.section("Design");
+    let experiment = &study.results.plan.experiment;
+    let explained = experiment.explained();
+    if !explained.is_empty() {
+        page.paragraph(&[Part::text(explained)]);
+    }
+    let seeds = experiment.seeds.len();
+    page.paragraph(&[Part::text(format!(
+        "{}: {} under {}, with {} each, of {} s of simulated time. Runs with the same seed begin alike and have the same chance in \
+         every arm, so arms are compared in pairs.",
+        counted(study.results.plan.units(), "run"),
+        counted(study.arms.len(), "arm"),
+        counted(study.conditions.len(), "condition"),
+        counted(seeds, "seed"),
+        experiment.duration_s
+    ))]);
+
+    let mut arms = Table::new(vec![Column::text("Arm"), Column::text("what it is")]);
+    for arm in study.arms {
+        let is_baseline = experiment.baseline.as_ref() == Some(&arm.name);
+        let baseline = if is_baseline { " (baseline)" } else { "" };
+        arms.rows.push(vec![
+            Cell::text(format!("{}{baseline}", arm.name)),
+            Cell::text(&arm.what),
+        ]);
+    }
+    let mut caption = "The arms.".to_owned();
+    if study.arms.len() < experiment.arms.len() {
+        caption += &format!(
+            " The first {} of {} are shown.",
+            study.arms.len(),
+            experiment.arms.len()
+        );
+    }
+    page.table(&[Part::text(caption)], &arms);
+
+    let mut conditions = Table::new(vec![Column::text("Condition"), Column::text("what it is")]);
+    for condition in study.conditions {
+        if !condition.what.is_empty() {
+            let name = study.heading(condition);
+            conditions
+                .rows
+                .push(vec![Cell::text(name), Cell::text(&condition.what)]);
+        }
+    }
+    if !conditions.rows.is_empty() {
+        page.table(&[Part::text("The conditions.")], &conditions);
+    }
+}
+
+fn write_measure(page: &mut Page, study: &Study<'_>, measure: &Measure) {
+    page.section(label(measure));
+    if let Some(what) = &measure.what {
+        page.paragraph(&[Part::text(format!("{what}."))]);
+    }
+
+    page.figure(&estimates(study, measure));
+    if let Some(figure) = heat_maps(study, measure) {
+        page.figure(&figure);
+    }
+    if measure.is_time() {
+        page.figure(&survival(study, measure));
+        for shown in [Shown::Share, Shown::Time] {
+            add_figure(page, differences(study, measure, shown));
+        }
+        return;
+    }
+    add_figure(page, differences(study, measure, Shown::Mean));
+    page.begin_details("Distributions");
+    page.figure(&distributions(study, measure));
+    page.end_details();
+}
+
+fn add_figure(page: &mut Page, figure: Option<Figure>) {
+    if let Some(figure) = figure {
+        page.figure(&figure);
+    }
+}
+
+/// A typical run, and the one that differs most, with what their robots felt.
+fn write_examples(page: &mut Page, study: &Study<'_>, folder: &Path) {
+    let Some(measure) = study.measures().first() else {
+        return;
+    };
+    let Some((typical, extreme)) = examples(study, measure) else {
+        return;
+    };
+
+    page.section("Two runs");
+    let baseline = baseline_name(study);
+    page.paragraph(&[
+        Part::text("A typical run is that of the arm "),
+        Part::strong(baseline),
+        Part::text(format!(
+            " whose {} is nearest to the median of all its runs. The worst run fails most expectations; where runs fail equally \
+             many, it is the one that is farthest from that median.",
+            label(measure)
+        )),
+    ]);
+    for (name, outcome) in [("The typical run", typical), ("The worst run", extreme)] {
+        write_example(page, study, folder, name, (measure, outcome));
+    }
+}
+
+fn baseline_name<'a>(study: &Study<'a>) -> &'a str {
+    let baseline = study.results.plan.experiment.baseline.as_deref();
+    baseline.unwrap_or_else(|| study.arms.first().map_or("", |arm| &arm.name))
+}
+
+/// The typical and the worst run.
+fn examples<'a>(study: &Study<'a>, measure: &Measure) -> Option<(&'a Outcome, &'a Outcome)> {
+    let value = |outcome: &Outcome| outcome.measures.get(&measure.name).map(|one| one.value);
+    let baseline = baseline_name(study);
+    let outcomes = &study.results.outcomes;
+    let mut values: Vec<f64> = outcomes
+        .iter()
+        .filter(|outcome| outcome.arm == baseline)
+        .filter_map(value)
+        .collect();
+    values.sort_by(f64::total_cmp);
+    let median = *values.get(values.len() / 2)?;
+
+    let mut typical: Option<(&Outcome, f64)> = None;
+    let mut worst: Option<(&Outcome, usize, f64)> = None;
+    for outcome in outcomes {
+        let Some(value) = value(outcome) else {
+            continue;
+        };
+        let distance = (value - median).abs();
+        let is_nearer = typical.is_none_or(|(_, least)| distance < least);
+        if outcome.arm == baseline && is_nearer {
+            typical = Some((outcome, distance));
+        }
+
+        let fails = outcome
+            .verdicts
+            .values()
+            .filter(|verdict| *verdict == "fail")
+            .count();
+        let is_worse = worst.is_none_or(|(_, most, farthest)| {
+            fails > most || (fails == most && distance > farthest)
+        });
+        if is_worse {
+            worst = Some((outcome, fails, distance));
+        }
+    }
+    Some((typical?.0, worst?.0))
+}
+
+fn write_example(
+    page: &mut Page,
+    study: &Study<'_>,
+    folder: &Path,
+    name: &str,
+    (measure, outcome): (&Measure, &Outcome),
+) {
+    page.heading(name);
+    let measured = outcome
+        .measures
+        .get(&measure.name)
+        .map_or(f64::NAN, |one| one.value);
+    page.paragraph(&[
+        Part::text(format!("Unit {}: arm ", outcome.unit)),
+        Part::strong(&outcome.arm),
+        Part::text(format!(
+            ", {}, seed {}; {} {measured}. To record it: ",
+            study.heading_of(&outcome.condition),
+            outcome.seed,
+            label(measure),
+        )),
+        Part::code(format!(
+            "cars experiment replay {} {}",
+            quoted(folder),
+            outcome.unit
+        )),
+    ]);
+    if *study.results.plan.robots() != Robots::InProcess {
+        page.remark(&[Part::text(
+            "Its robots are processes, which a report does not start: record it by the command above and report the run.",
+        )]);
+        return;
+    }
+    if let Err(error) = write_course(page, study, outcome) {
+        page.remark(&[Part::text(format!("It cannot be shown: {error}."))]);
+    }
+}
+
+/// Plays a unit again, recorded in a temporary folder, and shows its course.
+fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette::Result<()> {
+    let plan = &study.results.plan;
+    let unit = plan.unit(outcome.unit);
+    let mut scenario =
+        plan.scenario_of(&unit, &|| unreachable!("its robots run in this process"))?;
+    scenario.record.frames = false;
+    let place = tempfile::tempdir().into_diagnostic()?;
+    let run = RunName::new("unit").into_diagnostic()?;
+    let recorded = RunFolder::new(place.path(), &run);
+    let lock = recorded.create(&scenario)?;
+    let summary = execute(scenario, &run, &recorded, None)?;
+    drop(lock);
+    if summary.digest != outcome.digest {
+        return Err(miette!(
+            "played again, it is another run than that of the results: the program is another one"
+        ));
+    }
+
+    let files = recorded_epoch(&recorded, None)?;
+    let facts = RunFacts::read(&files)?;
+    let mut panels = Vec::new();
+    panels.extend(run_panel(&facts, State::Emotion, "Emotions"));
+    let diagram = diagram_lines(&format!("unit {}", outcome.unit), &facts, &files)?;
+    panels.extend(diagram.lines);
+    let mut caption = "Emotions over time, and the space-time diagram, to be read line by line: robots are lanes, with emotion above \
+         behavior; a slanted line is a command, from the tick it was sent to the tick it arrived; a cross is where one was lost. n = 1 run."
+        .to_owned();
+    if diagram.last < facts.last_tick {
+        caption += &format!(
+            " The diagram ends at tick {} of {}.",
+            diagram.last, facts.last_tick
+        );
+    }
+    page.figure(&Figure {
+        panels,
+        caption: vec![Part::text(caption)],
+        table: None,
+    });
+    Ok(())
+}
+
+fn write_reproduction(
+    page: &mut Page,
+    study: &Study<'_>,
+    folder: &Path,
+    provenance: Option<&Provenance>,
+) {
+    let plan = &study.results.plan;
+    let folder = quoted(folder);
+    page.section("Reproduction");
+    page.paragraph(&[Part::text(
+        "The numbers, from the runs that were played; the numbers of every run as a table; one run, recorded; this page:",
+    )]);
+    page.commands(&[
+        format!("cars experiment merge {folder}"),
+        format!("cat {folder}/runs.csv"),
+        format!("cars experiment replay {folder} UNIT"),
+        format!("cars report {folder} -o report.html"),
+    ]);
+
+    let mut table = Table::new(vec![Column::text("What"), Column::text("")]);
+    let mut add = |name: &str, value: Cell| table.rows.push(vec![Cell::text(name), value]);
+    add("experiment", Cell::text(plan.name()));
+    add("program", Cell::text(format!("cars {}", plan.program())));
+    if let Some(provenance) = provenance {
+        let mut command = "cars".to_owned();
+        for argument in &provenance.command {
+            command += &format!(" {}", quoted(Path::new(argument)));
+        }
+        add("command", Cell::Code(command));
+        let machine = &provenance.machine;
+        let host = machine.host.as_deref().unwrap_or("unknown host");
+        let processor = machine.processor.as_deref().unwrap_or("unknown processor");
+        let text = format!(
+            "{host}: {} {}, {} × {processor}",
+            machine.os, machine.architecture, machine.processors
+        );
+        add("machine", Cell::text(text));
+        add(
+            "written, s since 1970 (UTC)",
+            Cell::Count(provenance.written_unix_s),
+        );
+    }
+    page.table(&[Part::text("Where the numbers come from.")], &table);
+
+    write_failures(page, study);
+    let source = plan.experiment.source();
+    page.file("Experiment file, whole", &source.text);
+}
+
+fn write_failures(page: &mut Page, study: &Study<'_>) {
+    let failures = &study.results.failures;
+    if failures.is_empty() {
+        return;
+    }
+    let mut table = Table::new(vec![
+        Column::number("Unit"),
+        Column::text("condition"),
+        Column::text("arm"),
+        Column::number("seed"),
+        Column::text("reason"),
+    ]);
+    for failure in failures.iter().take(MOST_NAMED) {
+        table.rows.push(vec![
+            Cell::Count(failure.unit as u64),
+            Cell::text(study.heading_of(&failure.condition)),
+            Cell::text(&failure.arm),
+            Cell::Count(failure.seed),
+            Cell::text(&failure.reason),
+        ]);
+    }
+    let caption = format!(
+        "Runs that could not be played to their end: {} of {}.",
+        table.rows.len(),
+        failures.len()
+    );
+    page.table(&[Part::text(caption)], &table);
+}

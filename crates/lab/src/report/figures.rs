@@ -1,0 +1,809 @@
+//! The figures of an experiment: estimates of arms, differences, curves, heat maps, verdicts.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
+
+use observe::Measure;
+use report::{
+    Cell, Column, Curve, Estimate, Figure, IntervalRow, Intervals, Matrix, MatrixCell, MatrixLabel,
+    Panel, Part, Step, Steps, Table, Trend, TrendLine, TrendPoint, decimals_for, fixed,
+    round_range,
+};
+
+use super::limits::{MOST_PANELS, limited};
+use super::study::{CellPlace, Study, axis, is_shown, label, level_number};
+use crate::experiment::{Contrast, Difference};
+use crate::statistics::{Bootstrapped, Survival, ecdf, quantile};
+
+/// Most rows of a table.
+const MOST_ROWS: usize = 500;
+/// How many values a factor has of which lines are drawn.
+const LINE_LEVELS: RangeInclusive<usize> = 3..=60;
+
+/// What of a difference a forest plot shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// Of means.
+    Mean,
+    /// Of the percentages of runs with an event.
+    Share,
+    /// Of mean times to an event.
+    Time,
+}
+
+/// Estimates of the arms under each condition.
+pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
+    let range = estimates_range(study, measure);
+    let mut caption = vec![Part::text(format!(
+        "{}. {} {}.",
+        axis(measure),
+        estimated(measure),
+        sample_sizes(study)
+    ))];
+    let mut panels = Vec::new();
+    if let Some(levels) = numeric_factor(study) {
+        panels.push(trend(study, measure, range, &levels));
+        if let Some(differences) = trend_of_differences(study, measure, &levels) {
+            panels.push(differences);
+            caption.push(Part::text(
+                " At the right, the paired differences to the baseline with 95 % intervals (BCa bootstrap); filled markers: \
+                 p < 0.05 after Holm's correction.",
+            ));
+        }
+    } else {
+        let all = interval_panels(study, measure, range);
+        let (kept, sentence) = limited(all, study.conditions.len(), "conditions");
+        panels = kept;
+        caption.push(Part::text(sentence));
+    }
+
+    caption.extend([
+        Part::text(" Data: column "),
+        Part::code(&measure.name),
+        Part::text(" of "),
+        Part::code("runs.csv"),
+        Part::text("."),
+    ]);
+    Figure {
+        panels,
+        caption,
+        table: Some(estimates_table(study, measure)),
+    }
+}
+
+/// What the estimates of a measure are.
+fn estimated(measure: &Measure) -> &'static str {
+    if measure.is_time() {
+        "Percentage of runs with the event by the end, from the survival curve, with 95 % intervals (Greenwood, log(-log));"
+    } else {
+        "Means over the seeds with 95 % intervals (Student's t);"
+    }
+}
+
+/// How many runs each arm has under each condition.
+fn sample_sizes(study: &Study<'_>) -> String {
+    let mut sizes = BTreeSet::new();
+    for place in places(study) {
+        sizes.insert(study.runs(place).len());
+    }
+    match (sizes.first(), sizes.last()) {
+        (Some(least), Some(most)) if least == most => format!("n = {least} runs each"),
+        (Some(least), Some(most)) => format!("n = {least} to {most} runs"),
+        _ => "n = 0".to_owned(),
+    }
+}
+
+/// All cells of the design.
+pub(super) fn places(study: &Study<'_>) -> Vec<CellPlace> {
+    let mut places = Vec::new();
+    for condition in 0..study.conditions.len() {
+        for arm in 0..study.arms.len() {
+            places.push((condition, arm));
+        }
+    }
+    places
+}
+
+/// The values of the only factor, if they are numbers and enough for a line.
+fn numeric_factor(study: &Study<'_>) -> Option<Vec<f64>> {
+    if study.factors.len() != 1 || !LINE_LEVELS.contains(&study.conditions.len()) {
+        return None;
+    }
+    let levels = study.conditions.iter().map(|condition| {
+        let (_, level) = condition.levels.first()?;
+        level_number(level)
+    });
+    levels.collect()
+}
+
+/// Ends of the axis of a measure: of all its intervals.
+fn estimates_range(study: &Study<'_>, measure: &Measure) -> (f64, f64) {
+    if measure.is_time() {
+        return (0.0, 100.0);
+    }
+    let mut values = Vec::new();
+    for place in places(study) {
+        values.extend(study.estimate(measure, place).into_iter().flat_map(ends));
+    }
+    widened(&values, true)
+}
+
+fn ends(estimate: Estimate) -> [f64; 2] {
+    let (low, high) = estimate
+        .interval
+        .unwrap_or((estimate.value, estimate.value));
+    [low.min(estimate.value), high.max(estimate.value)]
+}
+
+/// A range with round ends around values. If it would begin not far above zero it begins there.
+fn widened(values: &[f64], is_of_amounts: bool) -> (f64, f64) {
+    let mut from = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut to = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !from.is_finite() || !to.is_finite() {
+        return (0.0, 1.0);
+    }
+    if is_of_amounts && from >= 0.0 && from < 0.6 * to {
+        from = 0.0;
+    }
+    if !is_of_amounts {
+        from = from.min(0.0);
+        to = to.max(0.0);
+    }
+    round_range(from, to, 4)
+}
+
+fn decimals_of((from, to): (f64, f64)) -> usize {
+    decimals_for((to - from) / 2.0)
+}
+
+fn trend(study: &Study<'_>, measure: &Measure, range: (f64, f64), levels: &[f64]) -> Panel {
+    let mut lines = Vec::new();
+    for (arm, of) in study.arms.iter().enumerate() {
+        let mut points = Vec::new();
+        for (condition, x) in levels.iter().enumerate() {
+            if let Some(estimate) = study.estimate(measure, (condition, arm)) {
+                points.push(TrendPoint {
+                    x: *x,
+                    estimate,
+                    is_filled: true,
+                });
+            }
+        }
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        lines.push(TrendLine {
+            label: of.name.clone(),
+            arm: look(study, arm),
+            points,
+        });
+    }
+
+    let factor = study.factors.join(", ");
+    let chart = Trend {
+        title: format!("{} over {factor}", axis(measure)),
+        x_axis: factor,
+        y_axis: axis(measure),
+        levels: named_levels(study, levels),
+        range,
+        decimals: decimals_of(range),
+        reference: None,
+        lines,
+    };
+    Panel {
+        heading: "Arms".to_owned(),
+        svg: chart.draw(),
+        is_wide: false,
+    }
+}
+
+/// The differences to the baseline over the factor; `None` if there are none.
+fn trend_of_differences(study: &Study<'_>, measure: &Measure, levels: &[f64]) -> Option<Panel> {
+    let shown = if measure.is_time() {
+        Shown::Share
+    } else {
+        Shown::Mean
+    };
+    let mut values = Vec::new();
+    let mut lines = Vec::new();
+    for (arm, of) in study.arms.iter().enumerate() {
+        let mut points = Vec::new();
+        for (condition, x) in study.conditions.iter().zip(levels) {
+            if let Some(contrast) = study.contrast(measure, condition, of) {
+                let estimate = difference(contrast, shown);
+                values.extend(ends(estimate));
+                points.push(TrendPoint {
+                    x: *x,
+                    estimate,
+                    is_filled: is_shown(contrast),
+                });
+            }
+        }
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        if !points.is_empty() {
+            lines.push(TrendLine {
+                label: of.name.clone(),
+                arm: look(study, arm),
+                points,
+            });
+        }
+    }
+    let baseline = &study.contrasts_of(measure).first()?.baseline;
+
+    let factor = study.factors.join(", ");
+    let range = widened(&values, false);
+    let chart = Trend {
+        title: format!("Differences in {} over {factor}", label(measure)),
+        x_axis: factor,
+        y_axis: difference_axis(measure, shown, baseline),
+        levels: named_levels(study, levels),
+        range,
+        decimals: decimals_of(range),
+        reference: Some(0.0),
+        lines,
+    };
+    Some(Panel {
+        heading: format!("Differences to {baseline}"),
+        svg: chart.draw(),
+        is_wide: false,
+    })
+}
+
+/// The values of the only factor with their names, with growing values.
+fn named_levels(study: &Study<'_>, levels: &[f64]) -> Vec<(f64, String)> {
+    let mut named = Vec::new();
+    for (x, condition) in levels.iter().zip(study.conditions) {
+        let name = condition.levels.first().map_or("", |(_, level)| level);
+        named.push((*x, name.to_owned()));
+    }
+    named.sort_by(|a, b| a.0.total_cmp(&b.0));
+    named
+}
+
+/// The index by which an arm has its color and marker: that of the baseline is the first one.
+pub(super) fn look(study: &Study<'_>, arm: usize) -> usize {
+    let baseline = study.results.plan.experiment.baseline.as_ref();
+    let baseline = study
+        .arms
+        .iter()
+        .position(|one| Some(&one.name) == baseline);
+    match baseline {
+        Some(baseline) if arm == baseline => 0,
+        Some(baseline) if arm < baseline => arm + 1,
+        _ => arm,
+    }
+}
+
+fn interval_panels(study: &Study<'_>, measure: &Measure, range: (f64, f64)) -> Vec<Panel> {
+    let mut panels = Vec::new();
+    for (condition, of) in study.conditions.iter().enumerate().take(MOST_PANELS) {
+        let mut rows = Vec::new();
+        for (arm, of) in study.arms.iter().enumerate() {
+            rows.push(IntervalRow {
+                label: of.name.clone(),
+                arm: look(study, arm),
+                estimate: study.estimate(measure, (condition, arm)),
+                is_filled: true,
+            });
+        }
+        let heading = study.heading(of);
+        let chart = Intervals {
+            title: format!("{} {heading}", axis(measure)),
+            axis: axis(measure),
+            range,
+            decimals: decimals_of(range),
+            reference: None,
+            rows,
+        };
+        panels.push(Panel {
+            heading,
+            svg: chart.draw(),
+            is_wide: false,
+        });
+    }
+    panels
+}
+
+fn estimates_table(study: &Study<'_>, measure: &Measure) -> Table {
+    let mut columns = vec![
+        Column::text("Condition"),
+        Column::text("arm"),
+        Column::number("n"),
+    ];
+    let names: &[&str] = if measure.is_time() {
+        &[
+            "with it",
+            "with it, %",
+            "95 % from",
+            "to",
+            "median time, s",
+            "95 % from",
+            "to",
+        ]
+    } else {
+        &[
+            "mean",
+            "95 % from",
+            "to",
+            "least",
+            "quartile",
+            "median",
+            "quartile",
+            "most",
+        ]
+    };
+    columns.extend(names.iter().map(|name| Column::number(name)));
+    let mut table = Table::new(columns);
+
+    for (condition, arm) in places(study).into_iter().take(MOST_ROWS) {
+        let place = (condition, arm);
+        let Some(estimate) = study.estimate(measure, place) else {
+            continue;
+        };
+        let mut row = vec![
+            Cell::text(study.heading(&study.conditions[condition])),
+            Cell::text(&study.arms[arm].name),
+            Cell::Count(estimate.n as u64),
+        ];
+        if measure.is_time() {
+            let survival = Survival::of(&study.times(measure, place));
+            row.push(Cell::Count(survival.events as u64));
+            row.push(Cell::Number(estimate.value, 1));
+            row.extend(interval_cells(estimate.interval, 1));
+            for time_s in [
+                survival.median_s,
+                survival.median_low_s,
+                survival.median_high_s,
+            ] {
+                row.push(
+                    time_s.map_or(Cell::text("not reached"), |time_s| Cell::Number(time_s, 1)),
+                );
+            }
+        } else {
+            let numbers = study.numbers(measure, place);
+            row.push(Cell::Number(estimate.value, 2));
+            row.extend(interval_cells(estimate.interval, 2));
+            for quarter in 0..5 {
+                let value = quantile(&numbers, f64::from(quarter) / 4.0);
+                row.push(value.map_or(Cell::Empty, |value| Cell::Number(value, 2)));
+            }
+        }
+        table.rows.push(row);
+    }
+    table
+}
+
+fn interval_cells(interval: Option<(f64, f64)>, decimals: usize) -> [Cell; 2] {
+    match interval {
+        Some((low, high)) => [Cell::Number(low, decimals), Cell::Number(high, decimals)],
+        None => [Cell::Empty, Cell::Empty],
+    }
+}
+
+/// Differences of the arms to the baseline under each condition; `None` if there are none.
+pub(super) fn differences(study: &Study<'_>, measure: &Measure, shown: Shown) -> Option<Figure> {
+    let contrasts = study.contrasts_of(measure);
+    let first = contrasts.first()?;
+    let mut values = Vec::new();
+    for contrast in &contrasts {
+        values.extend(ends(difference(contrast, shown)));
+    }
+    let range = widened(&values, false);
+
+    let compared: BTreeSet<&str> = contrasts.iter().map(|one| one.condition.as_str()).collect();
+    let compared = compared.len();
+    let mut panels = Vec::new();
+    for condition in study.conditions.iter().take(MOST_PANELS) {
+        let mut rows = Vec::new();
+        for (arm, of) in study.arms.iter().enumerate() {
+            if let Some(contrast) = study.contrast(measure, condition, of) {
+                rows.push(IntervalRow {
+                    label: of.name.clone(),
+                    arm: look(study, arm),
+                    estimate: Some(difference(contrast, shown)),
+                    is_filled: is_shown(contrast),
+                });
+            }
+        }
+        if rows.is_empty() {
+            continue;
+        }
+        let heading = study.heading(condition);
+        let chart = Intervals {
+            title: format!("Differences in {} {heading}", label(measure)),
+            axis: difference_axis(measure, shown, &first.baseline),
+            range,
+            decimals: decimals_of(range),
+            reference: Some(0.0),
+            rows,
+        };
+        panels.push(Panel {
+            heading,
+            svg: chart.draw(),
+            is_wide: false,
+        });
+    }
+
+    let test = match shown {
+        Shown::Mean => "sign-flip test of the pairs",
+        Shown::Share | Shown::Time => "log-rank test",
+    };
+    let n = contrasts
+        .iter()
+        .map(|contrast| contrast.n)
+        .max()
+        .unwrap_or(0);
+    let mut caption = format!(
+        "Differences to {}, paired by seed, with 95 % intervals (BCa bootstrap). Filled markers: p < 0.05 after Holm's correction \
+         of {} comparisons ({test}). n = {n} pairs each.",
+        first.baseline,
+        contrasts.len()
+    );
+    let (panels, sentence) = limited(panels, compared, "conditions");
+    caption += &sentence;
+    Some(Figure {
+        panels,
+        caption: vec![Part::text(caption)],
+        table: Some(differences_table(study, &contrasts, shown)),
+    })
+}
+
+fn difference_axis(measure: &Measure, shown: Shown, baseline: &str) -> String {
+    match shown {
+        Shown::Mean => format!("{} minus {baseline}", axis(measure)),
+        Shown::Share => format!("{}, points, minus {baseline}", label(measure)),
+        Shown::Time => format!("mean time to {}, s, minus {baseline}", label(measure)),
+    }
+}
+
+fn difference(contrast: &Contrast, shown: Shown) -> Estimate {
+    let factor = if shown == Shown::Share { 100.0 } else { 1.0 };
+    let Bootstrapped { value, interval } = match &contrast.difference {
+        Difference::Number { mean, .. } => mean,
+        Difference::Time { share, .. } if shown == Shown::Share => share,
+        Difference::Time {
+            restricted_mean_s, ..
+        } => restricted_mean_s,
+    };
+    let bounds = interval.bounds();
+    Estimate {
+        value: value * factor,
+        interval: bounds.map(|(low, high)| (low * factor, high * factor)),
+        n: contrast.n,
+    }
+}
+
+fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], shown: Shown) -> Table {
+    let mut table = Table::new(vec![
+        Column::text("Condition"),
+        Column::text("arm"),
+        Column::number("pairs"),
+        Column::number("difference"),
+        Column::number("95 % from"),
+        Column::number("to"),
+        Column::number("effect size"),
+        Column::number("p"),
+        Column::number("p after Holm"),
+    ]);
+    for contrast in contrasts.iter().take(MOST_ROWS) {
+        let estimate = difference(contrast, shown);
+        let effect = match &contrast.difference {
+            Difference::Number { dominance, .. } => Cell::Number(*dominance, 2),
+            Difference::Time { .. } => Cell::Empty,
+        };
+        let mut row = vec![
+            Cell::text(study.heading_of(&contrast.condition)),
+            Cell::text(&contrast.arm),
+            Cell::Count(contrast.n as u64),
+            Cell::Number(estimate.value, 2),
+        ];
+        row.extend(interval_cells(estimate.interval, 2));
+        row.push(effect);
+        row.push(Cell::Number(contrast.difference.p(), 4));
+        row.push(Cell::Number(contrast.p_holm, 4));
+        table.rows.push(row);
+    }
+    table
+}
+
+/// Survival curves of the arms under each condition.
+pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
+    let duration_s = study.results.plan.experiment.duration_s;
+    let times: Vec<f64> = (0..4)
+        .map(|third| duration_s * f64::from(third) / 3.0)
+        .collect();
+    let mut panels = Vec::new();
+    for (condition, of) in study.conditions.iter().enumerate().take(MOST_PANELS) {
+        let mut curves = Vec::new();
+        for (arm, of) in study.arms.iter().enumerate() {
+            let sample = study.times(measure, (condition, arm));
+            if sample.is_empty() {
+                continue;
+            }
+            let survival = Survival::of(&sample);
+            let mut steps = Vec::new();
+            let mut censored = Vec::new();
+            for step in &survival.curve {
+                if step.events > 0 {
+                    steps.push(Step {
+                        x: step.time_s,
+                        y: step.share,
+                        band: Some((step.low, step.high)),
+                    });
+                }
+                if step.censored > 0 {
+                    censored.push(step.time_s);
+                }
+            }
+            let at_risk = times
+                .iter()
+                .map(|time_s| sample.iter().filter(|time| time.time_s >= *time_s).count());
+            curves.push(Curve {
+                label: of.name.clone(),
+                arm: look(study, arm),
+                begin: 1.0,
+                steps,
+                end: survival.until_s,
+                censored,
+                at_risk: at_risk.collect(),
+            });
+        }
+        let heading = study.heading(of);
+        let chart = Steps {
+            title: format!("Runs without {} {heading}", label(measure)),
+            x_axis: "simulated time, s".to_owned(),
+            y_axis: format!("share of runs without {}", label(measure)),
+            range: (0.0, duration_s),
+            at_risk: Some(times.clone()),
+            curves,
+        };
+        panels.push(Panel {
+            heading,
+            svg: chart.draw(),
+            is_wide: false,
+        });
+    }
+    let mut caption = format!(
+        "Share of runs without {} over time (Kaplan-Meier) with 95 % bands (Greenwood, log(-log)). Ticks on a curve are runs that \
+         ended without it. {}.",
+        label(measure),
+        sample_sizes(study)
+    );
+    let (panels, sentence) = limited(panels, study.conditions.len(), "conditions");
+    caption += &sentence;
+    Figure {
+        panels,
+        caption: vec![Part::text(caption)],
+        table: None,
+    }
+}
+
+/// Distribution functions of the arms under each condition.
+pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
+    let mut values = Vec::new();
+    for place in places(study) {
+        values.extend(study.numbers(measure, place));
+    }
+    let range = widened(&values, true);
+
+    let mut panels = Vec::new();
+    for (condition, of) in study.conditions.iter().enumerate().take(MOST_PANELS) {
+        let mut curves = Vec::new();
+        for (arm, of) in study.arms.iter().enumerate() {
+            let steps = ecdf(&study.numbers(measure, (condition, arm)));
+            if steps.is_empty() {
+                continue;
+            }
+            let steps = steps.iter().map(|step| Step {
+                x: step.value,
+                y: step.share,
+                band: None,
+            });
+            curves.push(Curve {
+                label: of.name.clone(),
+                arm: look(study, arm),
+                begin: 0.0,
+                steps: steps.collect(),
+                end: range.1,
+                censored: Vec::new(),
+                at_risk: Vec::new(),
+            });
+        }
+        let heading = study.heading(of);
+        let chart = Steps {
+            title: format!("Distribution of {} {heading}", label(measure)),
+            x_axis: axis(measure),
+            y_axis: "share of runs with at most this".to_owned(),
+            range,
+            at_risk: None,
+            curves,
+        };
+        panels.push(Panel {
+            heading,
+            svg: chart.draw(),
+            is_wide: false,
+        });
+    }
+    let mut caption = format!(
+        "Empirical distribution functions of {}. {}.",
+        label(measure),
+        sample_sizes(study)
+    );
+    let (panels, sentence) = limited(panels, study.conditions.len(), "conditions");
+    caption += &sentence;
+    Figure {
+        panels,
+        caption: vec![Part::text(caption)],
+        table: None,
+    }
+}
+
+/// A heat map for each arm over two factors; `None` if there are not two.
+pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> {
+    let [rows, columns] = study.factors[..] else {
+        return None;
+    };
+    let row_levels = levels(study, 0);
+    let column_levels = levels(study, 1);
+    if row_levels.len() < 2 || column_levels.len() < 2 {
+        return None;
+    }
+
+    let range = estimates_range(study, measure);
+    let mut panels = Vec::new();
+    for (arm, of) in study.arms.iter().enumerate().take(MOST_PANELS) {
+        let mut cells = vec![vec![None; column_levels.len()]; row_levels.len()];
+        for (condition, place) in study.conditions.iter().enumerate() {
+            let row = position(&row_levels, &place.levels[0].1);
+            let column = position(&column_levels, &place.levels[1].1);
+            cells[row][column] =
+                study
+                    .estimate(measure, (condition, arm))
+                    .map(|estimate| MatrixCell {
+                        share: (estimate.value - range.0) / (range.1 - range.0),
+                        text: fixed(estimate.value, decimals_of(range)),
+                        remark: String::new(),
+                    });
+        }
+        let chart = Matrix {
+            title: format!("{} of {}", axis(measure), of.name),
+            rows_title: rows.to_owned(),
+            columns_title: columns.to_owned(),
+            rows: row_levels.iter().map(|level| plain_label(level)).collect(),
+            columns: column_levels
+                .iter()
+                .map(|level| plain_label(level))
+                .collect(),
+            cells,
+        };
+        panels.push(Panel {
+            heading: of.name.clone(),
+            svg: chart.draw(),
+            is_wide: false,
+        });
+    }
+    let (panels, sentence) = limited(panels, study.arms.len(), "arms");
+    let caption = format!(
+        "{} by {rows} and {columns}, a map for each arm; darker is more. The numbers with their intervals are in the table of the \
+         figure before. {}.{sentence}",
+        axis(measure),
+        sample_sizes(study)
+    );
+    Some(Figure {
+        panels,
+        caption: vec![Part::text(caption)],
+        table: None,
+    })
+}
+
+/// The values of a factor in their order.
+fn levels<'a>(study: &Study<'a>, factor: usize) -> Vec<&'a str> {
+    let mut levels = Vec::new();
+    for condition in study.conditions {
+        if let Some((_, level)) = condition.levels.get(factor)
+            && !levels.contains(&level.as_str())
+        {
+            levels.push(level.as_str());
+        }
+    }
+    levels
+}
+
+fn position(levels: &[&str], level: &str) -> usize {
+    let found = levels.iter().position(|one| *one == level);
+    found.unwrap_or_else(|| unreachable!("every condition has a level of each factor"))
+}
+
+fn plain_label(text: &str) -> MatrixLabel {
+    MatrixLabel {
+        text: text.to_owned(),
+        color: None,
+    }
+}
+
+/// How often an expectation held, by arm and condition; `None` without expectations.
+pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
+    let mut names = BTreeSet::new();
+    for outcome in &study.results.outcomes {
+        names.extend(outcome.verdicts.keys());
+    }
+    if names.is_empty() {
+        return None;
+    }
+
+    let mut table = Table::new(vec![
+        Column::text("Expectation"),
+        Column::text("condition"),
+        Column::text("arm"),
+        Column::number("pass"),
+        Column::number("fail"),
+        Column::number("undecided"),
+    ]);
+    let mut panels = Vec::new();
+    for name in names {
+        let mut cells = vec![vec![None; study.conditions.len()]; study.arms.len()];
+        for (condition, arm) in places(study) {
+            let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+            for run in study.runs((condition, arm)) {
+                if let Some(verdict) = run.verdicts.get(name) {
+                    *counts.entry(verdict.as_str()).or_insert(0) += 1;
+                }
+            }
+            let count = |verdict: &str| counts.get(verdict).copied().unwrap_or(0);
+            let all: u64 = counts.values().sum();
+            if all == 0 {
+                continue;
+            }
+            cells[arm][condition] = Some(MatrixCell {
+                share: count("fail") as f64 / all as f64,
+                text: format!("{}/{all}", count("pass")),
+                remark: match (count("fail"), count("undecided")) {
+                    (0, 0) => String::new(),
+                    (0, undecided) => format!("{undecided} open"),
+                    (fails, _) => format!("{fails} fail"),
+                },
+            });
+            if table.rows.len() < MOST_ROWS {
+                table.rows.push(vec![
+                    Cell::text(name),
+                    Cell::text(study.heading(&study.conditions[condition])),
+                    Cell::text(&study.arms[arm].name),
+                    Cell::Count(count("pass")),
+                    Cell::Count(count("fail")),
+                    Cell::Count(count("undecided")),
+                ]);
+            }
+        }
+        if panels.len() < MOST_PANELS {
+            let chart = Matrix {
+                title: format!("Expectation {name}"),
+                rows_title: "arm".to_owned(),
+                columns_title: "condition".to_owned(),
+                rows: study
+                    .arms
+                    .iter()
+                    .map(|arm| plain_label(&arm.name))
+                    .collect(),
+                columns: study
+                    .conditions
+                    .iter()
+                    .map(|condition| plain_label(&study.heading(condition)))
+                    .collect(),
+                cells,
+            };
+            panels.push(Panel {
+                heading: name.clone(),
+                svg: chart.draw(),
+                is_wide: false,
+            });
+        }
+    }
+    let caption = format!(
+        "Verdicts about the expectations: runs that pass of all runs, and how many fail or are undecided (open), because the run \
+         ended first. Darker is a larger share of runs that fail. {}.",
+        sample_sizes(study)
+    );
+    Some(Figure {
+        panels,
+        caption: vec![Part::text(caption)],
+        table: Some(table),
+    })
+}

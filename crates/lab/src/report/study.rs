@@ -1,0 +1,198 @@
+//! The results of an experiment as a report needs them: by condition, arm and measure.
+
+use std::collections::BTreeMap;
+
+use observe::Measure;
+use report::Estimate;
+
+use crate::experiment::{Arm, Condition, Contrast, Outcome, Results};
+use crate::statistics::{self, Survival, TimeTo};
+
+/// Largest p value, after Holm's correction, of a difference that is stated.
+const SHOWN_P: f64 = 0.05;
+
+/// Most arms that are shown.
+const MOST_ARMS: usize = 24;
+
+/// The results of an experiment.
+pub(super) struct Study<'a> {
+    pub(super) results: &'a Results,
+    pub(super) conditions: &'a [Condition],
+    /// The arms that are shown.
+    pub(super) arms: &'a [Arm],
+    /// Names of the factors.
+    pub(super) factors: Vec<&'a str>,
+    pub(super) contrasts: Vec<Contrast>,
+    /// The runs of an arm under a condition, by their indices.
+    cells: BTreeMap<(usize, usize), Vec<&'a Outcome>>,
+}
+
+/// A cell of the design: indices of a condition and an arm.
+pub(super) type CellPlace = (usize, usize);
+
+impl<'a> Study<'a> {
+    pub(super) fn of(results: &'a Results) -> Self {
+        let experiment = &results.plan.experiment;
+        let conditions = results.plan.conditions();
+        let mut cells: BTreeMap<CellPlace, Vec<&Outcome>> = BTreeMap::new();
+        for outcome in &results.outcomes {
+            let condition = conditions
+                .iter()
+                .position(|one| one.name == outcome.condition);
+            let arm = experiment
+                .arms
+                .iter()
+                .position(|one| one.name == outcome.arm);
+            if let Some(condition) = condition
+                && let Some(arm) = arm
+            {
+                cells.entry((condition, arm)).or_default().push(outcome);
+            }
+        }
+
+        let first = conditions.first().map(|condition| &condition.levels);
+        let factors = first.into_iter().flatten().map(|(name, _)| name.as_str());
+        Self {
+            results,
+            conditions,
+            arms: &experiment.arms[..experiment.arms.len().min(MOST_ARMS)],
+            factors: factors.collect(),
+            contrasts: experiment.contrast(&results.outcomes),
+            cells,
+        }
+    }
+
+    /// The measures of the experiment.
+    pub(super) fn measures(&self) -> &'a [Measure] {
+        &self.results.plan.experiment.measures
+    }
+
+    /// The runs of an arm under a condition.
+    pub(super) fn runs(&self, place: CellPlace) -> &[&'a Outcome] {
+        self.cells.get(&place).map_or(&[], Vec::as_slice)
+    }
+
+    /// The numbers of the runs of a cell.
+    pub(super) fn numbers(&self, measure: &Measure, place: CellPlace) -> Vec<f64> {
+        let runs = self.runs(place).iter();
+        runs.filter_map(|run| run.measures.get(&measure.name))
+            .map(|measured| measured.value)
+            .collect()
+    }
+
+    /// The times of the runs of a cell.
+    pub(super) fn times(&self, measure: &Measure, place: CellPlace) -> Vec<TimeTo> {
+        let mut times = Vec::new();
+        for run in self.runs(place) {
+            if let Some(measured) = run.measures.get(&measure.name) {
+                times.push(TimeTo {
+                    time_s: measured.value,
+                    is_event: !measured.is_censored,
+                });
+            }
+        }
+        times
+    }
+
+    /// The mean of a measure, or the percentage of runs with its event by the end of the curve; `None` without runs.
+    pub(super) fn estimate(&self, measure: &Measure, place: CellPlace) -> Option<Estimate> {
+        if measure.is_time() {
+            let times = self.times(measure, place);
+            return (!times.is_empty()).then(|| share_with_event(&times));
+        }
+
+        let numbers = self.numbers(measure, place);
+        let estimate = statistics::Estimate::of(&numbers);
+        let half_width = estimate.half_width;
+        let ends = (estimate.mean - half_width, estimate.mean + half_width);
+        (!numbers.is_empty()).then_some(Estimate {
+            value: estimate.mean,
+            interval: half_width.is_finite().then_some(ends),
+            n: numbers.len(),
+        })
+    }
+
+    /// The contrast of an arm with the baseline.
+    pub(super) fn contrast(
+        &self,
+        measure: &Measure,
+        condition: &Condition,
+        arm: &Arm,
+    ) -> Option<&Contrast> {
+        self.contrasts.iter().find(|contrast| {
+            contrast.measure == measure.name
+                && contrast.condition == condition.name
+                && contrast.arm == arm.name
+        })
+    }
+
+    /// The contrasts of a measure.
+    pub(super) fn contrasts_of(&self, measure: &Measure) -> Vec<&Contrast> {
+        let all = self.contrasts.iter();
+        all.filter(|contrast| contrast.measure == measure.name)
+            .collect()
+    }
+
+    /// The name of a condition with those of its factors; empty if there is only one condition without a name.
+    pub(super) fn heading(&self, condition: &Condition) -> String {
+        let mut parts = Vec::new();
+        for (factor, level) in &condition.levels {
+            if factor == "condition" {
+                parts.push(level.clone());
+            } else {
+                parts.push(format!("{factor} {level}"));
+            }
+        }
+        if parts.is_empty() {
+            return condition.name.clone();
+        }
+        parts.join(", ")
+    }
+
+    /// The heading of the condition of this name.
+    pub(super) fn heading_of(&self, name: &str) -> String {
+        let condition = self
+            .conditions
+            .iter()
+            .find(|condition| condition.name == name);
+        condition.map_or_else(|| name.to_owned(), |condition| self.heading(condition))
+    }
+}
+
+/// Percentage of runs with the event, from the survival curve.
+fn share_with_event(times: &[TimeTo]) -> Estimate {
+    let survival = Survival::of(times);
+    let last = survival.curve.last();
+    let percent = |without: f64| 100.0 * (1.0 - without);
+    Estimate {
+        value: percent(last.map_or(1.0, |step| step.share)),
+        interval: last.map(|step| (percent(step.high), percent(step.low))),
+        n: survival.n,
+    }
+}
+
+/// Whether a contrast is stated as a difference.
+pub(super) fn is_shown(contrast: &Contrast) -> bool {
+    contrast.p_holm < SHOWN_P
+}
+
+/// Name of a measure for people.
+pub(super) fn label(measure: &Measure) -> &str {
+    measure.column.as_deref().unwrap_or(&measure.name)
+}
+
+/// Name and unit of the axis of a measure.
+pub(super) fn axis(measure: &Measure) -> String {
+    if measure.is_time() {
+        return format!("runs with {}, %", label(measure));
+    }
+    match &measure.unit {
+        Some(unit) => format!("{}, {unit}", label(measure)),
+        None => label(measure).to_owned(),
+    }
+}
+
+/// The number that the value of a factor begins with.
+pub(super) fn level_number(level: &str) -> Option<f64> {
+    level.split_whitespace().next()?.parse().ok()
+}

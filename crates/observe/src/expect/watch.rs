@@ -1,0 +1,315 @@
+//! Expectations while a run is observed.
+
+use config::units::Time;
+use protocol::messages::{End, Standing, Verdict};
+use protocol::{Event, RobotName, Tick};
+
+use super::condition::{Evaluation, first_event, place, shortened};
+use super::rule::{Expectation, Rule};
+use crate::Observation;
+
+/// A verdict and its reason.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Judgment {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Why, in words.
+    pub because: String,
+}
+
+/// Longest reason, characters, so that it fits into a line of the log.
+const MAX_REASON_CHARS: usize = 600;
+
+impl Judgment {
+    fn new(verdict: Verdict, because: String) -> Self {
+        Self {
+            verdict,
+            because: shortened(because, MAX_REASON_CHARS),
+        }
+    }
+}
+
+/// One expectation while a run is observed.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    rule: Rule,
+    condition: Evaluation,
+    tick_s: f64,
+    /// The last tick that was observed.
+    now: Tick,
+    /// The earliest event after which the condition has not held yet, if it is waited for.
+    pending: Option<Pending>,
+    /// How many times the condition held after an event.
+    met: u64,
+    /// The longest wait, ticks.
+    longest: Tick,
+}
+
+#[derive(Debug, Clone)]
+struct Pending {
+    since: Tick,
+    /// The event in words.
+    event: String,
+}
+
+impl Watch {
+    /// Begins to watch a run with ticks of `tick_s` seconds, bodies with sides of `body_m` meters, and these robots.
+    #[must_use]
+    pub fn new(expectation: &Expectation, tick_s: f64, body_m: f64, roster: &[RobotName]) -> Self {
+        let rule = expectation.rule.clone();
+        let condition = match &rule {
+            Rule::Never(condition) | Rule::Always(condition) => condition,
+            Rule::Eventually { condition, .. } | Rule::After { condition, .. } => condition,
+        };
+        Self {
+            condition: Evaluation::new(condition, tick_s, body_m, roster),
+            rule,
+            tick_s,
+            now: 0,
+            pending: None,
+            met: 0,
+            longest: 0,
+        }
+    }
+
+    /// Observes a tick. Ticks come in their order, from tick 0 on. Returns the judgment in the tick in which the expectation is
+    /// decided; it must not be called after that.
+    pub fn observe(&mut self, seen: &Observation<'_>) -> Option<Judgment> {
+        self.now = seen.tick;
+        let held = self.condition.holds(seen);
+
+        match &self.rule {
+            Rule::Never(_) => {
+                let reason = held?;
+                let here = self.place(seen.tick);
+                Some(Judgment::new(Verdict::Fail, format!("{here}: {reason}")))
+            }
+            Rule::Always(_) => self.observe_always(held.is_some()),
+            Rule::Eventually { within, .. } => {
+                let within = *within;
+                self.observe_eventually(held, within)
+            }
+            Rule::After {
+                trigger,
+                within,
+                unless,
+                ..
+            } => {
+                let triggered = first_event(trigger, seen);
+                let is_over = first_event(unless, seen).is_some();
+                let within = *within;
+                self.observe_after(held.is_some(), triggered, is_over, within)
+            }
+        }
+    }
+
+    fn observe_always(&self, holds: bool) -> Option<Judgment> {
+        if holds {
+            return None;
+        }
+        // Before a robot has reported, nothing is known of it.
+        if self.condition.unknown().is_some() {
+            return None;
+        }
+
+        let here = self.place(self.now);
+        let because = format!("{here}: it does not hold");
+        Some(Judgment::new(Verdict::Fail, because))
+    }
+
+    fn observe_eventually(&self, held: Option<String>, within: Time) -> Option<Judgment> {
+        let here = self.place(self.now);
+        if let Some(reason) = held {
+            return Some(Judgment::new(Verdict::Pass, format!("{here}: {reason}")));
+        }
+        if self.now < self.limit(within) {
+            return None;
+        }
+        let because = format!("{here}: it has not happened within {} s", within.0);
+        Some(Judgment::new(Verdict::Fail, self.with_unknown(because)))
+    }
+
+    /// A tick is one instant: the condition counts for an event of the same tick, and so does an event that ends the wait.
+    fn observe_after(
+        &mut self,
+        holds: bool,
+        triggered: Option<String>,
+        is_over: bool,
+        within: Time,
+    ) -> Option<Judgment> {
+        if self.pending.is_none() {
+            let since = self.now;
+            self.pending = triggered.map(|event| Pending { since, event });
+        }
+        let pending = self.pending.as_ref()?;
+
+        let waited = self.now - pending.since;
+        if holds {
+            self.met += 1;
+            self.longest = self.longest.max(waited);
+        }
+        if holds || is_over {
+            self.pending = None;
+            return None;
+        }
+        if waited < self.limit(within) {
+            return None;
+        }
+
+        let because = format!(
+            "{}: it has not happened within {} s after {}: {}",
+            self.place(self.now),
+            within.0,
+            self.place(pending.since),
+            pending.event
+        );
+        Some(Judgment::new(Verdict::Fail, self.with_unknown(because)))
+    }
+
+    /// Judges what is open at the end of the run. A run that did not go on to its end, or not long enough, leaves it undecided.
+    #[must_use]
+    pub fn end(&self, end: End) -> Judgment {
+        let here = self.place(self.now);
+        if let Some(pending) = &self.pending {
+            let because = format!(
+                "the run ended at {here}, and it had not happened after {}: {}",
+                self.place(pending.since),
+                pending.event
+            );
+            return Judgment::new(Verdict::Undecided, because);
+        }
+        if let Rule::Eventually { .. } = self.rule {
+            let because = format!("the run ended at {here}, and it had not happened");
+            return Judgment::new(Verdict::Undecided, self.with_unknown(because));
+        }
+        if end != End::Finished {
+            let because = format!("the run was ended at {here}, before its time");
+            return Judgment::new(Verdict::Undecided, because);
+        }
+        if let Some(unknown) = self.condition.unknown()
+            && !matches!(self.rule, Rule::After { .. })
+        {
+            return Judgment::new(Verdict::Undecided, unknown.to_owned());
+        }
+
+        let because = match &self.rule {
+            Rule::Never(_) => format!("it did not happen until {here}"),
+            Rule::Always(_) => format!("it held until {here}"),
+            Rule::After { .. } if self.met == 0 => {
+                format!("nothing that it is expected after happened until {here}")
+            }
+            Rule::After { .. } | Rule::Eventually { .. } => format!(
+                "it happened each time ({}) until {here}, at the latest after {:.1} s",
+                self.met,
+                self.longest as f64 * self.tick_s
+            ),
+        };
+        Judgment::new(Verdict::Pass, because)
+    }
+
+    /// The last tick in which it is not too late, counted from the one from which the time is.
+    fn limit(&self, within: Time) -> Tick {
+        // Times and lengths of ticks are read from decimal fractions: within 0.3 s are three ticks of 0.1 s.
+        (within.0 / self.tick_s + 1e-6).floor().max(0.0) as Tick
+    }
+
+    fn place(&self, tick: Tick) -> String {
+        place(tick, self.tick_s)
+    }
+
+    fn with_unknown(&self, because: String) -> String {
+        match self.condition.unknown() {
+            Some(unknown) => format!("{because}; {unknown}"),
+            None => because,
+        }
+    }
+}
+
+/// All expectations of a run while it is observed.
+#[derive(Debug, Clone, Default)]
+pub struct Watches(Vec<Watched>);
+
+/// An expectation of a run, and its judgment when it is decided.
+#[derive(Debug, Clone)]
+struct Watched {
+    name: String,
+    watch: Watch,
+    judgment: Option<Judgment>,
+}
+
+impl Watches {
+    /// Begins to watch a run with ticks of `tick_s` seconds, bodies with sides of `body_m` meters, and these robots.
+    #[must_use]
+    pub fn new(
+        expectations: &[Expectation],
+        tick_s: f64,
+        body_m: f64,
+        roster: &[RobotName],
+    ) -> Self {
+        let mut watches = Vec::new();
+        for expectation in expectations {
+            watches.push(Watched {
+                name: expectation.name.clone(),
+                watch: Watch::new(expectation, tick_s, body_m, roster),
+                judgment: None,
+            });
+        }
+        Self(watches)
+    }
+
+    /// Whether there are no expectations.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Observes a tick. Returns an event for each expectation that is decided in it.
+    pub fn observe(&mut self, seen: &Observation<'_>) -> Vec<Event> {
+        let mut events = Vec::new();
+        for watched in self.open() {
+            watched.judgment = watched.watch.observe(seen);
+            events.extend(watched.event());
+        }
+        events
+    }
+
+    /// Judges what is open at the end of the run. Returns an event for each.
+    pub fn end(&mut self, end: End) -> Vec<Event> {
+        let mut events = Vec::new();
+        for watched in self.open() {
+            watched.judgment = Some(watched.watch.end(end));
+            events.extend(watched.event());
+        }
+        events
+    }
+
+    /// How each expectation stands, in the order of the file.
+    #[must_use]
+    pub fn standings(&self) -> Vec<Standing> {
+        let mut standings = Vec::with_capacity(self.0.len());
+        for watched in &self.0 {
+            standings.push(Standing {
+                expectation: watched.name.clone(),
+                verdict: watched.judgment.as_ref().map(|judgment| judgment.verdict),
+            });
+        }
+        standings
+    }
+
+    /// Those that are not decided.
+    fn open(&mut self) -> impl Iterator<Item = &mut Watched> {
+        let watches = self.0.iter_mut();
+        watches.filter(|watched| watched.judgment.is_none())
+    }
+}
+
+impl Watched {
+    fn event(&self) -> Option<Event> {
+        let judgment = self.judgment.as_ref()?;
+        Some(Event::Judged {
+            expectation: self.name.clone(),
+            verdict: judgment.verdict,
+            because: judgment.because.clone(),
+        })
+    }
+}

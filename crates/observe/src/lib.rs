@@ -1,0 +1,39 @@
+//! What is asked of a run, tick by tick, while it is played or when it is read again. Pure: no simulator, no file, no clock.
+
+pub mod expect;
+pub mod measure;
+mod pattern;
+mod probe;
+
+use protocol::messages::{Point, StateVariables};
+use protocol::{Event, RobotName, Tick};
+
+pub use expect::{Expectation, Judgment, Watch, Watches};
+pub use measure::{Kind, Measure, MeasureError, Measured};
+pub use pattern::{Pattern, PatternError};
+pub use probe::{MissingNumber, Probe};
+
+/// A complete tick of a run, or its end.
+pub struct Observation<'a> {
+    /// The tick; at the end of the run, the last one again.
+    pub tick: Tick,
+    /// Its simulated time, seconds.
+    pub time_s: f64,
+    /// What happened in it.
+    pub events: &'a [Event],
+    /// What a robot reported last; `None` before its first report.
+    pub state: &'a dyn Fn(&RobotName) -> Option<RobotState<'a>>,
+}
+
+/// What a robot reported last. Borrowed, because a run is observed in every tick.
+#[derive(Debug, Clone, Copy)]
+pub struct RobotState<'a> {
+    /// Where it stands, meters.
+    pub location: Point,
+    /// The variables it publishes.
+    pub state_variables: &'a StateVariables,
+    /// Its emotion state.
+    pub emotion_state: &'a str,
+    /// Its behavior state.
+    pub behavior_state: &'a str,
+}

@@ -1,0 +1,562 @@
+//! Measures: the numbers that are taken of each run, as defined in a file.
+
+use std::ops::Range;
+
+use config::units::Time;
+use protocol::RobotName;
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use crate::pattern::Pattern;
+
+/// Longest name of a measure, bytes.
+const MAX_NAME_BYTES: usize = 100;
+
+/// Definition of one number of each run.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(try_from = "RawMeasure")]
+pub struct Measure {
+    /// Key of the number in results.
+    pub name: String,
+    /// Head of its column in tables, without the unit; a measure without a column is in the results only.
+    pub column: Option<String>,
+    /// Its unit, for people.
+    pub unit: Option<String>,
+    /// What it means, for people.
+    pub what: Option<String>,
+    /// Whether arms are compared by it.
+    pub contrast: bool,
+    /// Where the number comes from.
+    pub kind: Kind,
+    /// Place of the kind in the file, bytes.
+    span: Range<usize>,
+}
+
+/// Where the number of a measure comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// Path of a number in the summary, parts joined by `.`. A part `*` is the sum over all entries.
+    Summary(String),
+    /// Number of events.
+    Count(Count),
+    /// Time to an event.
+    Time(TimeTo),
+    /// Durations between pairs of events.
+    Between(Between),
+    /// Share of the simulated time in which a robot has one of these emotions or behaviors, 0 to 1.
+    Share(Share),
+    /// A state variable of a robot.
+    Variable(OfVariable),
+    /// Time of the last progress before the robots come to a standstill.
+    Stalled(Stalled),
+}
+
+/// A count of events.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Count {
+    /// The events.
+    pub pattern: Pattern,
+    /// Part of the run in which they count; `None` is the whole run.
+    pub when: Option<When>,
+}
+
+/// A part of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum When {
+    /// While the condition lasts.
+    During,
+    /// From the end of the condition on.
+    After,
+}
+
+/// The time from one event to another, seconds. The events of a tick happen at the same time.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimeTo {
+    /// The first of these events, in the tick of `after` or later, ends the time.
+    pub to: Pattern,
+    /// The first of these events begins the time; without it the time begins with the run.
+    pub after: Option<Pattern>,
+}
+
+/// Durations between pairs of events, seconds. Events of a tick are taken in the order of the record, and an event that is both
+/// an end and a begin ends one pair and begins the next.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Between {
+    /// Begins a pair, unless one is open.
+    pub begin: Pattern,
+    /// Ends the pair that is open. A pair that is open at the end of the run ends there.
+    pub end: Pattern,
+    /// The number of the durations that is taken.
+    #[serde(rename = "as")]
+    pub number: OfDurations,
+}
+
+/// A number of several durations; 0 where there are none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OfDurations {
+    /// Their mean, seconds.
+    Mean,
+    /// The longest, seconds.
+    Max,
+    /// Their sum, seconds.
+    Sum,
+    /// How many there are.
+    Count,
+}
+
+/// The states of a robot whose share is measured.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(try_from = "RawShare")]
+pub struct Share {
+    /// The robot.
+    pub robot: RobotName,
+    /// The states.
+    pub states: States,
+}
+
+/// Emotions or behaviors.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum States {
+    /// Emotions.
+    Emotions(Vec<String>),
+    /// Behaviors.
+    Behaviors(Vec<String>),
+}
+
+/// A number of a robot's state variable, which keeps its value from one report to the next. A flag is 1 or 0.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OfVariable {
+    /// The robot.
+    pub robot: RobotName,
+    /// Name of the variable.
+    pub name: String,
+    /// The number of its values that is taken.
+    #[serde(rename = "as")]
+    pub number: OfValues,
+}
+
+/// A number of the values that a variable has during a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OfValues {
+    /// The last one.
+    End,
+    /// The largest one.
+    Max,
+    /// Their mean over time.
+    Mean,
+    /// Their integral over time, in the unit of the variable times seconds.
+    Area,
+}
+
+/// A standstill: none of these numbers rises for a time that lasts until the end of the run.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(try_from = "RawStalled")]
+pub struct Stalled {
+    /// State variables that rise with progress toward a robot's goal.
+    pub progress: Vec<Counter>,
+    /// Shortest time without progress that counts, seconds.
+    pub lasting_s: f64,
+}
+
+/// A state variable of a robot, in a file `ROBOT.VARIABLE`.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct Counter {
+    /// The robot.
+    pub robot: RobotName,
+    /// Name of the variable.
+    pub variable: String,
+}
+
+/// The number of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// The number. For a time that did not come, the time that was waited for it.
+    pub value: f64,
+    /// Whether it is a time that did not come before the end of the run. Other numbers are never censored.
+    pub is_censored: bool,
+}
+
+/// A measure that cannot be taken of any run.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MeasureError {
+    /// It has no kind, or several.
+    #[error(
+        "a measure has exactly one of `summary`, `count`, `time`, `between`, `share`, `variable` and `stalled`"
+    )]
+    NotOne,
+    /// It names a part of the run and counts no events.
+    #[error("`when` is for `count` only")]
+    NoEvents,
+    /// Its name is empty, or too long, or has control characters.
+    #[error("a name has 1 to {MAX_NAME_BYTES} bytes, and no control characters")]
+    Name,
+    /// A share names no states.
+    #[error("`share` names either `emotion` or `behavior`, with one word or several")]
+    NoStates,
+    /// A variable of a robot that is not `ROBOT.VARIABLE`.
+    #[error("\"{0}\" is not a state variable of a robot, such as \"Butler.served\"")]
+    NoVariable(String),
+    /// A standstill without a duration or variables.
+    #[error("`stalled` names the variables of progress, and a time that is more than zero")]
+    NoProgress,
+}
+
+/// A measure as written in the file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMeasure {
+    name: String,
+    column: Option<String>,
+    unit: Option<String>,
+    what: Option<String>,
+    #[serde(default)]
+    contrast: bool,
+    when: Option<When>,
+    summary: Option<Spanned<String>>,
+    count: Option<Spanned<Pattern>>,
+    time: Option<Spanned<TimeTo>>,
+    between: Option<Spanned<Between>>,
+    share: Option<Spanned<Share>>,
+    variable: Option<Spanned<OfVariable>>,
+    stalled: Option<Spanned<Stalled>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawShare {
+    robot: RobotName,
+    emotion: Option<Words>,
+    behavior: Option<Words>,
+}
+
+/// One word, or several.
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "a word, or a list of words")]
+enum Words {
+    One(String),
+    Several(Vec<String>),
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawStalled {
+    progress: Vec<Counter>,
+    #[serde(rename = "for")]
+    lasting: Time,
+}
+
+impl TryFrom<RawMeasure> for Measure {
+    type Error = MeasureError;
+
+    fn try_from(raw: RawMeasure) -> Result<Self, MeasureError> {
+        check_name(&raw.name)?;
+        if raw.when.is_some() && raw.count.is_none() {
+            return Err(MeasureError::NoEvents);
+        }
+
+        let when = raw.when;
+        let kinds = [
+            raw.summary.map(|path| spanned(path, Kind::Summary)),
+            raw.count
+                .map(|pattern| spanned(pattern, |pattern| Kind::Count(Count { pattern, when }))),
+            raw.time.map(|time| spanned(time, Kind::Time)),
+            raw.between.map(|between| spanned(between, Kind::Between)),
+            raw.share.map(|share| spanned(share, Kind::Share)),
+            raw.variable
+                .map(|variable| spanned(variable, Kind::Variable)),
+            raw.stalled.map(|stalled| spanned(stalled, Kind::Stalled)),
+        ];
+        let mut kinds = kinds.into_iter().flatten();
+        let (kind, span) = kinds.next().ok_or(MeasureError::NotOne)?;
+        if kinds.next().is_some() {
+            return Err(MeasureError::NotOne);
+        }
+
+        Ok(Self {
+            name: raw.name,
+            column: raw.column,
+            unit: raw.unit,
+            what: raw.what,
+            contrast: raw.contrast,
+            kind,
+            span,
+        })
+    }
+}
+
+fn spanned<T>(raw: Spanned<T>, kind: impl FnOnce(T) -> Kind) -> (Kind, Range<usize>) {
+    let span = raw.span();
+    (kind(raw.into_inner()), span)
+}
+
+/// Checks the name of a measure, of a factor, of an arm or of a condition: it is printed in tables.
+///
+/// # Errors
+/// [`MeasureError::Name`].
+pub fn check_name(name: &str) -> Result<(), MeasureError> {
+    let is_short = (1..=MAX_NAME_BYTES).contains(&name.len());
+    if is_short && !name.chars().any(char::is_control) {
+        return Ok(());
+    }
+    Err(MeasureError::Name)
+}
+
+impl TryFrom<RawShare> for Share {
+    type Error = MeasureError;
+
+    fn try_from(raw: RawShare) -> Result<Self, MeasureError> {
+        let states = match (raw.emotion, raw.behavior) {
+            (Some(emotions), None) => States::Emotions(emotions.list()?),
+            (None, Some(behaviors)) => States::Behaviors(behaviors.list()?),
+            _ => return Err(MeasureError::NoStates),
+        };
+        Ok(Self {
+            robot: raw.robot,
+            states,
+        })
+    }
+}
+
+impl Words {
+    fn list(self) -> Result<Vec<String>, MeasureError> {
+        match self {
+            Self::One(word) => Ok(vec![word]),
+            Self::Several(words) if words.is_empty() => Err(MeasureError::NoStates),
+            Self::Several(words) => Ok(words),
+        }
+    }
+}
+
+impl TryFrom<RawStalled> for Stalled {
+    type Error = MeasureError;
+
+    fn try_from(raw: RawStalled) -> Result<Self, MeasureError> {
+        if raw.progress.is_empty() || raw.lasting.0 <= 0.0 {
+            return Err(MeasureError::NoProgress);
+        }
+        Ok(Self {
+            progress: raw.progress,
+            lasting_s: raw.lasting.0,
+        })
+    }
+}
+
+impl TryFrom<String> for Counter {
+    type Error = MeasureError;
+
+    fn try_from(text: String) -> Result<Self, MeasureError> {
+        let parts = text.split_once('.');
+        let counter = parts.and_then(|(robot, variable)| {
+            Some(Self {
+                robot: robot.parse().ok()?,
+                variable: variable.to_owned(),
+            })
+        });
+
+        counter.ok_or(MeasureError::NoVariable(text))
+    }
+}
+
+impl std::fmt::Display for Counter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}", self.robot, self.variable)
+    }
+}
+
+impl Measure {
+    /// Whether it is a time to an event, which does not come in every run.
+    #[must_use]
+    pub fn is_time(&self) -> bool {
+        matches!(self.kind, Kind::Time(_) | Kind::Stalled(_))
+    }
+
+    /// Head of its column in tables, with the unit; its name if it has no column.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let column = self.column.as_ref().unwrap_or(&self.name);
+        match &self.unit {
+            Some(unit) => format!("{column}, {unit}"),
+            None => column.clone(),
+        }
+    }
+
+    /// What the measure means, where its name does not show it.
+    #[must_use]
+    pub fn explained(&self) -> Option<String> {
+        if let Some(what) = &self.what {
+            return Some(format!("{}: {what}", self.name));
+        }
+        let Kind::Stalled(stalled) = &self.kind else {
+            return None;
+        };
+
+        let variables: Vec<String> = stalled.progress.iter().map(Counter::to_string).collect();
+        Some(format!(
+            "{}: none of {} rises for {} s or more until the end of the run. The time to it is that of the last\n\
+             rise; its median over the runs is by Kaplan and Meier, runs without it being censored at their end.",
+            self.name,
+            variables.join(", "),
+            stalled.lasting_s
+        ))
+    }
+
+    /// Place in the file of what it measures, bytes.
+    #[must_use]
+    pub fn span(&self) -> Range<usize> {
+        self.span.clone()
+    }
+
+    /// The robots that it names. A run has the number only if its roster has them.
+    #[must_use]
+    pub fn robots(&self) -> Vec<&str> {
+        match &self.kind {
+            Kind::Summary(path) => path
+                .strip_prefix("robots.")
+                .and_then(|rest| rest.split('.').next())
+                .filter(|robot| *robot != "*")
+                .into_iter()
+                .collect(),
+            Kind::Count(count) => count.pattern.robots().collect(),
+            Kind::Time(time) => {
+                let after = time.after.iter().flat_map(Pattern::robots);
+                time.to.robots().chain(after).collect()
+            }
+            Kind::Between(between) => {
+                let ends = between.end.robots();
+                between.begin.robots().chain(ends).collect()
+            }
+            Kind::Share(share) => vec![share.robot.as_str()],
+            Kind::Variable(variable) => vec![variable.robot.as_str()],
+            Kind::Stalled(stalled) => {
+                let progress = stalled.progress.iter();
+                progress.map(|counter| counter.robot.as_str()).collect()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measure(text: &str) -> Result<Measure, String> {
+        let text = format!("name = 'x'\n{text}");
+        toml::from_str(&text).map_err(|error| error.message().to_owned())
+    }
+
+    #[test]
+    fn a_measure_knows_its_robots_and_its_title() {
+        for (text, robots) in [
+            ("summary = 'robots.Butler.missed'", &["Butler"][..]),
+            ("summary = 'robots.*.missed'", &[]),
+            ("summary = 'network.sent'", &[]),
+            (
+                "count = { event = 'behavior', robot = ['A', 'B'] }",
+                &["A", "B"],
+            ),
+            (
+                "time = { to = { event = 'lost', robot = 'A' }, after = { event = 'link_cut', to = 'B' } }",
+                &["A", "B"],
+            ),
+            (
+                "between = { begin = { event = 'lost', robot = 'A' }, end = { event = 'joined', robot = 'B' }, as = 'sum' }",
+                &["A", "B"],
+            ),
+            ("share = { robot = 'A', emotion = 'HAPPY' }", &["A"]),
+            (
+                "variable = { robot = 'A', name = 'served', as = 'end' }",
+                &["A"],
+            ),
+            (
+                "stalled = { progress = ['A.x', 'B.y'], for = '1 s' }",
+                &["A", "B"],
+            ),
+        ] {
+            assert_eq!(measure(text).unwrap().robots(), robots, "{text}");
+        }
+
+        let mut one = measure("summary = 'ticks'").unwrap();
+        assert_eq!(one.title(), "x");
+        one.column = Some("ticks".to_owned());
+        one.unit = Some("1".to_owned());
+        assert_eq!(one.title(), "ticks, 1");
+    }
+
+    #[test]
+    fn what_cannot_be_measured_is_refused() {
+        for (text, reason) in [
+            ("", "exactly one of"),
+            (
+                "summary = 'a'\nstalled = { progress = ['A.x'], for = '1 s' }",
+                "exactly one of",
+            ),
+            ("summary = 'a'\nwhen = 'during'", "`when` is for `count`"),
+            (
+                "count = { event = 'lost' }\nwhen = 'before'",
+                "unknown variant",
+            ),
+            ("count = { event = 'loss' }", "no event \"loss\""),
+            (
+                "time = { after = { event = 'lost' } }",
+                "missing field `to`",
+            ),
+            (
+                "time = { to = { event = 'lost', who = 'A' } }",
+                "no field `who`",
+            ),
+            (
+                "between = { begin = { event = 'lost' }, end = { event = 'joined' }, as = 'median' }",
+                "unknown variant `median`",
+            ),
+            (
+                "between = { begin = { event = 'lost' }, as = 'sum' }",
+                "missing field `end`",
+            ),
+            ("share = { robot = 'A' }", "either `emotion` or `behavior`"),
+            (
+                "share = { robot = 'A', emotion = [] }",
+                "either `emotion` or `behavior`",
+            ),
+            (
+                "share = { robot = 'A', emotion = 3 }",
+                "a word, or a list of words",
+            ),
+            (
+                "share = { robot = 'A', emotion = 'X', behavior = 'Y' }",
+                "either `emotion` or `behavior`",
+            ),
+            (
+                "variable = { robot = 'A', name = 'x' }",
+                "missing field `as`",
+            ),
+            (
+                "variable = { robot = 'A/B', name = 'x', as = 'end' }",
+                "name",
+            ),
+            (
+                "stalled = { progress = ['x'], for = '1 s' }",
+                "not a state variable",
+            ),
+            (
+                "stalled = { progress = ['A.x'], for = '0 s' }",
+                "more than zero",
+            ),
+            (
+                "stalled = { progress = [], for = '1 s' }",
+                "variables of progress",
+            ),
+        ] {
+            let error = measure(text).unwrap_err();
+            assert!(error.contains(reason), "{text}: {error}");
+        }
+        assert!(toml::from_str::<Measure>("name = ''\nsummary = 'ticks'").is_err());
+        assert!(toml::from_str::<Measure>("name = \"a\\nb\"\nsummary = 'ticks'").is_err());
+    }
+}

@@ -1,0 +1,795 @@
+//! Takes a measure of a run, one observation after the other.
+
+use protocol::{Event, RobotName};
+use serde_json::Value;
+
+use crate::Observation;
+use crate::measure::{
+    Between, Count, Kind, Measure, Measured, OfDurations, OfValues, OfVariable, Share, Stalled,
+    States, TimeTo, When,
+};
+
+/// A number that a run does not have.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MissingNumber {
+    /// The summary of the run has no such number.
+    #[error("the measure \"{measure}\": the summary of a run has no number `{path}`")]
+    Summary {
+        /// Name of the measure.
+        measure: String,
+        /// Path in the summary.
+        path: String,
+    },
+    /// The robot has no such number.
+    #[error(
+        "the measure \"{measure}\": {robot} has no number `{variable}` among its state variables"
+    )]
+    Variable {
+        /// Name of the measure.
+        measure: String,
+        /// The robot.
+        robot: RobotName,
+        /// Name of the variable.
+        variable: String,
+    },
+}
+
+/// A measure of one run.
+#[derive(Debug)]
+pub struct Probe<'a> {
+    measure: &'a Measure,
+    /// Time of the last observation, simulated seconds. A run begins at 0.
+    now_s: f64,
+    tally: Tally<'a>,
+}
+
+#[derive(Debug)]
+enum Tally<'a> {
+    Summary(&'a str),
+    Count(CountTally<'a>),
+    Time(TimeTally<'a>),
+    Between(BetweenTally<'a>),
+    Share(ShareTally<'a>),
+    Variable(VariableTally<'a>),
+    Stalled(StalledTally<'a>),
+}
+
+impl<'a> Probe<'a> {
+    /// A measure of a run that has not begun. The condition of the run begins and ends at these times, simulated seconds.
+    #[must_use]
+    pub fn new(measure: &'a Measure, condition_s: (f64, f64)) -> Self {
+        let tally = match &measure.kind {
+            Kind::Summary(path) => Tally::Summary(path),
+            Kind::Count(count) => Tally::Count(CountTally {
+                definition: count,
+                condition_s,
+                count: 0,
+            }),
+            Kind::Time(time) => Tally::Time(TimeTally {
+                definition: time,
+                begun_s: time.after.is_none().then_some(0.0),
+                reached_s: None,
+            }),
+            Kind::Between(between) => Tally::Between(BetweenTally {
+                definition: between,
+                open_s: None,
+                durations: Durations::default(),
+            }),
+            Kind::Share(share) => Tally::Share(ShareTally {
+                definition: share,
+                entered_s: None,
+                total_s: 0.0,
+            }),
+            Kind::Variable(variable) => Tally::Variable(VariableTally {
+                definition: variable,
+                values: None,
+            }),
+            Kind::Stalled(stalled) => Tally::Stalled(StalledTally {
+                definition: stalled,
+                values: vec![None; stalled.progress.len()],
+                progress_s: 0.0,
+            }),
+        };
+
+        Self {
+            measure,
+            now_s: 0.0,
+            tally,
+        }
+    }
+
+    /// Takes a tick, or the end of the run, into account.
+    pub fn observe(&mut self, observation: &Observation<'_>) {
+        self.now_s = observation.time_s;
+        match &mut self.tally {
+            Tally::Summary(_) => {}
+            Tally::Count(tally) => tally.observe(observation),
+            Tally::Time(tally) => tally.observe(observation),
+            Tally::Between(tally) => tally.observe(observation),
+            Tally::Share(tally) => tally.observe(observation),
+            Tally::Variable(tally) => tally.observe(observation),
+            Tally::Stalled(tally) => tally.observe(observation),
+        }
+    }
+
+    /// The number at the end of the run, the summary of which is given as JSON.
+    ///
+    /// # Errors
+    /// [`MissingNumber`] if the run has no such number.
+    pub fn measured(&self, summary: &Value) -> Result<Measured, MissingNumber> {
+        let now_s = self.now_s;
+        match &self.tally {
+            Tally::Summary(path) => {
+                let parts: Vec<&str> = path.split('.').collect();
+                let number = sum(summary, &parts).ok_or_else(|| MissingNumber::Summary {
+                    measure: self.measure.name.clone(),
+                    path: (*path).to_owned(),
+                })?;
+                Ok(certain(number))
+            }
+            Tally::Count(tally) => Ok(certain(tally.count as f64)),
+            Tally::Time(tally) => Ok(tally.measured(now_s)),
+            Tally::Between(tally) => Ok(certain(tally.number(now_s))),
+            Tally::Share(tally) => Ok(certain(tally.share(now_s))),
+            Tally::Variable(tally) => {
+                let definition = tally.definition;
+                let number = tally
+                    .number(now_s)
+                    .ok_or_else(|| self.no_variable(&definition.robot, &definition.name))?;
+                Ok(certain(number))
+            }
+            Tally::Stalled(tally) => {
+                for (counter, value) in tally.definition.progress.iter().zip(&tally.values) {
+                    if value.is_none() {
+                        return Err(self.no_variable(&counter.robot, &counter.variable));
+                    }
+                }
+                Ok(tally.measured(now_s))
+            }
+        }
+    }
+
+    fn no_variable(&self, robot: &RobotName, variable: &str) -> MissingNumber {
+        MissingNumber::Variable {
+            measure: self.measure.name.clone(),
+            robot: robot.clone(),
+            variable: variable.to_owned(),
+        }
+    }
+}
+
+fn certain(value: f64) -> Measured {
+    Measured {
+        value,
+        is_censored: false,
+    }
+}
+
+/// The number at a path, or the sum over all entries where a part is `*`.
+fn sum(value: &Value, path: &[&str]) -> Option<f64> {
+    let Some((first, rest)) = path.split_first() else {
+        return value.as_f64();
+    };
+
+    let table = value.as_object()?;
+
+    if *first != "*" {
+        return sum(table.get(*first)?, rest);
+    }
+
+    let mut total = 0.0;
+    for entry in table.values() {
+        total += sum(entry, rest)?;
+    }
+
+    Some(total)
+}
+
+/// The last value of a robot's variable, if it is a number or a flag, which is 1 or 0.
+fn number_of(observation: &Observation<'_>, robot: &RobotName, variable: &str) -> Option<f64> {
+    let state = (observation.state)(robot)?;
+    let value = state.state_variables.get(variable)?;
+    let flag = value.as_bool().map(|is_set| f64::from(u8::from(is_set)));
+    value.as_f64().or(flag)
+}
+
+#[derive(Debug)]
+struct CountTally<'a> {
+    definition: &'a Count,
+    /// Begin and end of the condition, simulated seconds.
+    condition_s: (f64, f64),
+    count: u64,
+}
+
+impl CountTally<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        let (from_s, until_s) = self.condition_s;
+        let is_counting = match self.definition.when {
+            None => true,
+            Some(When::During) => (from_s..until_s).contains(&observation.time_s),
+            Some(When::After) => observation.time_s >= until_s,
+        };
+        if !is_counting {
+            return;
+        }
+
+        for event in observation.events {
+            if self.definition.pattern.matches(event) {
+                self.count += 1;
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct TimeTally<'a> {
+    definition: &'a TimeTo,
+    /// Begin and end of the time, simulated seconds.
+    begun_s: Option<f64>,
+    reached_s: Option<f64>,
+}
+
+impl TimeTally<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        if self.reached_s.is_some() {
+            return;
+        }
+
+        let events = observation.events;
+        if let Some(after) = &self.definition.after
+            && self.begun_s.is_none()
+            && events.iter().any(|event| after.matches(event))
+        {
+            self.begun_s = Some(observation.time_s);
+        }
+
+        let to = &self.definition.to;
+        if self.begun_s.is_some() && events.iter().any(|event| to.matches(event)) {
+            self.reached_s = Some(observation.time_s);
+        }
+    }
+
+    /// A time that has not begun is censored at 0: the run was never at risk of the event, and contributes nothing to an
+    /// estimate of survival.
+    fn measured(&self, now_s: f64) -> Measured {
+        let begun_s = self.begun_s.unwrap_or(now_s);
+        Measured {
+            value: self.reached_s.unwrap_or(now_s) - begun_s,
+            is_censored: self.reached_s.is_none(),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct BetweenTally<'a> {
+    definition: &'a Between,
+    /// Begin of the pair that is open, simulated seconds.
+    open_s: Option<f64>,
+    durations: Durations,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Durations {
+    count: u64,
+    sum_s: f64,
+    max_s: f64,
+}
+
+impl Durations {
+    fn add(&mut self, duration_s: f64) {
+        self.count += 1;
+        self.sum_s += duration_s;
+        self.max_s = self.max_s.max(duration_s);
+    }
+}
+
+impl BetweenTally<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        for event in observation.events {
+            if let Some(begun_s) = self.open_s
+                && self.definition.end.matches(event)
+            {
+                self.durations.add(observation.time_s - begun_s);
+                self.open_s = None;
+            }
+            if self.open_s.is_none() && self.definition.begin.matches(event) {
+                self.open_s = Some(observation.time_s);
+            }
+        }
+    }
+
+    fn number(&self, now_s: f64) -> f64 {
+        let mut durations = self.durations;
+        if let Some(begun_s) = self.open_s {
+            durations.add(now_s - begun_s);
+        }
+
+        match self.definition.number {
+            OfDurations::Mean if durations.count == 0 => 0.0,
+            OfDurations::Mean => durations.sum_s / durations.count as f64,
+            OfDurations::Max => durations.max_s,
+            OfDurations::Sum => durations.sum_s,
+            OfDurations::Count => durations.count as f64,
+        }
+    }
+}
+
+#[derive(Debug)]
+struct ShareTally<'a> {
+    definition: &'a Share,
+    /// Since when the robot has been in one of the states, simulated seconds.
+    entered_s: Option<f64>,
+    /// Time in the states before, seconds.
+    total_s: f64,
+}
+
+impl ShareTally<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        for event in observation.events {
+            let (of, to, states) = match (event, &self.definition.states) {
+                (Event::Emotion { robot, to, .. }, States::Emotions(states))
+                | (Event::Behavior { robot, to, .. }, States::Behaviors(states)) => {
+                    (robot, to, states)
+                }
+                _ => continue,
+            };
+            if *of == self.definition.robot {
+                let is_in = states.contains(to);
+                self.change(is_in, observation.time_s);
+            }
+        }
+    }
+
+    fn change(&mut self, is_in: bool, now_s: f64) {
+        match self.entered_s {
+            None if is_in => self.entered_s = Some(now_s),
+            Some(entered_s) if !is_in => {
+                self.total_s += now_s - entered_s;
+                self.entered_s = None;
+            }
+            _ => {}
+        }
+    }
+
+    fn share(&self, now_s: f64) -> f64 {
+        if now_s <= 0.0 {
+            return f64::from(u8::from(self.entered_s.is_some()));
+        }
+
+        let last_s = self.entered_s.map_or(0.0, |entered_s| now_s - entered_s);
+        (self.total_s + last_s) / now_s
+    }
+}
+
+#[derive(Debug)]
+struct VariableTally<'a> {
+    definition: &'a OfVariable,
+    /// `None` before the variable has a value.
+    values: Option<Values>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Values {
+    /// When the variable got its first value, simulated seconds.
+    begun_s: f64,
+    last: f64,
+    /// When it got its last value, simulated seconds.
+    last_s: f64,
+    max: f64,
+    /// Integral up to `last_s`.
+    area: f64,
+}
+
+impl Values {
+    fn area(&self, now_s: f64) -> f64 {
+        self.area + self.last * (now_s - self.last_s)
+    }
+}
+
+impl VariableTally<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        let definition = self.definition;
+        let Some(value) = number_of(observation, &definition.robot, &definition.name) else {
+            return;
+        };
+
+        let now_s = observation.time_s;
+        let values = self.values.get_or_insert(Values {
+            begun_s: now_s,
+            last: value,
+            last_s: now_s,
+            max: value,
+            area: 0.0,
+        });
+        if value.to_bits() != values.last.to_bits() {
+            values.area = values.area(now_s);
+            values.last = value;
+            values.last_s = now_s;
+            values.max = values.max.max(value);
+        }
+    }
+
+    fn number(&self, now_s: f64) -> Option<f64> {
+        let values = self.values?;
+        let duration_s = now_s - values.begun_s;
+        Some(match self.definition.number {
+            OfValues::Mean if duration_s > 0.0 => values.area(now_s) / duration_s,
+            OfValues::End | OfValues::Mean => values.last,
+            OfValues::Max => values.max,
+            OfValues::Area => values.area(now_s),
+        })
+    }
+}
+
+#[derive(Debug)]
+struct StalledTally<'a> {
+    definition: &'a Stalled,
+    /// Values of the variables of progress at the last tick.
+    values: Vec<Option<f64>>,
+    /// Time of the last progress, simulated seconds.
+    progress_s: f64,
+}
+
+impl StalledTally<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        for (counter, before) in self.definition.progress.iter().zip(&mut self.values) {
+            let now = number_of(observation, &counter.robot, &counter.variable);
+            if let (Some(before), Some(now)) = (*before, now)
+                && now > before
+            {
+                self.progress_s = observation.time_s;
+            }
+            *before = now;
+        }
+    }
+
+    fn measured(&self, now_s: f64) -> Measured {
+        let is_stalled = now_s - self.progress_s >= self.definition.lasting_s;
+        Measured {
+            value: if is_stalled { self.progress_s } else { now_s },
+            is_censored: !is_stalled,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+    use protocol::messages::{Point, StateVariables, Variable};
+    use serde_json::json;
+
+    use super::*;
+    use crate::RobotState;
+
+    /// Length of a tick, seconds.
+    const TICK_S: f64 = 0.5;
+
+    fn name(robot: &str) -> RobotName {
+        RobotName::new(robot).unwrap()
+    }
+
+    fn enters(robot: &str, from: &str, to: &str) -> Event {
+        Event::Behavior {
+            robot: name(robot),
+            from: Some(from.to_owned()),
+            to: to.to_owned(),
+        }
+    }
+
+    fn feels(robot: &str, to: &str) -> Event {
+        Event::Emotion {
+            robot: name(robot),
+            from: None,
+            to: to.to_owned(),
+        }
+    }
+
+    fn measure(text: &str) -> Measure {
+        toml::from_str(&format!("name = 'x'\n{text}")).unwrap()
+    }
+
+    /// What happens in a tick, and the variable `v` of robot A after it, of which the flag `is_high` depends.
+    #[derive(Debug, Clone, Default)]
+    struct Tick {
+        events: Vec<Event>,
+        v: Option<f64>,
+    }
+
+    fn happens(events: &[&Event]) -> Tick {
+        Tick {
+            events: events.iter().copied().cloned().collect(),
+            v: None,
+        }
+    }
+
+    fn has(v: f64) -> Tick {
+        Tick {
+            events: Vec::new(),
+            v: Some(v),
+        }
+    }
+
+    /// Takes a measure of a run with these ticks, the last of which is observed again at the end. The condition lasts from
+    /// 1 s to 2 s.
+    fn take(text: &str, ticks: &[Tick]) -> Result<Measured, MissingNumber> {
+        let measure = measure(text);
+        let mut probe = Probe::new(&measure, (1.0, 2.0));
+        let mut variables = BTreeMap::new();
+        for (tick, happening) in ticks.iter().enumerate() {
+            let mut state_variables = StateVariables::new();
+            if let Some(v) = happening.v {
+                state_variables.insert("v".to_owned(), Variable::Number(v));
+                state_variables.insert("is_high".to_owned(), Variable::Flag(v > 3.0));
+            }
+            variables.insert(name("A"), state_variables);
+            observe(&mut probe, tick, &happening.events, &variables);
+        }
+
+        observe(&mut probe, ticks.len() - 1, &[], &variables);
+        probe.measured(&Value::Null)
+    }
+
+    fn observe(
+        probe: &mut Probe<'_>,
+        tick: usize,
+        events: &[Event],
+        variables: &BTreeMap<RobotName, StateVariables>,
+    ) {
+        probe.observe(&Observation {
+            tick: tick as u64,
+            time_s: tick as f64 * TICK_S,
+            events,
+            state: &|robot| {
+                variables.get(robot).map(|state_variables| RobotState {
+                    location: Point::new(0.0, 0.0),
+                    state_variables,
+                    emotion_state: "",
+                    behavior_state: "",
+                })
+            },
+        });
+    }
+
+    fn certain_of(text: &str, ticks: &[Tick]) -> f64 {
+        let measured = take(text, ticks).unwrap();
+        assert!(!measured.is_censored, "{text}");
+        measured.value
+    }
+
+    #[test]
+    fn a_path_in_the_summary_is_followed_and_a_star_is_a_sum() {
+        let summary =
+            json!({ "robots": { "A": { "sent": { "x": 2, "y": 3 } }, "B": { "sent": {} } } });
+        let at = |path: &str| {
+            let measure = measure(&format!("summary = '{path}'"));
+            let probe = Probe::new(&measure, (0.0, 1.0));
+            probe.measured(&summary).map(|measured| measured.value)
+        };
+        assert_eq!(at("robots.A.sent.x"), Ok(2.0));
+        assert_eq!(at("robots.*.sent.*"), Ok(5.0));
+        for missing in ["robots.A.sent", "robots.C.sent.x"] {
+            let error = at(missing).unwrap_err().to_string();
+            assert!(error.contains(missing), "{error}");
+        }
+    }
+
+    #[test]
+    fn events_count_in_their_part_of_the_run() {
+        let enters = enters("A", "X", "Y");
+        let mut ticks = vec![Tick::default(); 6];
+        ticks[0] = happens(&[&enters]);
+        // The condition lasts from tick 2 until tick 4.
+        ticks[2] = happens(&[&enters, &enters]);
+        ticks[3] = happens(&[&enters, &feels("A", "Y")]);
+        ticks[4] = happens(&[&enters]);
+        ticks[5] = happens(&[&enters]);
+
+        let count = "count = { event = 'behavior', robot = 'A', to = 'Y' }";
+        assert_eq!(certain_of(count, &ticks), 6.0);
+        assert_eq!(
+            certain_of(&format!("{count}\nwhen = 'during'"), &ticks),
+            3.0
+        );
+        assert_eq!(certain_of(&format!("{count}\nwhen = 'after'"), &ticks), 2.0);
+        assert_eq!(certain_of(count, &[Tick::default()]), 0.0);
+        let other = "count = { event = 'behavior', robot = 'B' }";
+        assert_eq!(certain_of(other, &ticks), 0.0);
+    }
+
+    #[test]
+    fn a_time_ends_with_the_first_event_or_is_censored_at_the_end() {
+        let to_y = "time = { to = { event = 'behavior', to = 'Y' } }";
+        let after_z = "time = { to = { event = 'behavior', to = 'Y' }, after = { event = 'behavior', to = 'Z' } }";
+        let y = enters("A", "X", "Y");
+        let z = enters("A", "X", "Z");
+        let come = |value| Measured {
+            value,
+            is_censored: false,
+        };
+        let waited = |value| Measured {
+            value,
+            is_censored: true,
+        };
+        let nothing = Tick::default();
+        let both = happens(&[&y, &z]);
+        let y = happens(&[&y]);
+        let z = happens(&[&z]);
+
+        for (text, ticks, expected) in [
+            (to_y, vec![&y, &nothing, &y], come(0.0)),
+            (to_y, vec![&nothing, &nothing, &y], come(1.0)),
+            (to_y, vec![&nothing, &nothing, &nothing], waited(1.0)),
+            (after_z, vec![&y, &z, &nothing, &y, &y], come(1.0)),
+            (after_z, vec![&nothing, &z, &z, &y], come(1.0)),
+            // The events of a tick happen at the same time, whatever their order in the record.
+            (after_z, vec![&nothing, &both], come(0.0)),
+            (after_z, vec![&nothing, &z, &nothing, &nothing], waited(1.0)),
+            (after_z, vec![&nothing, &z], waited(0.0)),
+            (after_z, vec![&y, &nothing, &nothing], waited(0.0)),
+        ] {
+            let ticks: Vec<Tick> = ticks.into_iter().cloned().collect();
+            assert_eq!(take(text, &ticks).unwrap(), expected, "{text}: {ticks:?}");
+        }
+    }
+
+    #[test]
+    fn durations_are_taken_between_pairs() {
+        let numbers = |ticks: &[Tick]| {
+            ["mean", "max", "sum", "count"].map(|number| {
+                let text = format!(
+                    "between = {{ begin = {{ event = 'behavior', to = 'Y' }}, \
+                     end = {{ event = 'behavior', from = 'Y' }}, as = '{number}' }}"
+                );
+                certain_of(&text, ticks)
+            })
+        };
+        let begin = enters("A", "X", "Y");
+        let end = enters("A", "Y", "X");
+        let again = enters("A", "Y", "Y");
+        let nothing = Tick::default();
+
+        assert_eq!(numbers(&[nothing.clone(), happens(&[&end])]), [0.0; 4]);
+        let pairs = [
+            happens(&[&begin]),
+            happens(&[&begin]), // One is open.
+            happens(&[&end, &begin]),
+            nothing.clone(),
+            nothing.clone(),
+            happens(&[&end]),
+            happens(&[&end]),
+        ];
+        assert_eq!(numbers(&pairs), [1.25, 1.5, 2.5, 2.0]);
+        // A pair that is open lasts until the end, also where it begins there.
+        let open = [happens(&[&begin]), nothing.clone(), nothing.clone()];
+        assert_eq!(numbers(&open), [1.0, 1.0, 1.0, 1.0]);
+        assert_eq!(
+            numbers(&[nothing, happens(&[&begin])]),
+            [0.0, 0.0, 0.0, 1.0]
+        );
+        // Both in one tick, in the order of the record.
+        let at_once = [Tick::default(), happens(&[&begin, &end]), Tick::default()];
+        assert_eq!(numbers(&at_once), [0.0, 0.0, 0.0, 1.0]);
+        // One event may end a pair and begin the next.
+        let chain = [happens(&[&begin]), happens(&[&again]), Tick::default()];
+        assert_eq!(numbers(&chain), [0.5, 0.5, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn a_share_is_of_the_time_of_the_run() {
+        let sad = "share = { robot = 'A', emotion = ['SAD', 'WORRIED'] }";
+        let behavior = "share = { robot = 'A', behavior = 'Y' }";
+        let ticks = [
+            happens(&[&feels("A", "SAD"), &enters("A", "X", "Y")]),
+            happens(&[&feels("A", "WORRIED"), &feels("B", "HAPPY")]),
+            happens(&[&feels("A", "HAPPY"), &enters("B", "Y", "X")]),
+            happens(&[&feels("B", "SAD")]),
+            happens(&[&feels("A", "SAD")]),
+        ];
+        assert_eq!(certain_of(sad, &ticks), 0.5);
+        assert_eq!(certain_of(behavior, &ticks), 1.0);
+        assert_eq!(certain_of(sad, &[Tick::default(), Tick::default()]), 0.0);
+        // A run that ends with its first tick.
+        assert_eq!(certain_of(sad, &ticks[..1]), 1.0);
+    }
+
+    #[test]
+    fn a_variable_keeps_its_value_until_the_next_report() {
+        let numbers = |ticks: &[Tick]| {
+            ["end", "max", "mean", "area"].map(|number| {
+                let text = format!("variable = {{ robot = 'A', name = 'v', as = '{number}' }}");
+                certain_of(&text, ticks)
+            })
+        };
+        let ticks = [has(2.0), has(6.0), Tick::default(), has(1.0), has(4.0)];
+        assert_eq!(numbers(&ticks), [4.0, 6.0, 3.75, 7.5]);
+        let is_high = "variable = { robot = 'A', name = 'is_high', as = 'mean' }";
+        assert_eq!(certain_of(is_high, &ticks), 0.5);
+        assert_eq!(numbers(&[has(-3.0)]), [-3.0, -3.0, -3.0, 0.0]);
+        // The mean is over the time since the first value.
+        assert_eq!(
+            numbers(&[Tick::default(), has(2.0), has(2.0)]),
+            [2.0, 2.0, 2.0, 1.0]
+        );
+
+        for (robot, variable) in [("A", "w"), ("B", "v")] {
+            let text =
+                format!("variable = {{ robot = '{robot}', name = '{variable}', as = 'end' }}");
+            let error = take(&text, &ticks).unwrap_err().to_string();
+            let expected = format!("{robot} has no number `{variable}`");
+            assert!(error.contains(&expected), "{error}");
+        }
+    }
+
+    /// A standstill of 2 s in a run in which `v` rises in these ticks.
+    fn stalled(rises: &[usize], ticks: usize) -> Measured {
+        let mut v = 0.0;
+        let mut run = Vec::new();
+        for tick in 0..=ticks {
+            if rises.contains(&tick) {
+                v += 1.0;
+            }
+            run.push(has(v));
+        }
+        take("stalled = { progress = ['A.v'], for = '2 s' }", &run).unwrap()
+    }
+
+    #[test]
+    fn a_standstill_lasts_until_the_end() {
+        let at = |value, is_censored| Measured { value, is_censored };
+        assert_eq!(stalled(&[2, 6], 10), at(3.0, false));
+        assert_eq!(stalled(&[2, 7], 10), at(5.0, true));
+        assert_eq!(stalled(&[10], 10), at(5.0, true));
+        // The first value is no progress.
+        assert_eq!(stalled(&[], 10), at(0.0, false));
+        assert_eq!(stalled(&[], 3), at(1.5, true));
+
+        let error = take("stalled = { progress = ['A.w'], for = '2 s' }", &[has(1.0)]);
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains("A has no number `w`"), "{error}");
+    }
+
+    proptest! {
+        /// Measures that can be counted tick by tick, too: behaviors of a robot and a variable that changes with them.
+        #[test]
+        fn measures_agree_with_a_count_of_ticks(behaviors in prop::collection::vec(0..3_u8, 2..60)) {
+            let word = |behavior: u8| ["X", "Y", "Z"][usize::from(behavior)];
+            let mut ticks = Vec::new();
+            for (tick, behavior) in behaviors.iter().enumerate() {
+                let before = tick.checked_sub(1).map(|before| behaviors[before]);
+                let mut happening = has(f64::from(*behavior));
+                if before != Some(*behavior) {
+                    happening.events.push(Event::Behavior {
+                        robot: name("A"),
+                        from: before.map(|before| word(before).to_owned()),
+                        to: word(*behavior).to_owned(),
+                    });
+                }
+                ticks.push(happening);
+            }
+
+            // The state of a tick lasts until the next one.
+            let lasting = &behaviors[..behaviors.len() - 1];
+            let in_y = lasting.iter().filter(|behavior| **behavior == 1).count() as f64;
+            let area: u32 = lasting.iter().map(|behavior| u32::from(*behavior)).sum();
+            let run_s = lasting.len() as f64 * TICK_S;
+
+            let stays = "begin = { event = 'behavior', to = 'Y' }, end = { event = 'behavior', from = 'Y' }";
+            let share = in_y / lasting.len() as f64;
+            let area = f64::from(area) * TICK_S;
+            let entered = certain_of("count = { event = 'behavior', to = 'Y' }", &ticks);
+
+            for (text, expected) in [
+                ("share = { robot = 'A', behavior = 'Y' }".to_owned(), share),
+                (format!("between = {{ {stays}, as = 'sum' }}"), in_y * TICK_S),
+                (format!("between = {{ {stays}, as = 'count' }}"), entered),
+                ("variable = { robot = 'A', name = 'v', as = 'area' }".to_owned(), area),
+                ("variable = { robot = 'A', name = 'v', as = 'mean' }".to_owned(), area / run_s),
+            ] {
+                let found = certain_of(&text, &ticks);
+                prop_assert!((found - expected).abs() < 1e-9, "{}: {} is not {}", text, found, expected);
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! What of a scenario is in effect in a tick.
+
+use std::collections::BTreeSet;
+
+use protocol::messages::Parameters;
+use protocol::{RobotName, Tick};
+
+use super::change::Change;
+use super::checked::Scenario;
+use super::fault::Fault;
+use super::network::Network;
+
+impl Scenario {
+    /// The changes that are in effect from a tick on, and not in the tick before.
+    pub fn changes_at(&self, tick: Tick) -> impl Iterator<Item = &Change> {
+        self.changes.iter().filter(move |change| change.at == tick)
+    }
+
+    /// The last change that is in effect in a tick.
+    fn in_effect(&self, tick: Tick) -> Option<&Change> {
+        self.changes.iter().rfind(|change| change.at <= tick)
+    }
+
+    /// The network in a tick.
+    #[must_use]
+    pub fn network_at(&self, tick: Tick) -> &Network {
+        let change = self.in_effect(tick);
+        change.map_or(&self.network, |change| &change.network)
+    }
+
+    /// The faults of the run, as they are known in a tick.
+    #[must_use]
+    pub fn faults_at(&self, tick: Tick) -> &[Fault] {
+        let change = self.in_effect(tick);
+        change.map_or(&self.faults, |change| &change.faults)
+    }
+
+    /// The parameters of a robot in a tick.
+    #[must_use]
+    pub fn parameters_at(&self, robot: &RobotName, tick: Tick) -> Option<&Parameters> {
+        if let Some(change) = self.in_effect(tick) {
+            return change.parameters.get(robot);
+        }
+        Some(&self.robots.get(robot)?.parameters)
+    }
+
+    /// Robots that start again, with other parameters, before a tick. One whose process is killed or stopped then has the new
+    /// parameters when it takes part again.
+    #[must_use]
+    pub fn restarts_at(&self, tick: Tick) -> BTreeSet<RobotName> {
+        let mut robots = BTreeSet::new();
+        for change in self.changes_at(tick) {
+            robots.extend(change.restarted.iter().cloned());
+        }
+        for fault in self.faults_at(tick) {
+            if fault.is_absence_at(tick) {
+                robots.remove(&fault.robot);
+            }
+        }
+        robots
+    }
+
+    /// Whether processes have to be killed or stopped for the run.
+    #[must_use]
+    pub fn concerns_processes(&self) -> bool {
+        let has_faults =
+            |change: &Change| !change.faults.is_empty() || !change.restarted.is_empty();
+        !self.faults.is_empty() || self.changes.iter().any(has_faults)
+    }
+}

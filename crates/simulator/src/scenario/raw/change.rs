@@ -1,0 +1,202 @@
+//! The tables `[[change]]` and `[parent]` as written in the file.
+
+use std::collections::BTreeMap;
+
+use config::units::Time;
+use config::{FileError, Override, Source};
+use protocol::{RobotName, RunName, Tick};
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::super::change::{Change, Parent};
+use super::super::checked;
+use super::super::fault::Fault;
+use super::super::network::ticks;
+use super::unplaced::unplaced;
+
+/// Most changes of a scenario.
+const MAX_CHANGES: usize = 100;
+/// Tables that a change cannot set.
+const NOT_CHANGED: [&str; 2] = ["change", "parent"];
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ChangeTable {
+    at: Time,
+    set: Vec<Spanned<String>>,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ParentTable {
+    run: RunName,
+    tick: Tick,
+    digest: String,
+}
+
+/// Checks the changes of a scenario that is complete but for them; returns them in the order of their ticks. What they set is
+/// set in the text of the file, one change after the other, and `resolve` checks the text.
+pub(super) fn check(
+    raw: Vec<Spanned<ChangeTable>>,
+    scenario: &checked::Scenario,
+    source: &Source,
+    resolve: impl Fn(&Source) -> Result<checked::Scenario, FileError>,
+) -> Result<Vec<Change>, FileError> {
+    if raw.is_empty() {
+        return Ok(Vec::new());
+    }
+    if let Some(extra) = raw.get(MAX_CHANGES) {
+        let span = Some(extra.span());
+        return Err(FileError::at(source, span, "more than 100 changes"));
+    }
+
+    let mut tables = raw;
+    tables.sort_by_key(|table| ticks(table.get_ref().at.0, scenario.tick_s));
+    let mut content: toml::Table = source.parse()?;
+    for table in NOT_CHANGED {
+        content.remove(table);
+    }
+
+    let mut changes = Vec::new();
+    let mut before = scenario.clone();
+    for entry in tables {
+        let span = Some(entry.span());
+        let table = entry.into_inner();
+        let at = ticks(table.at.0, scenario.tick_s);
+        if at < 1 {
+            let reason =
+                "a change is in effect from the first tick on or later; before, it is the scenario";
+            return Err(FileError::at(source, span, reason));
+        }
+
+        let mut set = Vec::new();
+        for text in &table.set {
+            let change = parse(text, source)?;
+            content = change
+                .apply(content)
+                .map_err(|reason| FileError::at(source, Some(text.span()), &reason))?;
+            set.push(change);
+        }
+        let after = resolve(&changed(&content, source, at)?)?;
+        check_difference(&before, &after, at)
+            .map_err(|reason| FileError::at(source, span, &reason))?;
+        changes.push(change(at, set, &before, &after));
+        before = after;
+    }
+    Ok(changes)
+}
+
+fn parse(text: &Spanned<String>, source: &Source) -> Result<Override, FileError> {
+    let change: Override = text
+        .get_ref()
+        .parse()
+        .map_err(|reason: String| FileError::at(source, Some(text.span()), &reason))?;
+    if NOT_CHANGED.contains(&change.top()) {
+        let reason = "a change of a change is a further [[change]]";
+        return Err(FileError::at(source, Some(text.span()), reason));
+    }
+    Ok(change)
+}
+
+/// The text of the scenario as it is changed.
+fn changed(content: &toml::Table, source: &Source, at: Tick) -> Result<Source, FileError> {
+    let text = toml::to_string(content).map_err(|error| FileError::new(error.to_string()))?;
+    Ok(Source {
+        name: format!("{} (with its change at tick {at})", source.name),
+        text,
+    })
+}
+
+/// Checks that a change concerns only what can change while the run goes on.
+fn check_difference(
+    before: &checked::Scenario,
+    after: &checked::Scenario,
+    at: Tick,
+) -> Result<(), String> {
+    let mut same = after.clone();
+    same.network.clone_from(&before.network);
+    same.faults.clone_from(&before.faults);
+    same.parent.clone_from(&before.parent);
+    for (name, robot) in &mut same.robots {
+        if let Some(robot_before) = before.robots.get(name) {
+            robot.parameters.clone_from(&robot_before.parameters);
+        }
+    }
+    let is_same = same.to_toml().ok() == before.to_toml().ok();
+    if !is_same {
+        return Err(
+            "only the network, faults, and parameters of robots can change while a run goes on"
+                .to_owned(),
+        );
+    }
+
+    let begun = |faults: &[Fault]| -> Vec<Fault> {
+        let begun = faults.iter().filter(|fault| fault.at < at);
+        begun.cloned().collect()
+    };
+    if begun(&before.faults) != begun(&after.faults) {
+        return Err(format!(
+            "a fault that begins before the change, at tick {at}, cannot change"
+        ));
+    }
+    Ok(())
+}
+
+fn change(
+    at: Tick,
+    set: Vec<Override>,
+    before: &checked::Scenario,
+    after: &checked::Scenario,
+) -> Change {
+    let mut parameters = BTreeMap::new();
+    let mut restarted: Vec<RobotName> = Vec::new();
+    for (name, robot) in &after.robots {
+        let parameters_before = before.robots.get(name).map(|robot| &robot.parameters);
+        if parameters_before != Some(&robot.parameters) {
+            restarted.push(name.clone());
+        }
+        parameters.insert(name.clone(), robot.parameters.clone());
+    }
+
+    Change {
+        at,
+        set,
+        network: after.network.clone(),
+        faults: after.faults.clone(),
+        parameters,
+        restarted,
+    }
+}
+
+impl ChangeTable {
+    pub(super) fn of(change: &Change, tick_s: f64) -> Self {
+        let mut set = Vec::new();
+        for change in &change.set {
+            set.push(unplaced(change.to_string()));
+        }
+        Self {
+            at: Time(change.at as f64 * tick_s),
+            set,
+        }
+    }
+}
+
+impl From<ParentTable> for Parent {
+    fn from(table: ParentTable) -> Self {
+        Self {
+            run: table.run,
+            tick: table.tick,
+            digest: table.digest,
+        }
+    }
+}
+
+impl From<&Parent> for ParentTable {
+    fn from(parent: &Parent) -> Self {
+        Self {
+            run: parent.run.clone(),
+            tick: parent.tick,
+            digest: parent.digest.clone(),
+        }
+    }
+}

@@ -1,0 +1,127 @@
+"""The space-time diagram of a recorded run."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from lab import PATIENCE_S, eventually, start_console, until
+
+
+@pytest.fixture
+def recorded(launch):
+    """The address of a console that shows the recording of a run with losses, 400 ticks, and its events."""
+    run = launch(options=("--speed", "max", "--duration", "200 s", "--set", "network.commands.loss=0.4"))
+    run.start("cars", "ctl", "start", "--run", run.RUN, "--connect", run.endpoint)
+    assert run.simulator.wait(PATIENCE_S) == 0
+    return start_console(run.processes, "--recording", run.run_folder), run.events()
+
+
+def open_diagram(page):
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("tab-diagram").click()
+    expect(page.locator(".diagram svg")).to_be_visible()
+
+
+def window(page):
+    """First and last tick of the diagram."""
+    data = page.locator(".diagram svg").evaluate("svg => [svg.dataset.from, svg.dataset.to]")
+    return [int(tick) for tick in data]
+
+
+def shown_tick(page):
+    return int(page.get_by_test_id("tick").inner_text())
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_click_on_a_command_shows_its_tick(recorded, open_page, screenshots, scheme):
+    address, events = recorded
+    page = open_page(address, scheme=scheme)
+    open_diagram(page)
+    for _ in range(2):
+        page.get_by_test_id("diagram-out").click()
+    eventually("the whole run", lambda: window(page) == [0, 400])
+
+    sent = [event["tick"] for event in events if event["event"] == "command_sent"]
+    commands = page.locator(".diagram .command")
+    expect(commands).to_have_count(len(sent))
+    dropped = [event for event in events if event["event"] == "command_dropped"]
+    expect(page.locator(".diagram .break")).to_have_count(len(dropped))
+    page.screenshot(path=screenshots / f"diagram-1440x900-{scheme}.png")
+
+    tick = sent[len(sent) // 2]
+    commands.nth(len(sent) // 2).locator(".start").click()
+    expect(page.get_by_test_id("tick")).to_have_text(str(tick))
+    # The mark of the shown tick is where the command begins.
+    mark = page.locator(".diagram .cursor").evaluate("line => line.x1.baseVal.value")
+    begin = commands.nth(len(sent) // 2).locator(".start").evaluate("dot => dot.cx.baseVal.value")
+    assert abs(mark - begin) < 0.5, (mark, begin)
+
+
+def test_a_click_beside_everything_shows_the_tick_of_its_place(recorded, open_page):
+    address, _ = recorded
+    page = open_page(address)
+    open_diagram(page)
+    knots = page.locator(".diagram svg").get_attribute("data-scale").split(", ")
+    (left, first), (right, end) = (map(float, knots[i].split(" ")) for i in (0, -1))
+
+    page.locator(".diagram svg").click(position={"x": left + (right - left) * 0.6, "y": 30})
+    expected = int(first + (end - first) * 0.6)
+    eventually("the tick", lambda: abs(shown_tick(page) - expected) <= 1)
+
+
+def test_the_window_is_moved_and_follows_playback(recorded, open_page):
+    address, _ = recorded
+    page = open_page(address)
+    open_diagram(page)
+    assert window(page) == [0, 119]
+
+    expect(page.get_by_test_id("diagram-previous")).to_be_disabled()
+    page.get_by_test_id("diagram-next").click()
+    eventually("the next window", lambda: window(page) == [60, 179])
+    assert shown_tick(page) == 60
+    page.get_by_test_id("diagram-previous").click()
+    eventually("the window before", lambda: window(page) == [0, 119])
+    page.get_by_test_id("diagram-in").click()
+    eventually("a shorter window", lambda: window(page) == [0, 59])
+
+    page.get_by_test_id("speed").select_option("max")
+    page.get_by_test_id("play").click()
+    until(page, "window.carsConsole.frame().tick === 400")
+    eventually("the window of the last tick", lambda: window(page)[1] == 400)
+
+
+def test_a_state_has_one_color_in_bands_and_diagram(recorded, open_page):
+    address, events = recorded
+    page = open_page(address)
+    open_diagram(page)
+    for _ in range(2):
+        page.get_by_test_id("diagram-out").click()
+    eventually("the whole run", lambda: window(page) == [0, 400])
+    in_diagram = {}
+    for kind in ("emotion", "behavior"):
+        for band in page.locator(f".diagram .{kind}").all():
+            state = re.search(rf": {kind} (\S+),", band.locator("title").text_content())[1]
+            in_diagram[state] = band.locator("rect").evaluate("rect => getComputedStyle(rect).fill")
+    states = {event["to"] for event in events if event["event"] in ("emotion", "behavior")}
+    assert set(in_diagram) == states
+
+    page.get_by_test_id("tab-charts").click()
+    fill = "band => [band.dataset.state, getComputedStyle(band.querySelector('rect')).fill]"
+
+    def in_bands():
+        return dict(page.locator(".bands .band").evaluate_all(f"bands => bands.map({fill})"))
+
+    eventually("all states", lambda: set(in_bands()) == states)
+    assert in_bands() == in_diagram
+
+
+def test_names_without_a_color_of_their_own_have_the_colors_of_the_diagram(recorded, open_page):
+    """The hash of the page is that of the crate: its tests have the same values."""
+    page = open_page(recorded[0])
+    classes = page.evaluate(
+        "import('./assets/palette.js').then(({stateClass}) => ["
+        "['emotion', 'CONFUSED'], ['emotion', ''], ['emotion', 'ärgerlich'], ['behavior', 'DANCE']]"
+        ".map(([kind, name]) => stateClass(kind, name)))"
+    )
+    assert classes == ["e13", "e12", "e13", "b8"]

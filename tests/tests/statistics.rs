@@ -1,0 +1,151 @@
+//! The laboratory's statistics, compared with SciPy and lifelines over samples of many kinds. What is exact agrees to 1e-9; what
+//! is drawn agrees within its own error, and to 1e-9 where the same draws are given to both.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+use lab::statistics::{
+    Estimate, Interval, LogRank, RestrictedMeans, SignFlip, Survival, TimeTo, bootstrap, dominance,
+    ecdf, quantile, resample, share_of_events,
+};
+use protocol::random::{self, Stream};
+use serde_json::{Value, json};
+use system_tests::root;
+use system_tests::tools::lacks_tool;
+
+/// Sizes of samples: the least that has an interval, those below and above the limit of exact tests, and more than one word
+/// of signs.
+const SIZES: [usize; 5] = [3, 8, 14, 16, 65];
+/// The quantiles that are compared.
+const QUANTILES: [f64; 6] = [0.0, 0.1, 0.25, 0.5, 0.9, 1.0];
+
+/// How a sample is drawn.
+type Draw = fn(&mut Stream) -> f64;
+
+#[test]
+fn all_numbers_are_those_of_scipy_and_lifelines() {
+    let imported = Command::new("python3")
+        .args(["-c", "import lifelines, scipy"])
+        .output();
+    if !imported.is_ok_and(|output| output.status.success()) {
+        lacks_tool("the statistics", "`pip install scipy lifelines`");
+        return;
+    }
+
+    let mut stream = random::stream(1, "tests/statistics");
+    let mut samples = Vec::new();
+    let mut pairs = Vec::new();
+    for size in SIZES {
+        for draw in [uniform as Draw, skewed, counted] {
+            let values: Vec<f64> = (0..size).map(|_| draw(&mut stream)).collect();
+            samples.push(sample(&values));
+        }
+        for draw in [skewed as Draw, counted] {
+            let arm = times(&mut stream, size, draw);
+            let baseline = times(&mut stream, size, draw);
+            pairs.push(pair(&arm, &baseline));
+        }
+    }
+    compare(&json!({ "samples": samples, "pairs": pairs }));
+}
+
+fn uniform(stream: &mut Stream) -> f64 {
+    random::unit(stream) - 0.4
+}
+
+fn skewed(stream: &mut Stream) -> f64 {
+    let uniform = random::unit(stream);
+    100.0 * uniform * uniform * uniform
+}
+
+/// A number with many ties.
+fn counted(stream: &mut Stream) -> f64 {
+    (random::unit(stream) * 6.0).floor() - 2.0
+}
+
+/// Times, a quarter of which is censored.
+fn times(stream: &mut Stream, size: usize, draw: Draw) -> Vec<TimeTo> {
+    let mut times = Vec::new();
+    for _ in 0..size {
+        times.push(TimeTo {
+            time_s: draw(stream).abs(),
+            is_event: random::unit(stream) > 0.25,
+        });
+    }
+    times
+}
+
+/// A sample, and what is found of it.
+fn sample(values: &[f64]) -> Value {
+    let mean = |indices: &[usize]| {
+        let sum: f64 = indices.iter().map(|index| values[*index]).sum();
+        sum / indices.len() as f64
+    };
+    let bootstrapped = bootstrap(values.len(), mean);
+    assert!(matches!(bootstrapped.interval, Interval::Bca { .. }));
+
+    json!({
+        "values": values,
+        "estimate": Estimate::of(values),
+        "quantiles": QUANTILES.map(|p| (p, quantile(values, p))),
+        "ecdf": ecdf(values),
+        "dominance": dominance(values),
+        "sign_flip": SignFlip::of(values),
+        "bootstrapped": bootstrapped,
+        "resampled": resample(values.len(), mean),
+    })
+}
+
+/// The times of two arms, and what is found of them.
+fn pair(arm: &[TimeTo], baseline: &[TimeTo]) -> Value {
+    let means = RestrictedMeans::of_pairs(arm, baseline);
+    let restricted = |indices: &[usize]| means.difference_s(indices);
+    let share =
+        |indices: &[usize]| share_of_events(arm, indices) - share_of_events(baseline, indices);
+
+    json!({
+        "arm": written(arm),
+        "baseline": written(baseline),
+        "survival": Survival::of(arm),
+        "log_rank": LogRank::of(arm, baseline),
+        "until_s": means.until_s,
+        "restricted_mean_s": Survival::of(arm).restricted_mean_s(means.until_s),
+        "restricted": bootstrap(arm.len(), restricted),
+        "restricted_resampled": resample(arm.len(), restricted),
+        "share": bootstrap(arm.len(), share).value,
+    })
+}
+
+fn written(times: &[TimeTo]) -> Value {
+    times
+        .iter()
+        .map(|time| json!([time.time_s, time.is_event]))
+        .collect()
+}
+
+/// Gives everything to the script that compares it; the script fails at the first difference.
+fn compare(found: &Value) {
+    let mut python = Command::new("python3")
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .arg(root().join("tests/statistics/compare.py"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = python.stdin.take().unwrap();
+    input.write_all(found.to_string().as_bytes()).unwrap();
+    drop(input);
+
+    let output = python.wait_with_output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let compared: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        compared,
+        json!({ "samples": 15, "pairs": 10, "intervals": 9 }),
+        "{errors}"
+    );
+}

@@ -1,0 +1,468 @@
+//! The folder of an experiment: whatever interrupts it, whoever plays its units and in whatever order, its results are the same
+//! bytes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use protocol::random;
+use system_tests::{Lab, PATIENCE, is_within, root};
+
+use super::{HALL, assert_same_results, cars, command, files_of_units, ok, rows};
+
+/// An experiment of very short runs: two factors, two arms, one of which is yoked.
+struct Short {
+    lab: Lab,
+    file: PathBuf,
+}
+
+impl Short {
+    fn new() -> Self {
+        let lab = Lab::new();
+        let file = lab.write("short.toml", &Self::text());
+        Self { lab, file }
+    }
+
+    fn text() -> String {
+        let scenario = root().join(HALL);
+        format!(
+            r#"
+question = "Are results independent of how they are made?"
+procedure = "Short runs."
+scenario = {scenario:?}
+seeds = 4
+duration = "3 s"
+baseline = "plain"
+
+[[factor]]
+name = "guests"
+path = "guests.count"
+values = [0, 3]
+
+[[factor]]
+name = "loss"
+values = [0.0, 0.25, 0.5, 0.75, 1.0]
+set = ["network.commands={{ loss = {{value}} }}"]
+
+[[arm]]
+name = "plain"
+what = "as it is"
+set = []
+
+[[arm]]
+name = "yoked"
+what = "emotions of the next seed"
+yoked_to = "plain"
+set = []
+
+[[measure]]
+name = "blocked"
+contrast = true
+summary = "robots.*.blocked"
+
+[[measure]]
+name = "served"
+column = "served"
+summary = "robots.Butler.state_variables.served"
+
+[[measure]]
+name = "concerned"
+time = {{ to = {{ event = "emotion", to = "CONCERNED" }} }}
+"#
+        )
+    }
+
+    fn out(&self, name: &str) -> PathBuf {
+        self.lab.out().join(name)
+    }
+
+    /// Plays the experiment into a folder; returns what is printed for people.
+    fn run(&self, folder: &Path, args: &[&str]) -> String {
+        let file = self.file.to_str().unwrap();
+        let fixed = ["run", file, "-o", folder.to_str().unwrap()];
+        ok(&[&fixed, args].concat())
+    }
+
+    fn start(&self, folder: &Path, args: &[&str]) -> Playing {
+        let file = self.file.to_str().unwrap();
+        let mut command = command(&["run", file, "-o", folder.to_str().unwrap()]);
+        command.args(args);
+        Playing::start(command)
+    }
+}
+
+/// An experiment in progress.
+struct Playing(Child);
+
+impl Playing {
+    fn start(mut command: Command) -> Self {
+        let command = command.stdout(Stdio::null()).stderr(Stdio::null());
+        Self(command.spawn().unwrap())
+    }
+}
+
+impl Drop for Playing {
+    fn drop(&mut self) {
+        let _has_ended = self.0.kill();
+        let _status = self.0.wait();
+    }
+}
+
+/// Bytes of the units that have been played.
+fn played_bytes(folder: &Path) -> u64 {
+    let files = files_of_units(folder).into_iter();
+    files
+        .map(|file| fs::metadata(file).map_or(0, |metadata| metadata.len()))
+        .sum()
+}
+
+#[test]
+fn an_experiment_that_is_killed_again_and_again_has_the_results_of_an_undisturbed_one() {
+    const KILLS: u64 = 10;
+    let short = Short::new();
+    let undisturbed = short.out("undisturbed");
+    let disturbed = short.out("disturbed");
+    let seeds = ["--seeds", "100", "--duration", "10 s"];
+    short.run(&undisturbed, &seeds);
+    assert_eq!(rows(&undisturbed).len(), 2000);
+
+    let mut chance = random::stream(14, "kills");
+    // Half of the units are left after the last one, so that each of them interrupts it.
+    let part = played_bytes(&undisturbed) / (2 * KILLS);
+    for kill in 0..KILLS {
+        let until = kill * part + (random::unit(&mut chance) * part as f64) as u64;
+        let mut playing = short.start(&disturbed, &[seeds.as_slice(), &["--jobs", "1"]].concat());
+        let is_reached = is_within(PATIENCE, || played_bytes(&disturbed) > until);
+        assert!(
+            is_reached,
+            "{kill}: {} of {until} bytes",
+            played_bytes(&disturbed)
+        );
+        assert_eq!(
+            playing.0.try_wait().unwrap(),
+            None,
+            "{kill}: it was not interrupted"
+        );
+        playing.0.kill().unwrap();
+        playing.0.wait().unwrap();
+    }
+    assert!(!disturbed.join("runs.csv").exists());
+
+    let printed = short.run(&disturbed, &seeds);
+    assert!(!printed.contains("2000 to play"), "{printed}");
+    assert_same_results(&undisturbed, &disturbed);
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_jobs_or_of_processes_at_work() {
+    let short = Short::new();
+    let one = short.out("one");
+    short.run(&one, &["--jobs", "1", "--seeds", "12"]);
+    let four = short.out("four");
+    short.run(&four, &["--jobs", "4", "--seeds", "12"]);
+    assert_same_results(&one, &four);
+
+    let both = short.out("both");
+    let mut playing = Vec::new();
+    for _ in 0..2 {
+        playing.push(short.start(&both, &["--jobs", "1", "--seeds", "12"]));
+    }
+    for process in &mut playing {
+        assert!(process.0.wait().unwrap().success());
+    }
+    assert_same_results(&one, &both);
+}
+
+#[test]
+fn units_that_are_played_one_by_one_merge_to_the_same() {
+    let short = Short::new();
+    let whole = short.out("whole");
+    short.run(&whole, &[]);
+
+    let parts = short.out("parts");
+    let folder = parts.to_str().unwrap();
+    let printed = short.run(&parts, &["--plan-only"]);
+    assert!(printed.contains("80 units in"), "{printed}");
+    // The last part is played first, and ends after the last unit.
+    for (units, played) in [("50..=99", 30), ("7", 1), ("0..=9", 9), ("0..=9", 0)] {
+        let printed = ok(&["unit", folder, units]);
+        assert!(
+            printed.contains(&format!("{played} to play")),
+            "{units}: {printed}"
+        );
+    }
+    let (code, printed) = cars(&["unit", folder, "80"]);
+    assert_eq!(code, 1);
+    assert!(printed.contains("has the units 0 to 79"), "{printed}");
+
+    let (code, printed) = cars(&["merge", folder]);
+    assert_eq!(code, 1);
+    assert!(
+        printed.contains("40 of 80 units are missing, the first is 10"),
+        "{printed}"
+    );
+    assert_eq!(rows(&parts).len(), 40);
+    ok(&["unit", folder, "10..=49"]);
+    ok(&["merge", folder]);
+    assert_same_results(&whole, &parts);
+
+    let status = command(&["status", folder]).output().unwrap();
+    let status = String::from_utf8(status.stdout).unwrap();
+    assert_eq!(status, "80 units: 80 played, 0 failed, 0 missing\n");
+}
+
+#[test]
+fn only_what_is_new_or_has_changed_is_played() {
+    let short = Short::new();
+    let folder = short.out("grown");
+    let play = |text: &str, args: &[&str], expected: &str| {
+        fs::write(&short.file, text).unwrap();
+        let printed = short.run(&folder, args);
+        assert!(printed.contains(expected), "{expected}: {printed}");
+        printed
+    };
+    let text = Short::text();
+    let arm = "[[arm]]\nname = \"few\"\nwhat = \"fewer treats\"\n\
+               set = [\"robot.Butler.params.treat_capacity=5\"]\n\n[[measure]]\nname = \"blocked\"";
+    let with_arm = text.replacen("[[measure]]\nname = \"blocked\"", arm, 1);
+
+    play(&text, &[], "80 units: 0 are there, 80 to play");
+    play(&text, &[], "80 units: 80 are there, 0 to play");
+    // Two more seeds of each of 20 cells; in the ten yoked ones the last seed was yoked to the first, and no longer is.
+    play(
+        &text,
+        &["--seeds", "6"],
+        "120 units: 70 are there, 50 to play",
+    );
+    play(
+        &with_arm,
+        &["--seeds", "6"],
+        "180 units: 120 are there, 60 to play",
+    );
+    play(
+        &text,
+        &["--seeds", "2..=5"],
+        "80 units: 70 are there, 10 to play",
+    );
+
+    let changed = text.replace("robots.*.blocked", "robots.Butler.blocked");
+    let printed = play(&changed, &[], "80 units: 0 are there, 80 to play");
+    assert!(printed.contains("the measures have changed"), "{printed}");
+    play(&text, &[], "80 units: 80 are there, 0 to play");
+    // What is only shown is no other measure.
+    let column = text.replace("column = \"served\"", "column = \"guests served\"");
+    play(&column, &[], "80 units: 80 are there, 0 to play");
+
+    let longer = play(
+        &text,
+        &["--duration", "4 s"],
+        "80 units: 0 are there, 80 to play",
+    );
+    assert!(
+        longer.contains("the scenario of the arm \"plain\""),
+        "{longer}"
+    );
+
+    let fresh = short.out("fresh");
+    fs::write(&short.file, &with_arm).unwrap();
+    short.run(&fresh, &["--seeds", "6"]);
+    play(
+        &with_arm,
+        &["--seeds", "6"],
+        "180 units: 180 are there, 0 to play",
+    );
+    assert_same_results(&fresh, &folder);
+}
+
+#[test]
+fn a_damaged_unit_is_named_and_played_again() {
+    let short = Short::new();
+    let whole = short.out("whole");
+    short.run(&whole, &[]);
+    let folder = short.out("damaged");
+    short.run(&folder, &["--jobs", "1"]);
+
+    let files = files_of_units(&folder);
+    let [file] = files.as_slice() else {
+        panic!("one process writes one file: {files:?}");
+    };
+    let mut bytes = fs::read(file).unwrap();
+    let lines: Vec<&[u8]> = bytes.split_inclusive(|byte| *byte == b'\n').collect();
+    let damaged = lines[..17].concat().len() + 60;
+    let cut = bytes.len() - 10;
+    bytes[damaged] ^= 1;
+    bytes.truncate(cut);
+    fs::write(file, bytes).unwrap();
+
+    let status = cars(&["status", folder.to_str().unwrap()]).1;
+    assert!(
+        status.contains("line 18 is damaged: unit 17 (condition"),
+        "{status}"
+    );
+    let printed = short.run(&folder, &[]);
+    assert!(
+        printed.contains("line 18 is damaged: unit 17 (condition"),
+        "{printed}"
+    );
+    assert!(
+        printed.contains("80 units: 78 are there, 2 to play"),
+        "{printed}"
+    );
+    assert_same_results(&whole, &folder);
+
+    let printed = short.run(&folder, &[]);
+    assert!(!printed.contains("is damaged"), "{printed}");
+}
+
+#[test]
+fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
+    let short = Short::new();
+    let arm =
+        "name = \"yoked\"\nwhat = \"no such parameter\"\nset = [\"robot.Butler.params.wings=2\"]";
+    let yoked =
+        "name = \"yoked\"\nwhat = \"emotions of the next seed\"\nyoked_to = \"plain\"\nset = []";
+    let text = Short::text();
+    assert!(text.contains(yoked));
+    fs::write(&short.file, text.replace(yoked, arm)).unwrap();
+    let folder = short.out("failing");
+    let file = short.file.to_str().unwrap();
+    let args = ["run", file, "-o", folder.to_str().unwrap()];
+
+    for (more, expected) in [
+        (&[] as &[&str], "80 units: 0 are there, 80 to play"),
+        (&[], "80 units: 80 are there, 0 to play"),
+        (&["--retry-failed"], "80 units: 40 are there, 40 to play"),
+    ] {
+        let (code, printed) = cars(&[&args, more].concat());
+        assert_eq!(code, 1, "{printed}");
+        assert!(printed.contains(expected), "{printed}");
+        assert!(printed.contains("40 of 80 units failed"), "{printed}");
+        assert!(printed.contains("wings"), "{printed}");
+    }
+
+    for row in rows(&folder) {
+        let has_failed = row["arm"] == "yoked";
+        assert_eq!(row["failed"].contains("wings"), has_failed, "{row:?}");
+        assert_eq!(row["digest"].is_empty(), has_failed, "{row:?}");
+        assert_eq!(row["served"].is_empty(), has_failed, "{row:?}");
+    }
+}
+
+/// The digest of a run in the folder of a lab.
+fn digest(lab: &Lab, run: &str) -> String {
+    lab.summary(run)["digest"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_unit_is_recorded_as_a_run_by_one_command() {
+    let short = Short::new();
+    let folder = short.out("results");
+    short.run(&folder, &["--duration", "60 s", "--seeds", "2"]);
+    let rows = rows(&folder);
+    for (unit, arm) in [("1", "plain"), ("39", "yoked")] {
+        let row = &rows[unit.parse::<usize>().unwrap()];
+        assert_eq!(row["arm"], arm);
+        let out = short.lab.out().to_str().unwrap();
+        let printed = ok(&["replay", folder.to_str().unwrap(), unit, "--out", out]);
+        assert!(printed.contains("is the same run"), "{printed}");
+
+        let run = format!("short-{unit}");
+        assert_eq!(digest(&short.lab, &run), row["digest"]);
+        assert_eq!(short.lab.recorded(&run).len(), 121);
+        short.lab.ok(&["verify", &run]);
+    }
+
+    // Another run than the unit that was played is an error.
+    let plan = folder.join("plan.json");
+    let text = fs::read_to_string(&plan).unwrap();
+    let changed = text.replace("\"version\": \"", "\"version\": \"0.");
+    fs::write(&plan, changed).unwrap();
+    let (code, printed) = cars(&["unit", folder.to_str().unwrap(), "0"]);
+    assert_eq!(code, 1);
+    assert!(printed.contains("was planned by cars 0."), "{printed}");
+}
+
+#[test]
+fn runs_of_processes_give_the_results_of_one_process() {
+    let lab = Lab::new();
+    let launch = root().join("launch/hors_doeuvres.toml");
+    let text = Short::text();
+    let text = text.replace(
+        &format!("scenario = {:?}", root().join(HALL)),
+        &format!("scenario = {launch:?}"),
+    );
+    let text = text.replace("values = [0, 3]", "values = [50]");
+    let text = text.replace("[0.0, 0.25, 0.5, 0.75, 1.0]", "[0.5]");
+    let file = lab.write("launched.toml", &text);
+    let play = |name: &str, more: &[&str]| {
+        let folder = lab.out().join(name);
+        let out = folder.to_str().unwrap();
+        let fixed = [
+            "run",
+            file.to_str().unwrap(),
+            "-o",
+            out,
+            "--seeds",
+            "2",
+            "--duration",
+            "60 s",
+        ];
+        ok(&[&fixed, more].concat());
+        folder
+    };
+    let one = play("one", &[]);
+    let processes = play("processes", &["--processes"]);
+    for name in ["runs.csv", "runs.parquet", "results.json"] {
+        let bytes = |folder: &Path| fs::read(folder.join(name)).unwrap();
+        assert!(bytes(&one) == bytes(&processes), "{name}");
+    }
+    // The yoke acts: what is compared is not the same run four times.
+    let rows = rows(&one);
+    assert_ne!(rows[0]["digest"], rows[2]["digest"]);
+
+    let out = lab.out().to_str().unwrap();
+    let folder = processes.to_str().unwrap();
+    let printed = ok(&["replay", folder, "2", "--out", out, "--run", "again"]);
+    assert!(printed.contains("is the same run"), "{printed}");
+    assert_eq!(digest(&lab, "again"), rows[2]["digest"]);
+}
+
+/// A robot that no process of the project can run takes part in an experiment.
+#[test]
+fn a_robot_in_another_language_takes_part() {
+    let lab = Lab::new();
+    let stroller = root().join("sdk/stdio/bash");
+    let scenario = "tick = \"0.5 s\"\nduration = \"10 s\"\n[field]\nsize = [\"30 ft\", \"30 ft\"]\n\
+                    [[robot]]\nname = \"Bruno\"\nclass = \"Bash\"\nat = [\"15 ft\", \"22 ft\"]\n";
+    lab.write("hall.toml", scenario);
+    std::os::unix::fs::symlink(stroller, lab.out().join("programs")).unwrap();
+    let launch = "scenario = \"hall.toml\"\n[[process]]\nname = \"Bruno\"\n\
+                  command = [\"cars\", \"exec\", \"--\", \"programs/stroller.sh\"]\n";
+    lab.write("launch.toml", launch);
+    let experiment = "question = \"Does he walk?\"\nprocedure = \"Guests.\"\nscenario = \"launch.toml\"\n\
+                      seeds = 2\nduration = \"10 s\"\n\
+                      [[factor]]\nname = \"guests\"\npath = \"guests.count\"\nvalues = [0, 40]\n\
+                      [[arm]]\nname = \"Bruno\"\nwhat = \"in Bash\"\nset = []\n\
+                      [[measure]]\nname = \"blocked\"\nsummary = \"robots.Bruno.blocked\"\n";
+    let file = lab.write("strolling.toml", experiment);
+    let folder = lab.out().join("results");
+    let args = [
+        "run",
+        file.to_str().unwrap(),
+        "-o",
+        folder.to_str().unwrap(),
+    ];
+
+    let (code, printed) = cars(&args);
+    assert_eq!(code, 1, "{printed}");
+    assert!(printed.contains("can run in this process"), "{printed}");
+    ok(&[&args, ["--processes"].as_slice()].concat());
+    let rows = rows(&folder);
+    assert_eq!(rows.len(), 4);
+    for row in rows {
+        assert!(
+            !row["digest"].is_empty() && !row["blocked"].is_empty(),
+            "{row:?}"
+        );
+    }
+}

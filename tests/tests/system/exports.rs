@@ -1,0 +1,516 @@
+//! Runs exported for other programs: tables, a log for ShiViz, a trace of wall-clock time.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use nix::sys::signal::Signal;
+use serde_json::Value;
+use system_tests::processes::send;
+use system_tests::tools::lacks_tool;
+use system_tests::{Lab, eventually, root};
+
+const HALL: &str = "configs/hors_doeuvres.toml";
+
+/// Runs Python in a folder; `None` if one of the packages is missing.
+fn python(folder: &Path, packages: &[&str], args: &[&str]) -> Option<Output> {
+    let import = format!("import {}", packages.join(", "));
+    let imported = Command::new("python3").args(["-c", &import]).output();
+    if !imported.is_ok_and(|output| output.status.success()) {
+        let need = format!("`pip install {}`", packages.join(" "));
+        lacks_tool("reading exports in Python", &need);
+        return None;
+    }
+
+    let output = Command::new("python3")
+        .current_dir(folder)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .args(args)
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    Some(output)
+}
+
+/// A script of `tests/exports`.
+fn script(name: &str) -> String {
+    let path = root().join("tests/exports").join(name);
+    path.to_str().unwrap().to_owned()
+}
+
+/// Compares the tables of a folder with the record of a run; returns the numbers of rows.
+fn compare_tables(lab: &Lab, run: &str, tables: &str, epochs: &[&str]) -> Option<Value> {
+    let run = lab.out().join(run);
+    let page = root().join("docs/exports.md");
+    let script = script("tables.py");
+    let mut args = vec![script.as_str(), run.to_str().unwrap(), tables];
+    args.push(page.to_str().unwrap());
+    args.extend(epochs);
+
+    let packages = ["pandas", "pyarrow", "polars", "duckdb", "mcap"];
+    let output = python(lab.out(), &packages, &args)?;
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+/// Exports a run of a lab to one of its folders; returns what is printed.
+fn export(lab: &Lab, run: &str, to: &str, formats: &[&str]) -> String {
+    let folder = lab.out().join(to);
+    let mut args = vec!["export", run, "-o", folder.to_str().unwrap()];
+    args.extend(formats);
+    lab.ok(&args)
+}
+
+const BOTH: [&str; 2] = ["--csv", "--parquet"];
+
+/// Plays a run with two epochs. In both a robot with hostile texts and numbers crashes and returns, and messages are lost,
+/// delayed and doubled.
+fn play_hostile(lab: &Lab, run: &str) {
+    let scenario = lab.write(
+        "scenario.toml",
+        r#"
+            seed = 9007199254740991
+            tick = "0.5 s"
+            duration = "60 s"
+            on_late = "continue"
+            deadline = "30 s"
+
+            [field]
+            size = ["20 ft", "20 ft"]
+
+            [guests]
+            count = 20
+
+            [[robot]]
+            name = "Bruno"
+            at = ["5 ft", "5 ft"]
+
+            [[robot]]
+            name = "Vonda"
+            at = ["15 ft", "15 ft"]
+            params = { waiter = "Bruno" }
+
+            [network]
+            commands = { loss = 0.2, duplication = 0.2, delay = { min = "0 s", mode = "1 s", max = "2 s" } }
+            queries = { loss = 0.1 }
+
+            [[network.partition]]
+            groups = [["Bruno"], ["Vonda"]]
+            from = "8 s"
+            until = "9 s"
+
+            [[fault]]
+            robot = "Bruno"
+            do = "crash"
+            at = "3 s"
+            until = "5 s"
+
+            [[change]]
+            at = "6 s"
+            set = ["network.commands.loss=0.25"]
+        "#,
+    );
+    let hostile = script("hostile.py");
+    let launch = format!(
+        r#"
+            scenario = {scenario:?}
+
+            [[process]]
+            name = "Bruno"
+            command = ["cars", "exec", "--", "python3", {hostile:?}]
+
+            [[process]]
+            name = "Vonda"
+            command = ["cars-vonda"]
+        "#
+    );
+    let launch = lab.write("hostile.toml", &launch);
+    let launch = launch.to_str().unwrap();
+    let args = [
+        "launch",
+        launch,
+        "--no-console",
+        "--paused",
+        "--speed",
+        "max",
+    ];
+    let mut running = lab.start(run, &args);
+
+    lab.until_ready(run);
+    lab.step(run, 30);
+    lab.ctl(run, &["init", "--seed", "7"]);
+    lab.until_ready(run);
+    lab.step(run, 20);
+    lab.ctl(run, &["stop"]);
+    running.finish();
+}
+
+#[test]
+fn tables_have_every_value_of_the_record_also_of_hostile_robots() {
+    let lab = Lab::new();
+    play_hostile(&lab, "exports-hostile");
+    let printed = export(&lab, "exports-hostile", "tables", &BOTH);
+    assert_eq!(printed.lines().count(), 6, "{printed}");
+
+    let Some(counts) = compare_tables(&lab, "exports-hostile", "tables", &[]) else {
+        return;
+    };
+    // Two robots, and ticks 0 to 30 and 0 to 20.
+    assert_eq!(counts["states"], 2 * (31 + 21), "{counts}");
+    let kinds: Vec<&str> = counts["kinds"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|kind| kind.as_str().unwrap())
+        .collect();
+    for kind in [
+        "init",
+        "joined",
+        "lost",
+        "missed",
+        "emotion",
+        "behavior",
+        "command_sent",
+        "command_delivered",
+        "command_dropped",
+        "command_delayed",
+        "command_duplicated",
+        "query_lost",
+        "link_cut",
+        "link_healed",
+        "fault",
+        "changed",
+        "say",
+        "tick",
+        "end",
+    ] {
+        assert!(kinds.contains(&kind), "no {kind}: {kinds:?}");
+    }
+    // No report while it is away, and one of a further incarnation after that.
+    let generations = counts["generations"].as_array().unwrap();
+    for generation in [0, 1, 2] {
+        assert!(generations.contains(&generation.into()), "{counts}");
+    }
+
+    // One epoch by itself, and the same bytes once more.
+    export(
+        &lab,
+        "exports-hostile",
+        "second",
+        &[&BOTH[..], &["--epoch", "2"]].concat(),
+    );
+    compare_tables(&lab, "exports-hostile", "second", &["2"]);
+    export(&lab, "exports-hostile", "again", &BOTH);
+    for table in ["events", "states", "variables"] {
+        for ending in ["csv", "parquet"] {
+            let name = format!("{table}.{ending}");
+            let [one, again] = ["tables", "again"]
+                .map(|folder| std::fs::read(lab.out().join(folder).join(&name)).unwrap());
+            assert!(one == again, "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_examples_of_the_documentation_work() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--run", "hall", "--duration", "60 s"]);
+    export(&lab, "hall", "tables", &BOTH);
+
+    let page = std::fs::read_to_string(root().join("docs/exports.md")).unwrap();
+    let mut count = 0;
+    for block in page.split("```python\n").skip(1) {
+        let code = block.split("```").next().unwrap();
+        let file = lab.write("example.py", code);
+        let packages = ["pandas", "pyarrow", "polars", "duckdb"];
+        let Some(output) = python(lab.out(), &packages, &[file.to_str().unwrap()]) else {
+            return;
+        };
+        assert!(!output.stdout.is_empty(), "{code}");
+        count += 1;
+    }
+    assert_eq!(count, 4);
+}
+
+/// Exports a run to the folder `tables` of a lab; returns the notes.
+fn notes_of_export(lab: &Lab, run: &str) -> String {
+    let folder = lab.out().join("tables");
+    let args = [&["export", run, "-o", folder.to_str().unwrap()], &BOTH[..]].concat();
+    let output = lab.cars(&args).output().unwrap();
+    let notes = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{notes}");
+    notes.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn a_run_that_was_killed_or_not_recorded_is_exported_as_far_as_it_goes() {
+    let lab = Lab::new();
+    let launch = [
+        "launch",
+        "launch/hors_doeuvres.toml",
+        "--speed",
+        "20",
+        "--no-console",
+    ];
+    let mut running = lab.start("exports-killed", &launch);
+    let file = lab.file("exports-killed", "run.mcap");
+    let recorded = || recording::Recording::open(&file).ok();
+    eventually("some ticks are recorded", || {
+        (recorded()?.len() > 50).then_some(())
+    });
+    send(running.process("cars-sim"), Signal::SIGKILL);
+    running.wait();
+
+    let notes = notes_of_export(&lab, "exports-killed");
+    assert!(notes.contains("has no end of the run"), "{notes}");
+    assert!(notes.contains("run.mcap was not finished"), "{notes}");
+    let states = std::fs::read_to_string(lab.out().join("tables/states.csv")).unwrap();
+    let ticks = recorded().unwrap().len() as usize;
+    assert_eq!(states.lines().count(), 1 + 2 * ticks);
+
+    std::fs::remove_dir_all(lab.out().join("tables")).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    let notes = notes_of_export(&lab, "exports-killed");
+    assert!(
+        notes.contains("has events, and no states and variables"),
+        "{notes}"
+    );
+    let Some(counts) = compare_tables(&lab, "exports-killed", "tables", &[]) else {
+        return;
+    };
+    assert!(counts["events"].as_u64().unwrap() > 50, "{counts}");
+}
+
+#[test]
+fn commands_are_arrows_in_shiviz() {
+    let lab = Lab::new();
+    play_hostile(&lab, "exports-arrows");
+    let log = export(&lab, "exports-arrows", "log", &["--shiviz"]);
+    assert!(log.trim_end().ends_with("log/shiviz.log"), "{log}");
+
+    let run = lab.out().join("exports-arrows");
+    let args = [
+        script("shiviz.py"),
+        run.to_str().unwrap().to_owned(),
+        log.trim_end().to_owned(),
+    ];
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let Some(output) = python(lab.out(), &["json"], &args) else {
+        return;
+    };
+    let executions = String::from_utf8(output.stdout).unwrap();
+    let executions: Vec<Value> = executions
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(executions.len(), 2);
+    for execution in executions {
+        assert_eq!(execution["hosts"], serde_json::json!(["Bruno", "Vonda"]));
+        assert!(execution["received"].as_u64().unwrap() > 0, "{execution}");
+    }
+}
+
+/// The trace of a run, which is valid by the schema of the format.
+fn trace(lab: &Lab, run: &str, args: &[&str]) -> Value {
+    let file = lab.out().join("trace.json");
+    let all = [&["trace", run, "-o", file.to_str().unwrap()], args].concat();
+    lab.ok(&all);
+
+    let schema = script("trace.schema.json");
+    let check = Command::new("check-jsonschema")
+        .args(["--schemafile", &schema])
+        .arg(&file)
+        .output();
+    match check {
+        Ok(output) => {
+            let printed = String::from_utf8_lossy(&output.stdout);
+            assert!(output.status.success(), "{printed}");
+        }
+        Err(_) => lacks_tool("the schema of traces", "`pip install check-jsonschema`"),
+    }
+    serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap()
+}
+
+/// The events of a trace with these members.
+fn select<'a>(trace: &'a Value, members: &[(&str, Value)]) -> Vec<&'a Value> {
+    let events = trace["traceEvents"].as_array().unwrap().iter();
+    events
+        .filter(|event| members.iter().all(|(name, value)| event[name] == *value))
+        .collect()
+}
+
+#[test]
+fn a_trace_has_every_tick_every_report_and_what_held_the_clock_up() {
+    let lab = Lab::new();
+    let run = "exports-trace";
+    let args = [
+        "launch",
+        "launch/hors_doeuvres.toml",
+        "--no-console",
+        "--speed",
+        "max",
+        "--duration",
+        "20 s",
+        "--paused",
+    ];
+    let mut launch = lab.start(run, &args);
+    lab.until_ready(run);
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    lab.ctl(run, &["start"]);
+    launch.prints("Leguin (is there but has not reported");
+    send(leguin, Signal::SIGCONT);
+    launch.finish();
+
+    let trace_of_all = trace(&lab, run, &[]);
+    let slice = ("ph", Value::from("X"));
+    let ticks = select(&trace_of_all, &[slice.clone(), ("name", "tick".into())]);
+    assert_eq!(ticks.len(), 41);
+    let reports = select(&trace_of_all, &[slice.clone(), ("name", "report".into())]);
+    assert_eq!(reports.len(), 2 * 41);
+    for report in reports {
+        let tick = ticks[report["args"]["tick"].as_u64().unwrap() as usize];
+        assert_eq!(report["ts"], tick["ts"]);
+        assert!(
+            report["dur"].as_f64() <= tick["dur"].as_f64(),
+            "{report} {tick}"
+        );
+    }
+
+    let held_up = select(
+        &trace_of_all,
+        &[slice, ("pid", 1.into()), ("tid", 2.into())],
+    );
+    let by_leguin = held_up
+        .iter()
+        .find(|event| event["args"]["robot"] == "Leguin");
+    let tick = by_leguin.expect("the clock was held up")["args"]["tick"]
+        .as_u64()
+        .unwrap();
+    let held = ticks[tick as usize];
+    assert_eq!(held["args"]["waited_for"], "Leguin");
+    // Microseconds: the clock is late after half a second.
+    assert!(held["dur"].as_f64().unwrap() > 500_000.0, "{held}");
+    assert_eq!(trace_of_all["otherData"]["notes"], serde_json::json!([]));
+
+    let part = trace(&lab, run, &["--from", "10", "--to", "12"]);
+    let numbers: Vec<&Value> = select(&part, &[("name", "tick".into())])
+        .iter()
+        .map(|event| &event["args"]["tick"])
+        .collect();
+    assert_eq!(numbers, [10, 11, 12]);
+}
+
+#[test]
+fn a_trace_of_a_run_in_one_process_states_what_it_lacks() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--run", "local", "--duration", "5 s"]);
+    let trace = trace(&lab, "local", &[]);
+    assert_eq!(select(&trace, &[("name", "tick".into())]).len(), 11);
+    assert!(select(&trace, &[("name", "report".into())]).is_empty());
+    let note = trace["otherData"]["notes"][0].as_str().unwrap();
+    assert!(
+        note.contains("the robots ran in the simulator's process"),
+        "{note}"
+    );
+}
+
+#[test]
+fn an_export_that_fails_names_the_reason_and_leaves_nothing_behind() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--run", "hall", "--duration", "60 s"]);
+    let place = |name: &str| lab.out().join(name);
+    let tables = place("tables").to_str().unwrap().to_owned();
+    let fails = |args: &[&str], code: i32, reason: &str| {
+        let (found, text) = lab.fails(args);
+        let text = text
+            .split_whitespace()
+            .filter(|word| *word != "│")
+            .collect::<Vec<_>>()
+            .join(" ");
+        assert_eq!(found, code, "{args:?}: {text}");
+        assert!(text.contains(reason), "{args:?}: {text}");
+        assert!(!place("tables").exists(), "{args:?}");
+    };
+
+    fails(
+        &["export", "hall", "-o", &tables],
+        2,
+        "required arguments were not provided",
+    );
+    fails(
+        &["export", "nowhere", "--csv", "-o", &tables],
+        1,
+        "there is no run nowhere",
+    );
+    fails(
+        &["export", "hall", "--csv", "-o", &tables, "--epoch", "7"],
+        1,
+        "has no epoch 7, the last one is 1",
+    );
+    fails(&["trace", "nowhere"], 1, "there is no run nowhere");
+    fails(&["trace", "hall", "--epoch", "0"], 1, "has no epoch 0");
+    fails(
+        &["trace", "hall", "--from", "500"],
+        1,
+        "has ticks 0 to 120, none of 500",
+    );
+    fails(
+        &["trace", "hall", "-o", "/nowhere/trace.json"],
+        1,
+        "cannot write /nowhere/trace.json",
+    );
+    fails(
+        &["trace", "hall", "-o", "/dev/null"],
+        1,
+        "something else than a file is there",
+    );
+    let recording = lab.file("hall", "run.mcap");
+    fails(
+        &["trace", "hall", "-o", recording.to_str().unwrap()],
+        1,
+        "is the record of the run",
+    );
+    let file = lab.write("a-file", "kept");
+    fails(
+        &["export", "hall", "--csv", "-o", file.to_str().unwrap()],
+        1,
+        "cannot write",
+    );
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+
+    // A byte in the middle, found when events are exported already.
+    let mut bytes = std::fs::read(&recording).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&recording, &bytes).unwrap();
+    fails(
+        &["export", "hall", "--csv", "--parquet", "-o", &tables],
+        1,
+        "run.mcap",
+    );
+    bytes[middle] ^= 1;
+    std::fs::write(&recording, &bytes).unwrap();
+
+    // A folder that was there stays, with what was in it.
+    std::fs::create_dir_all(place("other/variables.csv")).unwrap();
+    let other = place("other");
+    fails(
+        &["export", "hall", "--csv", "-o", other.to_str().unwrap()],
+        1,
+        "something else than a file is there",
+    );
+    let left: Vec<_> = std::fs::read_dir(&other)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    assert_eq!(left, ["variables.csv"]);
+
+    let full = std::fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let output = lab.cars(&["trace", "hall"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(errors.contains("No space left on device"), "{errors}");
+}

@@ -1,0 +1,230 @@
+//! `cars hunt`: it finds known defects unaided, and shrinks them to what causes them.
+
+use std::process::{Command, Stdio};
+
+use nix::sys::signal::Signal;
+use serde_json::Value;
+use system_tests::processes::send;
+use system_tests::{Lab, assert_same, eventually, programs, root};
+
+const HALL: &str = "configs/hors_doeuvres.toml";
+/// What the shipped team never does: it makes no progress toward any goal for two minutes.
+const NO_STALL: &str = "expect=[{ name = 'no stall', never = { stalled = { \
+                        progress = ['Butler.served', 'Butler.exchanges', 'Leguin.trips'], for = '120 s' } } }]";
+/// The team of Murphy et al. 2002 without emotions: a message is sent once, and no robot does anything else.
+const AFFECTLESS: [&str; 2] = [
+    "robot.Butler.params.policy=neither",
+    "robot.Leguin.params.policy=neither",
+];
+
+/// Arguments of a hunt in the hall of the affectless team.
+fn affectless<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    let mut args = vec!["hunt", HALL, "--json", "--set", NO_STALL];
+    for set in AFFECTLESS {
+        args.extend(["--set", set]);
+    }
+    args.extend(more);
+    args
+}
+
+/// The report of a hunt that finds something.
+fn found(command: &mut Command) -> Value {
+    let output = command.output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Events of a kind in the record of a run.
+fn events_of(lab: &Lab, run: &str, kind: &str) -> Vec<Value> {
+    let mut events = lab.events(run);
+    events.retain(|event| event["event"] == kind);
+    events
+}
+
+#[test]
+fn the_deadlock_from_one_lost_refill_is_found() {
+    let lab = Lab::new();
+    for seed in ["1", "2"] {
+        let report = found(&mut lab.cars(&affectless(&["--plans", "64", "--seed", seed])));
+        let refill = serde_json::json!([{
+            "lost": { "link": { "from": "Butler", "to": "Leguin" }, "text": "refill" }
+        }]);
+        let mut findings = report["findings"].as_array().unwrap().iter();
+        let finding = findings.find(|finding| finding["cause"] == refill).unwrap();
+        let faults = finding["case"]["faults"].as_array().unwrap();
+        assert_eq!(faults.len(), 1, "{finding}");
+        assert_eq!(faults[0]["fault"], "lose", "{finding}");
+        assert_eq!(finding["is_minimal"], true, "{finding}");
+
+        // The file has the same run, in which exactly this message is lost, and nothing else happens.
+        let file = finding["file"].as_str().unwrap();
+        let text = std::fs::read_to_string(file).unwrap();
+        assert!(
+            text.starts_with("# Expectation that fails: no stall\n"),
+            "{text}"
+        );
+        let run = format!("again-{seed}");
+        let (status, printed) = lab.fails(&["run", file, "--run", &run]);
+        assert_eq!(status, 1, "{printed}");
+        assert!(printed.contains("no stall"), "{printed}");
+        let dropped = events_of(&lab, &run, "command_dropped");
+        assert_eq!(dropped.len(), 1, "{dropped:?}");
+        assert_eq!(dropped[0]["because"], "scripted");
+        assert!(events_of(&lab, &run, "fault").is_empty());
+        assert!(events_of(&lab, &run, "link_cut").is_empty());
+        let judged = events_of(&lab, &run, "judged");
+        assert_eq!(judged[0]["verdict"], "fail", "{judged:?}");
+    }
+}
+
+#[test]
+fn the_result_depends_on_seed_and_plans_only() {
+    let lab = Lab::new();
+    let mut results = Vec::new();
+    for jobs in ["1", "2", "5"] {
+        let report = found(&mut lab.cars(&affectless(&[
+            "--plans", "40", "--seed", "3", "--jobs", jobs,
+        ])));
+        let file = report["findings"][0]["file"].as_str().unwrap().to_owned();
+        results.push((report, std::fs::read(file).unwrap()));
+    }
+    assert_eq!(results[0], results[1]);
+    assert_eq!(results[0], results[2]);
+}
+
+/// The planted defect: Leguin stands still after she has received a command twice for the second time.
+#[test]
+fn a_planted_defect_is_found() {
+    let lab = Lab::new();
+    let text = std::fs::read_to_string(root().join(HALL)).unwrap();
+    let configs = root().join("configs/robots");
+    let text = text.replace("robots/", &format!("{}/", configs.display()));
+    let expect = "[[expect]]\nname = \"no stall\"\n[expect.never.stalled]\n\
+                  progress = [\"Butler.served\", \"Butler.exchanges\", \"Leguin.trips\"]\nfor = \"120 s\"\n";
+    let scenario = lab.write("hall.toml", &format!("{text}\n{expect}"));
+
+    let mut hunt = Command::new(programs().join("planted-hunt"));
+    hunt.arg(&scenario).args(["1", "64", "2"]).arg(lab.out());
+    let report = found(&mut hunt);
+    let duplication = serde_json::json!([{ "fault": "duplication" }]);
+    let mut findings = report["findings"].as_array().unwrap().iter();
+    let finding = findings
+        .find(|finding| finding["cause"] == duplication)
+        .unwrap();
+    let faults = finding["case"]["faults"].as_array().unwrap();
+    assert_eq!(faults.len(), 1, "{finding}");
+    assert_eq!(finding["is_minimal"], true, "{finding}");
+
+    // Without the defect nothing fails in the same scenario.
+    let file = finding["file"].as_str().unwrap();
+    let run = lab.cars(&["run", file, "--run", "sound"]).output().unwrap();
+    let judged = events_of(&lab, "sound", "judged");
+    assert!(!judged.is_empty(), "{run:?}");
+    let mut verdicts = judged.iter().map(|judged| &judged["verdict"]);
+    assert!(verdicts.all(|verdict| verdict != "fail"), "{judged:?}");
+}
+
+#[test]
+fn a_scenario_that_fails_without_faults_is_refused() {
+    let lab = Lab::new();
+    let args = affectless(&["--plans", "1", "--set", "network.commands.loss=1"]);
+    let (status, printed) = lab.fails(&args);
+    assert_eq!(status, 2, "{printed}");
+    assert!(
+        printed.contains("fails without any fault: \"no stall\""),
+        "{printed}"
+    );
+
+    let (status, printed) = lab.fails(&affectless(&["--plans", "1", "--expect", "no stal"]));
+    assert_eq!(status, 2, "{printed}");
+    assert!(
+        printed.contains("has no expectation \"no stal\""),
+        "{printed}"
+    );
+}
+
+/// A hunt that is interrupted ends with what it has found, and its files are complete.
+#[test]
+fn an_interrupted_hunt_keeps_what_it_has_found() {
+    let lab = Lab::new();
+    let mut command = lab.cars(&affectless(&["--for", "3600 s"]));
+    let hunt = command.stdout(Stdio::piped()).stderr(Stdio::null());
+    let hunt = hunt.spawn().unwrap();
+    eventually("a finding", || {
+        let files = std::fs::read_dir(lab.out()).unwrap();
+        let mut texts = files.filter_map(|file| std::fs::read_to_string(file.ok()?.path()).ok());
+        let is_shrunk = texts.any(|text| text.contains("nothing can be left out"));
+        is_shrunk.then_some(())
+    });
+    send(hunt.id(), Signal::SIGINT);
+
+    let output = hunt.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["findings"][0]["expectation"], "no stall");
+    for finding in report["findings"].as_array().unwrap() {
+        let file = finding["file"].as_str().unwrap();
+        lab.cars_without_out(&["check", file]);
+    }
+}
+
+/// Numbers of the commands from Butler to Leguin that the scenario has lost, among all on that link.
+fn scripted(lab: &Lab, run: &str) -> Vec<usize> {
+    let mut sent = events_of(lab, run, "command_sent");
+    sent.retain(|event| event["from"] == "Butler" && event["to"] == "Leguin");
+    let mut numbers = Vec::new();
+    for dropped in events_of(lab, run, "command_dropped") {
+        assert_eq!(dropped["because"], "scripted", "{dropped}");
+        let place = sent.iter().position(|sent| sent["seq"] == dropped["seq"]);
+        numbers.push(1 + place.unwrap());
+    }
+    numbers
+}
+
+#[test]
+fn a_named_command_is_lost_in_runs_launches_and_forks() {
+    let lab = Lab::new();
+    let lose = "network.lose=[{ from = 'Butler', to = 'Leguin', number = 5 }]";
+    let rest = [
+        "--duration",
+        "150 s",
+        "--speed",
+        "max",
+        "--set",
+        lose,
+        "--set",
+        "expect=[]",
+    ];
+    for (command, file, run) in [
+        ("run", HALL, "alone"),
+        ("launch", "launch/hors_doeuvres.toml", "launched"),
+    ] {
+        let mut args = vec![command, file, "--run", run];
+        args.extend(rest);
+        lab.ok(&args);
+        assert_eq!(scripted(&lab, run), [5]);
+    }
+    assert_same(
+        ("run", &lab.bytes("alone")),
+        ("launch", &lab.bytes("launched")),
+    );
+    let said = lab.ok(&["verify", "launched"]);
+    assert!(said.contains("the same, 300 ticks to the end"), "{said}");
+
+    // In a fork the number is that of the run, not of the commands from the fork on.
+    let sent = events_of(&lab, "alone", "command_sent");
+    let third = sent.iter().filter(|event| event["from"] == "Butler").nth(2);
+    let tick = third.unwrap()["tick"].as_u64().unwrap() + 1;
+    let later = "network.lose=[{ from = 'Butler', to = 'Leguin', number = 4 }]";
+    lab.ok(&[
+        "fork",
+        &format!("alone@{tick}"),
+        "--run",
+        "fork",
+        "--set",
+        later,
+    ]);
+    assert_eq!(scripted(&lab, "fork"), [4]);
+    lab.ok(&["verify", "fork"]);
+}
