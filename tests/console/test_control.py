@@ -2,7 +2,7 @@
 
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, eventually, until
+from lab import PATIENCE_S, eventually, start_console, until
 
 
 def tick(page):
@@ -121,3 +121,18 @@ def test_a_reloaded_page_shows_the_same_again(launch, open_page):
     shows(page, "paused", 2)
     expect(page.get_by_test_id("panel-Leguin").get_by_test_id("face")).to_be_visible()
     expect(page.get_by_test_id("log").locator(".line")).to_have_count(lines)
+
+
+def test_a_console_that_comes_late_shows_the_whole_log(launch, open_page):
+    run = launch()
+    page = open_page(run.address)
+    for tick in range(1, 6):
+        page.get_by_test_id("btn-step").click()
+        shows(page, "paused", tick)
+    log = page.get_by_test_id("log")
+    expect(log).to_contain_text("initialized, seed 2002")
+
+    late = open_page(start_console(run.processes, environment=run.environment))
+
+    shows(late, "paused", 5)
+    expect(late.get_by_test_id("log")).to_have_text(log.inner_text(), use_inner_text=True)

@@ -236,6 +236,11 @@ pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
         }
         ControlAnswer::Done(status) => terminal::print(describe(&status))?,
         ControlAnswer::Setup(answer) => terminal::data(answer.scenario)?,
+        ControlAnswer::Log { lines } => {
+            for line in &lines {
+                terminal::print(log_line(line))?;
+            }
+        }
         ControlAnswer::Refused { explanation, .. } => {
             return Err(miette!("refused: {explanation}"));
         }

@@ -43,6 +43,9 @@ struct State {
     /// Number of the newest panel, counted over all robots, from 1.
     panel_count: u64,
     lines: VecDeque<Numbered<LogRecord>>,
+    /// Lines that arrived since the simulator appeared, each with the number of lines that were lost before it. Those before
+    /// them are yet to come.
+    held_lines: Option<VecDeque<(LogRecord, u64)>>,
     /// Number of the next line; a gap in the numbers is lines that were lost.
     next_line: u64,
 }
@@ -93,9 +96,13 @@ impl Feed {
         self.changed.subscribe()
     }
 
-    /// The simulator's liveliness token was declared or undeclared.
+    /// The simulator's liveliness token was declared or undeclared. Lines of a simulator that has just appeared are held back
+    /// until [`Feed::catch_up`].
     pub(crate) fn set_present(&self, is_present: bool) {
         self.change(|state| {
+            if is_present && !state.is_present {
+                state.held_lines = Some(VecDeque::new());
+            }
             state.is_present = is_present;
             state.was_present |= is_present;
         });
@@ -109,6 +116,11 @@ impl Feed {
     /// Whether the simulator's liveliness token has been declared at least once.
     pub(crate) fn was_present(&self) -> bool {
         self.lock().was_present
+    }
+
+    /// Whether lines are held back.
+    pub(crate) fn lacks_lines(&self) -> bool {
+        self.lock().held_lines.is_some()
     }
 
     /// Number of frames so far.
@@ -135,6 +147,12 @@ impl Feed {
         let text = ServerMessage::Panel { robot, panel }.text();
 
         self.change(|state| state.put_panel(robot, text))
+    }
+
+    /// Adds the lines of the simulator before its first one that arrived here, of its last lines; without them, what has
+    /// arrived here.
+    pub(crate) fn catch_up(&self, lines: Option<Vec<LogRecord>>) {
+        self.change(|state| state.catch_up(lines));
     }
 
     /// Adds a line of the log; `lost` lines before it could not be kept.
@@ -205,7 +223,33 @@ impl State {
             .sum()
     }
 
+    /// Adds those of the simulator's last lines that are not known, and then those that were held and are newer.
+    fn catch_up(&mut self, lines: Option<Vec<LogRecord>>) {
+        let held = self.held_lines.take().unwrap_or_default();
+        let lines = lines.unwrap_or_default();
+        let is_told = held.iter().rposition(|(line, _)| lines.contains(line));
+        let newer = is_told.map_or(0, |index| index + 1);
+
+        let last = self.lines.back().map(|line| &line.value);
+        let is_known = lines.iter().rposition(|line| Some(line) == last);
+        let new = is_known.map_or(0, |index| index + 1);
+        for line in lines.into_iter().skip(new) {
+            self.add_line(line, 0);
+        }
+        for (line, lost) in held.into_iter().skip(newer) {
+            self.add_line(line, lost);
+        }
+    }
+
     fn add_line(&mut self, line: LogRecord, lost: u64) {
+        if let Some(held) = &mut self.held_lines {
+            if held.len() == MAX_LINES {
+                held.pop_front();
+            }
+            held.push_back((line, lost));
+            return;
+        }
+
         let number = self.next_line + lost;
         self.next_line = number + 1;
 
@@ -413,6 +457,7 @@ mod tests {
         assert!(take_new(&feed, &mut cursor).is_empty());
 
         feed.set_present(true);
+        feed.catch_up(None);
         feed.put_frame(frame(1));
         feed.add_line(line(1), 0);
 
@@ -462,6 +507,62 @@ mod tests {
 
         let new = take_new(&feed, &mut cursor);
         assert_eq!(flights(&new[0]).len(), 1);
+    }
+
+    fn ticks(messages: &[Value]) -> Vec<u64> {
+        let lines = messages.iter().filter_map(|one| one["lines"].as_array());
+        lines
+            .flatten()
+            .filter_map(|line| line["tick"].as_u64())
+            .collect()
+    }
+
+    #[test]
+    fn lines_before_the_first_that_arrived_are_added_once_and_in_order() {
+        let feed = Feed::new();
+        let mut cursor = Cursor::default();
+        feed.set_present(true);
+        feed.add_line(line(3), 0);
+        assert_eq!(ticks(&take_new(&feed, &mut cursor)), []);
+
+        feed.add_line(line(4), 0);
+        feed.add_line(line(5), 0);
+        let so_far = (1..=4).map(line).collect();
+        feed.catch_up(Some(so_far));
+        feed.add_line(line(6), 0);
+
+        assert_eq!(ticks(&take_new(&feed, &mut cursor)), [1, 2, 3, 4, 5, 6]);
+    }
+
+    #[test]
+    fn a_simulator_that_returns_tells_what_was_missed() {
+        let feed = Feed::new();
+        let mut cursor = Cursor::default();
+        feed.set_present(true);
+        feed.catch_up(Some((1..=4).map(line).collect()));
+        feed.set_present(false);
+        feed.set_present(true);
+        feed.add_line(line(7), 0);
+
+        feed.catch_up(Some((2..=7).map(line).collect()));
+
+        let lines = ticks(&take_new(&feed, &mut cursor));
+        assert_eq!(lines, [1, 2, 3, 4, 5, 6, 7]);
+    }
+
+    #[test]
+    fn without_the_log_so_far_there_is_what_arrived() {
+        let feed = Feed::new();
+        let mut cursor = Cursor::default();
+        feed.set_present(true);
+        for tick in 1..=3000 {
+            feed.add_line(line(tick), 0);
+        }
+
+        feed.catch_up(None);
+
+        let lines = ticks(&take_new(&feed, &mut cursor));
+        assert_eq!(lines.first(), Some(&1001), "what is held is bounded");
     }
 
     #[test]

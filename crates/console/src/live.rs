@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use bus::{Bus, BusError, Declared, Role};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::Keys;
-use protocol::messages::{Command, Control, ControlAnswer};
+use protocol::messages::{Command, Control, ControlAnswer, LogRecord};
 use protocol::{FieldError, Message, RobotName, RunName, decode, encode};
 
 use crate::feed::Feed;
@@ -45,6 +45,8 @@ const MAX_QUEUED_BYTES: usize = 16 << 20;
 enum Sample {
     World(Vec<u8>),
     Log(Vec<u8>),
+    /// The last lines of the log so far, if the simulator has told them.
+    PastLog(Option<Vec<LogRecord>>),
     Panel {
         /// As the key names it.
         robot: String,
@@ -56,6 +58,7 @@ impl Sample {
     fn payload(&self) -> &[u8] {
         match self {
             Self::World(payload) | Self::Log(payload) | Self::Panel { payload, .. } => payload,
+            Self::PastLog(_) => &[],
         }
     }
 }
@@ -311,9 +314,9 @@ impl Live {
     /// Decodes samples until the process ends: `self` owns the sender of the queue.
     fn decode_all(&self, samples: &Receiver<Sample>) {
         for sample in samples {
-            let outcome = self.decode(&sample);
-            self.queued_bytes
-                .fetch_sub(sample.payload().len(), Ordering::Relaxed);
+            let len = sample.payload().len();
+            let outcome = self.decode(sample);
+            self.queued_bytes.fetch_sub(len, Ordering::Relaxed);
 
             if let Err(reason) = outcome {
                 self.ignore(&reason);
@@ -321,11 +324,15 @@ impl Live {
         }
     }
 
-    fn decode(&self, sample: &Sample) -> Result<(), String> {
+    fn decode(&self, sample: Sample) -> Result<(), String> {
         match sample {
-            Sample::World(payload) => self.decode_frame(payload),
-            Sample::Log(payload) => self.decode_line(payload),
-            Sample::Panel { robot, payload } => self.decode_panel(robot, payload),
+            Sample::World(payload) => self.decode_frame(&payload),
+            Sample::Log(payload) => self.decode_line(&payload),
+            Sample::PastLog(lines) => {
+                self.feed.catch_up(lines);
+                Ok(())
+            }
+            Sample::Panel { robot, payload } => self.decode_panel(&robot, &payload),
         }
     }
 
@@ -457,7 +464,7 @@ impl Live {
         }
     }
 
-    /// Requests a frame whenever the simulator appears; returns when there are no viewers.
+    /// Requests the log so far and a frame whenever the simulator appears; returns when there are no viewers.
     fn follow_simulator(&self) {
         loop {
             self.wait(|demand| !demand.has_viewers() || self.feed.is_present());
@@ -465,8 +472,31 @@ impl Live {
                 return;
             }
 
+            if self.feed.lacks_lines() {
+                self.request_log();
+            }
             self.request_frame();
             self.wait(|demand| !demand.has_viewers() || !self.feed.is_present());
+        }
+    }
+
+    /// Queries the lines of the log that were put before this console could receive them.
+    fn request_log(&self) {
+        let lines = match self.query(&Control::Log, REPLY_TIMEOUT) {
+            Ok(ControlAnswer::Log { lines }) => Some(lines),
+            Ok(other) => {
+                tracing::warn!("the log so far is not told: {other:?}");
+                None
+            }
+            Err(error) => {
+                tracing::warn!("the log so far is not told: {error}");
+                None
+            }
+        };
+
+        // After the lines that arrived before the answer. The decoder ends with the process.
+        if self.queue.send(Sample::PastLog(lines)).is_err() {
+            tracing::error!("there is no decoder");
         }
     }
 

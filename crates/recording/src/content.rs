@@ -85,7 +85,7 @@ pub struct TickView<'a> {
 impl TickView<'_> {
     /// The lines of the log about this tick, which are made from its events.
     pub(crate) fn log(&self, header: &Header) -> Vec<LogRecord> {
-        log(self.frame.tick, self.events, header)
+        log(self.frame.tick, self.events, self.wall, header)
     }
 }
 
@@ -111,13 +111,13 @@ impl RecordedTick {
     /// The lines of the log about this tick, which are made from its events.
     #[must_use]
     pub fn log(&self, header: &Header) -> Vec<LogRecord> {
-        log(self.tick(), &self.events, header)
+        log(self.tick(), &self.events, &self.wall, header)
     }
 }
 
-fn log(tick: Tick, events: &[Event], header: &Header) -> Vec<LogRecord> {
+fn log(tick: Tick, events: &[Event], wall: &Wall, header: &Header) -> Vec<LogRecord> {
     let time_s = tick as f64 * header.tick_s;
-    let mut lines = Vec::new();
+    let mut lines = wall.late.clone();
     for event in events {
         lines.extend(event.log_record(header.epoch, tick, time_s));
     }
@@ -149,7 +149,7 @@ impl RawTick {
     /// The lines of the log about this tick.
     #[must_use]
     pub fn log(&self, header: &Header) -> Vec<LogRecord> {
-        log(self.tick(), &self.events, header)
+        log(self.tick(), &self.events, &self.wall, header)
     }
 
     /// Decodes reports and panels.
@@ -299,4 +299,7 @@ pub struct Wall {
     /// Robots for which the clock was held, as people were notified of it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub awaited: Vec<Awaited>,
+    /// Lines of the log about that, which no event has.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub late: Vec<LogRecord>,
 }

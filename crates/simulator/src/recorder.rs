@@ -367,6 +367,8 @@ pub struct Observed {
     pub reports: BTreeMap<RobotName, Instant>,
     /// Robots for which the clock was held.
     pub awaited: Vec<Awaited>,
+    /// Lines of the log about that.
+    pub late: Vec<LogRecord>,
     /// The newest panel of each robot from which one arrived.
     pub panels: BTreeMap<RobotName, Panel>,
 }
@@ -750,6 +752,7 @@ fn wall_times(begun: Instant, observed: &Observed) -> Wall {
             .map(|(robot, arrived)| (robot.clone(), since(*arrived)))
             .collect(),
         awaited: observed.awaited.clone(),
+        late: observed.late.clone(),
     }
 }
 

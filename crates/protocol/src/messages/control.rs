@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::{counted, few, finite, short};
 use super::numbers::{Epoch, Generation, Tick};
+use super::observe::LogRecord;
 use super::point::Point;
 use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
@@ -69,6 +70,8 @@ pub enum Control {
         /// Tick of the order.
         tick: Tick,
     },
+    /// The last lines of the log: answered with [`ControlAnswer::Log`].
+    Log,
     /// Nothing but the status.
     Status,
 }
@@ -100,6 +103,11 @@ pub enum ControlAnswer {
     Done(Box<Status>),
     /// What the run is set up with.
     Setup(Box<SetupAnswer>),
+    /// The last lines of the log, the oldest first.
+    Log {
+        /// The lines. Every line that is put later is newer than these.
+        lines: Vec<LogRecord>,
+    },
     /// Not done.
     Refused {
         /// Why, and what to do about it.
@@ -163,7 +171,14 @@ pub struct LogFile {
     pub name: String,
 }
 
-impl Message for ControlAnswer {}
+impl Message for ControlAnswer {
+    fn check(&self) -> Result<(), FieldError> {
+        match self {
+            Self::Log { lines } => few(lines.len(), "lines"),
+            _ => Ok(()),
+        }
+    }
+}
 
 impl Setup {
     /// Numbers that are numbers and lists that are bounded; whether they make sense is the simulator's to say.

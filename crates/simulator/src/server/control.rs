@@ -48,6 +48,10 @@ impl Server {
                 answer_setup(&query, simulation.scenario());
                 return Ok(());
             }
+            Control::Log => {
+                self.observers.answer_log(&query);
+                return Ok(());
+            }
             Control::Stop => {
                 self.answer_status(&query, simulation);
                 return Err(Interrupt::End(End::Stopped));
@@ -88,6 +92,7 @@ impl Server {
             Control::Init { .. }
             | Control::Load { .. }
             | Control::Setup
+            | Control::Log
             | Control::Step { .. }
             | Control::Stop => {
                 unreachable!("handled by on_control")

@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Publisher};
+use bus::{Bus, BusError, Publisher, Query};
 use protocol::encode;
 use protocol::keys::Keys;
 use protocol::messages::{
-    Awaited, Flight, LogKind, LogRecord, MAX_FLIGHTS, Presence, RobotFrame, Status, WorldFrame,
+    Awaited, ControlAnswer, Flight, LogKind, LogRecord, MAX_ENTRIES, MAX_FLIGHTS, Presence,
+    RobotFrame, Status, WorldFrame,
 };
 use protocol::{Event, RobotName, Tick};
 
@@ -16,10 +17,16 @@ use crate::simulation::Simulation;
 /// Pictures are for eyes: no more often than this.
 pub(super) const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 
+/// Most bytes of texts among the lines of the log that are kept: with escapes and the other fields, all of them fit into one
+/// message.
+const MAX_PAST_BYTES: usize = 128 << 10;
+
 pub(super) struct Observers {
     world: Publisher,
     log: Publisher,
     painted: Instant,
+    /// For observers that come later.
+    past_lines: PastLines,
     /// What became of commands since the last frame.
     flights: VecDeque<Flight>,
 }
@@ -30,6 +37,7 @@ impl Observers {
             world: bus.observer_publisher(&keys.world())?,
             log: bus.observer_publisher(&keys.log())?,
             painted: Instant::now(),
+            past_lines: PastLines::default(),
             flights: VecDeque::new(),
         })
     }
@@ -71,33 +79,45 @@ impl Observers {
         }
     }
 
-    pub(super) fn log(&self, lines: &[LogRecord]) {
+    pub(super) fn log(&mut self, lines: &[LogRecord]) {
+        for line in lines {
+            self.past_lines.add(line);
+        }
         if self.log.has_subscribers() {
             lines.iter().for_each(|line| show(&self.log, encode(line)));
         }
     }
 
-    /// The clock is held: say for whom.
-    pub(super) fn held(&mut self, simulation: &Simulation, status: &Status) {
+    /// Answers an observer that has come later than the first lines of the log.
+    pub(super) fn answer_log(&self, query: &Query) {
+        let lines = self.past_lines.lines.iter().cloned().collect();
+        let answer = ControlAnswer::Log { lines };
+        query.reply(query.key(), encode(&answer));
+    }
+
+    /// The clock is held: say for whom. Returns the line of the log.
+    pub(super) fn held(&mut self, simulation: &Simulation, status: &Status) -> Option<LogRecord> {
         if status.awaiting.is_empty() {
-            return;
+            return None;
         }
         let text = format!(
             "the clock is held at {:.1} s: waiting for {}",
             status.time_s,
             name_all(&status.awaiting)
         );
-        self.late(simulation, &text);
+        let line = self.late(simulation, &text);
         self.frame(simulation, status);
+        Some(line)
     }
 
-    /// The clock goes on.
-    pub(super) fn released(&mut self, simulation: &Simulation, status: &Status) {
-        self.late(simulation, "the clock goes on");
+    /// The clock goes on. Returns the line of the log.
+    pub(super) fn released(&mut self, simulation: &Simulation, status: &Status) -> LogRecord {
+        let line = self.late(simulation, "the clock goes on");
         self.frame(simulation, status);
+        line
     }
 
-    fn late(&self, simulation: &Simulation, text: &str) {
+    fn late(&mut self, simulation: &Simulation, text: &str) -> LogRecord {
         tracing::warn!("{text}");
         let (epoch, tick) = (simulation.epoch(), simulation.tick());
         let (source, kind) = ("simulator".to_owned(), LogKind::Late);
@@ -109,7 +129,27 @@ impl Observers {
             kind,
             text: text.to_owned(),
         };
-        show(&self.log, encode(&line));
+        self.log(std::slice::from_ref(&line));
+        line
+    }
+}
+
+/// The last lines of the log.
+#[derive(Default)]
+struct PastLines {
+    lines: VecDeque<LogRecord>,
+    /// Bytes of their texts.
+    bytes: usize,
+}
+
+impl PastLines {
+    fn add(&mut self, line: &LogRecord) {
+        self.bytes += line.text.len();
+        self.lines.push_back(line.clone());
+        while self.lines.len() > MAX_ENTRIES || self.bytes > MAX_PAST_BYTES {
+            let dropped = self.lines.pop_front();
+            self.bytes -= dropped.map_or(self.bytes, |dropped| dropped.text.len());
+        }
     }
 }
 

@@ -186,6 +186,9 @@ pub struct Server {
     observing: Observing,
 }
 
+/// Most lines about one tick, of those for whom the clock is held, that are recorded: robots can cause any number.
+const MAX_LATE_LINES: usize = 64;
+
 /// What is observed of the tick in progress, for the recording.
 #[derive(Default)]
 struct Observing {
@@ -194,6 +197,8 @@ struct Observing {
     /// The tick of the last report of each robot, and when the first of that tick arrived.
     reports: BTreeMap<RobotName, (Tick, Instant)>,
     awaited: Vec<Awaited>,
+    /// What people were told of the robots for which the clock is held.
+    late: Vec<LogRecord>,
     panels: BTreeMap<RobotName, Panel>,
 }
 
@@ -202,6 +207,12 @@ impl Observing {
         let is_known = self.reports.get(robot).is_some_and(|last| last.0 == tick);
         if self.is_on && !is_known {
             self.reports.insert(robot.clone(), (tick, Instant::now()));
+        }
+    }
+
+    fn late(&mut self, line: LogRecord) {
+        if self.is_on && self.late.len() < MAX_LATE_LINES {
+            self.late.push(line);
         }
     }
 
@@ -217,6 +228,7 @@ impl Observing {
             opened,
             reports,
             awaited: std::mem::take(&mut self.awaited),
+            late: std::mem::take(&mut self.late),
             panels: std::mem::take(&mut self.panels),
         }
     }
@@ -511,7 +523,8 @@ impl Server {
                     Output::Held => self.tell_held(simulation),
                     Output::Released => {
                         let status = self.status(simulation);
-                        self.observers.released(simulation, &status);
+                        let line = self.observers.released(simulation, &status);
+                        self.observing.late(line);
                     }
                     Output::Aborted => return Err(Interrupt::End(End::Aborted)),
                     Output::SetTimer(timer, after) => self.timers.set(timer, after, Instant::now()),
@@ -642,7 +655,9 @@ impl Server {
         if self.observing.is_on {
             self.observing.awaited.clone_from(&status.awaiting);
         }
-        self.observers.held(simulation, &status);
+        if let Some(line) = self.observers.held(simulation, &status) {
+            self.observing.late(line);
+        }
         if let Some(query) = self.pace.give_up_stepping() {
             self.answer_status(&query, simulation);
         }

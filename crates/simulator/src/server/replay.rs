@@ -355,6 +355,7 @@ impl Replay {
         match control {
             Control::Step { n } => self.on_step(n, query),
             Control::Setup => self.answer_setup(&query),
+            Control::Log => self.observers.answer_log(&query),
             Control::Stop => {
                 self.answer_status(&query);
                 return Err(Over);
@@ -402,7 +403,7 @@ impl Replay {
             | Control::FaultsDone { .. } => {
                 return Err(format!("{}: it cannot be changed", self.what_it_is()));
             }
-            Control::Step { .. } | Control::Setup | Control::Stop => {
+            Control::Step { .. } | Control::Setup | Control::Log | Control::Stop => {
                 unreachable!("handled by on_control")
             }
         }
