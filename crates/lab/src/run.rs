@@ -59,6 +59,7 @@ pub(crate) fn observed(local: &Local, opened: Instant) -> Observed {
         opened,
         reports: BTreeMap::new(),
         awaited: Vec::new(),
+        late: Vec::new(),
         panels,
     }
 }

@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use protocol::messages::{
-    Awaited, Cut, End, Panel, Performative, Point, Reason, Report, Variable, Widget,
+    Awaited, Cut, End, LogKind, LogRecord, Panel, Performative, Point, Reason, Report, Variable,
+    Widget,
 };
 use protocol::{Event, RobotName, RunName, Tick};
 use recording::content::Missed;
@@ -134,6 +135,14 @@ fn tick(tick: Tick) -> RecordedTick {
                 name: name("Butler"),
                 since_s: 0.5,
                 because: Reason::Silent,
+            }],
+            late: vec![LogRecord {
+                epoch: 1,
+                tick,
+                time_s: 0.0,
+                source: "simulator".to_owned(),
+                kind: LogKind::Late,
+                text: "the clock is held".to_owned(),
             }],
         },
     }

@@ -140,7 +140,9 @@ impl Observer {
         });
         match decode("control", "simulator", &reply.result.unwrap()).unwrap() {
             ControlAnswer::Done(status) => Ok(*status),
-            ControlAnswer::Setup(setup) => panic!("not asked for: {setup:?}"),
+            other @ (ControlAnswer::Setup(_) | ControlAnswer::Log { .. }) => {
+                panic!("not asked for: {other:?}")
+            }
             ControlAnswer::Refused { explanation, .. } => Err(explanation),
         }
     }

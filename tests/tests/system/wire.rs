@@ -7,8 +7,8 @@ use std::time::Duration;
 use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{
-    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, News, OnLate, Performative,
-    Point, PublicState, Refusal, Report, Status, Welcome,
+    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, LogKind, LogRecord, News, OnLate,
+    Performative, Point, PublicState, Refusal, Report, Status, Welcome,
 };
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
@@ -100,7 +100,9 @@ impl Wire {
             .unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Done(status) => Ok(*status),
-            ControlAnswer::Setup(setup) => panic!("not asked for: {setup:?}"),
+            other @ (ControlAnswer::Setup(_) | ControlAnswer::Log { .. }) => {
+                panic!("not asked for: {other:?}")
+            }
             ControlAnswer::Refused { explanation, .. } => Err(explanation),
         }
     }
@@ -638,13 +640,62 @@ fn more_commands_than_news_hold_are_recorded_as_dropped_and_the_run_goes_on() {
 }
 
 #[test]
+fn the_last_lines_of_the_log_are_told_within_bounds() {
+    let (wire, a, b) = ready("wire-log");
+    let told = || {
+        let request = encode(&Control::Log);
+        let bytes = wire.ask(&wire.keys.control(), "", &request).unwrap();
+        match decode("control", "simulator", &bytes).unwrap() {
+            ControlAnswer::Log { lines } => lines,
+            other => panic!("not asked for: {other:?}"),
+        }
+    };
+    let count = |lines: &[LogRecord], text: &str| -> usize {
+        lines.iter().filter(|line| line.text == text).count()
+    };
+    let is_late = |line: &&LogRecord| line.kind == LogKind::Late;
+    assert!(
+        told()
+            .iter()
+            .any(|line| line.text.starts_with("initialized"))
+    );
+
+    // Many short lines, then a few that are as long as they may be, and longer in JSON.
+    let long = "\"".repeat(4096);
+    let short = (0..6).map(|_| vec!["short".to_owned(); 250]);
+    let ticks: Vec<Vec<String>> = short.chain([vec![long.clone(); 100]]).collect();
+    wire.start();
+    for (tick, log) in (1..).zip(ticks) {
+        let clock = a.clock_of(tick);
+        b.clock_of(clock.tick);
+        if tick == 7 {
+            let lines = told();
+            let late = lines.iter().filter(is_late).count();
+            assert_eq!((lines.len(), count(&lines, "short")), (1024, 1024 - late));
+        }
+        a.put(&Report {
+            log,
+            ..a.report(tick)
+        });
+        b.put(&b.report(tick));
+    }
+
+    a.clock_of(8);
+    let lines = told();
+    let late: usize = lines.iter().filter(is_late).count();
+    assert!(late < 8, "{late} lines about late robots");
+    assert!((31..=32).contains(&count(&lines, &long)));
+    assert_eq!(count(&lines, "short"), 0);
+}
+
+#[test]
 fn malformed_and_impossible_controls_are_refused_with_a_reason() {
     let (wire, ..) = ready("wire-control");
     let raw = |text: &str| {
         let bytes = wire.ask(&wire.keys.control(), "", text.as_bytes()).unwrap();
         match decode("control", "simulator", &bytes).unwrap() {
             ControlAnswer::Refused { explanation, .. } => explanation,
-            ControlAnswer::Done(_) | ControlAnswer::Setup(_) => panic!("accepted: {text}"),
+            other => panic!("{text}: {other:?}"),
         }
     };
 

@@ -82,6 +82,9 @@ export type Control =
       tick: number;
     }
   | {
+      do: "log";
+    }
+  | {
       do: "status";
     };
 /**
@@ -102,6 +105,13 @@ export type ControlAnswer =
   | (SetupAnswer & {
       answer: "setup";
     })
+  | {
+      answer: "log";
+      /**
+       * The lines. Every line that is put later is newer than these.
+       */
+      lines: LogRecord[];
+    }
   | {
       answer: "refused";
       /**
@@ -429,19 +439,6 @@ export interface SetupAnswer {
   setup: Setup;
 }
 /**
- * A field that is wrong, and why.
- */
-export interface FieldError {
-  /**
-   * Path of the field: `command`, `robots.Butler`, `setup.obstacles`.
-   */
-  field: string;
-  /**
-   * What is wrong with it, and what would be right.
-   */
-  reason: string;
-}
-/**
  * One line of the log.
  */
 export interface LogRecord {
@@ -466,6 +463,19 @@ export interface LogRecord {
    * Simulated time, seconds.
    */
   time_s: number;
+}
+/**
+ * A field that is wrong, and why.
+ */
+export interface FieldError {
+  /**
+   * Path of the field: `command`, `robots.Butler`, `setup.obstacles`.
+   */
+  field: string;
+  /**
+   * What is wrong with it, and what would be right.
+   */
+  reason: string;
 }
 /**
  * What a robot chooses to display: data, not code.

@@ -8,8 +8,8 @@ use bus::{Bus, BusError, Declared, Publisher, Query};
 use lockstep::{Barrier, Naming, Outcome, Output, Sent, Stamp, Timing};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Awaited, Clock, Command, CommandText, End, MAX_ENTRIES, Panel, Presence, Reason, Report,
-    Waiting,
+    Awaited, Clock, Command, CommandText, End, LogRecord, MAX_ENTRIES, Panel, Presence, Reason,
+    Report, Waiting,
 };
 use protocol::{Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 

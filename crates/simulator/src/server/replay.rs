@@ -432,7 +432,7 @@ impl Replay {
     }
 
     /// Notes in the log that the lines that follow do not continue those before.
-    fn log_seek(&self) {
+    fn log_seek(&mut self) {
         let header = self.player.header();
         let tick = self.player.tick();
         self.observers.log(&[LogRecord {
