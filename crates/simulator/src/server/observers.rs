@@ -25,6 +25,8 @@ pub(super) struct Observers {
     world: Publisher,
     log: Publisher,
     painted: Instant,
+    /// Whether a tick is complete that no frame has shown.
+    is_owed: bool,
     /// For observers that come later.
     past_lines: PastLines,
     /// What became of commands since the last frame.
@@ -37,6 +39,7 @@ impl Observers {
             world: bus.observer_publisher(&keys.world())?,
             log: bus.observer_publisher(&keys.log())?,
             painted: Instant::now(),
+            is_owed: false,
             past_lines: PastLines::default(),
             flights: VecDeque::new(),
         })
@@ -46,8 +49,15 @@ impl Observers {
         self.world.has_subscribers()
     }
 
-    pub(super) fn is_frame_due(&self) -> bool {
-        self.world.has_subscribers() && self.painted.elapsed() >= FRAME_INTERVAL
+    /// A tick is complete: observers see it, unless another one is complete before it is time for a frame.
+    pub(super) fn owe_frame(&mut self) {
+        self.is_owed = self.world.has_subscribers();
+    }
+
+    /// After how long it is time for the frame that observers are owed; `None` if there is none.
+    pub(super) fn frame_due_in(&self) -> Option<Duration> {
+        let rest = FRAME_INTERVAL.saturating_sub(self.painted.elapsed());
+        self.is_owed.then_some(rest)
     }
 
     pub(super) fn frame(&mut self, simulation: &Simulation, status: &Status) {
@@ -62,6 +72,7 @@ impl Observers {
     /// Puts a frame, with the flights since the one before.
     pub(super) fn put(&mut self, mut frame: WorldFrame) {
         self.painted = Instant::now();
+        self.is_owed = false;
         frame.flights = std::mem::take(&mut self.flights).into();
         show(&self.world, encode(&frame));
     }

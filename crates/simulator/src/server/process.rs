@@ -478,7 +478,7 @@ impl Server {
                 if self.past.is_none()
                     && let Err(patience) = self.pace.take_grant(simulation.scenario().tick_s)
                 {
-                    return Ok(Next::Wait(patience));
+                    return Ok(Next::Wait(self.show_owed(simulation, patience)));
                 }
                 if let Some(underway) = self.order_faults(simulation)? {
                     self.stage = Stage::Faults(underway);
@@ -595,10 +595,27 @@ impl Server {
         if let Some((query, _)) = self.pace.reached(simulation.tick()) {
             self.answer_status(&query, simulation);
         }
-        if self.observers.is_frame_due() {
-            self.observers.frame(simulation, &self.status(simulation));
-        }
+        self.observers.owe_frame();
+        self.show_owed(simulation, None);
         Ok(())
+    }
+
+    /// Shows a tick that observers have not seen, if it is time for a frame. Returns how long to wait at most before looking
+    /// again, at most `patience`.
+    fn show_owed(
+        &mut self,
+        simulation: &Simulation,
+        patience: Option<Duration>,
+    ) -> Option<Duration> {
+        match self.observers.frame_due_in() {
+            None => patience,
+            Some(Duration::ZERO) => {
+                let status = self.status(simulation);
+                self.observers.frame(simulation, &status);
+                patience
+            }
+            Some(rest) => Some(patience.map_or(rest, |patience| patience.min(rest))),
+        }
     }
 
     /// Begins the record of an epoch, or to write that of an epoch that is resumed once more.
