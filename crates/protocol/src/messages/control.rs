@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::{counted, few, finite, short};
+use super::log::LogRecord;
 use super::numbers::{Epoch, Generation, Tick};
-use super::observe::LogRecord;
 use super::point::Point;
 use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};

@@ -2,6 +2,7 @@
 
 mod control;
 mod limits;
+mod log;
 mod numbers;
 mod observe;
 mod performative;
@@ -15,10 +16,11 @@ pub use control::{
     ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
 pub use limits::{MAX_ENTRIES, MAX_TEXT_BYTES};
+pub use log::{LogKind, LogRecord};
 pub use numbers::{Epoch, Generation, Seq, Tick};
 pub use observe::{
-    Cut, Face, Fate, Flight, LogKind, LogRecord, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame,
-    Standing, Tone, Verdict, Widget, WorldFrame,
+    Cut, Face, Fate, Flight, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame, Standing, Tone, Verdict,
+    Widget, WorldFrame,
 };
 pub use performative::Performative;
 pub use point::Point;
