@@ -40,7 +40,7 @@ pub(crate) struct HuntArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
     jobs: Option<u64>,
     /// Kinds of faults that are drawn, for example `lose,crash`; without it all: lose, loss, burst, delay, duplication,
-    /// partition, one-way, crash, wall, crowd.
+    /// partition, one-way, crash, hang, wall, crowd.
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Vec<Kind>,
     /// Longest time of a fault, in simulated time. Walls and crowds are there for the whole run.

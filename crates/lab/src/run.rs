@@ -70,8 +70,8 @@ fn wait_until(begun: Instant, due_s: f64) {
     std::thread::sleep(due.saturating_sub(begun.elapsed()));
 }
 
-/// Plays a scenario to its end in this process and calls `each` after every tick and after the end of the run. Crashes of the
-/// scenario's `[[fault]]` are played; the record is that of a launch.
+/// Plays a scenario to its end in this process and calls `each` after every tick and after the end of the run. Crashes and hangs
+/// of the scenario's `[[fault]]` are played; the record is that of a launch.
 ///
 /// # Errors
 /// As [`execute`], the first error of `each`, and for a fault that needs a process ([`check_faults`]).
@@ -163,7 +163,7 @@ impl Local {
         })
     }
 
-    /// Carries out the crashes that the scenario has for the time before the next tick, their ends, and restarts.
+    /// Carries out the crashes and hangs that the scenario has for the time before the next tick, their ends, and restarts.
     ///
     /// # Errors
     /// If a robot that comes back is of a class that cannot run in this process.
@@ -182,10 +182,10 @@ impl Local {
             .note_faults(&orders, |robot| lateness.of(robot));
 
         for order in orders {
-            if order.begins {
-                self.robots.crash(&order.robot);
-            } else {
-                self.start(&order.robot, run, maker)?;
+            match (order.begins, order.kind) {
+                (true, FaultKind::Hang) => self.robots.hang(&order.robot, lateness.lose_after),
+                (true, _) => self.robots.crash(&order.robot),
+                (false, _) => self.start(&order.robot, run, maker)?,
             }
         }
         for robot in self.simulation.restarts_due() {
@@ -195,7 +195,7 @@ impl Local {
         Ok(())
     }
 
-    /// Starts a robot that has crashed, as a further incarnation.
+    /// Starts a robot that is stopped, as a further incarnation.
     fn start(&mut self, name: &RobotName, run: &RunName, maker: Maker) -> miette::Result<()> {
         let scenario = self.simulation.scenario();
         let mut robots = make_robots_by(scenario, Path::new("the scenario"), maker)?;
@@ -209,8 +209,8 @@ impl Local {
     }
 }
 
-/// Checks that the faults of a scenario that begin after a tick can be played without processes: crashes without which the
-/// clock goes on, and that end by simulated time or not at all.
+/// Checks that the faults of a scenario that begin after a tick can be played without processes: crashes and hangs
+/// without which the clock goes on, and that end by simulated time or not at all.
 ///
 /// # Errors
 /// If there is another fault.
@@ -219,10 +219,11 @@ pub fn check_faults(scenario: &Scenario, after: Tick) -> miette::Result<()> {
     for fault in scenario.faults.iter().chain(changed) {
         let is_simulated = !matches!(fault.end, FaultEnd::After(_));
         let goes_on = scenario.lateness.of(&fault.robot) == OnLate::Continue;
-        let is_played = fault.kind == FaultKind::Crash && is_simulated && goes_on;
+        let is_absence = matches!(fault.kind, FaultKind::Crash | FaultKind::Hang);
+        let is_played = is_absence && is_simulated && goes_on;
         if fault.at > after && !is_played {
             return Err(miette!(
-                help = "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash with `until`, under \
+                help = "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash or hang with `until`, under \
                         on_late = \"continue\", can be played without a process",
                 "the fault of {} at tick {} needs a process of its own",
                 fault.robot,

@@ -29,8 +29,8 @@ pub struct LocalHost {
     names: Vec<RobotName>,
     seats: Vec<Seat>,
     participants: Vec<LocalParticipant>,
-    /// Indices of the robots that have crashed and are not back.
-    crashed: BTreeSet<usize>,
+    /// Indices of the robots that are stopped and are not back.
+    stopped: BTreeSet<usize>,
     patience: Patience,
 }
 
@@ -106,7 +106,7 @@ impl LocalHost {
             names,
             seats,
             participants,
-            crashed: BTreeSet::new(),
+            stopped: BTreeSet::new(),
             patience,
         }
     }
@@ -114,21 +114,33 @@ impl LocalHost {
     /// Crashes a robot between two ticks: the clock goes on without it, as without a process that was killed under
     /// `on_late = "continue"`. Without effect on a robot that is not of the roster.
     pub fn crash(&mut self, name: &RobotName) {
+        self.stop(name, FaultKind::Crash, 1);
+        self.barrier.token(name, false, &mut self.outputs);
+        self.outputs.clear();
+    }
+
+    /// Hangs a robot between two ticks, as a process that is stopped under `on_late = "continue"`: it misses ticks, and is lost
+    /// after `lose_after` of them. Without effect on a robot that is not of the roster.
+    pub fn hang(&mut self, name: &RobotName, lose_after: u32) {
+        self.stop(name, FaultKind::Hang, lose_after);
+    }
+
+    fn stop(&mut self, name: &RobotName, fault: FaultKind, lose_after: u32) {
         let Some(index) = self.index(name) else {
             return;
         };
 
         let mut lateness = self.barrier.lateness().clone();
         lateness.own.insert(name.clone(), OnLate::Continue);
+        lateness.lose_after = lose_after;
         self.barrier.set_lateness(lateness, &mut self.outputs);
-        self.barrier.fault(name, Some(FaultKind::Crash));
-        self.barrier.token(name, false, &mut self.outputs);
+        self.barrier.fault(name, Some(fault));
         self.outputs.clear();
-        self.crashed.insert(index);
+        self.stopped.insert(index);
     }
 
-    /// Brings a crashed robot back between two ticks, as a further incarnation that takes over from the state that it reported
-    /// last. `welcome` is called with the number of that incarnation; it returns `None` for a robot that is not of the roster.
+    /// Brings a robot back that is stopped, between two ticks, as a further incarnation that takes over from the state that it
+    /// reported last. `welcome` is called with the number of that incarnation; it returns `None` for a robot that is not of the roster.
     pub fn bring_back(
         &mut self,
         name: &RobotName,
@@ -138,12 +150,14 @@ impl LocalHost {
         let Some(index) = self.index(name) else {
             return;
         };
-        if !self.crashed.contains(&index) {
+        if !self.stopped.contains(&index) {
             return;
         }
 
         let next = self.barrier.presence(name).0 + 1;
         let instance = format!("local {next}");
+        // Its predecessor is not there any more, and the fault is over only after that: it decides nothing by itself.
+        self.barrier.token(name, false, &mut self.outputs);
         self.barrier.fault(name, None);
         let admission = self
             .barrier
@@ -160,15 +174,15 @@ impl LocalHost {
         self.outputs.clear();
         self.participants[index] = participant;
         self.seats[index] = Seat::new(robot, welcome);
-        self.crashed.remove(&index);
+        self.stopped.remove(&index);
     }
 
-    /// The panel of every robot that has not crashed.
+    /// The panel of every robot that is not stopped.
     #[must_use]
     pub fn panels(&self) -> BTreeMap<RobotName, Panel> {
         let mut panels = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            if !self.crashed.contains(&index) {
+            if !self.stopped.contains(&index) {
                 panels.insert(name.clone(), self.seats[index].panel());
             }
         }
@@ -189,7 +203,7 @@ impl LocalHost {
             let mut actions: Vec<LocalAction> = Vec::new();
             for (name, naming) in to {
                 let index = self.names.iter().position(|own| *own == name);
-                let index = index.filter(|index| !self.crashed.contains(index));
+                let index = index.filter(|index| !self.stopped.contains(index));
                 if let Some(index) = index {
                     // Robots that share a flag all get news, also those for which nothing is new.
                     let news = news.remove(&name).unwrap_or_default();
@@ -198,7 +212,7 @@ impl LocalHost {
                 }
             }
             for (index, participant) in self.participants.iter_mut().enumerate() {
-                if self.crashed.contains(&index) {
+                if self.stopped.contains(&index) {
                     continue;
                 }
                 participant.clock(clock, &mut actions);
@@ -261,7 +275,7 @@ impl Exchange<News, Arc<Report>, CommandText> for LocalHost {
         self.barrier.open(tick, with_news, &mut self.outputs);
         let complete_at_once = self.take_outcome();
         if let Some(outcome) = complete_at_once {
-            // A run without robots, or all of them have crashed.
+            // A run without robots, or all of them are stopped.
             self.outputs.clear();
             return Ok(outcome);
         }

@@ -687,13 +687,20 @@ fn every_documented_behavior_has_its_test() {
     assert_eq!(found, (1..=25).collect());
 }
 
-/// Where an experiment plays a crash, no process ends: what comes of it must be the same.
+/// Where an experiment plays a crash or a hang, no process ends or stops: what comes of it must be the same.
 #[test]
-fn a_crash_in_one_process_gives_the_run_of_a_launch() {
+fn absences_in_one_process_give_the_run_of_a_launch() {
     let lab = Lab::new();
     let changes = [
-        "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"40 s\", until = \"70 s\" }]",
+        // Lost at once, lost after some ticks, not lost, and until after the end of the run.
+        "fault=[\
+         { robot = \"Leguin\", do = \"crash\", at = \"40 s\", until = \"70 s\" }, \
+         { robot = \"Butler\", do = \"hang\", at = \"50 s\", until = \"60 s\" }, \
+         { robot = \"Leguin\", do = \"hang\", at = \"80 s\", until = \"81 s\" }, \
+         { robot = \"Butler\", do = \"hang\", at = \"90 s\", until = \"90.5 s\" }, \
+         { robot = \"Leguin\", do = \"hang\", at = \"110 s\", until = \"200 s\" }]",
         "on_late=continue",
+        "lose_after=3",
         "deadline=10 s",
         "duration=120 s",
     ];
@@ -724,7 +731,8 @@ fn a_crash_in_one_process_gives_the_run_of_a_launch() {
     for event in &mut launched {
         event.as_object_mut().unwrap().remove("seal");
     }
-    assert!(events.iter().any(|event| event["event"] == "lost"));
+    let count = |kind: &str| events.iter().filter(|event| event["event"] == kind).count();
+    assert_eq!((count("lost"), count("joined")), (3, 6));
     assert_eq!(events.len(), launched.len());
     for (event, launched) in events.iter().zip(&launched) {
         assert_eq!(event, launched);

@@ -72,7 +72,7 @@ impl Case {
             match fault {
                 PlannedFault::Channel { .. } => channels.push(fault),
                 PlannedFault::Crowd { guests: count } => guests = Some(*count),
-                PlannedFault::Crash { robot, .. } => {
+                PlannedFault::Absence { robot, .. } => {
                     set(&format!("robot.{robot}.on_late"), "continue".into())?;
                     entries.add(fault, tick_s);
                 }
@@ -141,9 +141,9 @@ impl Entries {
                 ("one_way", (*one_way).into()),
                 ("cuts", texts(cuts.iter().map(|of| of.name()))),
             ])),
-            PlannedFault::Crash { robot, span } => self.faults.push(table([
+            PlannedFault::Absence { robot, why, span } => self.faults.push(table([
                 ("robot", robot.to_string().into()),
-                ("do", "crash".into()),
+                ("do", why.name().into()),
                 ("at", seconds(span.from, tick_s).into()),
                 ("until", seconds(span.until, tick_s).into()),
             ])),

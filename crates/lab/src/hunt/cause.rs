@@ -24,8 +24,8 @@ pub enum Sign {
         /// The text.
         text: String,
     },
-    /// This robot crashes.
-    Crashed(RobotName),
+    /// This robot takes no part for a time.
+    Absent(RobotName),
     /// There is a fault of this kind.
     Fault(Kind),
 }
@@ -42,8 +42,8 @@ impl Cause {
                         sent.find(|message| message.link == *link && message.number == *number);
                     signs.extend(message.map(lost));
                 }
-                PlannedFault::Crash { robot, .. } => {
-                    signs.insert(Sign::Crashed(robot.clone()));
+                PlannedFault::Absence { robot, .. } => {
+                    signs.insert(Sign::Absent(robot.clone()));
                 }
                 other => {
                     signs.insert(Sign::Fault(other.kind()));

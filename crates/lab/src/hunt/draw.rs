@@ -8,7 +8,7 @@ use protocol::{RobotName, Tick};
 use simulator::Scenario;
 use simulator::scenario::MAX_GUESTS;
 
-use super::fault::{Effect, Kind, Link, Messages, PlannedFault, Span};
+use super::fault::{Absence, Effect, Kind, Link, Messages, PlannedFault, Span};
 use super::trial::Played;
 
 /// Most faults of a plan.
@@ -76,7 +76,7 @@ impl Ground {
             | Kind::Duplication
             | Kind::Partition
             | Kind::OneWay => self.roster.len() > 1,
-            Kind::Crash => !self.roster.is_empty(),
+            Kind::Crash | Kind::Hang => !self.roster.is_empty(),
             Kind::Wall => true,
             Kind::Crowd => self.scenario.guests.count > 0,
         }
@@ -129,11 +129,8 @@ impl Ground {
             }
             Kind::Partition => self.partition(false, chance),
             Kind::OneWay => self.partition(true, chance),
-            Kind::Crash => {
-                let robot = self.roster[below(self.roster.len(), chance)].clone();
-                let span = self.span(chance);
-                PlannedFault::Crash { robot, span }
-            }
+            Kind::Crash => self.absence(Absence::Crash, chance),
+            Kind::Hang => self.absence(Absence::Hang, chance),
             Kind::Wall => self.wall(chance),
             Kind::Crowd => {
                 let count = self.scenario.guests.count;
@@ -179,6 +176,12 @@ impl Ground {
             effect,
             span: self.span(chance),
         }
+    }
+
+    fn absence(&self, why: Absence, chance: &mut Stream) -> PlannedFault {
+        let robot = self.roster[below(self.roster.len(), chance)].clone();
+        let span = self.span(chance);
+        PlannedFault::Absence { robot, why, span }
     }
 
     /// A partition of one robot from the others, or of two halves.

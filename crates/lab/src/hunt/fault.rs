@@ -27,6 +27,8 @@ pub enum Kind {
     OneWay,
     /// A robot crashes and comes back.
     Crash,
+    /// A robot hangs for a time.
+    Hang,
     /// A row of obstacles stands in the way.
     Wall,
     /// There are more guests.
@@ -35,7 +37,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Lose,
         Self::Loss,
         Self::Burst,
@@ -44,6 +46,7 @@ impl Kind {
         Self::Partition,
         Self::OneWay,
         Self::Crash,
+        Self::Hang,
         Self::Wall,
         Self::Crowd,
     ];
@@ -60,6 +63,7 @@ impl Kind {
             Self::Partition => "partition",
             Self::OneWay => "one-way",
             Self::Crash => "crash",
+            Self::Hang => "hang",
             Self::Wall => "wall",
             Self::Crowd => "crowd",
         }
@@ -130,6 +134,26 @@ pub enum Effect {
     Duplication(u64),
 }
 
+/// Why a robot takes no part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Absence {
+    /// Its process is killed, and starts again.
+    Crash,
+    /// Its process stands still, and goes on.
+    Hang,
+}
+
+impl Absence {
+    /// Its name in scenario files.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Crash => "crash",
+            Self::Hang => "hang",
+        }
+    }
+}
+
 /// A fault of a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "fault", rename_all = "snake_case")]
@@ -165,10 +189,12 @@ pub enum PlannedFault {
         /// When.
         span: Span,
     },
-    /// A robot crashes, and is back at the end of the time.
-    Crash {
+    /// A robot takes no part, and is back at the end of the time.
+    Absence {
         /// The robot.
         robot: RobotName,
+        /// Whether it crashes or hangs.
+        why: Absence,
         /// When.
         span: Span,
     },
@@ -198,7 +224,10 @@ impl PlannedFault {
             },
             Self::Partition { one_way: true, .. } => Kind::OneWay,
             Self::Partition { .. } => Kind::Partition,
-            Self::Crash { .. } => Kind::Crash,
+            Self::Absence { why, .. } => match why {
+                Absence::Crash => Kind::Crash,
+                Absence::Hang => Kind::Hang,
+            },
             Self::Wall { .. } => Kind::Wall,
             Self::Crowd { .. } => Kind::Crowd,
         }
@@ -210,7 +239,7 @@ impl PlannedFault {
         let is_gone = match self {
             Self::Lose { link, .. } => has(link),
             Self::Channel { link, .. } => link.as_ref().is_some_and(has),
-            Self::Crash { robot: own, .. } => own == robot,
+            Self::Absence { robot: own, .. } => own == robot,
             Self::Partition { .. } | Self::Wall { .. } | Self::Crowd { .. } => false,
         };
         if is_gone {
@@ -262,8 +291,12 @@ impl PlannedFault {
                     format!("no {cuts} pass between {one} and {other}, {span}")
                 }
             }
-            Self::Crash { robot, span } => {
-                format!("{robot} is crashed, {}", span.in_words(tick_s))
+            Self::Absence { robot, why, span } => {
+                let state = match why {
+                    Absence::Crash => "is crashed",
+                    Absence::Hang => "hangs",
+                };
+                format!("{robot} {state}, {}", span.in_words(tick_s))
             }
             Self::Wall { at } => {
                 let mut places = Vec::new();

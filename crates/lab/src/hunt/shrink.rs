@@ -313,10 +313,13 @@ fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
             }
         }
         PlannedFault::Partition { .. } => all = weaker_partitions(fault),
-        PlannedFault::Crash { robot, span } => {
+        PlannedFault::Absence { robot, why, span } => {
             for span in shorter(*span) {
-                let robot = robot.clone();
-                all.push(PlannedFault::Crash { robot, span });
+                all.push(PlannedFault::Absence {
+                    robot: robot.clone(),
+                    why: *why,
+                    span,
+                });
             }
         }
         PlannedFault::Wall { at } => {
@@ -421,7 +424,7 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::super::fault::Link;
+    use super::super::fault::{Absence, Link};
     use super::super::trial::{Failure, SentMessage};
     use super::*;
 
@@ -453,7 +456,7 @@ mod tests {
             match fault {
                 PlannedFault::Lose { number, .. } => _ = numbers.insert(*number),
                 // Any other fault loses the messages 0 to 9 while it lasts.
-                PlannedFault::Crash { span, .. } => {
+                PlannedFault::Absence { span, .. } => {
                     numbers.extend((0..10).filter(|n| (span.from..span.until).contains(n)));
                 }
                 _ => {}
@@ -557,8 +560,9 @@ mod tests {
     #[test]
     fn a_crash_becomes_the_message_that_it_lost() {
         let trial = Synthetic::of(&[&[7]]);
-        let crash = PlannedFault::Crash {
+        let crash = PlannedFault::Absence {
             robot: RobotName::new("A").unwrap(),
+            why: Absence::Crash,
             span: Span { from: 2, until: 9 },
         };
         let result = shrunk(&trial, Case::of(vec![lose(1), crash]), 10_000, 2);
@@ -572,7 +576,7 @@ mod tests {
             fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
                 let mut played = Played::default();
                 for fault in &case.faults {
-                    if let PlannedFault::Crash { span, .. } = fault
+                    if let PlannedFault::Absence { span, .. } = fault
                         && span.from <= 55
                         && span.until >= 60
                     {
@@ -587,8 +591,9 @@ mod tests {
             }
         }
 
-        let crash = |from, until| PlannedFault::Crash {
+        let crash = |from, until| PlannedFault::Absence {
             robot: RobotName::new("A").unwrap(),
+            why: Absence::Crash,
             span: Span { from, until },
         };
         let case = Case::of(vec![lose(1), crash(10, 300)]);
