@@ -104,10 +104,13 @@ fn render_contrasts(experiment: &Experiment, contrasts: &[Contrast]) -> tabled::
         };
 
         let value = difference.value * scale;
-        let p = contrast.p_holm;
+        let p = match contrast.p_holm {
+            p if p < 0.001 => "< 0.001".to_owned(),
+            p => format!("{p:.3}"),
+        };
         let n = contrast.n;
         let row = rows.of(&contrast.condition, &contrast.arm);
-        row.push(format!("{value:+.1} {interval}\np {p:.3}, n {n}"));
+        row.push(format!("{value:+.1} {interval}\np {p}, n {n}"));
     }
     table(head, rows.0)
 }
