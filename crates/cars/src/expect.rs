@@ -8,7 +8,6 @@ use config::{Changes, Source};
 use lab::folder::{find, recorded_epoch};
 use lab::judge::judge;
 use lab::table::verdicts;
-use miette::miette;
 use protocol::Epoch;
 use protocol::messages::Verdict;
 use simulator::Scenario;
@@ -42,10 +41,9 @@ pub(crate) fn expect(args: &ExpectArgs) -> miette::Result<ExitCode> {
         None => scenario.expectations.clone(),
     };
     if expected.is_empty() {
-        return Err(miette!(
-            help = "name a file that has [[expect]] with --expectations",
-            "the scenario of the run expects nothing"
-        ));
+        terminal::note(
+            "nothing is expected of the run; --expectations names a file that has [[expect]]",
+        );
     }
 
     let judged = judge(&files, &scenario, &expected)?;

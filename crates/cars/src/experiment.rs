@@ -204,6 +204,13 @@ fn run(args: &RunArgs) -> miette::Result<ExitCode> {
     }
 
     let store = play(&plan, &folder, &args.workers, 0..plan.units())?;
+    if !plan.is_in(&folder)? {
+        return Err(miette!(
+            help = "`cars experiment merge` writes the results of the plan that is there now",
+            "another process has written another plan to {}",
+            folder.display()
+        ));
+    }
     conclude(&Results::of(plan, &store), &folder, args.json)
 }
 

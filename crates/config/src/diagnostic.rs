@@ -128,6 +128,9 @@ fn escaped_with_span(text: &str, span: Range<usize>) -> (String, Range<usize>) {
     (escaped, start..end)
 }
 
+/// Most tables of a file that are looked at to find the one that an error is about.
+const MAX_ENTRIES: usize = 1000;
+
 /// A text and its name.
 #[derive(Debug, Clone)]
 pub struct Source {
@@ -173,8 +176,43 @@ impl Source {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, FileError> {
-        toml::from_str(&self.text)
-            .map_err(|error| FileError::at(self, error.span(), error.message()))
+        toml::from_str(&self.text).map_err(|error: toml::de::Error| {
+            let span = self.entry_of::<T>(&error).or(error.span());
+            FileError::at(self, span, error.message())
+        })
+    }
+
+    /// The head of the entry that an error is about, where the error points to the first entry of a list of tables: a list as a
+    /// whole has the place of its first entry. The entry is the last one of the shortest begin of the text, up to a head, that
+    /// has the same error.
+    fn entry_of<T: serde::de::DeserializeOwned>(
+        &self,
+        error: &toml::de::Error,
+    ) -> Option<Range<usize>> {
+        let start = error.span()?.start;
+        let text = &self.text;
+        let line = text.get(start..)?.lines().next()?;
+        let head = line.trim_end();
+        if !head.starts_with("[[") {
+            return None;
+        }
+
+        let mut place = start + line.len();
+        let mut entry = start..start + head.len();
+        for _ in 0..MAX_ENTRIES {
+            let next = text.get(place..)?.find("\n[")?;
+            let end = place + next + 1;
+            let begin = toml::from_str::<T>(&text[..end]);
+            if begin.is_err_and(|found| found.message() == error.message()) {
+                break;
+            }
+            let line = text[end..].lines().next()?;
+            if line.starts_with(head) {
+                entry = end..end + head.len();
+            }
+            place = end + 1;
+        }
+        Some(entry)
     }
 }
 

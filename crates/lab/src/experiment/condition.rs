@@ -98,6 +98,9 @@ pub enum ConditionError {
         "{0} and {1} make the same changes: `set` contains `{{value}}`, or `{{until}}` of a factor with `begins`"
     )]
     Same(Value, Value),
+    /// A change of what the experiment says itself.
+    #[error("`{0}` would have no effect: `seeds` and `duration` of the experiment say it")]
+    Own(Override),
     /// Two changes that are made together set the same value.
     #[error("`{0}` and `{1}` set the same value: an experiment sets each value in one place")]
     Overlap(Override, Override),
@@ -239,8 +242,14 @@ pub(super) fn check_apart(one: &[Condition], other: &[Condition]) -> Result<(), 
     Ok(())
 }
 
-/// Checks that a change sets something else than these.
+/// What the experiment says of every run.
+pub(super) const OWN_OPTIONS: [&str; 2] = ["seed", "duration"];
+
+/// Checks that a change sets something else than these, and than the experiment.
 pub(super) fn check_change(change: &Override, others: &[Override]) -> Result<(), ConditionError> {
+    if OWN_OPTIONS.contains(&change.top()) {
+        return Err(ConditionError::Own(change.clone()));
+    }
     let overridden = others.iter().find(|other| other.overlaps(change));
     match overridden {
         Some(other) => Err(ConditionError::Overlap(other.clone(), change.clone())),

@@ -26,6 +26,8 @@ pub const MAX_UNITS: u64 = 1_000_000;
 const MAX_FACTORS: usize = 8;
 /// Most values of a factor.
 const MAX_VALUES: usize = 1_000;
+/// Most bytes of a text for people.
+const MAX_TEXT_BYTES: usize = 2_000;
 /// Most measures.
 const MAX_MEASURES: usize = 200;
 /// Keys of results that are no measure and no factor.
@@ -265,6 +267,35 @@ impl Experiment {
         Ok(scenario)
     }
 
+    /// Bounds the texts for people, which every report has.
+    fn check_texts(&self) -> Result<(), FileError> {
+        let mut texts = vec![
+            ("`question`".to_owned(), self.question.as_str()),
+            ("`procedure`".to_owned(), self.procedure.as_str()),
+        ];
+        for arm in &self.arms {
+            texts.push((format!("`what` of the arm \"{}\"", arm.name), &arm.what));
+        }
+        for condition in &self.conditions.named {
+            let name = format!("`what` of the condition \"{}\"", condition.name);
+            texts.push((name, &condition.what));
+        }
+        for measure in &self.measures {
+            let what = measure.what.as_deref().unwrap_or_default();
+            texts.push((format!("`what` of the measure \"{}\"", measure.name), what));
+        }
+
+        for (name, text) in texts {
+            if text.len() > MAX_TEXT_BYTES {
+                let bytes = text.len();
+                let reason =
+                    format!("{name} has {bytes} bytes, more than the {MAX_TEXT_BYTES} allowed");
+                return Err(FileError::at(&self.source, None, &reason));
+            }
+        }
+        Ok(())
+    }
+
     fn check_robots(&self, scenario: &Scenario) -> Result<(), FileError> {
         let roster: Vec<String> = scenario.roster().iter().map(ToString::to_string).collect();
         for measure in &self.measures {
@@ -353,7 +384,7 @@ impl RawExperiment {
             expectations.push(expectation.into_inner());
         }
 
-        Ok(Experiment {
+        let experiment = Experiment {
             question: self.question,
             procedure: self.procedure,
             scenario: folder.join(self.scenario.into_inner()),
@@ -366,7 +397,9 @@ impl RawExperiment {
             baseline: baseline.transpose()?,
             arms,
             source,
-        })
+        };
+        experiment.check_texts()?;
+        Ok(experiment)
     }
 }
 

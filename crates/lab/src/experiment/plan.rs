@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use simulator::Scenario;
 use xxhash_rust::xxh3::Xxh3;
 
-use super::condition::Condition;
+use super::condition::{Condition, OWN_OPTIONS};
 use super::file::{Arm, Experiment};
 use super::script;
 use crate::export::draft::{Draft, unwritable};
@@ -22,9 +22,6 @@ use crate::export::draft::{Draft, unwritable};
 pub const PLAN: &str = "plan.json";
 /// The experiment file as it was planned, for people.
 const FILE: &str = "experiment.toml";
-
-/// What the options of an experiment set, instead of a change of the scenario.
-const OWN_OPTIONS: [&str; 2] = ["seed", "duration"];
 
 /// An experiment and what its options change.
 #[derive(Debug, Clone)]
@@ -338,6 +335,14 @@ impl Plan {
         Ok(())
     }
 
+    /// Whether the plan in the folder is this one.
+    ///
+    /// # Errors
+    /// If the plan that is there cannot be read.
+    pub fn is_in(&self, folder: &Path) -> miette::Result<bool> {
+        Ok(read(folder)?.is_some_and(|there| there == self.written))
+    }
+
     /// What of the plan that was in the folder before has changed, so that its units are played again: a sentence each.
     ///
     /// # Errors
@@ -522,7 +527,10 @@ impl LaunchText {
     /// [`FileError`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let source = Source::read(path)?;
-        let folder = std::path::absolute(path.parent().unwrap_or(Path::new("")))
+        // Of a bare name the parent is an empty path, which is none for the operating system.
+        let file = std::path::absolute(path);
+        let folder = file
+            .map(|file| file.parent().unwrap_or(Path::new("/")).to_owned())
             .map_err(|error| FileError::unreadable(path, &error))?;
         Ok(Self {
             folder,

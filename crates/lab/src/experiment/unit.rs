@@ -14,7 +14,7 @@ use super::follow::{Ended, Follow};
 use super::plan::{Plan, Robots, Unit};
 use super::processes::{self, Launcher};
 use super::script::Script;
-use crate::run::{check_faults, make_robots, play};
+use crate::run::{Local, check_faults, make_robots, play};
 
 /// The run of a unit, of which nothing is recorded.
 const RUN: &str = "experiment";
@@ -38,10 +38,10 @@ pub struct Played {
 struct Gauge<'a>(Vec<(&'a str, Probe<'a>)>);
 
 impl Plan {
-    /// Checks that every arm can be played under every condition.
+    /// Checks that every arm can be played under every condition: its robots begin with their parameters.
     ///
     /// # Errors
-    /// If a scenario has robots or faults that need processes, and there are none.
+    /// If a scenario has robots or faults that need processes, and there are none, or a robot refuses its parameters.
     pub fn check(&self) -> miette::Result<()> {
         if *self.robots() != Robots::InProcess {
             return Ok(());
@@ -53,8 +53,26 @@ impl Plan {
             let scenario = self.scenario(cell, seed, Vec::new())?;
             check_faults(&scenario, 0)?;
             make_robots(&scenario, &self.experiment.scenario)?;
+            self.begin(cell, scenario)?;
         }
         Ok(())
+    }
+
+    /// Plays tick 0 of a cell.
+    fn begin(&self, cell: usize, scenario: Scenario) -> miette::Result<()> {
+        let run = RunName::new(RUN).into_diagnostic()?;
+        let begun = caught(|| {
+            let mut local = Local::new(scenario, &run)?;
+            local.simulation.init(&mut local.robots).into_diagnostic()?;
+            Ok(())
+        });
+        begun.map_err(|reason| {
+            let arms = &self.experiment.arms;
+            let arm = &arms[cell % arms.len()].name;
+            let condition = &self.conditions()[cell / arms.len()].name;
+            let file = &self.experiment.source().name;
+            miette!("{file}: arm \"{arm}\", condition \"{condition}\": {reason}")
+        })
     }
 
     /// Plays a unit and takes its measures. A robot that panics is the failure of its unit.
@@ -84,7 +102,8 @@ impl Plan {
 
     fn measure(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> miette::Result<Played> {
         let condition_s = unit.condition.time_s;
-        let condition_s = condition_s.unwrap_or((0.0, self.experiment.duration_s));
+        // Where it lasts for the whole run there is no time after it, not even the last tick.
+        let condition_s = condition_s.unwrap_or((0.0, f64::INFINITY));
         let mut gauge = Gauge(Vec::new());
         for measure in &self.experiment.measures {
             let probe = Probe::new(measure, condition_s);
@@ -156,10 +175,10 @@ impl Follow for Gauge<'_> {
 }
 
 /// What comes of a unit, whose robots may panic.
-fn caught(measure: impl FnOnce() -> miette::Result<Played>) -> Result {
+fn caught<T>(measure: impl FnOnce() -> miette::Result<T>) -> std::result::Result<T, String> {
     // Nothing that it has changed is used after a panic.
     match std::panic::catch_unwind(AssertUnwindSafe(measure)) {
-        Ok(Ok(played)) => Ok(played),
+        Ok(Ok(done)) => Ok(done),
         Ok(Err(error)) => Err(in_words(&error)),
         Err(panic) => Err(format!("a robot panicked: {}", message_of(panic.as_ref()))),
     }
@@ -191,15 +210,15 @@ mod tests {
     #[test]
     fn a_panic_is_the_reason_of_a_failure() {
         assert_eq!(
-            caught(|| panic!("no way out")),
+            caught::<()>(|| panic!("no way out")),
             Err("a robot panicked: no way out".to_owned())
         );
         let number = 7;
         assert_eq!(
-            caught(|| panic!("{number} ways out")),
+            caught::<()>(|| panic!("{number} ways out")),
             Err("a robot panicked: 7 ways out".to_owned())
         );
         let error = miette!("inner").wrap_err("outer");
-        assert_eq!(caught(|| Err(error)), Err("outer: inner".to_owned()));
+        assert_eq!(caught::<()>(|| Err(error)), Err("outer: inner".to_owned()));
     }
 }

@@ -66,7 +66,8 @@ pub struct LogRank {
 pub struct RestrictedMeans {
     arm: Vec<(usize, TimeTo)>,
     baseline: Vec<(usize, TimeTo)>,
-    /// Up to which time the means count, seconds: the shorter one of the longest times of the arms.
+    /// Up to which time the means count, seconds: as far as both curves are known. The curve of an arm all of whose longest
+    /// times are those of events is at zero from then on.
     pub until_s: f64,
 }
 
@@ -189,8 +190,10 @@ impl RestrictedMeans {
     /// Pairs of times: those of the arm, and those of the baseline with the same seeds, in the same order.
     #[must_use]
     pub fn of_pairs(arm: &[TimeTo], baseline: &[TimeTo]) -> Self {
+        let longest_s = longest_s(arm).max(longest_s(baseline));
+        let until_s = known_until_s(arm).min(known_until_s(baseline));
         Self {
-            until_s: longest_s(arm).min(longest_s(baseline)),
+            until_s: until_s.min(longest_s),
             arm: sorted_with_indices(arm),
             baseline: sorted_with_indices(baseline),
         }
@@ -264,6 +267,17 @@ fn falls_to_half(curve: &[SurvivalStep], end: impl Fn(&SurvivalStep) -> f64) -> 
 
 fn longest_s(times: &[TimeTo]) -> f64 {
     times.iter().map(|time| time.time_s).fold(0.0, f64::max)
+}
+
+/// Up to which time a curve is known, seconds: without an end if it reaches zero.
+fn known_until_s(times: &[TimeTo]) -> f64 {
+    let longest_s = longest_s(times);
+    let is_open = |time: &TimeTo| time.time_s >= longest_s && !time.is_event;
+    if times.iter().any(is_open) {
+        longest_s
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// The times in their order, each with its index in the sample. Events come first at the time at which a run is censored.
@@ -345,6 +359,32 @@ mod tests {
             ],
             &[],
         )
+    }
+
+    #[test]
+    fn restricted_means_count_as_far_as_both_curves_are_known() {
+        let events = |times: &[f64]| -> Vec<TimeTo> {
+            let times = times.iter();
+            times
+                .map(|time_s| TimeTo {
+                    time_s: *time_s,
+                    is_event: true,
+                })
+                .collect()
+        };
+        let fast = events(&[10.0, 20.0, 30.0]);
+        let slow = events(&[10.0, 100.0, 190.0]);
+        let means = RestrictedMeans::of_pairs(&fast, &slow);
+        assert_eq!(means.until_s, 190.0);
+        assert!((means.difference_s(&[0, 1, 2]) + 80.0).abs() < 1e-9);
+
+        // Of the last run of the other arm it is not known when it would have had the event.
+        let mut cut = slow.clone();
+        cut[2].is_event = false;
+        assert_eq!(RestrictedMeans::of_pairs(&fast, &cut).until_s, 190.0);
+        let mut cut = fast.clone();
+        cut[2].is_event = false;
+        assert_eq!(RestrictedMeans::of_pairs(&cut, &slow).until_s, 30.0);
     }
 
     #[test]

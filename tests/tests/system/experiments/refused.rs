@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use system_tests::Lab;
+use system_tests::{Lab, root};
 
 use super::{cars, yoked};
 
@@ -96,4 +96,32 @@ fn cars_check_reads_experiments() {
         .filter(|word| *word != "│")
         .collect();
     assert!(words.join(" ").contains("condition \"crash\""), "{text}");
+}
+
+/// What only the robots know is refused before anything runs, too.
+#[test]
+fn parameters_that_a_robot_refuses_are_refused_before_anything_runs() {
+    let lab = Lab::new();
+    let out = lab.out().join("results");
+    for (set, reason) in [
+        ("robot.Butler.params.cauton=0.5", "cauton"),
+        ("robot.Butler.params.policy=angry", "angry"),
+        ("robot.Butler.params.treat_mean_s=-1 s", "treat_mean_s"),
+    ] {
+        let file = lab.write(
+            "wrong.toml",
+            &format!(
+                "question = '?'\nscenario = '{}'\nduration = '60 s'\nseeds = 2\n\
+                 [[arm]]\nname = 'right'\n[[arm]]\nname = 'wrong'\nset = ['{set}']\n\
+                 [[measure]]\nname = 'ticks'\nsummary = 'ticks'\n",
+                root().join("configs/hors_doeuvres.toml").display()
+            ),
+        );
+        let args = ["run", file.to_str().unwrap(), "-o", out.to_str().unwrap()];
+        let (code, notes) = cars(&args);
+        assert_eq!(code, 1, "{notes}");
+        assert!(notes.contains("arm \"wrong\""), "{notes}");
+        assert!(notes.contains(reason), "{notes}");
+        assert!(!out.exists(), "{notes}");
+    }
 }

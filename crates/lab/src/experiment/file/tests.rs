@@ -106,7 +106,31 @@ fn seeds_are_a_count_a_list_or_a_range() {
 /// A file with one mistake: what of [`GOOD`] is replaced, by what, what the line of the error contains, and its reason.
 type Wrong<'a> = (&'a str, &'a str, &'a str, &'a str);
 
-const WRONG: [Wrong<'_>; 53] = [
+const WRONG: [Wrong<'_>; 57] = [
+    (
+        "robot.Butler.params.policy=emotion",
+        "seed=7",
+        "set = [\"seed=7\"]",
+        "would have no effect",
+    ),
+    (
+        "path = \"guests.count\"",
+        "path = \"seed\"",
+        "values = [10, 20]",
+        "would have no effect",
+    ),
+    (
+        "when = \"after\"",
+        "share = { robot = \"Butler\", emotion = \"HAPPY\" }",
+        "[[measure]]",
+        "",
+    ),
+    (
+        "eventually = { robot = \"Butler\", behavior = \"EXCHANGE\" }",
+        "",
+        "[[expect]]",
+        "",
+    ),
     ("question", "qestion", "qestion", "unknown field"),
     ("question = \"?\"", "", "", "missing field `question`"),
     (
@@ -520,4 +544,46 @@ fn every_example_of_the_page_is_good() {
             }
         }
     }
+}
+
+/// The line that an error points to, from 1.
+fn line_of(text: &str) -> usize {
+    let error = parse(text).unwrap_err();
+    let label = miette::Diagnostic::labels(&error).unwrap().next().unwrap();
+    text[..label.offset()].matches('\n').count() + 1
+}
+
+#[test]
+fn an_error_of_a_table_points_to_its_own_head() {
+    let count = |text: &str| text.matches('\n').count();
+    for broken in [
+        "count = { event = \"behavior\", robot = \"Butler\", to = \"EXCHANGE\" }",
+        "name = \"exchanges\"",
+    ] {
+        let place = GOOD.find("[[measure]]\nname = \"exchanges\"").unwrap();
+        let text = GOOD.replace(broken, "");
+        assert_eq!(line_of(&text), count(&GOOD[..place]) + 1, "{broken}");
+    }
+
+    // The second of two, and the third one is good.
+    let more = "\n[[expect]]\nname = \"more\"\nnever = { overlap = \"any\" }\n";
+    let wrong = "\n[[expect]]\nname = \"wrong\"\nwithin = \"5 s\"\n";
+    let text = format!("{GOOD}{wrong}{more}");
+    assert_eq!(line_of(&text), count(GOOD) + 2);
+}
+
+#[test]
+fn texts_for_people_have_a_limit() {
+    let with = |bytes: usize| {
+        GOOD.replace(
+            "question = \"?\"",
+            &format!("question = \"{}\"", "?".repeat(bytes)),
+        )
+    };
+    assert!(parse(&with(MAX_TEXT_BYTES)).is_ok());
+    let error = parse(&with(MAX_TEXT_BYTES + 1)).unwrap_err();
+    assert!(
+        error.to_string().contains("`question` has 2001 bytes"),
+        "{error}"
+    );
 }
