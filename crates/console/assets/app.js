@@ -7,15 +7,18 @@ import { Connection } from "./connection.js";
 import { Controls, renderAwaiting } from "./controls.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
+import { Hover } from "./hover.js";
 import { LogView } from "./log.js";
 import { Notices } from "./notices.js";
 import { Panels } from "./panels.js";
 import { Plan } from "./plan.js";
 import { Player } from "./recording.js";
 import { renderScrub } from "./scrub.js";
+import { setRoster } from "./roster.js";
 import { SetupView } from "./setup.js";
 import { Store } from "./store.js";
 import { tabs } from "./tabs.js";
+import { onThemeChange } from "./theme.js";
 import { Units } from "./units.js";
 import { renderVerdicts } from "./verdicts.js";
 import { Voice } from "./voice.js";
@@ -36,6 +39,7 @@ function element(id, type) {
 const box = (/** @type {string} */ id) => element(id, HTMLElement);
 
 const store = new Store();
+store.on("epoch", () => setRoster((store.frame?.robots ?? []).map((robot) => robot.name)));
 const units = new Units();
 const notices = new Notices(box("notice"));
 const connection = new Connection(
@@ -101,6 +105,7 @@ setup.onChange = () => {
   box("hint").hidden = editor.draft === null;
   box("legend").hidden = editor.draft !== null;
 };
+new Hover(box("hover"), plan);
 const panels = new Panels(box("panels"), store, units, {
   send: sendCommand,
   choose,
@@ -205,6 +210,7 @@ store.on("panel", () => markStale("panels"));
 store.on("log", () => markStale("log"));
 store.on("connection", () => markStale("bar", "panels", "log"));
 units.listeners.push(() => markStale("panels"));
+onThemeChange(() => markStale("panels", "charts"));
 
 // The time that the clock has been waiting for a robot grows without any message.
 window.setInterval(() => {

@@ -172,7 +172,7 @@ export class Plan {
     for (const robot of frame.robots) {
       const track = history.tracks.get(robot.name);
       const place = this.motion.robotsNow.get(robot.name);
-      if (track && place) draw.trail(this.pen, track, Math.max(0, end - TRAIL_SAMPLES), end, place);
+      if (track && place) draw.trail(this.pen, robot.name, track, Math.max(0, end - TRAIL_SAMPLES), end, place);
     }
   }
 
@@ -185,7 +185,7 @@ export class Plan {
     draw.obstacles(this.pen, draft.obstacles.map(({ x, y }) => [x, y]), body_m);
 
     for (const [name, place] of Object.entries(draft.robots)) {
-      const robot = { name, blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
+      const robot = { name, emotion_state: "", blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
       draw.robot(this.pen, robot, place, body_m, { isLate: this.editor.faulty(name), isChosen: name === this.chosen });
     }
 
