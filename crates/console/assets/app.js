@@ -17,6 +17,7 @@ import { renderScrub } from "./scrub.js";
 import { setRoster } from "./roster.js";
 import { SetupView } from "./setup.js";
 import { Store } from "./store.js";
+import { renderStranger } from "./stranger.js";
 import { tabs } from "./tabs.js";
 import { onThemeChange } from "./theme.js";
 import { Units } from "./units.js";
@@ -45,6 +46,7 @@ const notices = new Notices(box("notice"));
 const connection = new Connection(
   (message) => store.apply(message),
   (isOpen) => store.setConnected(isOpen),
+  (stranger) => store.setStranger(stranger),
 );
 const player = new Player(store, {
   failed: (reason) => notices.refusal(reason),
@@ -59,12 +61,14 @@ async function request(control) {
 }
 
 /**
- * Sends a request and shows its outcome.
+ * Sends a request, shows its outcome, and resolves with whether it was accepted.
  * @param {Control} control
  * @param {string} note shown if it succeeds
  */
 async function act(control, note = "") {
-  notices.show(await request(control), note);
+  const answer = await request(control);
+  notices.show(answer, note);
+  return answer.answer !== "refused";
 }
 
 /**
@@ -80,10 +84,11 @@ async function sendCommand(to, command) {
 const isRecording = () => store.mode === "recording";
 const controls = new Controls(box("bar"), store, {
   control: (control) => act(control, control.do === "init" && !store.replayOf ? "The next epoch is ready at tick 0." : ""),
-  speed: (factor) => {
+  speed: async (factor) => {
     if (!isRecording()) return act({ do: "speed", factor });
     player.factor = factor;
     if (!player.isPlaying) player.seek(player.tick);
+    return true;
   },
   toggle: () => {
     if (isRecording()) player.toggle();
@@ -155,6 +160,7 @@ const views = new Map([
 function drawBar() {
   controls.render();
   renderAwaiting(box("awaiting"), store);
+  renderStranger(box("stranger"), store);
   renderVerdicts(box("verdicts"), store);
 
   if (isRecording()) renderScrub(box("scrub-bar"), player);
@@ -168,8 +174,9 @@ function drawBar() {
   box("empty").hidden = !isEmpty;
   box("empty-console").hidden = store.isConnected;
   box("empty-simulator").hidden = !store.isConnected;
+  box("advice").textContent = `cars launch launch/hors_doeuvres.toml --run ${store.run} --listen ${store.endpoint} --no-console`;
 
-  box("gone").hidden = isEmpty || isRecording() || store.isLive;
+  box("gone").hidden = isEmpty || isRecording() || store.isLive || store.stranger !== null;
   box("gone").textContent = store.isConnected
     ? "The simulator is disconnected. This is its last frame."
     : "The console is not reachable. This is the last frame.";

@@ -43,6 +43,8 @@ export class Panels {
    */
   panel(robot, awaiting) {
     const { word, since, detail, tone } = presence(robot, awaiting);
+    // Nothing is known of a robot without its simulator.
+    const seen = this.store.isPast ? "" : tone;
     const { name } = robot;
     const own = this.store.panels.get(name)?.widgets;
     const all = Array.isArray(own) && own.length ? own : generic(robot).widgets;
@@ -55,7 +57,7 @@ export class Panels {
         <header>
           <button type="button" class="name" title="show on the plan" @click=${() => this.actions.choose(name)}>
             <span class="initials" aria-hidden="true">${initials(name)}</span><h2>${name}</h2></button>
-          <span class="presence ${tone}" title=${detail}><span class="dot ${tone}"></span><span
+          <span class="presence ${seen}" title=${detail}><span class="dot ${seen}"></span><span
             data-testid="presence">${word}</span>${since ? html` <span class="since">${since}</span>` : nothing}</span>
         </header>
         <p class="where">${this.units.length(robot.location.x)}, ${this.units.length(robot.location.y)}

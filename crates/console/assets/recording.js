@@ -94,6 +94,7 @@ export class Player {
       return known;
     }
 
+    if (!this.store.isConnected) return Promise.reject(new Error("The console of this recording is not reachable."));
     const query = new URLSearchParams({ from: String(number * CHUNK), count: String(CHUNK) });
     const fetched = get("recording/ticks", query).then((/** @type {Chunk} */ chunk) => {
       this.numbers += numbersIn(chunk);
