@@ -16,6 +16,7 @@ import { Player } from "./recording.js";
 import { renderScrub } from "./scrub.js";
 import { setRoster } from "./roster.js";
 import { SetupView } from "./setup.js";
+import { download, readLink, share } from "./share.js";
 import { Store } from "./store.js";
 import { renderStranger } from "./stranger.js";
 import { tabs } from "./tabs.js";
@@ -94,6 +95,7 @@ const controls = new Controls(box("bar"), store, {
     if (isRecording()) player.toggle();
     else act({ do: store.phase === "running" ? "pause" : "start" });
   },
+  help: () => element("help", HTMLDialogElement).showModal(),
   step: () => (isRecording() ? player.step(1) : act({ do: "step", n: 1 })),
 });
 
@@ -245,8 +247,41 @@ let isOpened = false;
 store.on("connection", () => {
   if (!isRecording() || isOpened) return;
   isOpened = true;
-  player.open();
+  const { tick } = readLink(location.hash);
+  player.open(tick ?? 0);
 });
+
+/** Shows what a link leads to, if it is of this run. */
+function follow() {
+  const { run, tick, robot } = readLink(location.hash);
+  if (run && run !== store.run) return notices.refusal(`The link is to the run ${run}; this is ${store.run}.`);
+
+  const isKnown = store.frame?.robots.some((one) => one.name === robot) ?? false;
+  if (robot && isKnown && robot !== plan.chosen) choose(robot);
+  if (tick === null) return;
+  if (!isRecording()) notices.note("A tick is shown in recordings only: this run is in progress.");
+  else if (player.header && tick !== player.tick) player.step(tick - player.tick);
+}
+window.addEventListener("hashchange", follow);
+let isFollowed = false;
+store.on("frame", () => {
+  if (isFollowed || !store.frame) return;
+  isFollowed = true;
+  follow();
+});
+
+box("link").addEventListener("click", async () => {
+  const tick = isRecording() ? player.tick : null;
+  notices.note(await share({ run: store.run, tick, robot: plan.chosen }));
+});
+box("picture").addEventListener("click", async () => {
+  download(await plan.picture(), `${store.run}-tick-${store.frame?.tick ?? 0}.png`);
+});
+box("full-screen").addEventListener("click", () => {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.querySelector(".plan")?.requestFullscreen().catch(() => notices.refusal("This browser allows no full screen."));
+});
+box("keys").addEventListener("click", () => element("help", HTMLDialogElement).showModal());
 
 const unitChoice = element("units", HTMLSelectElement);
 unitChoice.value = units.unit;

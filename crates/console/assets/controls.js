@@ -21,6 +21,7 @@ const PLAYING = { running: "playing", ended: "at the end" };
  * @property {(factor: number | null) => Promise<boolean>} speed resolves with whether it was accepted
  * @property {() => void} toggle start or pause
  * @property {() => void} step
+ * @property {() => void} help shows the keys
  */
 
 export class Controls {
@@ -42,6 +43,9 @@ export class Controls {
   key(event) {
     if (event.key === "Escape" && this.isStopAsked) return this.askStop(false);
 
+    // The keys of a list or a question that is open are its own.
+    if (document.querySelector("dialog[open]")) return;
+
     const { target } = event;
     const isTyping = target instanceof HTMLElement && target.closest("input:not([type=range]), select, textarea") !== null;
     const isPressing = target instanceof HTMLElement && target.closest("button, summary, label") !== null;
@@ -52,6 +56,8 @@ export class Controls {
       this.transport.toggle();
     } else if (event.key === ".") {
       this.transport.step();
+    } else if (event.key === "?") {
+      this.transport.help();
     }
   }
 

@@ -229,8 +229,9 @@ export function cut({ context, camera, theme }, from, to, label) {
  * @param {import("./flights.js").Airborne} flight
  * @param {Place} from
  * @param {Place} to
+ * @param {boolean} isCalm whether it neither falls nor spreads when it arrives
  */
-export function flight({ context, camera, theme }, flight, from, to) {
+export function flight({ context, camera, theme }, flight, from, to, isCalm) {
   const x1 = camera.x(from.x);
   const y1 = camera.y(from.y);
   const x2 = camera.x(to.x);
@@ -238,7 +239,7 @@ export function flight({ context, camera, theme }, flight, from, to) {
   const isLost = flight.fate === "dropped";
   const eased = flight.progress * flight.progress * (3 - 2 * flight.progress);
   const x = x1 + (x2 - x1) * eased;
-  const y = y1 + (y2 - y1) * eased + 60 * flight.fallen * flight.fallen;
+  const y = y1 + (y2 - y1) * eased + (isCalm ? 0 : 60 * flight.fallen * flight.fallen);
   const color = isLost && flight.fallen > 0 ? theme.bad : theme.accent;
   context.globalAlpha = Math.max(0, 1 - Math.max(flight.fallen, flight.landed));
   context.strokeStyle = color;
@@ -249,7 +250,7 @@ export function flight({ context, camera, theme }, flight, from, to) {
   line(context, x1, y1, x2, y2);
   context.stroke();
   context.setLineDash([]);
-  if (flight.landed > 0) ring(context, x2, y2, 14 + 18 * flight.landed, color, 2);
+  if (flight.landed > 0) ring(context, x2, y2, 14 + (isCalm ? 6 : 18 * flight.landed), color, 2);
   else envelope(context, x, y, color, theme.field);
   if (isLost && flight.fallen > 0) cross(context, x, y, 9, color);
   if (flight.text) text(context, theme, flight.text, x, y - 16, color);

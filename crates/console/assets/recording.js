@@ -60,10 +60,11 @@ export class Player {
     return this.header?.ticks ?? 0;
   }
 
-  async open() {
+  /** @param {number} tick that is shown first, as far as the run has it */
+  async open(tick) {
     try {
       this.header = await get("recording");
-      await this.seek(0);
+      await this.seek(Math.min(this.last, tick));
       await this.readAll();
     } catch (error) {
       this.client.failed(String(error instanceof Error ? error.message : error));
