@@ -7,15 +7,20 @@ import { Connection } from "./connection.js";
 import { Controls, renderAwaiting } from "./controls.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
+import { Hover } from "./hover.js";
 import { LogView } from "./log.js";
 import { Notices } from "./notices.js";
 import { Panels } from "./panels.js";
 import { Plan } from "./plan.js";
 import { Player } from "./recording.js";
 import { renderScrub } from "./scrub.js";
+import { setRoster } from "./roster.js";
 import { SetupView } from "./setup.js";
+import { download, readLink, share } from "./share.js";
 import { Store } from "./store.js";
+import { renderStranger } from "./stranger.js";
 import { tabs } from "./tabs.js";
+import { onThemeChange } from "./theme.js";
 import { Units } from "./units.js";
 import { renderVerdicts } from "./verdicts.js";
 import { Voice } from "./voice.js";
@@ -36,11 +41,13 @@ function element(id, type) {
 const box = (/** @type {string} */ id) => element(id, HTMLElement);
 
 const store = new Store();
+store.on("epoch", () => setRoster((store.frame?.robots ?? []).map((robot) => robot.name)));
 const units = new Units();
 const notices = new Notices(box("notice"));
 const connection = new Connection(
   (message) => store.apply(message),
   (isOpen) => store.setConnected(isOpen),
+  (stranger) => store.setStranger(stranger),
 );
 const player = new Player(store, {
   failed: (reason) => notices.refusal(reason),
@@ -55,12 +62,14 @@ async function request(control) {
 }
 
 /**
- * Sends a request and shows its outcome.
+ * Sends a request, shows its outcome, and resolves with whether it was accepted.
  * @param {Control} control
  * @param {string} note shown if it succeeds
  */
 async function act(control, note = "") {
-  notices.show(await request(control), note);
+  const answer = await request(control);
+  notices.show(answer, note);
+  return answer.answer !== "refused";
 }
 
 /**
@@ -76,15 +85,17 @@ async function sendCommand(to, command) {
 const isRecording = () => store.mode === "recording";
 const controls = new Controls(box("bar"), store, {
   control: (control) => act(control, control.do === "init" && !store.replayOf ? "The next epoch is ready at tick 0." : ""),
-  speed: (factor) => {
+  speed: async (factor) => {
     if (!isRecording()) return act({ do: "speed", factor });
     player.factor = factor;
     if (!player.isPlaying) player.seek(player.tick);
+    return true;
   },
   toggle: () => {
     if (isRecording()) player.toggle();
     else act({ do: store.phase === "running" ? "pause" : "start" });
   },
+  help: () => element("help", HTMLDialogElement).showModal(),
   step: () => (isRecording() ? player.step(1) : act({ do: "step", n: 1 })),
 });
 
@@ -101,6 +112,7 @@ setup.onChange = () => {
   box("hint").hidden = editor.draft === null;
   box("legend").hidden = editor.draft !== null;
 };
+new Hover(box("hover"), plan);
 const panels = new Panels(box("panels"), store, units, {
   send: sendCommand,
   choose,
@@ -150,6 +162,7 @@ const views = new Map([
 function drawBar() {
   controls.render();
   renderAwaiting(box("awaiting"), store);
+  renderStranger(box("stranger"), store);
   renderVerdicts(box("verdicts"), store);
 
   if (isRecording()) renderScrub(box("scrub-bar"), player);
@@ -163,8 +176,9 @@ function drawBar() {
   box("empty").hidden = !isEmpty;
   box("empty-console").hidden = store.isConnected;
   box("empty-simulator").hidden = !store.isConnected;
+  box("advice").textContent = `cars launch launch/hors_doeuvres.toml --run ${store.run} --listen ${store.endpoint} --no-console`;
 
-  box("gone").hidden = isEmpty || isRecording() || store.isLive;
+  box("gone").hidden = isEmpty || isRecording() || store.isLive || store.stranger !== null;
   box("gone").textContent = store.isConnected
     ? "The simulator is disconnected. This is its last frame."
     : "The console is not reachable. This is the last frame.";
@@ -205,6 +219,7 @@ store.on("panel", () => markStale("panels"));
 store.on("log", () => markStale("log"));
 store.on("connection", () => markStale("bar", "panels", "log"));
 units.listeners.push(() => markStale("panels"));
+onThemeChange(() => markStale("panels", "charts"));
 
 // The time that the clock has been waiting for a robot grows without any message.
 window.setInterval(() => {
@@ -232,8 +247,41 @@ let isOpened = false;
 store.on("connection", () => {
   if (!isRecording() || isOpened) return;
   isOpened = true;
-  player.open();
+  const { tick } = readLink(location.hash);
+  player.open(tick ?? 0);
 });
+
+/** Shows what a link leads to, if it is of this run. */
+function follow() {
+  const { run, tick, robot } = readLink(location.hash);
+  if (run && run !== store.run) return notices.refusal(`The link is to the run ${run}; this is ${store.run}.`);
+
+  const isKnown = store.frame?.robots.some((one) => one.name === robot) ?? false;
+  if (robot && isKnown && robot !== plan.chosen) choose(robot);
+  if (tick === null) return;
+  if (!isRecording()) notices.note("A tick is shown in recordings only: this run is in progress.");
+  else if (player.header && tick !== player.tick) player.step(tick - player.tick);
+}
+window.addEventListener("hashchange", follow);
+let isFollowed = false;
+store.on("frame", () => {
+  if (isFollowed || !store.frame) return;
+  isFollowed = true;
+  follow();
+});
+
+box("link").addEventListener("click", async () => {
+  const tick = isRecording() ? player.tick : null;
+  notices.note(await share({ run: store.run, tick, robot: plan.chosen }));
+});
+box("picture").addEventListener("click", async () => {
+  download(await plan.picture(), `${store.run}-tick-${store.frame?.tick ?? 0}.png`);
+});
+box("full-screen").addEventListener("click", () => {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.querySelector(".plan")?.requestFullscreen().catch(() => notices.refusal("This browser allows no full screen."));
+});
+box("keys").addEventListener("click", () => element("help", HTMLDialogElement).showModal());
 
 const unitChoice = element("units", HTMLSelectElement);
 unitChoice.value = units.unit;

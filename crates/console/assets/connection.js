@@ -9,7 +9,7 @@
 
 /**
  * What the server sends.
- * @typedef {{type: "hello", mode: "live" | "recording", run: string, version: string}
+ * @typedef {{type: "hello", mode: "live" | "recording", run: string, endpoint?: string, version: string}
  *   | {type: "simulator", present: boolean}
  *   | {type: "frame", frame: WorldFrame}
  *   | {type: "panel", robot: string, panel: Panel}
@@ -18,20 +18,31 @@
  */
 
 /** Messages that do not answer a request. @typedef {Exclude<ServerMessage, {type: "answer"}>} Broadcast */
+/** The first message of a server. @typedef {Extract<ServerMessage, {type: "hello"}>} Hello */
 /** @typedef {{resolve: (answer: ControlAnswer) => void, timer: number}} Pending */
 
 const FIRST_PAUSE_MS = 500;
 const LONGEST_PAUSE_MS = 8000;
 const ANSWER_TIMEOUT_MS = 15000;
 
+/** Another run at the address of this page; without a name if the server there refuses this browser. @typedef {{run: string | null}} Stranger */
+
 export class Connection {
   /**
    * @param {(message: Broadcast) => void} onMessage
    * @param {(isOpen: boolean) => void} onConnection
+   * @param {(stranger: Stranger | null) => void} onStranger
    */
-  constructor(onMessage, onConnection) {
+  constructor(onMessage, onConnection, onStranger) {
     this.onMessage = onMessage;
     this.onConnection = onConnection;
+    this.onStranger = onStranger;
+    /** What the first server showed. The page stays with it. @type {Hello | null} */
+    this.shown = null;
+    /** Whether the page shows anything that would be lost. */
+    this.hasContent = false;
+    /** What is at the address now, if that is something else. @type {Stranger | null} */
+    this.stranger = null;
     /** @type {WebSocket | null} */
     this.socket = null;
     /** @type {Map<number, Pending>} */
@@ -52,13 +63,12 @@ export class Connection {
     socket.addEventListener("open", () => {
       wasOpen = true;
       this.pause_ms = FIRST_PAUSE_MS;
-      this.onConnection(true);
     });
 
     socket.addEventListener("message", (event) => this.receive(String(event.data)));
     socket.addEventListener("close", () => {
       this.closed();
-      if (!wasOpen) leaveIfRefused();
+      if (!wasOpen) this.explainIfRefused();
     });
   }
 
@@ -86,6 +96,8 @@ export class Connection {
    * @returns {Promise<ControlAnswer>}
    */
   send(message) {
+    if (this.stranger) return Promise.resolve(refused("This address shows another run now; nothing was sent."));
+
     const socket = this.socket;
     if (!socket || socket.readyState !== WebSocket.OPEN) {
       return Promise.resolve(refused("The console server is not reachable; the page reconnects by itself."));
@@ -106,11 +118,49 @@ export class Connection {
   receive(text) {
     /** @type {ServerMessage} */
     const message = JSON.parse(text);
+    if (message.type === "hello") this.greet(message);
+    if (this.stranger) return;
+    if (message.type === "frame" || this.shown?.mode === "recording") this.hasContent = true;
+
     if (message.type === "answer") {
       this.settle(message.id, message.answer ?? refused(message.error ?? "The server gave no reason."));
     } else {
       this.onMessage(message);
     }
+  }
+
+  /**
+   * A server may show another run than the one that had the address before. What it sends is ignored then.
+   * @param {Hello} hello
+   */
+  greet(hello) {
+    this.shown ??= hello;
+    const isSame = hello.run === this.shown.run && hello.mode === this.shown.mode;
+    this.meet(isSame ? null : { run: hello.mode === "live" ? hello.run : `the recording of ${hello.run}` });
+    if (isSame) this.onConnection(true);
+  }
+
+  /** @param {Stranger | null} stranger */
+  meet(stranger) {
+    this.stranger = stranger;
+    this.onStranger(stranger);
+  }
+
+  /**
+   * Where the server refuses this browser, its cookie is lost, or another console has the address now. The server's own page
+   * explains what to do: a page without content leaves for it. A script cannot see why a WebSocket was refused.
+   */
+  async explainIfRefused() {
+    try {
+      const answer = await fetch("ws");
+      if (answer.status !== 403) return;
+    } catch {
+      // The server is not reachable.
+      return;
+    }
+
+    if (this.hasContent) this.meet({ run: null });
+    else location.replace("/");
   }
 
   /**
@@ -134,19 +184,6 @@ export class Connection {
 
     window.setTimeout(() => this.open(), this.pause_ms);
     this.pause_ms = Math.min(this.pause_ms * 2, LONGEST_PAUSE_MS);
-  }
-}
-
-/**
- * Leaves the page if the server refuses this browser: its cookie is lost, or another console has the address now. The
- * server's own page explains what to do. A script cannot see why a WebSocket was refused.
- */
-async function leaveIfRefused() {
-  try {
-    const answer = await fetch("ws");
-    if (answer.status === 403) location.replace("/");
-  } catch {
-    // The server is not reachable.
   }
 }
 

@@ -18,9 +18,10 @@ const PLAYING = { running: "playing", ended: "at the end" };
  * What the buttons control: the simulator or the player of a recording.
  * @typedef {object} Transport
  * @property {(control: Control) => void} control
- * @property {(factor: number | null) => void} speed
+ * @property {(factor: number | null) => Promise<boolean>} speed resolves with whether it was accepted
  * @property {() => void} toggle start or pause
  * @property {() => void} step
+ * @property {() => void} help shows the keys
  */
 
 export class Controls {
@@ -42,6 +43,9 @@ export class Controls {
   key(event) {
     if (event.key === "Escape" && this.isStopAsked) return this.askStop(false);
 
+    // The keys of a list or a question that is open are its own.
+    if (document.querySelector("dialog[open]")) return;
+
     const { target } = event;
     const isTyping = target instanceof HTMLElement && target.closest("input:not([type=range]), select, textarea") !== null;
     const isPressing = target instanceof HTMLElement && target.closest("button, summary, label") !== null;
@@ -52,6 +56,8 @@ export class Controls {
       this.transport.toggle();
     } else if (event.key === ".") {
       this.transport.step();
+    } else if (event.key === "?") {
+      this.transport.help();
     }
   }
 
@@ -71,9 +77,9 @@ export class Controls {
 
     render(
       html`
-        <div class="brand"><h1>CARS</h1><span class="run" title="the run">${store.run}</span></div>
+        <div class="brand"><h1>CARS</h1><span class="run" title=${store.run} data-testid="run">${store.run}</span></div>
         <div class="now">
-          <span class="pill phase-${phase}" data-testid="phase">${word}</span>
+          <span class="pill ${store.isPast ? "" : `phase-${phase}`}" data-testid="phase">${word}</span>
           <span class="count">tick <b data-testid="tick">${frame?.tick ?? this.store.status?.tick ?? "–"}</b></span>
           <span class="count"><b data-testid="time">${frame ? seconds(frame.time_s) : "–"}</b>${
             frame ? html` of ${seconds(frame.duration_s)}` : nothing
@@ -105,8 +111,10 @@ export class Controls {
 
   /** @type {(event: Event) => void} */
   chooseSpeed = (event) => {
-    const { value } = /** @type {HTMLSelectElement} */ (event.target);
-    this.transport.speed(value === "max" ? null : Number(value));
+    const select = /** @type {HTMLSelectElement} */ (event.target);
+    this.transport.speed(select.value === "max" ? null : Number(select.value)).then((isAccepted) => {
+      if (!isAccepted) select.value = this.speed();
+    });
   };
 
   buttons() {
@@ -157,7 +165,10 @@ export class Controls {
     let word = "no simulator";
     let tone = "warning";
 
-    if (store.mode === "recording") {
+    if (store.stranger) {
+      word = "another run has the address";
+      tone = "bad";
+    } else if (store.mode === "recording") {
       word = "recording";
       tone = "neutral";
     } else if (!store.isConnected) {

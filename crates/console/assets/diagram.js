@@ -112,7 +112,7 @@ export class DiagramView {
       queries: String(this.hasQueries),
     });
     const wanted = query.toString();
-    if (wanted === this.shown) return;
+    if (wanted === this.shown || !this.player.store.isConnected) return;
     this.shown = wanted;
 
     const { svg, reason } = await fetchDiagram(query);

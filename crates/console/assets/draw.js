@@ -1,7 +1,9 @@
 // @ts-check
 // Draws the plan. Every function draws one kind of object and keeps no state.
 
-import { barrier, cross, envelope, line, nose, ring, text } from "./shapes.js";
+import { robotColor, stateColors } from "./palette.js";
+import { initials } from "./roster.js";
+import { barrier, cross, disk, envelope, line, nose, ring, text } from "./shapes.js";
 
 /** @typedef {import("./camera.js").Camera} Camera */
 /** @typedef {import("./theme.js").Theme} Theme */
@@ -13,6 +15,8 @@ import { barrier, cross, envelope, line, nose, ring, text } from "./shapes.js";
 const FULL_TURN = 2 * Math.PI;
 /** Smallest radius at which the letters in a robot can be read. */
 const SMALLEST_ROBOT_PX = 9;
+/** Width of the ring in the color of the emotion, with its edge. */
+const RING_PX = 4.5;
 /** Guests with a smaller radius are drawn as squares, which are faster than circles. */
 const SMALLEST_ROUND_PX = 1.7;
 /** More small guests than this are drawn as two crossed bars: twice as fast as circles, and hardly different. */
@@ -121,13 +125,14 @@ function circles(context, at, radius) {
 
 /**
  * @param {Pen} pen
+ * @param {string} name of the robot
  * @param {Track} track
  * @param {number} from index
  * @param {number} to index, not included
  * @param {Place} end where the robot is seen now
  */
-export function trail({ context, camera, theme }, track, from, to, end) {
-  context.strokeStyle = theme.robot;
+export function trail({ context, camera }, name, track, from, to, end) {
+  context.strokeStyle = robotColor(name);
   context.lineWidth = 2;
   context.lineJoin = "round";
   context.lineCap = "round";
@@ -136,7 +141,7 @@ export function trail({ context, camera, theme }, track, from, to, end) {
   for (let piece = 0; piece < pieces; piece += 1) {
     const first = from + Math.floor(((to - from) * piece) / pieces);
     const last = from + Math.floor(((to - from) * (piece + 1)) / pieces);
-    context.globalAlpha = 0.08 + (0.5 * (piece + 1)) / pieces;
+    context.globalAlpha = 0.1 + (0.7 * (piece + 1)) / pieces;
     context.beginPath();
 
     for (let i = first; i <= last && i < to; i += 1) {
@@ -152,9 +157,9 @@ export function trail({ context, camera, theme }, track, from, to, end) {
 }
 
 /**
- * A red circle with the first two letters of the name, and marks around it.
+ * A red circle with the initials, in a ring in the color of the emotion, and marks around it. A draft of the set-up has no emotion.
  * @param {Pen} pen
- * @param {Pick<RobotFrame, "name" | "blocked" | "presence" | "direction_rad" | "speed_mps">} robot
+ * @param {Pick<RobotFrame, "name" | "emotion_state" | "blocked" | "presence" | "direction_rad" | "speed_mps">} robot
  * @param {Place} place
  * @param {number} body_m
  * @param {{isLate: boolean, isChosen: boolean}} marks
@@ -166,20 +171,24 @@ export function robot({ context, camera, theme }, robot, place, body_m, { isLate
   if (isOutside(camera, x, y, 3 * radius)) return;
 
   const isHere = robot.presence === "here";
-  if (isChosen) ring(context, x, y, radius + 6, theme.accent, 2);
-  if (isLate && isHere) ring(context, x, y, radius + 4, theme.warning, 2.5, [4, 4]);
-  context.beginPath();
-  context.arc(x, y, radius, 0, FULL_TURN);
-  context.fillStyle = isHere ? theme.robot : theme.absentFill;
-  context.fill();
+  const outside = radius + RING_PX;
+  if (isChosen) ring(context, x, y, outside + 5, theme.accent, 2);
+  if (isLate && isHere) ring(context, x, y, outside + 2.5, theme.warning, 2.5, [4, 4]);
+  if (isHere && robot.emotion_state) {
+    disk(context, x, y, outside, theme.muted);
+    disk(context, x, y, outside - 0.75, stateColors("emotion", robot.emotion_state).fill);
+    disk(context, x, y, radius + 0.75, theme.field);
+  }
+  disk(context, x, y, radius, isHere ? theme.robot : theme.absentFill);
   if (!isHere) ring(context, x, y, radius - 1, robot.presence === "lost" ? theme.absent : theme.robot, 2.25, [3, 3]);
-  if (isHere && robot.speed_mps > 0) nose(context, x, y, radius, robot.direction_rad, theme.robot);
-  if (isHere && robot.blocked) barrier(context, x, y, radius, robot.direction_rad, theme.warning);
+  if (isHere && robot.speed_mps > 0) nose(context, x, y, outside, robot.direction_rad, theme.robot);
+  if (isHere && robot.blocked) barrier(context, x, y, outside, robot.direction_rad, theme.warning);
   context.fillStyle = isHere ? theme.robotText : theme.absent;
-  context.font = `650 ${Math.max(10, Math.min(22, radius * 0.95))}px ${theme.font}`;
+  const letters = initials(robot.name);
+  context.font = `650 ${Math.max(10, Math.min(22, radius * (letters.length > 2 ? 0.75 : 0.95)))}px ${theme.font}`;
   context.textAlign = "center";
   context.textBaseline = "middle";
-  context.fillText([...robot.name].slice(0, 2).join(""), x, y + 0.5);
+  context.fillText(letters, x, y + 0.5);
   if (robot.presence === "lost") cross(context, x, y, radius * 1.15, theme.absent);
 }
 
@@ -220,8 +229,9 @@ export function cut({ context, camera, theme }, from, to, label) {
  * @param {import("./flights.js").Airborne} flight
  * @param {Place} from
  * @param {Place} to
+ * @param {boolean} isCalm whether it neither falls nor spreads when it arrives
  */
-export function flight({ context, camera, theme }, flight, from, to) {
+export function flight({ context, camera, theme }, flight, from, to, isCalm) {
   const x1 = camera.x(from.x);
   const y1 = camera.y(from.y);
   const x2 = camera.x(to.x);
@@ -229,7 +239,7 @@ export function flight({ context, camera, theme }, flight, from, to) {
   const isLost = flight.fate === "dropped";
   const eased = flight.progress * flight.progress * (3 - 2 * flight.progress);
   const x = x1 + (x2 - x1) * eased;
-  const y = y1 + (y2 - y1) * eased + 60 * flight.fallen * flight.fallen;
+  const y = y1 + (y2 - y1) * eased + (isCalm ? 0 : 60 * flight.fallen * flight.fallen);
   const color = isLost && flight.fallen > 0 ? theme.bad : theme.accent;
   context.globalAlpha = Math.max(0, 1 - Math.max(flight.fallen, flight.landed));
   context.strokeStyle = color;
@@ -240,7 +250,7 @@ export function flight({ context, camera, theme }, flight, from, to) {
   line(context, x1, y1, x2, y2);
   context.stroke();
   context.setLineDash([]);
-  if (flight.landed > 0) ring(context, x2, y2, 14 + 18 * flight.landed, color, 2);
+  if (flight.landed > 0) ring(context, x2, y2, 14 + (isCalm ? 6 : 18 * flight.landed), color, 2);
   else envelope(context, x, y, color, theme.field);
   if (isLost && flight.fallen > 0) cross(context, x, y, 9, color);
   if (flight.text) text(context, theme, flight.text, x, y - 16, color);

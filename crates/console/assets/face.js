@@ -33,16 +33,14 @@ const FACES = {
   fearful: { browInner: -9, browOuter: -1, eye: 8.5, lid: 0, corners: -4, upper: -4, lower: 5, width: 16, nose: 0 },
 };
 
-/** Part of the full expression at intensity 0, so that a weak expression is visible. */
-const WEAKEST = 0.4;
-
 /**
  * @param {Face} face
  * @param {number} intensity 0 to 1
  */
 export function drawFace(face, intensity) {
   const full = Object.hasOwn(FACES, face) ? FACES[face] : NEUTRAL;
-  const part = WEAKEST + (1 - WEAKEST) * Math.min(1, Math.max(0, Number.isFinite(intensity) ? intensity : 0));
+  // Without intensity a face is neutral; a weak expression is made stronger, so that it is visible.
+  const part = Math.sqrt(Math.min(1, Math.max(0, Number.isFinite(intensity) ? intensity : 0)));
   const m = /** @type {Measures} */ (
     Object.fromEntries(
       Object.entries(NEUTRAL).map(([key, value]) => [key, value + part * (full[/** @type {keyof Measures} */ (key)] - value)]),

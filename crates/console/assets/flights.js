@@ -57,11 +57,14 @@ export class Flights {
     }
   }
 
-  /** @param {number} passed_ms wall clock since the last call */
-  advance(passed_ms) {
+  /**
+   * @param {number} passed_ms wall clock since the last call
+   * @param {boolean} isCalm whether a command is where it ends at once
+   */
+  advance(passed_ms, isCalm) {
     for (const [key, flight] of this.airborne) {
       flight.age_ms += passed_ms;
-      step(flight, passed_ms);
+      step(flight, passed_ms, isCalm);
       if (flight.fallen >= 1 || flight.landed >= 1 || flight.age_ms > FORGOTTEN_MS) this.airborne.delete(key);
     }
   }
@@ -75,10 +78,12 @@ export class Flights {
 /**
  * @param {Airborne} flight
  * @param {number} passed_ms
+ * @param {boolean} isCalm
  */
-function step(flight, passed_ms) {
+function step(flight, passed_ms, isCalm) {
   const isLost = flight.fate === "dropped";
   const end = isLost ? Math.max(HALF_WAY, flight.progress) : flight.fate === "delivered" ? 1 : BEFORE_TARGET;
+  if (isCalm) flight.progress = end;
   if (flight.progress < end) flight.progress = Math.min(end, flight.progress + passed_ms / FLIGHT_MS);
   else if (isLost) flight.fallen += passed_ms / FALL_MS;
   else if (flight.fate === "delivered") flight.landed += passed_ms / LANDING_MS;

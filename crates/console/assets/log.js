@@ -13,6 +13,8 @@ const MOST_ROWS_READING = 4000;
 const NEAR_END_PX = 12;
 /** Every kind; the type check keeps the list complete. @type {Record<import("./types/messages.js").LogKind, true>} */
 const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, verdict: true, late: true };
+/** What the medium did to a command: of the kind `command`, and of the network, too. */
+const FATE = /^command \d+ of .+ (was lost on the way|is held back until|comes twice)/;
 const KINDS = Object.keys(ALL_KINDS);
 
 export class LogView {
@@ -30,6 +32,8 @@ export class LogView {
     this.until = Infinity;
     this.isFollowing = true;
     this.waiting = 0;
+    /** Epoch of the last row. @type {number | null} */
+    this.epoch = null;
     /** The last scroll position. */
     this.top_px = 0;
     this.bar = document.createElement("div");
@@ -72,6 +76,7 @@ export class LogView {
   /** Renders all rows again, after a change of filter or time. */
   rebuild() {
     this.rows.replaceChildren();
+    this.epoch = null;
     this.seen = this.store.logCount - this.store.log.length;
     this.waiting = 0;
     this.isFollowing = true;
@@ -105,9 +110,8 @@ export class LogView {
 
   /** @param {LogRecord} line */
   isShown(line) {
-    return (
-      line.tick <= this.until && (this.robot === "" || line.source === this.robot) && (this.kind === "" || line.kind === this.kind)
-    );
+    const isOfKind = this.kind === "" || line.kind === this.kind || (this.kind === "network" && FATE.test(line.text));
+    return line.tick <= this.until && (this.robot === "" || line.source === this.robot) && isOfKind;
   }
 
   /** @param {LogRecord[]} lines */
@@ -116,13 +120,20 @@ export class LogView {
     const room = this.isFollowing ? Infinity : MOST_ROWS_READING - rows.childElementCount;
     const kept = lines.slice(0, Math.max(0, room)).slice(-MOST_ROWS);
     this.waiting += this.isFollowing ? 0 : lines.length;
-    rows.append(...kept.map(row));
+    rows.append(...kept.flatMap((line) => this.withEpoch(line)));
     if (!this.isFollowing) return;
 
     const tooMany = rows.childElementCount - MOST_ROWS;
 
     for (let i = 0; i < tooMany; i += 1) rows.firstElementChild?.remove();
     this.toEnd();
+  }
+
+  /** A row, below a division if it begins another epoch. @param {LogRecord} line */
+  withEpoch(line) {
+    const isNext = this.epoch !== null && line.epoch !== this.epoch;
+    this.epoch = line.epoch;
+    return isNext ? [division(line.epoch), row(line)] : [row(line)];
   }
 
   /** To be called when the tab is shown again: a hidden element does not scroll. */
@@ -159,6 +170,15 @@ export class LogView {
       this.bar,
     );
   }
+}
+
+/** @param {number} epoch */
+function division(epoch) {
+  const element = document.createElement("div");
+  element.className = "epoch";
+  element.dataset.testid = "log-epoch";
+  element.textContent = `epoch ${epoch}`;
+  return element;
 }
 
 /**

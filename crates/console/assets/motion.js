@@ -31,14 +31,15 @@ export class Motion {
   /**
    * @param {WorldFrame} frame
    * @param {number} now_ms
+   * @param {boolean} isCalm whether robots and guests jump to their places
    */
-  push(frame, now_ms) {
+  push(frame, now_ms, isCalm) {
     const last = this.to;
     this.to = frame;
     const leap = last?.epoch === frame.epoch ? frame.tick - last.tick : Infinity;
     if (leap === 0) return;
 
-    const isGlide = leap > 0 && leap <= MOST_TICKS && last?.guests.length === frame.guests.length;
+    const isGlide = !isCalm && leap > 0 && leap <= MOST_TICKS && last?.guests.length === frame.guests.length;
     this.from_m = isGlide ? this.now_m.slice() : flat(frame.guests);
     this.robotsFrom = isGlide ? new Map(this.robotsNow) : new Map();
     if (this.now_m.length !== this.from_m.length) this.now_m = this.from_m.slice();

@@ -2,6 +2,7 @@
 // A panel for each robot. The page has no knowledge of particular robots: it renders the widgets that they publish.
 
 import { presence } from "./presence.js";
+import { initials } from "./roster.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 import { drawWidget } from "./widgets.js";
 
@@ -42,6 +43,8 @@ export class Panels {
    */
   panel(robot, awaiting) {
     const { word, since, detail, tone } = presence(robot, awaiting);
+    // Nothing is known of a robot without its simulator.
+    const seen = this.store.isPast ? "" : tone;
     const { name } = robot;
     const own = this.store.panels.get(name)?.widgets;
     const all = Array.isArray(own) && own.length ? own : generic(robot).widgets;
@@ -53,8 +56,8 @@ export class Panels {
       <section class="panel ${word} ${name === this.chosen ? "chosen" : ""}" data-testid="panel-${name}" aria-label=${name}>
         <header>
           <button type="button" class="name" title="show on the plan" @click=${() => this.actions.choose(name)}>
-            <span class="initials" aria-hidden="true">${[...name].slice(0, 2).join("")}</span><h2>${name}</h2></button>
-          <span class="presence ${tone}" title=${detail}><span class="dot ${tone}"></span><span
+            <span class="initials" aria-hidden="true">${initials(name)}</span><h2>${name}</h2></button>
+          <span class="presence ${seen}" title=${detail}><span class="dot ${seen}"></span><span
             data-testid="presence">${word}</span>${since ? html` <span class="since">${since}</span>` : nothing}</span>
         </header>
         <p class="where">${this.units.length(robot.location.x)}, ${this.units.length(robot.location.y)}

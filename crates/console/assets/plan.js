@@ -18,6 +18,7 @@ import { onThemeChange, readTheme } from "./theme.js";
 
 /** Samples in a trail. */
 const TRAIL_SAMPLES = 240;
+const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 /** The window of the frame rate. */
 const RATE_WINDOW_MS = 1000;
 
@@ -76,7 +77,7 @@ export class Plan {
   push() {
     const { frame } = this.store;
     if (!frame) return;
-    this.motion.push(frame, performance.now());
+    this.motion.push(frame, performance.now(), CALM.matches);
     this.flights.push(frame.flights ?? []);
     this.touch();
   }
@@ -134,7 +135,7 @@ export class Plan {
   paintRun(frame, now_ms) {
     const { pen, motion } = this;
     motion.advance(now_ms);
-    this.flights.advance(Math.min(100, now_ms - this.lastDraw_ms));
+    this.flights.advance(Math.min(100, now_ms - this.lastDraw_ms), CALM.matches);
     this.lastDraw_ms = now_ms;
     draw.field(pen, this.step_m());
     draw.guests(pen, motion.now_m, frame.body_m);
@@ -158,7 +159,7 @@ export class Plan {
       // A sender that is not on the field, such as the operator, is drawn above it.
       const outside = { x: frame.field_m[0] / 2, y: frame.field_m[1] };
       const to = motion.robotsNow.get(flight.to);
-      if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to);
+      if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to, CALM.matches);
     }
 
     this.paintScale();
@@ -172,7 +173,7 @@ export class Plan {
     for (const robot of frame.robots) {
       const track = history.tracks.get(robot.name);
       const place = this.motion.robotsNow.get(robot.name);
-      if (track && place) draw.trail(this.pen, track, Math.max(0, end - TRAIL_SAMPLES), end, place);
+      if (track && place) draw.trail(this.pen, robot.name, track, Math.max(0, end - TRAIL_SAMPLES), end, place);
     }
   }
 
@@ -185,7 +186,7 @@ export class Plan {
     draw.obstacles(this.pen, draft.obstacles.map(({ x, y }) => [x, y]), body_m);
 
     for (const [name, place] of Object.entries(draft.robots)) {
-      const robot = { name, blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
+      const robot = { name, emotion_state: "", blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
       draw.robot(this.pen, robot, place, body_m, { isLate: this.editor.faulty(name), isChosen: name === this.chosen });
     }
 
@@ -215,6 +216,12 @@ export class Plan {
     const reach_m = Math.max((this.motion.to?.body_m ?? 0) / 2, 12 / this.camera.scale);
     const isHit = (/** @type {Place} */ at) => Math.hypot(at.x - place.x, at.y - place.y) <= reach_m;
     return [...this.motion.robotsNow].find(([, at]) => isHit(at))?.[0] ?? null;
+  }
+
+  /** A picture of what is shown. @returns {Promise<Blob | null>} */
+  picture() {
+    this.paint(performance.now());
+    return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
   }
 
   /**

@@ -60,10 +60,11 @@ export class Player {
     return this.header?.ticks ?? 0;
   }
 
-  async open() {
+  /** @param {number} tick that is shown first, as far as the run has it */
+  async open(tick) {
     try {
       this.header = await get("recording");
-      await this.seek(0);
+      await this.seek(Math.min(this.last, tick));
       await this.readAll();
     } catch (error) {
       this.client.failed(String(error instanceof Error ? error.message : error));
@@ -94,6 +95,7 @@ export class Player {
       return known;
     }
 
+    if (!this.store.isConnected) return Promise.reject(new Error("The console of this recording is not reachable."));
     const query = new URLSearchParams({ from: String(number * CHUNK), count: String(CHUNK) });
     const fetched = get("recording/ticks", query).then((/** @type {Chunk} */ chunk) => {
       this.numbers += numbersIn(chunk);

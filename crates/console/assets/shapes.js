@@ -31,6 +31,14 @@ export function line(context, x1, y1, x2, y2) {
   context.lineTo(x2, y2);
 }
 
+/** @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, color: string) => void} */
+export function disk(context, x, y, radius, color) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, FULL_TURN);
+  context.fillStyle = color;
+  context.fill();
+}
+
 /** @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, color: string, width: number, dash?: number[]) => void} */
 export function ring(context, x, y, radius, color, width, dash = []) {
   context.beginPath();

@@ -23,6 +23,10 @@ export class Store {
     this.mode = null;
     this.run = "";
     this.version = "";
+    /** Where the simulator of a run in progress is expected. */
+    this.endpoint = "";
+    /** What has taken the address of this page, see `connection.js`. @type {import("./connection.js").Stranger | null} */
+    this.stranger = null;
     this.isConnected = false;
     this.isSimulatorPresent = false;
     /** @type {WorldFrame | null} */
@@ -60,6 +64,20 @@ export class Store {
   /** @param {boolean} isConnected */
   setConnected(isConnected) {
     this.isConnected = isConnected;
+    // Whether there is a simulator is known when the server has said so.
+    if (!isConnected) this.setSimulator(false);
+    this.emit("connection");
+  }
+
+  /** @param {boolean} isPresent */
+  setSimulator(isPresent) {
+    this.isSimulatorPresent = isPresent;
+    if (!isPresent) this.status = null;
+  }
+
+  /** @param {import("./connection.js").Stranger | null} stranger */
+  setStranger(stranger) {
+    this.stranger = stranger;
     this.emit("connection");
   }
 
@@ -67,11 +85,11 @@ export class Store {
   apply(message) {
     switch (message.type) {
       case "hello":
+        this.endpoint = message.endpoint ?? "";
         this.hello(message.mode, message.run, message.version);
         break;
       case "simulator":
-        this.isSimulatorPresent = message.present;
-        if (!message.present) this.status = null;
+        this.setSimulator(message.present);
         this.emit("connection");
         break;
       case "frame":
@@ -97,7 +115,6 @@ export class Store {
    * @param {string} version
    */
   hello(mode, run, version) {
-    if (run !== this.run) this.forget();
     this.mode = mode;
     this.run = run;
     this.version = version;
@@ -106,12 +123,6 @@ export class Store {
     this.logMissed = 0;
     this.emit("connection");
     this.emit("log");
-  }
-
-  forget() {
-    this.frame = null;
-    this.panels.clear();
-    this.history.clear();
   }
 
   /**
@@ -187,6 +198,11 @@ export class Store {
 
   get phase() {
     return this.frame?.phase ?? this.status?.phase ?? null;
+  }
+
+  /** Whether what is shown is not the state of now: there is no simulator any more. */
+  get isPast() {
+    return this.mode === "live" && !this.isLive;
   }
 
   /** Whether requests reach a simulator. */

@@ -2,6 +2,7 @@
 // The widgets of a robot's panel. Everything that a robot sends is untrusted: text is rendered as text, SVG as an image.
 
 import { drawFace } from "./face.js";
+import { stateColors } from "./palette.js";
 import { short } from "./units.js";
 import { html, nothing, svg } from "./vendor/lit-html.js";
 
@@ -28,7 +29,7 @@ export function drawWidget(widget, send) {
     case "badge":
       return html`
         <div class="widget pair"><span class="label">${widget.label}</span>
-          <span class="badge ${tone(widget.tone)}">${widget.text}</span></div>`;
+          ${badge(widget)}</div>`;
     case "bar":
       return bar(widget);
     case "face":
@@ -50,6 +51,14 @@ export function drawWidget(widget, send) {
     default:
       return nothing;
   }
+}
+
+/** An emotion and a behavior have their own color, as in the bands, whatever the tone. @param {Extract<Widget, {widget: "badge"}>} widget */
+function badge({ label, text, tone: word }) {
+  if (label !== "emotion" && label !== "behavior") return html`<span class="badge ${tone(word)}">${text}</span>`;
+
+  const { fill, ink } = stateColors(label, String(text));
+  return html`<span class="badge state" .style=${`background:${fill};color:${ink}`}>${text}</span>`;
 }
 
 /** @param {Tone} word */

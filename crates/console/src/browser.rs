@@ -186,13 +186,14 @@ impl Browser {
     }
 
     async fn send_hello(&mut self) -> Result<(), Disconnect> {
-        let (mode, run) = match &self.app.mode {
-            Mode::Live(live) => ("live", live.run()),
-            Mode::Recording(recording) => ("recording", recording.run()),
+        let (mode, run, endpoint) = match &self.app.mode {
+            Mode::Live(live) => ("live", live.run(), Some(live.endpoint())),
+            Mode::Recording(recording) => ("recording", recording.run(), None),
         };
         let hello = ServerMessage::Hello {
             mode,
             run,
+            endpoint,
             version: env!("CARGO_PKG_VERSION"),
         };
 

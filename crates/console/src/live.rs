@@ -154,6 +154,11 @@ impl Live {
         self.run.as_str()
     }
 
+    /// Where its simulator is expected.
+    pub(crate) fn endpoint(&self) -> &str {
+        &self.connect
+    }
+
     /// What the run shows.
     pub(crate) fn feed(&self) -> &Feed {
         &self.feed

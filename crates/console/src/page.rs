@@ -15,6 +15,9 @@ pub(crate) enum ServerMessage<'a> {
         mode: &'static str,
         /// Name of the run.
         run: &'a str,
+        /// Where the simulator of a run in progress is expected.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        endpoint: Option<&'a str>,
         /// Version of the console.
         version: &'static str,
     },

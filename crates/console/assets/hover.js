@@ -1,0 +1,48 @@
+// @ts-check
+// The full name and the states of the robot below the pointer.
+
+/** @typedef {import("./plan.js").Plan} Plan */
+
+export class Hover {
+  /**
+   * @param {HTMLElement} label
+   * @param {Plan} plan
+   */
+  constructor(label, plan) {
+    this.label = label;
+    this.plan = plan;
+    /** Of the pointer, in the canvas. @type {{x: number, y: number} | null} */
+    this.at = null;
+
+    plan.canvas.addEventListener("pointermove", (event) => this.move(event));
+    plan.canvas.addEventListener("pointerleave", () => this.leave());
+    plan.store.on("frame", () => this.at && this.render());
+  }
+
+  /** @param {PointerEvent} event */
+  move(event) {
+    this.at = this.plan.gestures.at(event);
+    this.render();
+  }
+
+  leave() {
+    this.at = null;
+    this.label.hidden = true;
+  }
+
+  render() {
+    const { at, plan } = this;
+    if (!at) return;
+
+    const name = plan.editor.draft ? null : plan.robotAt(plan.camera.place(at.x, at.y));
+    const robot = plan.store.frame?.robots.find((one) => one.name === name);
+    this.label.hidden = !robot;
+    if (!robot) return;
+
+    this.label.textContent = [robot.name, robot.emotion_state, robot.behavior_state].filter(Boolean).join(" · ");
+    const isRight = at.x > plan.camera.width_px / 2;
+    this.label.style.left = isRight ? "" : `${at.x + 14}px`;
+    this.label.style.right = isRight ? `${plan.camera.width_px - at.x + 14}px` : "";
+    this.label.style.top = `${Math.max(4, at.y - 34)}px`;
+  }
+}

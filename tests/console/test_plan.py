@@ -1,0 +1,110 @@
+"""What the plan shows of a robot: its emotion, its initials, its name."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from lab import ROOT, eventually, until
+
+PIXEL = """([x, y]) => {
+    const canvas = document.querySelector('[data-testid=plan]'), box = canvas.getBoundingClientRect();
+    const scale = canvas.width / box.width;
+    const copy = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
+    copy.drawImage(canvas, -(x - box.left) * scale, -(y - box.top) * scale);
+    return [...copy.getImageData(0, 0, 1, 1).data].slice(0, 3);
+}"""
+
+# The middle of the ring of a robot, where neither its nose nor its barrier is.
+RING = """(name) => {
+    const {frame, toClient} = window.carsConsole;
+    const {body_m, robots} = frame(), {location, direction_rad} = robots.find((one) => one.name === name);
+    const at = toClient(location.x, location.y), scale = toClient(location.x + 1, location.y).x - at.x;
+    const far = Math.max(9, body_m * scale / 2) + 2.5;
+    return [at.x - Math.cos(direction_rad) * far, at.y + Math.sin(direction_rad) * far];
+}"""
+
+
+def color_of_emotion(name, scheme):
+    """As the space-time diagrams and the reports have it."""
+    source = (ROOT / "crates/diagram/src/palette.rs").read_text()
+    names = re.findall(r'"([A-Z]+)"', source.split("EMOTIONS: [&str; 7] = [")[1].split("]")[0])
+    shades = re.findall(r'shade\("#(\w+)", "#(\w+)"\)', source.split("EMOTION_SHADES: [Shade; 15] = [")[1])
+    color = shades[names.index(name)][0 if scheme == "light" else 1]
+    return [int(color[at : at + 2], 16) for at in (0, 2, 4)]
+
+
+@pytest.mark.parametrize("scheme, width", [("light", 1440), ("dark", 1440), ("light", 390)])
+def test_an_emotion_has_one_color_on_the_plan_and_in_the_panel(launch, open_page, screenshots, scheme, width):
+    run = launch(options=("--speed", "20", "--set", "guests.count=20"))
+    page = open_page(run.address, width=width, scheme=scheme)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("trails").check()
+    for tick in range(1, 13):
+        page.get_by_test_id("btn-step").click()
+        expect(page.get_by_test_id("tick")).to_have_text(str(tick))
+
+    for robot in page.evaluate("window.carsConsole.frame().robots"):
+        wanted = color_of_emotion(robot["emotion_state"], scheme)
+        ring = lambda: page.evaluate(PIXEL, page.evaluate(RING, robot["name"]))
+        eventually(f"the ring of {robot['name']}", lambda: ring() == wanted)
+
+        badge = page.get_by_test_id(f"panel-{robot['name']}").locator(".badge.state").first
+        expect(badge).to_have_text(robot["emotion_state"])
+        expect(badge).to_have_css("background-color", f"rgb({', '.join(map(str, wanted))})")
+    page.screenshot(path=screenshots / f"emotions-{width}-{scheme}.png")
+
+
+def test_initials_are_unique_and_the_name_is_shown_on_hover(launch, open_page):
+    run = launch()
+    page = open_page(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    expect(page.get_by_test_id("panel-Butler").locator(".initials")).to_have_text("B")
+    expect(page.get_by_test_id("panel-Leguin").locator(".initials")).to_have_text("L")
+
+    def labels(*names):
+        return page.evaluate(
+            "(names) => import('./assets/roster.js').then(({labelsOf}) => Object.fromEntries(labelsOf(names)))", list(names)
+        )
+
+    assert labels("Bea", "Butler", "Leguin") == {"Bea": "Be", "Butler": "Bu", "Leguin": "L"}
+    assert labels("Waiter1", "Waiter2", "Waiter12") == {"Waiter1": "W1", "Waiter2": "W2", "Waiter12": "W12"}
+    many = [a + b + c for a in "ab" for b in "abcd" for c in "abcd"]
+    found = labels(*many)
+    assert len({label.lower() for label in found.values()}) == len(many)
+
+    at = page.evaluate(
+        "(() => { const {location} = window.carsConsole.frame().robots[0];"
+        " return window.carsConsole.toClient(location.x, location.y); })()"
+    )
+    page.mouse.move(at["x"], at["y"])
+    expect(page.get_by_test_id("hover")).to_contain_text("Butler")
+    page.mouse.move(at["x"] + 200, at["y"] + 100)
+    expect(page.get_by_test_id("hover")).to_be_hidden()
+
+
+def test_a_robot_has_the_color_of_its_place_in_the_roster(launch, open_page):
+    """The order in which a page happens to ask is of no importance."""
+    page = open_page(launch().address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    ask = "(names) => import('./assets/palette.js').then(({robotColor}) => names.map(robotColor))"
+    until(page, "window.carsConsole.frame().robots.length === 2")
+    butler, leguin = page.evaluate(ask, ["Butler", "Leguin"])
+    assert butler != leguin
+
+    page.reload()
+    until(page, "window.carsConsole.frame() !== null")
+    assert page.evaluate(ask, ["Leguin", "Butler"]) == [leguin, butler]
+
+
+def test_a_face_without_intensity_is_neutral(launch, open_page):
+    page = open_page(launch().address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    mouth = (
+        "([face, intensity]) => Promise.all([import('./assets/face.js'), import('./assets/vendor/lit-html.js')])"
+        ".then(([{drawFace}, {html, render}]) => { const place = document.createElement('div');"
+        " render(html`<svg>${drawFace(face, intensity)}</svg>`, place); return place.querySelector('.mouth').getAttribute('d'); })"
+    )
+    neutral = page.evaluate(mouth, ["neutral", 0])
+    assert page.evaluate(mouth, ["happy", 0]) == neutral
+    assert page.evaluate(mouth, ["happy", 0.1]) != neutral

@@ -1,0 +1,162 @@
+"""Links, pictures, keys, calm motion, and contrast."""
+
+import pytest
+from playwright.sync_api import expect
+
+from lab import PATIENCE_S, start_console, until
+
+
+@pytest.fixture
+def recorded(launch):
+    run = launch(options=("--speed", "max", "--duration", "100 s"))
+    run.start("cars", "ctl", "start", "--run", run.RUN, "--connect", run.endpoint)
+    assert run.simulator.wait(PATIENCE_S) == 0
+    return start_console(run.processes, "--recording", run.run_folder)
+
+
+def test_a_link_leads_to_a_tick_and_a_robot(recorded, open_page):
+    page = open_page(recorded)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    home = page.url
+
+    page.goto(f"{home}#tick=150&robot=Butler")
+    expect(page.get_by_test_id("tick")).to_have_text("150")
+    expect(page.locator(".panel.chosen")).to_have_attribute("data-testid", "panel-Butler")
+    page.reload()
+    expect(page.get_by_test_id("tick")).to_have_text("150")
+    expect(page.locator(".panel.chosen")).to_have_attribute("data-testid", "panel-Butler")
+
+    page.get_by_test_id("step").click()
+    expect(page.get_by_test_id("tick")).to_have_text("151")
+    page.get_by_test_id("link").click()
+    expect(page.get_by_test_id("message")).to_contain_text("link")
+    assert page.url == f"{home}#run=console-test&tick=151&robot=Butler"
+
+    page.goto(f"{home}#run=other&tick=20")
+    expect(page.get_by_test_id("message")).to_contain_text("other")
+    expect(page.get_by_test_id("tick")).to_have_text("151")
+    for odd in ("tick=-1", "tick=9999999", "tick=x&robot=Nobody", "%"):
+        page.goto(f"{home}#{odd}")
+    expect(page.get_by_test_id("tick")).to_have_text("200")
+
+
+def test_the_plan_is_saved_as_a_picture_and_fills_the_screen(launch, open_page, tmp_path):
+    page = open_page(launch().address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    with page.expect_download() as download:
+        page.get_by_test_id("picture").click()
+    assert download.value.suggested_filename == "console-test-tick-0.png"
+    download.value.save_as(tmp_path / "plan.png")
+    start = (tmp_path / "plan.png").read_bytes()[:24]
+    width, height = (int.from_bytes(start[at : at + 4], "big") for at in (16, 20))
+    assert start[:8] == b"\x89PNG\r\n\x1a\n"
+    assert [width, height] == page.evaluate("(() => { const {width, height} = document.querySelector('#plan'); return [width, height]; })()")
+
+    page.get_by_test_id("full-screen").click()
+    until(page, "document.fullscreenElement?.classList.contains('plan') ?? false")
+    page.get_by_test_id("full-screen").click()
+    until(page, "document.fullscreenElement === null")
+
+
+def test_the_keys_are_listed(launch, open_page, screenshots):
+    run = launch()
+    page = open_page(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.keyboard.press("?")
+    expect(page.get_by_test_id("help")).to_be_visible()
+    page.screenshot(path=screenshots / "help.png")
+    page.keyboard.press(".")
+    page.keyboard.press("Escape")
+    expect(page.get_by_test_id("help")).to_be_hidden()
+    assert run.status()["tick"] == 0, "keys of the list do not step the run"
+    page.keyboard.press(".")
+    expect(page.get_by_test_id("tick")).to_have_text("1")
+
+
+@pytest.mark.parametrize("motion", ["reduce", "no-preference"])
+def test_reduced_motion_is_obeyed_on_the_plan(launch, open_page, motion):
+    page = open_page(launch().address, reduced_motion=motion)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    moved = page.evaluate(
+        """() => Promise.all([import('./assets/plan.js'), import('./assets/store.js'), import('./assets/units.js')])
+        .then(([{Plan}, {Store}, {Units}]) => {
+            const store = new Store();
+            const plan = new Plan(document.createElement('canvas'), store, new Units(), {draft: null}, () => {});
+            const frame = window.carsConsole.frame();
+            const there = {x: frame.robots[0].location.x + 3, y: frame.robots[0].location.y};
+            store.show(frame);
+            plan.paint(performance.now());
+            const sent = {from: 'Leguin', to: 'Butler', seq: 1, tick: 1, command: 'x', fate: 'sent'};
+            const robots = [{...frame.robots[0], location: there}, frame.robots[1]];
+            plan.motion.arrivedAt_ms -= 500;
+            store.show({...frame, tick: frame.tick + 1, speed: 1, robots, flights: [sent]});
+            plan.paint(performance.now());
+            const at = plan.motion.robotsNow.get('Butler').x;
+            return [at === there.x, [...plan.flights.airborne.values()][0].progress > 0.8];
+        })"""
+    )
+    assert moved == ([True, True] if motion == "reduce" else [False, False])
+
+
+CONTRAST = """() => import('./assets/palette.js').then(() => {
+    const bright = (color) => {
+        const copy = new OffscreenCanvas(1, 1).getContext('2d');
+        copy.fillStyle = color;
+        copy.fillRect(0, 0, 1, 1);
+        const part = [...copy.getImageData(0, 0, 1, 1).data].slice(0, 3).map((byte) => byte / 255)
+            .map((value) => value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * part[0] + 0.7152 * part[1] + 0.0722 * part[2];
+    };
+    const ratio = (one, other) => {
+        const [low, high] = [bright(one), bright(other)].sort((a, b) => a - b);
+        return (high + 0.05) / (low + 0.05);
+    };
+    const found = {};
+    const place = document.body.appendChild(document.createElement('div'));
+    const text = (classes, outer = '') => {
+        place.className = outer;
+        const one = place.appendChild(document.createElement('span'));
+        one.className = classes;
+        const {color, backgroundColor} = getComputedStyle(one);
+        found[`${outer} ${classes}`] = [ratio(color, backgroundColor), 4.5];
+        one.remove();
+    };
+    for (const tone of ['good', 'neutral', 'warning', 'bad']) text(`badge ${tone}`);
+    for (const phase of ['gathering', 'ready', 'running', 'paused', 'ended']) text(`pill phase-${phase}`);
+    text('blocked');
+    text('initials');
+    text('initials', 'panel gone');
+    text('initials', 'panel lost');
+    place.remove();
+
+    const fill = (name) => {
+        document.body.insertAdjacentHTML('beforeend', `<svg class="cars-diagram"><rect class="${name}"></rect></svg>`);
+        const {fill} = getComputedStyle(document.body.lastChild.firstChild);
+        document.body.lastChild.remove();
+        return fill;
+    };
+    // One shade, of emotions without a color of their own, has the bound of the crate `diagram`, which chooses its ink.
+    for (const [kind, count] of [['e', 15], ['b', 14]])
+        for (let i = 0; i < count; i += 1)
+            found[`band ${kind}${i}`] = [ratio(fill(`${kind}${i}`), fill(`on-${kind}${i}`)), `${kind}${i}` === 'e10' ? 4.35 : 4.5];
+
+    const style = getComputedStyle(document.documentElement);
+    const value = (name) => style.getPropertyValue(name).trim();
+    found['initials on the plan'] = [ratio(value('--robot-text'), value('--robot')), 4.5];
+    found['initials of an absent robot'] = [ratio(value('--absent'), value('--absent-fill')), 4.5];
+    found['muted text'] = [ratio(value('--muted'), value('--surface')), 4.5];
+    // Shapes: WCAG 2.2, 1.4.11.
+    found.guests = [ratio(value('--guest'), value('--field')), 3];
+    found.robots = [ratio(value('--robot'), value('--field')), 3];
+    return found;
+})"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_contrast_is_enough(launch, open_page, scheme):
+    page = open_page(launch().address, scheme=scheme)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    found = page.evaluate(CONTRAST)
+    assert len(found) == 4 + 5 + 4 + 29 + 5
+    print(scheme, {name: round(ratio, 2) for name, (ratio, _) in found.items()})
+    assert [(name, round(ratio, 2)) for name, (ratio, least) in found.items() if ratio < least] == []
