@@ -305,7 +305,7 @@ fn intervals_with_one_range_have_one_axis() {
 
 #[test]
 fn a_matrix_is_as_wide_as_its_numbers_need() {
-    for (columns, is_wide) in [(5, false), (9, true)] {
+    for (columns, is_wide) in [(5, false), (12, true)] {
         let labels = |count: usize| {
             let label = |index: usize| MatrixLabel {
                 text: format!("{index}"),
