@@ -235,7 +235,7 @@ fn a_trend_has_a_marker_for_each_estimate_and_each_name() {
 fn the_arms_at_a_value_are_nearer_to_it_than_to_the_next_one() {
     let levels = [0.0, 0.1, 1.0];
     let mut lines = Vec::new();
-    for arm in 0..8 {
+    for _ in 0..8 {
         let point = |x: &f64| TrendPoint {
             x: *x,
             estimate: estimate(*x),
