@@ -6,9 +6,11 @@ mod course;
 mod experiment;
 mod facts;
 mod figures;
+mod floor;
 mod limits;
 mod runs;
 mod study;
+mod transitions;
 mod words;
 
 pub use experiment::of_experiment;

@@ -7,7 +7,7 @@ use crate::scale::Scale;
 /// Draws an axis below a plot, with grid lines through it. `top` and `bottom` are the ends of the plot.
 pub(crate) fn draw_below(chart: &mut Chart, scale: &Scale, top: f64, bottom: f64, title: &str) {
     let width_px = (scale.to_px - scale.from_px).abs();
-    let (ticks, decimals) = scale.ticks((width_px / 50.0).round().max(2.0) as usize);
+    let (ticks, decimals) = scale.ticks((width_px / 50.0).round().max(3.0) as usize);
     for value in ticks {
         let x = scale.at(value);
         chart.line("grid", (x, top), (x, bottom));

@@ -197,7 +197,7 @@ impl Bands {
 
 fn key_text(name: &str, share: f64) -> String {
     let name = shortened(name, NAME_LETTERS);
-    if share < 0.005 {
+    if share < 0.01 {
         return format!("{name} < 1 %");
     }
     format!("{name} {:.0} %", share * 100.0)

@@ -34,8 +34,8 @@ impl Floor {
     #[must_use]
     pub fn draw(&self) -> String {
         let [width_m, height_m] = self.field_m;
-        let left = 34.0;
-        let right = PANEL_PX - 10.0;
+        let left = 44.0;
+        let right = PANEL_PX - 2.0;
         let px_per_m = ((right - left) / width_m).min(MOST_PX / height_m);
         let right = left + width_m * px_per_m;
         let top = 6.0;
@@ -47,6 +47,8 @@ impl Floor {
         let mut chart = Chart::begin("floor", PANEL_PX, bottom + 64.0, &self.title, &description);
         draw_below(&mut chart, &x, top, bottom, "x, m");
         draw_left(&mut chart, &y, left, right);
+        let middle = f64::midpoint(top, bottom);
+        chart.upward("muted", 12.0, middle, "middle", "y, m");
         self.draw_times(&mut chart, &x, &y);
         self.draw_obstacles(&mut chart, &x, &y);
         chart.rect("frame", left, top, right - left, bottom - top);

@@ -10,8 +10,8 @@ use crate::scale::Scale;
 
 /// Height of a row, pixels.
 const ROW_PX: f64 = 22.0;
-/// Width of a letter beside its estimate, which is rather too wide.
-const NARROW: f64 = 0.87;
+/// Font of the numbers, pixels.
+const NUMBERS_PX: f64 = 10.5;
 /// Most letters of a label.
 const LABEL_LETTERS: usize = 20;
 
@@ -138,14 +138,21 @@ impl Intervals {
         for row in &self.rows {
             widest = widest.max(width_px(&shortened(&row.label, LABEL_LETTERS), LABEL_PX));
         }
-        (widest * NARROW).min(110.0)
+        widest
     }
 
+    /// Width of the widest numbers that the axis allows, so that charts of one figure have their axes in one place.
     fn numbers_px(&self) -> f64 {
-        let mut widest: f64 = 20.0;
-        for row in &self.rows {
-            widest = widest.max(width_px(&self.numbers(row), 10.0));
+        let (from, to) = self.range;
+        let mut widest: f64 = 0.0;
+        for end in [from, to] {
+            let end = typeset(end, self.decimals);
+            let numbers = format!("{end} [{end}, {end}]");
+            widest = widest.max(width_px(&numbers, NUMBERS_PX));
         }
-        (widest * NARROW).min(140.0)
+        for row in &self.rows {
+            widest = widest.max(width_px(&self.numbers(row), NUMBERS_PX));
+        }
+        widest.min(150.0)
     }
 }

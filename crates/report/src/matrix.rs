@@ -2,7 +2,7 @@
 
 use diagram::{shortened, width_px};
 
-use crate::chart::{Chart, LABEL_PX, PANEL_PX, SMALL_PX};
+use crate::chart::{Chart, LABEL_PX, PANEL_PX, SMALL_PX, WIDE_PX};
 use crate::palette::level;
 
 /// Most rows and columns that are drawn.
@@ -52,23 +52,46 @@ pub struct Matrix {
 }
 
 impl Matrix {
+    /// Whether its numbers need the width of the page.
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        let cell_px = self.cell_px(PANEL_PX);
+        let mut cells = self.cells.iter().flatten().flatten();
+        cells.any(|cell| !fits(cell, cell_px))
+    }
+
+    /// Where the cells begin.
+    fn left(&self) -> f64 {
+        labels_px(&self.rows[..self.rows.len().min(MOST)]).clamp(50.0, 130.0) + 20.0
+    }
+
+    /// Width of a cell in a chart of this width.
+    fn cell_px(&self, width: f64) -> f64 {
+        let columns = self.columns.len().clamp(1, MOST) as f64;
+        ((width - self.left() - 2.0) / columns).min(CELL_PX)
+    }
+
     /// The chart as SVG. Rows and columns after the 24th are left out.
     #[must_use]
     pub fn draw(&self) -> String {
         let rows = &self.rows[..self.rows.len().min(MOST)];
         let columns = &self.columns[..self.columns.len().min(MOST)];
-        let left = labels_px(rows).clamp(50.0, 130.0) + 20.0;
-        let is_upward = labels_px(columns) > CELL_PX - 8.0;
+        let width = if self.is_wide() { WIDE_PX } else { PANEL_PX };
+        let left = self.left();
+        let is_upward = labels_px(columns) > CELL_PX - 4.0;
+        // Colors are between the names and the cells.
+        let has_colors = columns.iter().any(|label| label.color.is_some());
+        let names_px = if has_colors { 18.0 } else { 6.0 };
         let top = if is_upward {
-            labels_px(columns).clamp(30.0, 130.0) + 32.0
+            labels_px(columns).clamp(30.0, 150.0) + names_px + 14.0
         } else {
             38.0
         };
-        let cell_px = ((PANEL_PX - left - 2.0) / columns.len().max(1) as f64).min(CELL_PX);
+        let cell_px = self.cell_px(width);
         let bottom = top + rows.len() as f64 * ROW_PX;
 
         let description = self.description();
-        let mut chart = Chart::begin("matrix", PANEL_PX, bottom + 6.0, &self.title, &description);
+        let mut chart = Chart::begin("matrix", width, bottom + 6.0, &self.title, &description);
         let rows_title = format!("{} ↓", self.rows_title);
         let columns_title = format!("{} →", self.columns_title);
         chart.text("muted", left - 6.0, top - 5.0, "end", &rows_title);
@@ -77,9 +100,9 @@ impl Matrix {
             let middle = left + (index as f64 + 0.5) * cell_px;
             let text = shortened(&label.text, LABEL_LETTERS);
             if is_upward {
-                chart.upward("", middle + 4.0, top - 18.0, "start", &text);
+                chart.upward("", middle + 4.0, top - names_px, "start", &text);
             } else {
-                chart.text("", middle, top - 18.0, "middle", &text);
+                chart.text("", middle, top - names_px, "middle", &text);
             }
             if let Some(color) = &label.color {
                 chart.rect(color, middle - 5.0, top - 12.0, 10.0, 8.0);
@@ -125,6 +148,11 @@ fn labels_px(labels: &[MatrixLabel]) -> f64 {
     widest
 }
 
+/// Whether the number of a cell is shown in this width.
+fn fits(cell: &MatrixCell, width: f64) -> bool {
+    width_px(&cell.text, LABEL_PX) <= width + 4.0
+}
+
 fn draw_cell(
     chart: &mut Chart,
     cell: Option<&MatrixCell>,
@@ -142,7 +170,7 @@ fn draw_cell(
     chart.group("cell", title.trim_end());
     chart.rect(&format!("box h{level}"), x, y, width, ROW_PX);
     let middle = x + width / 2.0;
-    if width_px(&cell.text, LABEL_PX) <= width + 4.0 {
+    if fits(cell, width) {
         let up = if cell.remark.is_empty() { 0.0 } else { 4.0 };
         let class = format!("on-h{level}");
         chart.text(&class, middle, y + 17.0 - up, "middle", &cell.text);

@@ -226,6 +226,12 @@ impl Page {
         self.body.close("details");
     }
 
+    /// Number of figures so far.
+    #[must_use]
+    pub fn figures(&self) -> usize {
+        self.figures
+    }
+
     /// Number of bytes so far.
     #[must_use]
     pub fn size(&self) -> usize {
@@ -284,10 +290,20 @@ fn write_contents(page: &mut Markup, sections: &[(String, String)]) {
     page.close("nav");
 }
 
+/// A text whose lines do not break within `n = 32`, `p < 0.05` and `95 %`.
+fn kept_together(text: &str) -> String {
+    let mut text = text.replace(" %", "\u{a0}%");
+    for relation in [" = ", " < "] {
+        let kept = relation.replace(' ', "\u{a0}");
+        text = text.replace(relation, &kept);
+    }
+    text
+}
+
 fn write_parts(markup: &mut Markup, parts: &[Part]) {
     for part in parts {
         match part {
-            Part::Text(text) => markup.text(text),
+            Part::Text(text) => markup.text(&kept_together(text)),
             Part::Strong(text) => markup.tag("strong").content(text),
             Part::Code(text) => markup.tag("code").content(text),
             Part::Link(text, id) => markup

@@ -73,7 +73,7 @@ impl Steps {
     #[must_use]
     pub fn draw(&self) -> String {
         let left = 34.0_f64.max(if self.at_risk.is_some() {
-            self.labels_px() + 20.0
+            self.labels_px() + 14.0
         } else {
             0.0
         });
@@ -123,7 +123,7 @@ impl Steps {
         for (index, curve) in self.curves.iter().enumerate() {
             let baseline = top + (index + 1) as f64 * ROW_PX;
             let name = shortened(&curve.label, LABEL_LETTERS);
-            chart.text("tick", x.from_px - 20.0, baseline, "end", &name);
+            chart.text("tick", x.from_px - 14.0, baseline, "end", &name);
             for (time, count) in times.iter().zip(&curve.at_risk) {
                 chart.text("tick", x.at(*time), baseline, "middle", &count.to_string());
             }
@@ -148,7 +148,7 @@ impl Steps {
         for curve in &self.curves {
             widest = widest.max(width_px(&shortened(&curve.label, LABEL_LETTERS), LABEL_PX));
         }
-        (0.9 * widest).min(84.0)
+        widest
     }
 }
 

@@ -84,8 +84,9 @@ impl Trend {
         self.draw_levels(&mut chart, &x, (left, right), bottom);
 
         let count = self.lines.len() as f64;
+        let dodge_px = self.dodge_px(&x);
         for (index, line) in self.lines.iter().enumerate() {
-            let aside = (index as f64 - (count - 1.0) / 2.0) * DODGE_PX.min(24.0 / count.max(1.0));
+            let aside = (index as f64 - (count - 1.0) / 2.0) * dodge_px;
             self.draw_line(&mut chart, line, &x, &y, aside);
         }
         self.draw_names(&mut chart, &y, right, (top, bottom));
@@ -104,6 +105,16 @@ impl Trend {
             .map(|(x, _)| *x)
             .fold(f64::NEG_INFINITY, f64::max);
         (first, last)
+    }
+
+    /// Distance between the markers of two arms: all arms at a value are nearer to it than to the next one.
+    fn dodge_px(&self, x: &Scale) -> f64 {
+        let mut least_px = f64::INFINITY;
+        for pair in self.levels.windows(2) {
+            least_px = least_px.min((x.at(pair[1].0) - x.at(pair[0].0)).abs());
+        }
+        let gaps = (self.lines.len() as f64 - 1.0).max(1.0);
+        DODGE_PX.min(24.0 / gaps).min(0.6 * least_px / gaps)
     }
 
     fn draw_levels(&self, chart: &mut Chart, x: &Scale, (left, right): (f64, f64), bottom: f64) {
@@ -191,7 +202,7 @@ impl Trend {
         for line in &self.lines {
             widest = widest.max(width_px(&shortened(&line.label, LABEL_LETTERS), LABEL_PX));
         }
-        (0.9 * widest).min(96.0)
+        widest
     }
 }
 

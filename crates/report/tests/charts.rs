@@ -232,6 +232,116 @@ fn a_trend_has_a_marker_for_each_estimate_and_each_name() {
 }
 
 #[test]
+fn the_arms_at_a_value_are_nearer_to_it_than_to_the_next_one() {
+    let levels = [0.0, 0.1, 1.0];
+    let mut lines = Vec::new();
+    for _ in 0..8 {
+        let point = |x: &f64| TrendPoint {
+            x: *x,
+            estimate: estimate(*x),
+            is_filled: true,
+        };
+        lines.push(TrendLine {
+            label: String::new(),
+            arm: 0,
+            points: levels.iter().map(point).collect(),
+        });
+    }
+    let chart = Trend {
+        title: String::new(),
+        x_axis: String::new(),
+        y_axis: String::new(),
+        levels: levels.iter().map(|x| (*x, x.to_string())).collect(),
+        range: (0.0, 1.0),
+        decimals: 1,
+        reference: None,
+        lines,
+    };
+
+    // The markers of a line are at growing values.
+    let svg = chart.draw();
+    let document = parsed(&svg);
+    let mut places = vec![Vec::new(); levels.len()];
+    for line in of_class(&document, "curve") {
+        let data = line.attribute("d").unwrap();
+        let points: Vec<&str> = data.split(['M', 'L']).skip(1).collect();
+        if points.len() == levels.len() {
+            for (place, point) in places.iter_mut().zip(points) {
+                let x = point.split_whitespace().next().unwrap();
+                place.push(x.parse::<f64>().unwrap());
+            }
+        }
+    }
+    let most = |places: &[f64]| places.iter().copied().fold(f64::MIN, f64::max);
+    let least = |places: &[f64]| places.iter().copied().fold(f64::MAX, f64::min);
+    assert_eq!(places[0].len(), 8);
+    assert!(most(&places[0]) < least(&places[1]), "{places:?}");
+    assert!(most(&places[1]) < least(&places[2]), "{places:?}");
+}
+
+#[test]
+fn intervals_with_one_range_have_one_axis() {
+    let chart = |value: f64| Intervals {
+        title: String::new(),
+        axis: String::new(),
+        range: (-400.0, 100.0),
+        decimals: 1,
+        reference: Some(0.0),
+        rows: vec![IntervalRow {
+            label: "arm".to_owned(),
+            arm: 0,
+            estimate: Some(estimate(value)),
+            is_filled: true,
+        }],
+    };
+    let axis = |value: f64| {
+        let svg = chart(value).draw();
+        let document = parsed(&svg);
+        let axis = of_class(&document, "axis")[0].attribute("d").unwrap();
+        axis.to_owned()
+    };
+    assert_eq!(axis(0.0), axis(-380.0));
+}
+
+#[test]
+fn a_matrix_is_as_wide_as_its_numbers_need() {
+    for (columns, is_wide) in [(5, false), (12, true)] {
+        let labels = |count: usize| {
+            let label = |index: usize| MatrixLabel {
+                text: format!("{index}"),
+                color: None,
+            };
+            (0..count).map(label).collect::<Vec<MatrixLabel>>()
+        };
+        let cell = MatrixCell {
+            share: 0.5,
+            text: "64/64".to_owned(),
+            remark: String::new(),
+        };
+        let chart = Matrix {
+            title: String::new(),
+            rows_title: "arm".to_owned(),
+            columns_title: "condition".to_owned(),
+            rows: labels(2),
+            columns: labels(columns),
+            cells: vec![vec![Some(cell); columns]; 2],
+        };
+        assert_eq!(chart.is_wide(), is_wide);
+        let numbers = chart.draw().matches(">64/64<").count();
+        assert_eq!(numbers, 2 * columns);
+    }
+}
+
+#[test]
+fn numbers_stay_with_their_units_and_relations() {
+    let mut page = Page::new("kind", "title");
+    page.paragraph(&[Part::text("n = 32, p < 0.05, 95 %"), Part::code("a = 1 %")]);
+    let html = page.finish();
+    assert!(html.contains("n\u{a0}=\u{a0}32, p\u{a0}&lt;\u{a0}0.05, 95\u{a0}%"));
+    assert!(html.contains("a = 1 %"));
+}
+
+#[test]
 fn curves_are_thinned_to_what_can_be_seen() {
     let mut steps = Vec::new();
     for index in 0..100_000 {

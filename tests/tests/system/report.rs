@@ -431,6 +431,135 @@ fn assert_has_two_runs(document: &Document<'_>, html: &str, folder: &str) {
     );
 }
 
+/// An experiment with two factors, two arms, four measures and 24 units.
+fn small_experiment(report: &str) -> String {
+    let scenario = system_tests::root().join("configs/hors_doeuvres.toml");
+    let mut file = format!(
+        "question = \"What is shown?\"\nscenario = {scenario:?}\nseeds = 2\nduration = \"20 s\"\nbaseline = \"a\"\n{report}\n\
+         [[factor]]\nname = \"guests\"\npath = \"guests.count\"\nvalues = [5, 10, 15]\n\
+         [[factor]]\nname = \"loss\"\nset = [\"network.commands={{ loss = {{value}} }}\"]\nvalues = [0, 0.5]\n\
+         [[arm]]\nname = \"a\"\n[[arm]]\nname = \"b\"\nset = [\"robot.Butler.params.caution=0.9\"]\n\
+         [[measure]]\nname = \"first\"\ncontrast = true\n[measure.time]\nto = {{ event = \"behavior\", robot = \"Butler\" }}\n"
+    );
+    for name in ["treats", "ticks", "more"] {
+        file += &format!(
+            "[[measure]]\nname = \"{name}\"\ncontrast = true\nsummary = \"robots.Butler.state_variables.treats\"\n"
+        );
+    }
+    file
+}
+
+/// Headings of a page.
+fn headings(html: &str, tag: &str) -> Vec<String> {
+    let document = parsed(html);
+    let found = document.descendants().filter(|node| node.has_tag_name(tag));
+    found.map(text_of).collect()
+}
+
+#[test]
+fn a_report_shows_what_its_experiment_names_and_results_stay_as_they_are() {
+    let lab = Lab::new();
+    let file = lab.write("small.toml", &small_experiment(""));
+    let file = file.to_str().unwrap();
+    let folder = play_experiment(&lab, file, &[]);
+    let results = || {
+        ["runs.csv", "results.json"]
+            .map(|name| std::fs::read_to_string(format!("{folder}/{name}")).unwrap())
+    };
+    let before = results();
+    let html = lab.ok(&["report", &folder]);
+    assert_eq!(
+        headings(&html, "h2"),
+        [
+            "Answer",
+            "Design",
+            "First",
+            "Treats",
+            "Ticks",
+            "More",
+            "Expectations",
+            "Example runs",
+            "Reproduction"
+        ]
+    );
+    let examples = ["The typical run", "The worst run"];
+    assert!(headings(&html, "h3").ends_with(&examples.map(str::to_owned)));
+    assert!(!html.contains("class=\"chart trend\""));
+    for class in ["chart steps", "chart floor", "cars-diagram"] {
+        assert!(html.contains(&format!("class=\"{class}\"")), "{class}");
+    }
+
+    let report = "[report]\nmeasures = [\"ticks\", \"first\"]\nx = \"guests\"\n\
+                  show = [\"estimates\", \"heat maps\", \"floor\"]\nruns = [17, \"typical\"]";
+    lab.write("small.toml", &small_experiment(report));
+    let (status, text) = lab.cars_without_out(&["experiment", "run", file, "-o", &folder]);
+    assert_eq!(status, 0, "{text}");
+    assert!(text.contains("24 are there, 0 to play"), "{text}");
+    assert_eq!(results(), before);
+
+    let html = lab.ok(&["report", &folder]);
+    let sections = [
+        "Answer",
+        "Design",
+        "Ticks",
+        "First",
+        "Example runs",
+        "Reproduction",
+    ];
+    assert_eq!(headings(&html, "h2"), sections);
+    let examples = ["Unit 17", "The typical run"];
+    assert!(headings(&html, "h3").ends_with(&examples.map(str::to_owned)));
+    assert!(html.contains("not shown by choice of the experiment file: treats, more."));
+    let document = parsed(&html);
+    let charts = |class: &str| {
+        let found = document.descendants();
+        found
+            .filter(|node| node.attribute("class") == Some(class))
+            .count()
+    };
+    assert_eq!(
+        charts("chart trend"),
+        2 * 2 * 2,
+        "measures, values of loss, differences"
+    );
+    assert_eq!(charts("chart matrix"), 2 * 2, "measures, arms");
+    assert_eq!(charts("chart floor"), 2 * 2, "runs, robots");
+    for class in [
+        "chart steps",
+        "chart intervals",
+        "chart bands",
+        "cars-diagram",
+    ] {
+        assert_eq!(charts(class), 0, "{class}");
+    }
+}
+
+#[test]
+fn a_report_of_what_there_is_not_is_refused_before_anything_runs() {
+    let lab = Lab::new();
+    let folder = lab.out().join("none");
+    let folder = folder.to_str().unwrap();
+    for (report, reason) in [
+        ("measures = [\"served\"]", "there is no measure \"served\""),
+        ("show = [\"all\"]", "unknown variant `all`"),
+        ("runs = [24]", "there is no unit 24"),
+    ] {
+        let text = small_experiment(&format!("[report]\n{report}"));
+        let file = lab.write("small.toml", &text);
+        let file = file.to_str().unwrap();
+        for args in [
+            &["check", file][..],
+            &["experiment", "run", file, "-o", folder],
+        ] {
+            let (status, text) = lab.cars_without_out(args);
+            assert_ne!(status, 0, "{report}");
+            assert!(text.contains(reason), "{text}");
+            assert!(text.contains("small.toml:7:"), "{text}");
+        }
+        assert!(!std::path::Path::new(folder).exists());
+    }
+}
+
 #[test]
 fn ten_thousand_runs_over_two_factors_are_a_page_of_a_bounded_size() {
     let lab = Lab::new();

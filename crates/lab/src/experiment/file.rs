@@ -17,6 +17,7 @@ use super::condition::{
     Condition, ConditionError, Conditions, Factor, NAMED, Target, Value, check_apart, check_change,
     check_levels, parse,
 };
+use super::presentation::{Presentation, RawPresentation};
 
 /// Fewest runs of each arm under each condition; an interval needs two.
 const MIN_SEEDS: usize = 2;
@@ -85,6 +86,8 @@ pub struct Experiment {
     pub measures: Vec<Measure>,
     /// What is expected of every run, beside what the scenario expects.
     pub expectations: Vec<Expectation>,
+    /// What its report shows.
+    pub report: Presentation,
     /// Places of the expectations in the file, bytes.
     expectation_spans: Vec<Range<usize>>,
     /// The file, for errors that only the scenario shows.
@@ -124,6 +127,8 @@ struct RawExperiment {
     measures: Spanned<Vec<Measure>>,
     #[serde(default, rename = "expect")]
     expectations: Vec<Spanned<Expectation>>,
+    #[serde(default)]
+    report: RawPresentation,
 }
 
 /// Seeds as written in the file.
@@ -377,6 +382,9 @@ impl RawExperiment {
             .list(duration_s)
             .map_err(|error| FileError::at(&source, None, &error.to_string()))?;
 
+        let measures = check_measures(&source, self.measures, &conditions)?;
+        let report = self.report.check(&source, &measures, &conditions)?;
+
         let mut expectations = Vec::new();
         let mut expectation_spans = Vec::new();
         for expectation in self.expectations {
@@ -390,8 +398,9 @@ impl RawExperiment {
             scenario: folder.join(self.scenario.into_inner()),
             seeds,
             duration_s,
-            measures: check_measures(&source, self.measures, &conditions)?,
+            measures,
             expectations,
+            report,
             expectation_spans,
             conditions,
             baseline: baseline.transpose()?,

@@ -213,10 +213,12 @@ impl Plan {
         for change in &request.set {
             set.push(change.to_string());
         }
+        let units = cells.len() * experiment.seeds.len();
+        experiment.report.check_units(experiment.source(), units)?;
         let written = Written {
             name: request.name.clone(),
             program: Program::this(),
-            units: cells.len() * experiment.seeds.len(),
+            units,
             duration_s: experiment.duration_s,
             seeds: experiment.seeds.clone(),
             set,

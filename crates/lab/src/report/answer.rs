@@ -117,9 +117,9 @@ fn sentence(
         let under = if heading.is_empty() {
             String::new()
         } else {
-            format!("{heading} ")
+            format!("{} ", unbroken(&heading))
         };
-        named.push(format!("{under}({})", numbers(contrast)));
+        named.push(format!("{under}({})", numbers(measure, contrast)));
     }
     let mut text = named.join("; ");
     if contrasts.len() > MOST_NAMED {
@@ -132,10 +132,17 @@ fn sentence(
     parts
 }
 
+/// The name of a condition, whose lines break between its factors only.
+fn unbroken(heading: &str) -> String {
+    heading.replace(' ', "\u{a0}").replace(",\u{a0}", ", ")
+}
+
 /// The difference with its interval, n and p.
-fn numbers(contrast: &Contrast) -> String {
+fn numbers(measure: &Measure, contrast: &Contrast) -> String {
+    let unit = measure.unit.as_ref();
+    let unit = unit.map_or_else(String::new, |unit| format!("\u{a0}{unit}"));
     let difference = match &contrast.difference {
-        Difference::Number { mean, .. } => with_interval(mean, 1.0, ""),
+        Difference::Number { mean, .. } => with_interval(mean, 1.0, &unit),
         Difference::Time { share, .. } => with_interval(share, 100.0, " points"),
     };
     format!(
@@ -153,7 +160,7 @@ fn with_interval(difference: &Bootstrapped, factor: f64, unit: &str) -> String {
     let value = signed(difference.value * factor, decimals);
     match bounds {
         Some((low, high)) => format!(
-            "{value}{unit} [{}, {}]",
+            "{value}{unit} [{},\u{a0}{}]",
             signed(low * factor, decimals),
             signed(high * factor, decimals)
         ),

@@ -6,15 +6,17 @@ use miette::{IntoDiagnostic, miette};
 use observe::Measure;
 use protocol::RunName;
 use report::{Cell, Column, Figure, Page, Part, State, Table};
-use simulator::RunFolder;
+use simulator::{EpochFiles, RunFolder};
 
 use super::answer::{lead, sentences};
 use super::course::{diagram_lines, run_panel};
 use super::facts::RunFacts;
-use super::figures::{Shown, differences, distributions, estimates, heat_maps, survival, verdicts};
+use super::figures::{Of, differences, distributions, estimates, heat_maps, survival, verdicts};
+use super::floor::occupancy;
 use super::study::{Study, label};
-use super::words::{counted, quoted};
-use crate::experiment::{Outcome, Provenance, Results, Robots};
+use super::transitions::transitions;
+use super::words::{capitalized, counted, quoted, utc};
+use crate::experiment::{Example, Outcome, Provenance, Results, Robots, Shown};
 use crate::folder::recorded_epoch;
 use crate::run::execute;
 
@@ -23,6 +25,12 @@ const MOST_NAMED: usize = 10;
 
 /// No further measure is shown on a page with this many bytes.
 const MOST_BYTES_OF_MEASURES: usize = 3_000_000;
+
+/// No further figure of an example run is shown on a page with this many bytes.
+const MOST_BYTES_OF_EXAMPLES: usize = 6_000_000;
+
+/// What is shown of example runs.
+const EXAMPLE_PARTS: [Shown; 3] = [Shown::Runs, Shown::Transitions, Shown::Floor];
 
 /// Writes the report of the experiment in a folder, as HTML.
 ///
@@ -44,21 +52,10 @@ pub fn of_experiment(folder: &Path) -> miette::Result<String> {
     page.lead(&lead(&study));
     write_answer(&mut page, &study);
     write_design(&mut page, &study);
-    let mut left_out = Vec::new();
-    for measure in study.measures() {
-        if page.size() > MOST_BYTES_OF_MEASURES {
-            left_out.push(label(measure));
-            continue;
-        }
-        write_measure(&mut page, &study, measure);
-    }
-    if !left_out.is_empty() {
-        page.remark(&[Part::text(format!(
-            "So that this page stays small, charts and tables of these measures are left out: {}.",
-            left_out.join(", ")
-        ))]);
-    }
-    if let Some(figure) = verdicts(&study) {
+    write_measures(&mut page, &study);
+    if study.shows(Shown::Expectations)
+        && let Some(figure) = verdicts(&study)
+    {
         page.section("Expectations");
         page.figure(&figure);
     }
@@ -87,7 +84,7 @@ fn write_answer(page: &mut Page, study: &Study<'_>) {
     for measure in study.measures() {
         let sentences = sentences(study, measure);
         if !sentences.is_empty() {
-            page.heading(label(measure));
+            page.heading(&capitalized(label(measure)));
             page.list(&sentences);
         }
     }
@@ -96,7 +93,9 @@ fn write_answer(page: &mut Page, study: &Study<'_>) {
 fn write_design(page: &mut Page, study: &Study<'_>) {
     page.section("Design");
     let experiment = &study.results.plan.experiment;
+    // A text in a file has line breaks where they are convenient there.
     let explained = experiment.explained();
+    let explained = explained.split_whitespace().collect::<Vec<_>>().join(" ");
     if !explained.is_empty() {
         page.paragraph(&[Part::text(explained)]);
     }
@@ -144,57 +143,131 @@ fn write_design(page: &mut Page, study: &Study<'_>) {
     }
 }
 
-fn write_measure(page: &mut Page, study: &Study<'_>, measure: &Measure) {
-    page.section(label(measure));
-    if let Some(what) = &measure.what {
-        page.paragraph(&[Part::text(format!("{what}."))]);
-    }
-
-    page.figure(&estimates(study, measure));
-    if let Some(figure) = heat_maps(study, measure) {
-        page.figure(&figure);
-    }
-    if measure.is_time() {
-        page.figure(&survival(study, measure));
-        for shown in [Shown::Share, Shown::Time] {
-            add_figure(page, differences(study, measure, shown));
+fn write_measures(page: &mut Page, study: &Study<'_>) {
+    let shown = study.shown_measures();
+    let mut large = Vec::new();
+    for measure in &shown {
+        if page.size() > MOST_BYTES_OF_MEASURES {
+            large.push(label(measure));
+            continue;
         }
+        write_measure(page, study, measure);
+    }
+
+    if !large.is_empty() {
+        page.remark(&[Part::text(format!(
+            "So that this page stays small, charts and tables of these measures are left out: {}.",
+            large.join(", ")
+        ))]);
+    }
+    let mut others = Vec::new();
+    for measure in study.measures() {
+        if !shown.iter().any(|one| one.name == measure.name) {
+            others.push(label(measure));
+        }
+    }
+    if !others.is_empty() {
+        page.remark(&[
+            Part::text(format!(
+                "Also measured, and not shown by choice of the experiment file: {}. Their numbers are in ",
+                others.join(", ")
+            )),
+            Part::code("runs.csv"),
+            Part::text(" and "),
+            Part::code("results.json"),
+            Part::text("."),
+        ]);
+    }
+}
+
+fn write_measure(page: &mut Page, study: &Study<'_>, measure: &Measure) {
+    let mut figures = Vec::new();
+    if study.shows(Shown::Estimates) {
+        figures.push(estimates(study, measure));
+    }
+    if study.shows(Shown::HeatMaps) {
+        figures.extend(heat_maps(study, measure));
+    }
+    let is_time = measure.is_time();
+    if is_time && study.shows(Shown::Survival) {
+        figures.push(survival(study, measure));
+    }
+    if study.shows(Shown::Differences) {
+        let of: &[Of] = if is_time {
+            &[Of::Share, Of::Time]
+        } else {
+            &[Of::Mean]
+        };
+        figures.extend(of.iter().filter_map(|of| differences(study, measure, *of)));
+    }
+    let has_distributions = !is_time && study.shows(Shown::Distributions);
+    if figures.is_empty() && !has_distributions {
         return;
     }
-    add_figure(page, differences(study, measure, Shown::Mean));
-    page.begin_details("Distributions");
-    page.figure(&distributions(study, measure));
-    page.end_details();
-}
 
-fn add_figure(page: &mut Page, figure: Option<Figure>) {
-    if let Some(figure) = figure {
-        page.figure(&figure);
+    page.section(&capitalized(label(measure)));
+    if let Some(what) = &measure.what {
+        page.paragraph(&[Part::text(format!("{}.", capitalized(what)))]);
+    }
+    for figure in &figures {
+        page.figure(figure);
+    }
+    if has_distributions {
+        page.begin_details(&format!("Distributions, figure {}", page.figures() + 1));
+        page.figure(&distributions(study, measure));
+        page.end_details();
     }
 }
 
-/// A typical run, and the one that differs most, with what their robots felt.
+/// Single runs as examples, with what their robots felt.
 fn write_examples(page: &mut Page, study: &Study<'_>, folder: &Path) {
-    let Some(measure) = study.measures().first() else {
+    let shown = study.shown_measures();
+    let first = shown.first().copied().or(study.measures().first());
+    let runs = &study.results.plan.experiment.report.runs;
+    let is_any_shown = EXAMPLE_PARTS.iter().any(|part| study.shows(*part));
+    let Some(measure) = first.filter(|_| is_any_shown && !runs.is_empty()) else {
         return;
     };
-    let Some((typical, extreme)) = examples(study, measure) else {
-        return;
-    };
+    let found = typical_and_worst(study, measure);
 
-    page.section("Two runs");
-    let baseline = baseline_name(study);
-    page.paragraph(&[
-        Part::text("A typical run is that of the arm "),
-        Part::strong(baseline),
-        Part::text(format!(
-            " whose {} is nearest to the median of all its runs. The worst run fails most expectations; where runs fail equally \
-             many, it is the one that is farthest from that median.",
-            label(measure)
-        )),
-    ]);
-    for (name, outcome) in [("The typical run", typical), ("The worst run", extreme)] {
-        write_example(page, study, folder, name, (measure, outcome));
+    page.section("Example runs");
+    let mut explained = Vec::new();
+    if runs.contains(&Example::Typical) {
+        explained.extend([
+            Part::text("The typical run is that of the arm "),
+            Part::strong(baseline_name(study)),
+            Part::text(format!(
+                " whose {} is nearest to the median of all its runs. ",
+                label(measure)
+            )),
+        ]);
+    }
+    if runs.contains(&Example::Worst) {
+        explained.push(Part::text(format!(
+            "The worst run fails most expectations; where runs fail equally many, it is the one whose {} is farthest from the median \
+             of all runs of the arm {}.",
+            label(measure),
+            baseline_name(study)
+        )));
+    }
+    if !explained.is_empty() {
+        page.paragraph(&explained);
+    }
+    for run in runs {
+        let (name, outcome) = match run {
+            Example::Typical => ("The typical run".to_owned(), found.map(|found| found.0)),
+            Example::Worst => ("The worst run".to_owned(), found.map(|found| found.1)),
+            Example::Unit(number) => {
+                let mut outcomes = study.results.outcomes.iter();
+                let outcome = outcomes.find(|outcome| outcome.unit == *number);
+                (format!("Unit {number}"), outcome)
+            }
+        };
+        page.heading(&name);
+        match outcome {
+            Some(outcome) => write_example(page, study, folder, (measure, outcome)),
+            None => page.remark(&[Part::text("There are no results of it.")]),
+        }
     }
 }
 
@@ -204,7 +277,10 @@ fn baseline_name<'a>(study: &Study<'a>) -> &'a str {
 }
 
 /// The typical and the worst run.
-fn examples<'a>(study: &Study<'a>, measure: &Measure) -> Option<(&'a Outcome, &'a Outcome)> {
+fn typical_and_worst<'a>(
+    study: &Study<'a>,
+    measure: &Measure,
+) -> Option<(&'a Outcome, &'a Outcome)> {
     let value = |outcome: &Outcome| outcome.measures.get(&measure.name).map(|one| one.value);
     let baseline = baseline_name(study);
     let outcomes = &study.results.outcomes;
@@ -247,10 +323,8 @@ fn write_example(
     page: &mut Page,
     study: &Study<'_>,
     folder: &Path,
-    name: &str,
     (measure, outcome): (&Measure, &Outcome),
 ) {
-    page.heading(name);
     let measured = outcome
         .measures
         .get(&measure.name)
@@ -287,7 +361,7 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette
     let unit = plan.unit(outcome.unit);
     let mut scenario =
         plan.scenario_of(&unit, &|| unreachable!("its robots run in this process"))?;
-    scenario.record.frames = false;
+    scenario.record.frames = study.shows(Shown::Floor);
     let place = tempfile::tempdir().into_diagnostic()?;
     let run = RunName::new("unit").into_diagnostic()?;
     let recorded = RunFolder::new(place.path(), &run);
@@ -302,9 +376,36 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette
 
     let files = recorded_epoch(&recorded, None)?;
     let facts = RunFacts::read(&files)?;
+    let mut figures = Vec::new();
+    if study.shows(Shown::Runs) {
+        figures.push(course(outcome, &facts, &files)?);
+    }
+    if study.shows(Shown::Transitions) {
+        figures.extend(transitions(&[&facts]));
+    }
+    if study.shows(Shown::Floor) {
+        figures.extend(occupancy(&[&facts]));
+    }
+
+    let all = figures.len();
+    for (index, figure) in figures.iter().enumerate() {
+        if page.size() > MOST_BYTES_OF_EXAMPLES {
+            page.remark(&[Part::text(format!(
+                "So that this page stays small, {} of this run are left out.",
+                counted(all - index, "figure")
+            ))]);
+            break;
+        }
+        page.figure(figure);
+    }
+    Ok(())
+}
+
+/// Emotions over time and the space-time diagram of a unit.
+fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> miette::Result<Figure> {
     let mut panels = Vec::new();
-    panels.extend(run_panel(&facts, State::Emotion, "Emotions"));
-    let diagram = diagram_lines(&format!("unit {}", outcome.unit), &facts, &files)?;
+    panels.extend(run_panel(facts, State::Emotion, "Emotions"));
+    let diagram = diagram_lines(&format!("unit {}", outcome.unit), facts, files)?;
     panels.extend(diagram.lines);
     let mut caption = "Emotions over time, and the space-time diagram, to be read line by line: robots are lanes, with emotion above \
          behavior; a slanted line is a command, from the tick it was sent to the tick it arrived; a cross is where one was lost. n = 1 run."
@@ -315,12 +416,11 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette
             diagram.last, facts.last_tick
         );
     }
-    page.figure(&Figure {
+    Ok(Figure {
         panels,
         caption: vec![Part::text(caption)],
         table: None,
-    });
-    Ok(())
+    })
 }
 
 fn write_reproduction(
@@ -360,10 +460,7 @@ fn write_reproduction(
             machine.os, machine.architecture, machine.processors
         );
         add("machine", Cell::text(text));
-        add(
-            "written, s since 1970 (UTC)",
-            Cell::Count(provenance.written_unix_s),
-        );
+        add("written", Cell::text(utc(provenance.written_unix_s)));
     }
     page.table(&[Part::text("Where the numbers come from.")], &table);
 

@@ -11,7 +11,8 @@ use report::{
 };
 
 use super::limits::{MOST_PANELS, limited};
-use super::study::{CellPlace, Study, axis, is_shown, label, level_number};
+use super::study::{CellPlace, Study, axis, is_shown, label, level_number, named};
+use super::words::capitalized;
 use crate::experiment::{Contrast, Difference};
 use crate::statistics::{Bootstrapped, Survival, ecdf, quantile};
 
@@ -20,14 +21,14 @@ const MOST_ROWS: usize = 500;
 /// How many values a factor has of which lines are drawn.
 const LINE_LEVELS: RangeInclusive<usize> = 3..=60;
 
-/// What of a difference a forest plot shows.
+/// Of what a difference is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shown {
-    /// Of means.
+pub(super) enum Of {
+    /// Means.
     Mean,
-    /// Of the percentages of runs with an event.
+    /// The percentages of runs with an event.
     Share,
-    /// Of mean times to an event.
+    /// Mean times to an event.
     Time,
 }
 
@@ -35,30 +36,33 @@ pub(super) enum Shown {
 pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
     let range = estimates_range(study, measure);
     let mut caption = vec![Part::text(format!(
-        "{}. {} {}.",
-        axis(measure),
+        "{} {}.",
         estimated(measure),
         sample_sizes(study)
     ))];
-    let mut panels = Vec::new();
-    if let Some(levels) = numeric_factor(study) {
-        panels.push(trend(study, measure, range, &levels));
-        if let Some(differences) = trend_of_differences(study, measure, &levels) {
-            panels.push(differences);
-            caption.push(Part::text(
-                " At the right, the paired differences to the baseline with 95 % intervals (BCa bootstrap); filled markers: \
-                 p < 0.05 after Holm's correction.",
-            ));
-        }
-    } else {
+    let lines = lines(study);
+    let (panels, sentence) = if lines.is_empty() {
         let all = interval_panels(study, measure, range);
-        let (kept, sentence) = limited(all, study.conditions.len(), "conditions");
-        panels = kept;
-        caption.push(Part::text(sentence));
-    }
+        limited(all, study.conditions.len(), "conditions")
+    } else {
+        let mut panels = Vec::new();
+        let mut all = 0;
+        for line in &lines {
+            let of = [
+                Some(trend(study, measure, range, line)),
+                trend_of_differences(study, measure, line),
+            ];
+            all += of.iter().flatten().count();
+            panels.extend(of.into_iter().flatten());
+        }
+        if all > lines.len() {
+            caption.push(Part::text(differences_in_words(study, measure)));
+        }
+        limited(panels, all, "charts")
+    };
 
     caption.extend([
-        Part::text(" Data: column "),
+        Part::text(format!("{sentence} Data: column ")),
         Part::code(&measure.name),
         Part::text(" of "),
         Part::code("runs.csv"),
@@ -72,11 +76,43 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
 }
 
 /// What the estimates of a measure are.
-fn estimated(measure: &Measure) -> &'static str {
+fn estimated(measure: &Measure) -> String {
     if measure.is_time() {
-        "Percentage of runs with the event by the end, from the survival curve, with 95 % intervals (Greenwood, log(-log));"
+        format!(
+            "Percentage of runs with {} by the end of the run, from the survival curve, with 95 % intervals (Greenwood, log(-log));",
+            label(measure)
+        )
     } else {
-        "Means over the seeds with 95 % intervals (Student's t);"
+        format!(
+            "{}: means over the seeds with 95 % intervals (Student's t);",
+            capitalized(&axis(measure))
+        )
+    }
+}
+
+/// What differences beside estimates are.
+fn differences_in_words(study: &Study<'_>, measure: &Measure) -> String {
+    let contrasts = study.contrasts_of(measure);
+    let baseline = contrasts.first().map_or("", |one| &one.baseline);
+    format!(
+        " Differences to {baseline} are paired by seed{}, with 95 % intervals (BCa bootstrap), and filled where p < 0.05 after Holm's \
+         correction of {} comparisons ({}).",
+        if measure.is_time() {
+            ", in percentage points"
+        } else {
+            ""
+        },
+        contrasts.len(),
+        test_of(measure)
+    )
+}
+
+/// How differences in a measure are tested.
+fn test_of(measure: &Measure) -> &'static str {
+    if measure.is_time() {
+        "log-rank test"
+    } else {
+        "sign-flip test of the pairs"
     }
 }
 
@@ -104,16 +140,61 @@ pub(super) fn places(study: &Study<'_>) -> Vec<CellPlace> {
     places
 }
 
-/// The values of the only factor, if they are numbers and enough for a line.
-fn numeric_factor(study: &Study<'_>) -> Option<Vec<f64>> {
-    if study.factors.len() != 1 || !LINE_LEVELS.contains(&study.conditions.len()) {
-        return None;
+/// The conditions along a factor whose values are numbers.
+struct Line<'a> {
+    /// The factor.
+    factor: &'a str,
+    /// The values of the other factors in words; empty if there are none.
+    others: String,
+    /// The conditions, with growing values of the factor.
+    levels: Vec<Level<'a>>,
+}
+
+/// A value of a factor.
+struct Level<'a> {
+    x: f64,
+    name: &'a str,
+    /// Index of the condition that has it.
+    condition: usize,
+}
+
+/// The conditions along the factor that the experiment file names, or the only factor if its values are numbers and enough for
+/// a line: a line for each combination of the other factors. Otherwise there are none.
+fn lines<'a>(study: &Study<'a>) -> Vec<Line<'a>> {
+    let is_only = study.factors.len() == 1 && LINE_LEVELS.contains(&study.conditions.len());
+    let Some(factor) = study.named_axis().or(is_only.then_some(0)) else {
+        return Vec::new();
+    };
+
+    let mut lines: Vec<Line<'_>> = Vec::new();
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    for (index, condition) in study.conditions.iter().enumerate() {
+        let mut others = condition.levels.clone();
+        others.remove(factor);
+        let (_, name) = &condition.levels[factor];
+        let Some(x) = level_number(name) else {
+            return Vec::new();
+        };
+
+        let others = named(&others);
+        let place = *places.entry(others.clone()).or_insert(lines.len());
+        if place == lines.len() {
+            lines.push(Line {
+                factor: study.factors[factor],
+                others,
+                levels: Vec::new(),
+            });
+        }
+        lines[place].levels.push(Level {
+            x,
+            name,
+            condition: index,
+        });
     }
-    let levels = study.conditions.iter().map(|condition| {
-        let (_, level) = condition.levels.first()?;
-        level_number(level)
-    });
-    levels.collect()
+    for line in &mut lines {
+        line.levels.sort_by(|a, b| a.x.total_cmp(&b.x));
+    }
+    lines
 }
 
 /// Ends of the axis of a measure: of all its intervals.
@@ -149,27 +230,26 @@ fn widened(values: &[f64], is_of_amounts: bool) -> (f64, f64) {
         from = from.min(0.0);
         to = to.max(0.0);
     }
-    round_range(from, to, 4)
+    round_range(from, to, 6)
 }
 
 fn decimals_of((from, to): (f64, f64)) -> usize {
-    decimals_for((to - from) / 2.0)
+    decimals_for(to - from)
 }
 
-fn trend(study: &Study<'_>, measure: &Measure, range: (f64, f64), levels: &[f64]) -> Panel {
+fn trend(study: &Study<'_>, measure: &Measure, range: (f64, f64), line: &Line<'_>) -> Panel {
     let mut lines = Vec::new();
     for (arm, of) in study.arms.iter().enumerate() {
         let mut points = Vec::new();
-        for (condition, x) in levels.iter().enumerate() {
-            if let Some(estimate) = study.estimate(measure, (condition, arm)) {
+        for level in &line.levels {
+            if let Some(estimate) = study.estimate(measure, (level.condition, arm)) {
                 points.push(TrendPoint {
-                    x: *x,
+                    x: level.x,
                     estimate,
                     is_filled: true,
                 });
             }
         }
-        points.sort_by(|a, b| a.x.total_cmp(&b.x));
         lines.push(TrendLine {
             label: of.name.clone(),
             arm: look(study, arm),
@@ -177,47 +257,50 @@ fn trend(study: &Study<'_>, measure: &Measure, range: (f64, f64), levels: &[f64]
         });
     }
 
-    let factor = study.factors.join(", ");
+    let factor = line.factor;
+    let title = format!("{} over {factor} {}", axis(measure), line.others);
     let chart = Trend {
-        title: format!("{} over {factor}", axis(measure)),
-        x_axis: factor,
+        title: title.trim_end().to_owned(),
+        x_axis: factor.to_owned(),
         y_axis: axis(measure),
-        levels: named_levels(study, levels),
+        levels: line.named_levels(),
         range,
         decimals: decimals_of(range),
         reference: None,
         lines,
     };
+    let heading = if line.others.is_empty() {
+        "Arms"
+    } else {
+        &line.others
+    };
     Panel {
-        heading: "Arms".to_owned(),
+        heading: heading.to_owned(),
         svg: chart.draw(),
         is_wide: false,
     }
 }
 
 /// The differences to the baseline over the factor; `None` if there are none.
-fn trend_of_differences(study: &Study<'_>, measure: &Measure, levels: &[f64]) -> Option<Panel> {
-    let shown = if measure.is_time() {
-        Shown::Share
+fn trend_of_differences(study: &Study<'_>, measure: &Measure, line: &Line<'_>) -> Option<Panel> {
+    let what = if measure.is_time() {
+        Of::Share
     } else {
-        Shown::Mean
+        Of::Mean
     };
-    let mut values = Vec::new();
     let mut lines = Vec::new();
     for (arm, of) in study.arms.iter().enumerate() {
         let mut points = Vec::new();
-        for (condition, x) in study.conditions.iter().zip(levels) {
+        for level in &line.levels {
+            let condition = &study.conditions[level.condition];
             if let Some(contrast) = study.contrast(measure, condition, of) {
-                let estimate = difference(contrast, shown);
-                values.extend(ends(estimate));
                 points.push(TrendPoint {
-                    x: *x,
-                    estimate,
+                    x: level.x,
+                    estimate: difference(contrast, what),
                     is_filled: is_shown(contrast),
                 });
             }
         }
-        points.sort_by(|a, b| a.x.total_cmp(&b.x));
         if !points.is_empty() {
             lines.push(TrendLine {
                 label: of.name.clone(),
@@ -227,35 +310,56 @@ fn trend_of_differences(study: &Study<'_>, measure: &Measure, levels: &[f64]) ->
         }
     }
     let baseline = &study.contrasts_of(measure).first()?.baseline;
+    if lines.is_empty() {
+        return None;
+    }
 
-    let factor = study.factors.join(", ");
-    let range = widened(&values, false);
+    let factor = line.factor;
+    let title = format!(
+        "Differences in {} over {factor} {}",
+        label(measure),
+        line.others
+    );
+    let range = differences_range(study, measure, what);
     let chart = Trend {
-        title: format!("Differences in {} over {factor}", label(measure)),
-        x_axis: factor,
-        y_axis: difference_axis(measure, shown, baseline),
-        levels: named_levels(study, levels),
+        title: title.trim_end().to_owned(),
+        x_axis: factor.to_owned(),
+        y_axis: difference_axis(measure, what, baseline),
+        levels: line.named_levels(),
         range,
         decimals: decimals_of(range),
         reference: Some(0.0),
         lines,
     };
+    let heading = if line.others.is_empty() {
+        format!("Differences to {baseline}")
+    } else {
+        format!("{}: differences to {baseline}", line.others)
+    };
     Some(Panel {
-        heading: format!("Differences to {baseline}"),
+        heading,
         svg: chart.draw(),
         is_wide: false,
     })
 }
 
-/// The values of the only factor with their names, with growing values.
-fn named_levels(study: &Study<'_>, levels: &[f64]) -> Vec<(f64, String)> {
-    let mut named = Vec::new();
-    for (x, condition) in levels.iter().zip(study.conditions) {
-        let name = condition.levels.first().map_or("", |(_, level)| level);
-        named.push((*x, name.to_owned()));
+/// Ends of the axis of the differences in a measure: of all their intervals.
+fn differences_range(study: &Study<'_>, measure: &Measure, what: Of) -> (f64, f64) {
+    let mut values = Vec::new();
+    for contrast in study.contrasts_of(measure) {
+        values.extend(ends(difference(contrast, what)));
     }
-    named.sort_by(|a, b| a.0.total_cmp(&b.0));
-    named
+    widened(&values, false)
+}
+
+impl Line<'_> {
+    /// The values of the factor with their names.
+    fn named_levels(&self) -> Vec<(f64, String)> {
+        let levels = self.levels.iter();
+        levels
+            .map(|level| (level.x, level.name.to_owned()))
+            .collect()
+    }
 }
 
 /// The index by which an arm has its color and marker: that of the baseline is the first one.
@@ -379,14 +483,10 @@ fn interval_cells(interval: Option<(f64, f64)>, decimals: usize) -> [Cell; 2] {
 }
 
 /// Differences of the arms to the baseline under each condition; `None` if there are none.
-pub(super) fn differences(study: &Study<'_>, measure: &Measure, shown: Shown) -> Option<Figure> {
+pub(super) fn differences(study: &Study<'_>, measure: &Measure, what: Of) -> Option<Figure> {
     let contrasts = study.contrasts_of(measure);
     let first = contrasts.first()?;
-    let mut values = Vec::new();
-    for contrast in &contrasts {
-        values.extend(ends(difference(contrast, shown)));
-    }
-    let range = widened(&values, false);
+    let range = differences_range(study, measure, what);
 
     let compared: BTreeSet<&str> = contrasts.iter().map(|one| one.condition.as_str()).collect();
     let compared = compared.len();
@@ -398,7 +498,7 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, shown: Shown) ->
                 rows.push(IntervalRow {
                     label: of.name.clone(),
                     arm: look(study, arm),
-                    estimate: Some(difference(contrast, shown)),
+                    estimate: Some(difference(contrast, what)),
                     is_filled: is_shown(contrast),
                 });
             }
@@ -409,7 +509,7 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, shown: Shown) ->
         let heading = study.heading(condition);
         let chart = Intervals {
             title: format!("Differences in {} {heading}", label(measure)),
-            axis: difference_axis(measure, shown, &first.baseline),
+            axis: difference_axis(measure, what, &first.baseline),
             range,
             decimals: decimals_of(range),
             reference: Some(0.0),
@@ -422,9 +522,16 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, shown: Shown) ->
         });
     }
 
-    let test = match shown {
-        Shown::Mean => "sign-flip test of the pairs",
-        Shown::Share | Shown::Time => "log-rank test",
+    let of = match what {
+        Of::Mean => axis(measure),
+        Of::Share => format!(
+            "the percentage of runs with {} by the end of the run, in percentage points",
+            label(measure)
+        ),
+        Of::Time => format!(
+            "the mean time to {}, at most to the end of the run, in seconds",
+            label(measure)
+        ),
     };
     let n = contrasts
         .iter()
@@ -432,33 +539,34 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, shown: Shown) ->
         .max()
         .unwrap_or(0);
     let mut caption = format!(
-        "Differences to {}, paired by seed, with 95 % intervals (BCa bootstrap). Filled markers: p < 0.05 after Holm's correction \
-         of {} comparisons ({test}). n = {n} pairs each.",
+        "Differences to {} in {of}, paired by seed, with 95 % intervals (BCa bootstrap). Filled markers: p < 0.05 after Holm's \
+         correction of {} comparisons ({}). n = {n} pairs each.",
         first.baseline,
-        contrasts.len()
+        contrasts.len(),
+        test_of(measure)
     );
     let (panels, sentence) = limited(panels, compared, "conditions");
     caption += &sentence;
     Some(Figure {
         panels,
         caption: vec![Part::text(caption)],
-        table: Some(differences_table(study, &contrasts, shown)),
+        table: Some(differences_table(study, &contrasts, what)),
     })
 }
 
-fn difference_axis(measure: &Measure, shown: Shown, baseline: &str) -> String {
-    match shown {
-        Shown::Mean => format!("{} minus {baseline}", axis(measure)),
-        Shown::Share => format!("{}, points, minus {baseline}", label(measure)),
-        Shown::Time => format!("mean time to {}, s, minus {baseline}", label(measure)),
+fn difference_axis(measure: &Measure, what: Of, baseline: &str) -> String {
+    match what {
+        Of::Mean => format!("{} minus {baseline}", axis(measure)),
+        Of::Share => format!("{}, points, minus {baseline}", label(measure)),
+        Of::Time => format!("mean time to {}, s, minus {baseline}", label(measure)),
     }
 }
 
-fn difference(contrast: &Contrast, shown: Shown) -> Estimate {
-    let factor = if shown == Shown::Share { 100.0 } else { 1.0 };
+fn difference(contrast: &Contrast, what: Of) -> Estimate {
+    let factor = if what == Of::Share { 100.0 } else { 1.0 };
     let Bootstrapped { value, interval } = match &contrast.difference {
         Difference::Number { mean, .. } => mean,
-        Difference::Time { share, .. } if shown == Shown::Share => share,
+        Difference::Time { share, .. } if what == Of::Share => share,
         Difference::Time {
             restricted_mean_s, ..
         } => restricted_mean_s,
@@ -471,7 +579,7 @@ fn difference(contrast: &Contrast, shown: Shown) -> Estimate {
     }
 }
 
-fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], shown: Shown) -> Table {
+fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], what: Of) -> Table {
     let mut table = Table::new(vec![
         Column::text("Condition"),
         Column::text("arm"),
@@ -484,7 +592,7 @@ fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], shown: Shown) -
         Column::number("p after Holm"),
     ]);
     for contrast in contrasts.iter().take(MOST_ROWS) {
-        let estimate = difference(contrast, shown);
+        let estimate = difference(contrast, what);
         let effect = match &contrast.difference {
             Difference::Number { dominance, .. } => Cell::Number(*dominance, 2),
             Difference::Time { .. } => Cell::Empty,
@@ -549,7 +657,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
         let heading = study.heading(of);
         let chart = Steps {
             title: format!("Runs without {} {heading}", label(measure)),
-            x_axis: "simulated time, s".to_owned(),
+            x_axis: format!("time to {}, s", label(measure)),
             y_axis: format!("share of runs without {}", label(measure)),
             range: (0.0, duration_s),
             at_risk: Some(times.clone()),
@@ -563,7 +671,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
     }
     let mut caption = format!(
         "Share of runs without {} over time (Kaplan-Meier) with 95 % bands (Greenwood, log(-log)). Ticks on a curve are runs that \
-         ended without it. {}.",
+         ended without it. Below, the number of runs at risk. {}.",
         label(measure),
         sample_sizes(study)
     );
@@ -638,11 +746,15 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
 
 /// A heat map for each arm over two factors; `None` if there are not two.
 pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> {
-    let [rows, columns] = study.factors[..] else {
+    let [_, _] = study.factors[..] else {
         return None;
     };
-    let row_levels = levels(study, 0);
-    let column_levels = levels(study, 1);
+    let of_columns = study.named_axis().unwrap_or(1);
+    let of_rows = 1 - of_columns;
+    let rows = study.factors[of_rows];
+    let columns = study.factors[of_columns];
+    let row_levels = levels(study, of_rows);
+    let column_levels = levels(study, of_columns);
     if row_levels.len() < 2 || column_levels.len() < 2 {
         return None;
     }
@@ -652,8 +764,8 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
     for (arm, of) in study.arms.iter().enumerate().take(MOST_PANELS) {
         let mut cells = vec![vec![None; column_levels.len()]; row_levels.len()];
         for (condition, place) in study.conditions.iter().enumerate() {
-            let row = position(&row_levels, &place.levels[0].1);
-            let column = position(&column_levels, &place.levels[1].1);
+            let row = position(&row_levels, &place.levels[of_rows].1);
+            let column = position(&column_levels, &place.levels[of_columns].1);
             cells[row][column] =
                 study
                     .estimate(measure, (condition, arm))
@@ -677,14 +789,13 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
         panels.push(Panel {
             heading: of.name.clone(),
             svg: chart.draw(),
-            is_wide: false,
+            is_wide: chart.is_wide(),
         });
     }
     let (panels, sentence) = limited(panels, study.arms.len(), "arms");
     let caption = format!(
-        "{} by {rows} and {columns}, a map for each arm; darker is more. The numbers with their intervals are in the table of the \
-         figure before. {}.{sentence}",
-        axis(measure),
+        "{} by {rows} and {columns}, a map for each arm; darker is more. {}.{sentence}",
+        capitalized(&axis(measure)),
         sample_sizes(study)
     );
     Some(Figure {
@@ -737,6 +848,10 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
         Column::number("fail"),
         Column::number("undecided"),
     ]);
+    let columns_title = match study.factors[..] {
+        [only] => only,
+        _ => "condition",
+    };
     let mut panels = Vec::new();
     for name in names {
         let mut cells = vec![vec![None; study.conditions.len()]; study.arms.len()];
@@ -776,7 +891,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
             let chart = Matrix {
                 title: format!("Expectation {name}"),
                 rows_title: "arm".to_owned(),
-                columns_title: "condition".to_owned(),
+                columns_title: columns_title.to_owned(),
                 rows: study
                     .arms
                     .iter()
@@ -785,14 +900,17 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
                 columns: study
                     .conditions
                     .iter()
-                    .map(|condition| plain_label(&study.heading(condition)))
+                    .map(|condition| match &condition.levels[..] {
+                        [(_, level)] => plain_label(level),
+                        _ => plain_label(&study.heading(condition)),
+                    })
                     .collect(),
                 cells,
             };
             panels.push(Panel {
                 heading: name.clone(),
                 svg: chart.draw(),
-                is_wide: false,
+                is_wide: chart.is_wide(),
             });
         }
     }

@@ -6,15 +6,14 @@ use std::path::PathBuf;
 use miette::miette;
 use protocol::RobotName;
 use protocol::messages::{End, Variable};
-use report::{
-    BandRow, Cell, Column, Figure, Floor, Matrix, MatrixCell, MatrixLabel, Page, Panel, Part,
-    State, Table,
-};
+use report::{BandRow, Cell, Column, Figure, Page, Panel, Part, State, Table};
 use simulator::{EpochFiles, RunFolder, Summary};
 
 use super::course::{diagram_lines, run_panel, state_panel, states_of};
 use super::facts::{Disturbance, RunFacts};
+use super::floor::occupancy;
 use super::limits::{MOST_PANELS, limited};
+use super::transitions::transitions;
 use super::words::{counted, quoted};
 use crate::folder::{read_summary, recorded_epoch};
 
@@ -74,8 +73,15 @@ pub fn of_runs(folders: &[RunFolder]) -> miette::Result<String> {
     write_summary(&mut page, &runs);
     write_states(&mut page, &runs);
     write_diagrams(&mut page, &runs);
-    write_transitions(&mut page, &runs);
-    write_floor(&mut page, &runs);
+    let facts: Vec<&RunFacts> = runs.iter().map(|run| &run.facts).collect();
+    page.section("Transitions");
+    for figure in transitions(&facts) {
+        page.figure(&figure);
+    }
+    if let Some(figure) = occupancy(&facts) {
+        page.section("Occupancy of the floor");
+        page.figure(&figure);
+    }
     write_disturbances(&mut page, &runs);
     write_expectations(&mut page, &runs);
     write_reproduction(&mut page, &runs);
@@ -452,201 +458,6 @@ fn write_diagrams(page: &mut Page, runs: &[Run]) {
             Part::text("."),
         ]);
     }
-}
-
-fn write_transitions(page: &mut Page, runs: &[Run]) {
-    page.section("Transitions");
-    for (state, what) in [(State::Emotion, "emotions"), (State::Behavior, "behaviors")] {
-        let mut panels = Vec::new();
-        let mut table = Table::new(vec![
-            Column::text("Robot"),
-            Column::text("from"),
-            Column::text("to"),
-            Column::number("count"),
-            Column::number("share of the row, %"),
-        ]);
-        for name in all_robots(runs).into_iter().take(MOST_PANELS) {
-            let mut transitions: BTreeMap<(String, String), u64> = BTreeMap::new();
-            for robot in runs.iter().filter_map(|run| run.facts.robots.get(name)) {
-                for (transition, count) in &states_of(robot, state).transitions {
-                    *transitions.entry(transition.clone()).or_insert(0) += count;
-                }
-            }
-            if transitions.is_empty() {
-                continue;
-            }
-            panels.push(Panel {
-                heading: name.to_string(),
-                svg: transition_matrix(name, state, what, &transitions).draw(),
-                is_wide: false,
-            });
-            add_transitions(&mut table, name, &transitions);
-        }
-        if panels.is_empty() {
-            continue;
-        }
-        let caption = format!(
-            "Transitions between {what}: how often the state of the row was followed by that of the column, and below it the share \
-             of all transitions from the row. Darker is a larger share. n = {}.",
-            counted(runs.len(), "run")
-        );
-        page.figure(&Figure {
-            panels,
-            caption: vec![Part::text(caption)],
-            table: Some(table),
-        });
-    }
-}
-
-/// Transitions from each state.
-fn row_sums(transitions: &BTreeMap<(String, String), u64>) -> BTreeMap<&str, u64> {
-    let mut sums = BTreeMap::new();
-    for ((from, _), count) in transitions {
-        *sums.entry(from.as_str()).or_insert(0) += count;
-    }
-    sums
-}
-
-fn transition_matrix(
-    name: &RobotName,
-    state: State,
-    what: &str,
-    transitions: &BTreeMap<(String, String), u64>,
-) -> Matrix {
-    let sums = row_sums(transitions);
-    let mut states = BTreeSet::new();
-    for (from, to) in transitions.keys() {
-        states.insert(from.as_str());
-        states.insert(to.as_str());
-    }
-
-    let mut labels = Vec::new();
-    let mut cells = Vec::new();
-    for from in &states {
-        labels.push(MatrixLabel {
-            text: (*from).to_owned(),
-            color: Some(state.class(from)),
-        });
-        let mut row = Vec::new();
-        for to in &states {
-            let key = ((*from).to_owned(), (*to).to_owned());
-            row.push(transitions.get(&key).map(|count| {
-                let share = *count as f64 / sums[from] as f64;
-                MatrixCell {
-                    share,
-                    text: count.to_string(),
-                    remark: format!("{:.0} %", 100.0 * share),
-                }
-            }));
-        }
-        cells.push(row);
-    }
-    Matrix {
-        title: format!("Transitions between {what} of {name}"),
-        rows_title: "from".to_owned(),
-        columns_title: "to".to_owned(),
-        rows: labels.clone(),
-        columns: labels,
-        cells,
-    }
-}
-
-fn add_transitions(
-    table: &mut Table,
-    name: &RobotName,
-    transitions: &BTreeMap<(String, String), u64>,
-) {
-    let sums = row_sums(transitions);
-    for ((from, to), count) in transitions {
-        let share = *count as f64 / sums[from.as_str()] as f64;
-        table.rows.push(vec![
-            Cell::text(name.as_str()),
-            Cell::text(from),
-            Cell::text(to),
-            Cell::Count(*count),
-            Cell::Number(100.0 * share, 1),
-        ]);
-    }
-}
-
-fn write_floor(page: &mut Page, runs: &[Run]) {
-    let mut floors: BTreeMap<&RobotName, Floor> = BTreeMap::new();
-    let mut others = 0;
-    for run in runs {
-        for (name, floor) in &run.facts.floors {
-            let sum = floors.entry(name).or_insert_with(|| Floor {
-                times_s: BTreeMap::new(),
-                ..floor.clone()
-            });
-            // Fields of other sizes have other parts.
-            if sum.field_m != floor.field_m {
-                others += 1;
-                continue;
-            }
-            for (part, time_s) in &floor.times_s {
-                *sum.times_s.entry(*part).or_insert(0.0) += time_s;
-            }
-        }
-    }
-    if floors.is_empty() {
-        return;
-    }
-
-    page.section("Occupancy of the floor");
-    let mut panels = Vec::new();
-    let mut table = Table::new(vec![
-        Column::text("Robot"),
-        Column::number("parts visited"),
-        Column::number("time, s"),
-        Column::number("longest in a part, s"),
-        Column::number("at x, m"),
-        Column::number("at y, m"),
-    ]);
-    for (name, mut floor) in floors {
-        floor.title = format!("Where {name} was");
-        add_floor(&mut table, name, &floor);
-        if panels.len() < MOST_PANELS {
-            panels.push(Panel {
-                heading: name.to_string(),
-                svg: floor.draw(),
-                is_wide: false,
-            });
-        }
-    }
-    let mut caption = format!(
-        "Where the robots were, from above: the time that the center of a robot spent in each part of the floor. Darkness grows \
-         with the square root of the time. Dark squares are obstacles. n = {}.",
-        counted(runs.len(), "run")
-    );
-    if others > 0 {
-        caption += " Runs in a field of another size are left out.";
-    }
-    page.figure(&Figure {
-        panels,
-        caption: vec![Part::text(caption)],
-        table: Some(table),
-    });
-}
-
-fn add_floor(table: &mut Table, name: &RobotName, floor: &Floor) {
-    let mut total_s = 0.0;
-    let mut longest_s = 0.0;
-    let mut place = (0, 0);
-    for (part, time_s) in &floor.times_s {
-        total_s += time_s;
-        if *time_s > longest_s {
-            longest_s = *time_s;
-            place = *part;
-        }
-    }
-    table.rows.push(vec![
-        Cell::text(name.as_str()),
-        Cell::Count(floor.times_s.len() as u64),
-        Cell::Number(total_s, 1),
-        Cell::Number(longest_s, 1),
-        Cell::Number((f64::from(place.0) + 0.5) * floor.part_m, 2),
-        Cell::Number((f64::from(place.1) + 0.5) * floor.part_m, 2),
-    ]);
 }
 
 fn write_disturbances(page: &mut Page, runs: &[Run]) {

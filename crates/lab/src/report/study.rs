@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use observe::Measure;
 use report::Estimate;
 
-use crate::experiment::{Arm, Condition, Contrast, Outcome, Results};
+use crate::experiment::{Arm, Condition, Contrast, Outcome, Results, Shown};
 use crate::statistics::{self, Survival, TimeTo};
 
 /// Largest p value, after Holm's correction, of a difference that is stated.
@@ -65,6 +65,26 @@ impl<'a> Study<'a> {
     /// The measures of the experiment.
     pub(super) fn measures(&self) -> &'a [Measure] {
         &self.results.plan.experiment.measures
+    }
+
+    /// The measures that have a section, in their order.
+    pub(super) fn shown_measures(&self) -> Vec<&'a Measure> {
+        let experiment = &self.results.plan.experiment;
+        let named = experiment.report.measures.iter();
+        named
+            .filter_map(|name| self.measures().iter().find(|one| one.name == *name))
+            .collect()
+    }
+
+    /// Whether the report has a part.
+    pub(super) fn shows(&self, part: Shown) -> bool {
+        self.results.plan.experiment.report.shows(part)
+    }
+
+    /// The factor that its experiment file puts on the horizontal axis, by its place.
+    pub(super) fn named_axis(&self) -> Option<usize> {
+        let name = self.results.plan.experiment.report.x.as_ref()?;
+        self.factors.iter().position(|factor| factor == name)
     }
 
     /// The runs of an arm under a condition.
@@ -135,18 +155,10 @@ impl<'a> Study<'a> {
 
     /// The name of a condition with those of its factors; empty if there is only one condition without a name.
     pub(super) fn heading(&self, condition: &Condition) -> String {
-        let mut parts = Vec::new();
-        for (factor, level) in &condition.levels {
-            if factor == "condition" {
-                parts.push(level.clone());
-            } else {
-                parts.push(format!("{factor} {level}"));
-            }
-        }
-        if parts.is_empty() {
+        if condition.levels.is_empty() {
             return condition.name.clone();
         }
-        parts.join(", ")
+        named(&condition.levels)
     }
 
     /// The heading of the condition of this name.
@@ -157,6 +169,19 @@ impl<'a> Study<'a> {
             .find(|condition| condition.name == name);
         condition.map_or_else(|| name.to_owned(), |condition| self.heading(condition))
     }
+}
+
+/// Names levels of factors. A named condition stands for itself.
+pub(super) fn named<'a>(levels: impl IntoIterator<Item = &'a (String, String)>) -> String {
+    let mut parts = Vec::new();
+    for (factor, level) in levels {
+        if factor == "condition" {
+            parts.push(level.clone());
+        } else {
+            parts.push(format!("{factor} {level}"));
+        }
+    }
+    parts.join(", ")
 }
 
 /// Percentage of runs with the event, from the survival curve.

@@ -1,5 +1,6 @@
 //! Tests of experiment files: what is read, and what is refused, where and why.
 
+use super::super::presentation::{Example, Shown};
 use super::*;
 
 #[test]
@@ -70,6 +71,12 @@ when = "after"
 name = "exchange"
 eventually = { robot = "Butler", behavior = "EXCHANGE" }
 within = "60 s"
+
+[report]
+measures = ["exchanges", "served"]
+x = "guests"
+show = ["estimates", "heat maps", "floor"]
+runs = ["worst", 17]
 "#;
 
 fn parse(text: &str) -> Result<Experiment, FileError> {
@@ -92,6 +99,22 @@ fn conditions_and_factors_make_a_grid() {
 }
 
 #[test]
+fn a_report_shows_what_is_named_or_everything() {
+    let report = parse(GOOD).unwrap().report;
+    assert_eq!(report.measures, ["exchanges", "served"]);
+    assert_eq!(report.x.as_deref(), Some("guests"));
+    assert!(report.shows(Shown::HeatMaps) && !report.shows(Shown::Survival));
+    assert_eq!(report.runs, [Example::Worst, Example::Unit(17)]);
+
+    let (without, _) = GOOD.split_once("[report]").unwrap();
+    let report = parse(without).unwrap().report;
+    assert_eq!(report.measures, ["served", "exchanges"]);
+    assert_eq!(report.x, None);
+    assert!(report.shows(Shown::Estimates) && report.shows(Shown::Floor));
+    assert_eq!(report.runs, [Example::Typical, Example::Worst]);
+}
+
+#[test]
 fn seeds_are_a_count_a_list_or_a_range() {
     for (text, seeds) in [
         ("3", vec![1, 2, 3]),
@@ -106,7 +129,7 @@ fn seeds_are_a_count_a_list_or_a_range() {
 /// A file with one mistake: what of [`GOOD`] is replaced, by what, what the line of the error contains, and its reason.
 type Wrong<'a> = (&'a str, &'a str, &'a str, &'a str);
 
-const WRONG: [Wrong<'_>; 57] = [
+const WRONG: [Wrong<'_>; 66] = [
     (
         "robot.Butler.params.policy=emotion",
         "seed=7",
@@ -423,6 +446,60 @@ const WRONG: [Wrong<'_>; 57] = [
         "summary = \"ticks\"\ncount = {",
         "[[measure]]",
         "exactly one of",
+    ),
+    (
+        "measures = [\"exchanges\", \"served\"]",
+        "measures = [\n\"exchanges\",\n\"server\"]",
+        "\"server\"",
+        "no measure \"server\"; there are served, exchanges",
+    ),
+    (
+        "measures = [\"exchanges\", \"served\"]",
+        "measures = [\n\"served\",\n\"served\"]",
+        "\"served\"]",
+        "it is there twice",
+    ),
+    (
+        "x = \"guests\"",
+        "x = \"guest\"",
+        "x = ",
+        "no factor \"guest\"",
+    ),
+    (
+        "values = [10, 20]",
+        "values = [10]",
+        "x = ",
+        "at least two numbers or times",
+    ),
+    (
+        "show = [\"estimates\", \"heat maps\", \"floor\"]",
+        "show = [\n\"estimates\",\n\"heatmaps\"]",
+        "\"heatmaps\"",
+        "unknown variant `heatmaps`, expected one of `estimates`, `heat maps`",
+    ),
+    (
+        "runs = [\"worst\", 17]",
+        "runs = [\n\"worst\",\n\"best\"]",
+        "\"best\"",
+        "a run is \"typical\", \"worst\", or the number of a unit",
+    ),
+    (
+        "runs = [\"worst\", 17]",
+        "runs = [\n\"worst\",\n-1]",
+        "-1",
+        "a run is \"typical\", \"worst\", or the number of a unit",
+    ),
+    (
+        "runs = [\"worst\", 17]",
+        "runs = [0, 1, 2, 3, 4, 5, 6, 7,\n8]",
+        "8]",
+        "at most 8 runs",
+    ),
+    (
+        "runs = [\"worst\", 17]",
+        "page = 1",
+        "page",
+        "unknown field `page`",
     ),
 ];
 
