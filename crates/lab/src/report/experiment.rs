@@ -38,6 +38,14 @@ const EXAMPLE_PARTS: [Shown; 3] = [Shown::Runs, Shown::Transitions, Shown::Floor
 /// If it is not the folder of an experiment, none of its units has been played, or a file cannot be read.
 pub fn of_experiment(folder: &Path) -> miette::Result<String> {
     let results = Results::load(folder)?;
+    if let (true, Some(first)) = (results.outcomes.is_empty(), results.failures.first()) {
+        return Err(miette!(
+            help = "the reasons of all: `cars experiment merge`",
+            "every unit that was played has failed, the first one, {}: {}",
+            first.unit,
+            first.reason
+        ));
+    }
     if results.outcomes.is_empty() {
         return Err(miette!(
             help = "play it with `cars experiment run`",
@@ -78,6 +86,17 @@ fn write_answer(page: &mut Page, study: &Study<'_>) {
         page.remark(&[Part::text(format!(
             "{} could not be played to the end and have no numbers: the results are those of the others.",
             counted(results.failures.len(), "run")
+        ))]);
+    }
+
+    if !results.conflicts.is_empty() {
+        let units: Vec<String> = results.conflicts.iter().map(usize::to_string).collect();
+        let named = units.len().min(MOST_NAMED);
+        page.remark(&[Part::text(format!(
+            "{} gave different runs when they were played again, so the results are not reproducible: {}{}.",
+            counted(units.len(), "unit"),
+            units[..named].join(", "),
+            if named < units.len() { " and more" } else { "" }
         ))]);
     }
 

@@ -529,8 +529,9 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, what: Of) -> Opt
             label(measure)
         ),
         Of::Time => format!(
-            "the mean time to {}, at most to the end of the run, in seconds",
-            label(measure)
+            "the mean time to {}, in seconds, where a longer time counts as {}",
+            label(measure),
+            horizons(&contrasts)
         ),
     };
     let n = contrasts
@@ -552,6 +553,26 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, what: Of) -> Opt
         caption: vec![Part::text(caption)],
         table: Some(differences_table(study, &contrasts, what)),
     })
+}
+
+/// Up to which times the mean times of contrasts count: as far as both curves are known.
+fn horizons(contrasts: &[&Contrast]) -> String {
+    let mut least_s = f64::INFINITY;
+    let mut most_s: f64 = 0.0;
+    for contrast in contrasts {
+        if let Difference::Time { until_s, .. } = contrast.difference {
+            least_s = least_s.min(until_s);
+            most_s = most_s.max(until_s);
+        }
+    }
+
+    if least_s == most_s {
+        format!("{most_s} s")
+    } else {
+        format!(
+            "{least_s} s to {most_s} s, as far as both curves are known (`until_s` in results.json)"
+        )
+    }
 }
 
 fn difference_axis(measure: &Measure, what: Of, baseline: &str) -> String {
