@@ -317,8 +317,9 @@ fn a_damaged_unit_is_named_and_played_again() {
 #[test]
 fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
     let short = Short::new();
-    let arm =
-        "name = \"yoked\"\nwhat = \"no such parameter\"\nset = [\"robot.Butler.params.wings=2\"]";
+    // Butler begins, and starts again at 10 s with a parameter that he does not have.
+    let arm = "name = \"yoked\"\nwhat = \"no such parameter\"\n\
+               set = ['change=[{ at = \"10 s\", set = [\"robot.Butler.params.wings=2\"] }]']";
     let yoked =
         "name = \"yoked\"\nwhat = \"emotions of the next seed\"\nyoked_to = \"plain\"\nset = []";
     let text = Short::text();
@@ -346,6 +347,24 @@ fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
         assert_eq!(row["digest"].is_empty(), has_failed, "{row:?}");
         assert_eq!(row["served"].is_empty(), has_failed, "{row:?}");
     }
+}
+
+#[test]
+fn results_name_the_commit_that_the_program_was_built_from() {
+    let short = Short::new();
+    let folder = short.out("results");
+    short.run(&folder, &["--duration", "10 s", "--seeds", "2"]);
+    let read = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&fs::read(folder.join(name)).unwrap()).unwrap()
+    };
+
+    let commit = read("provenance.json")["commit"].clone();
+    assert_eq!(read("plan.json")["program"]["commit"], commit);
+    let mut git = Command::new("git");
+    let asked = git.args(["rev-parse", "HEAD"]).current_dir(root()).output();
+    let is_checkout = asked.is_ok_and(|output| output.status.success());
+    let digits = commit.as_str().unwrap_or_default();
+    assert_eq!(digits.len(), if is_checkout { 40 } else { 0 }, "{commit}");
 }
 
 /// The digest of a run in the folder of a lab.
