@@ -317,9 +317,9 @@ fn a_damaged_unit_is_named_and_played_again() {
 #[test]
 fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
     let short = Short::new();
-    // Butler begins, and starts again at 10 s with a parameter that he does not have.
+    // Butler begins, and starts again at 2 s with a parameter that he does not have.
     let arm = "name = \"yoked\"\nwhat = \"no such parameter\"\n\
-               set = ['change=[{ at = \"10 s\", set = [\"robot.Butler.params.wings=2\"] }]']";
+               set = ['change=[{ at = \"2 s\", set = [\"robot.Butler.params.wings=2\"] }]']";
     let yoked =
         "name = \"yoked\"\nwhat = \"emotions of the next seed\"\nyoked_to = \"plain\"\nset = []";
     let text = Short::text();
