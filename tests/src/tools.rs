@@ -1,6 +1,8 @@
 //! Tools that tests need beside the toolchain.
 
 use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
 
 /// Reports a skipped test directly on the standard error, because the test harness hides the output of passing tests.
 pub fn skip(test: &str, reason: &str) {
@@ -11,4 +13,25 @@ pub fn skip(test: &str, reason: &str) {
 pub fn lacks_tool(test: &str, what: &str) {
     assert!(std::env::var_os("CI").is_none(), "{test}: {what}");
     skip(test, what);
+}
+
+/// Runs a script in Python with a text as its input, to its end.
+///
+/// # Panics
+/// If there is no Python, or the script does not read all of its input.
+#[must_use]
+pub fn python(script: &Path, input: &str) -> Output {
+    let mut python = Command::new("python3")
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .arg(script)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = python.stdin.take().unwrap();
+    stdin.write_all(input.as_bytes()).unwrap();
+    drop(stdin);
+
+    python.wait_with_output().unwrap()
 }

@@ -3,8 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
-use std::io::Write;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use lab::statistics::{
     Estimate, Interval, LogRank, RestrictedMeans, SignFlip, Survival, TimeTo, bootstrap, dominance,
@@ -13,7 +12,7 @@ use lab::statistics::{
 use protocol::random::{self, Stream};
 use serde_json::{Value, json};
 use system_tests::root;
-use system_tests::tools::lacks_tool;
+use system_tests::tools::{lacks_tool, python};
 
 /// Sizes of samples: the least that has an interval, those below and above the limit of exact tests, and more than one word
 /// of signs.
@@ -127,19 +126,8 @@ fn written(times: &[TimeTo]) -> Value {
 
 /// Gives everything to the script that compares it; the script fails at the first difference.
 fn compare(found: &Value) {
-    let mut python = Command::new("python3")
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .arg(root().join("tests/statistics/compare.py"))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut input = python.stdin.take().unwrap();
-    input.write_all(found.to_string().as_bytes()).unwrap();
-    drop(input);
-
-    let output = python.wait_with_output().unwrap();
+    let script = root().join("tests/statistics/compare.py");
+    let output = python(&script, &found.to_string());
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");
     let compared: Value = serde_json::from_slice(&output.stdout).unwrap();

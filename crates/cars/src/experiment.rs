@@ -274,6 +274,7 @@ impl PlanArgs {
         };
         let plan = Plan::new(&request)?;
         plan.check()?;
+        plan.check_begins()?;
         for change in plan.changes_since(&folder)? {
             terminal::note(change);
         }

@@ -489,12 +489,8 @@ impl Live {
     fn request_log(&self) {
         let lines = match self.query(&Control::Log, REPLY_TIMEOUT) {
             Ok(ControlAnswer::Log { lines }) => Some(lines),
-            Ok(other) => {
+            other => {
                 tracing::warn!("the log so far is not told: {other:?}");
-                None
-            }
-            Err(error) => {
-                tracing::warn!("the log so far is not told: {error}");
                 None
             }
         };

@@ -114,25 +114,27 @@ impl LocalHost {
     /// Crashes a robot between two ticks: the clock goes on without it, as without a process that was killed under
     /// `on_late = "continue"`. Without effect on a robot that is not of the roster.
     pub fn crash(&mut self, name: &RobotName) {
-        self.stop(name, FaultKind::Crash, 1);
+        self.stop(name, FaultKind::Crash);
         self.barrier.token(name, false, &mut self.outputs);
         self.outputs.clear();
     }
 
     /// Hangs a robot between two ticks, as a process that is stopped under `on_late = "continue"`: it misses ticks, and is lost
-    /// after `lose_after` of them. Without effect on a robot that is not of the roster.
+    /// after `lose_after` of them, which is the same for all robots. Without effect on a robot that is not of the roster.
     pub fn hang(&mut self, name: &RobotName, lose_after: u32) {
-        self.stop(name, FaultKind::Hang, lose_after);
+        let mut lateness = self.barrier.lateness().clone();
+        lateness.lose_after = lose_after;
+        self.barrier.set_lateness(lateness, &mut self.outputs);
+        self.stop(name, FaultKind::Hang);
     }
 
-    fn stop(&mut self, name: &RobotName, fault: FaultKind, lose_after: u32) {
+    fn stop(&mut self, name: &RobotName, fault: FaultKind) {
         let Some(index) = self.index(name) else {
             return;
         };
 
         let mut lateness = self.barrier.lateness().clone();
         lateness.own.insert(name.clone(), OnLate::Continue);
-        lateness.lose_after = lose_after;
         self.barrier.set_lateness(lateness, &mut self.outputs);
         self.barrier.fault(name, Some(fault));
         self.outputs.clear();

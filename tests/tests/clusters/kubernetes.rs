@@ -1,10 +1,9 @@
 //! The manifest of an indexed Job: checked with the schemas of Kubernetes, and its tasks run as pods would run them.
 
-use std::io::Write;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use serde_json::Value;
-use system_tests::tools::lacks_tool;
+use system_tests::tools::{lacks_tool, python};
 use system_tests::{programs, root};
 
 use super::{Trial, UNITS, checked};
@@ -81,19 +80,7 @@ fn the_pods_of_a_job_give_the_results_of_this_machine() {
 
 /// Reads a manifest; refused if the schemas of Kubernetes do.
 fn read(manifest: &str) -> Result<Value, String> {
-    let mut python = Command::new("python3")
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .arg(root().join("tests/clusters/manifest.py"))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut input = python.stdin.take().unwrap();
-    input.write_all(manifest.as_bytes()).unwrap();
-    drop(input);
-
-    let output = python.wait_with_output().unwrap();
+    let output = python(&root().join("tests/clusters/manifest.py"), manifest);
     if !output.status.success() {
         return Err(String::from_utf8_lossy(&output.stderr).into_owned());
     }

@@ -56,18 +56,8 @@ fn count_of(events: &[Value], kind: &str, robot: &str) -> usize {
 
 /// What every picture of a run to its end has.
 fn assert_agrees(picture: &Picture, events: &[Value]) {
-    let sent = count(events, "command_sent");
-    assert_eq!(picture.of_class("command"), sent);
+    assert_agrees_up_to_the_end(picture, events);
     assert_eq!(picture.of_class("head"), count(events, "command_delivered"));
-    assert_eq!(picture.of_class("break"), count(events, "command_dropped"));
-    assert_eq!(
-        picture.of_class("delayed"),
-        count(events, "command_delayed")
-    );
-    assert_eq!(
-        picture.of_class("doubled"),
-        count(events, "command_duplicated")
-    );
     assert_eq!(
         picture.of_class("fault"),
         count(events, "fault").div_ceil(2)

@@ -692,12 +692,14 @@ fn every_documented_behavior_has_its_test() {
 fn absences_in_one_process_give_the_run_of_a_launch() {
     let lab = Lab::new();
     let changes = [
-        // Lost at once, lost after some ticks, not lost, and until after the end of the run.
+        // Lost at once, lost after some ticks, not lost, both at a time, and until after the end of the run.
         "fault=[\
          { robot = \"Leguin\", do = \"crash\", at = \"40 s\", until = \"70 s\" }, \
          { robot = \"Butler\", do = \"hang\", at = \"50 s\", until = \"60 s\" }, \
          { robot = \"Leguin\", do = \"hang\", at = \"80 s\", until = \"81 s\" }, \
          { robot = \"Butler\", do = \"hang\", at = \"90 s\", until = \"90.5 s\" }, \
+         { robot = \"Butler\", do = \"hang\", at = \"99.5 s\", until = \"104 s\" }, \
+         { robot = \"Leguin\", do = \"crash\", at = \"100 s\", until = \"105 s\" }, \
          { robot = \"Leguin\", do = \"hang\", at = \"110 s\", until = \"200 s\" }]",
         "on_late=continue",
         "lose_after=3",
@@ -732,7 +734,7 @@ fn absences_in_one_process_give_the_run_of_a_launch() {
         event.as_object_mut().unwrap().remove("seal");
     }
     let count = |kind: &str| events.iter().filter(|event| event["event"] == kind).count();
-    assert_eq!((count("lost"), count("joined")), (3, 6));
+    assert_eq!((count("lost"), count("joined")), (5, 8));
     assert_eq!(events.len(), launched.len());
     for (event, launched) in events.iter().zip(&launched) {
         assert_eq!(event, launched);
