@@ -68,7 +68,7 @@ fn describe(path: &Path) -> miette::Result<String> {
     Ok(format!("{processes}, {}", content(&scenario)))
 }
 
-/// An experiment, every scenario of which has been read.
+/// An experiment, every scenario of which has been read, and begun where its robots can run in this process.
 fn describe_experiment(path: &Path) -> miette::Result<String> {
     let mut experiment = Experiment::load(path)?;
     experiment.scenario = scenario_file(&experiment.scenario)?;
@@ -76,15 +76,23 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
         name: String::new(),
         experiment,
         set: Vec::new(),
-        robots: Robots::Programs,
+        robots: Robots::InProcess,
     })?;
+    let needs_processes = plan.check().is_err();
+    if !needs_processes {
+        plan.check_begins()?;
+    }
 
     let experiment = &plan.experiment;
     let arms = count(experiment.arms.len(), "arm", "arms");
     let conditions = count(plan.conditions().len(), "condition", "conditions");
     let measures = count(experiment.measures.len(), "measure", "measures");
     let seeds = experiment.seeds.len();
-    Ok(format!("{arms}, {conditions}, {seeds} seeds, {measures}"))
+    let mut text = format!("{arms}, {conditions}, {seeds} seeds, {measures}");
+    if needs_processes {
+        text += "; to be played with --processes";
+    }
+    Ok(text)
 }
 
 /// The record of a run: its events, those of earlier epochs, too.

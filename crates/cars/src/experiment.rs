@@ -16,8 +16,10 @@ use config::units::Time;
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::experiment::engine::{self, Options, Queue, WORKER};
 use lab::experiment::{Experiment, LaunchText, Plan, Provenance, Request, Results, Robots, Store};
+use lab::shell;
 use launch::{is_launch_file, scenario_file};
 use miette::{IntoDiagnostic, miette};
+use protocol::messages::Verdict;
 use protocol::random::MAX_SEED;
 
 use self::launcher::launcher;
@@ -304,6 +306,7 @@ impl PlanArgs {
         let mut experiment = load(&self.file)?;
         if let Some(duration) = self.duration {
             experiment.duration_s = duration.0;
+            experiment.duration_span = None;
         }
         if let Some(seeds) = &self.seeds {
             experiment.seeds = seeds.clone().collect();
@@ -392,7 +395,7 @@ fn be_quiet_about_units() {
 }
 
 /// Writes the results into their folder and prints them. The exit status is 1 if a unit is missing, failed, or gave different
-/// runs.
+/// runs; otherwise it is that of the worst verdict about what the experiment file expects.
 fn conclude(results: &Results, folder: &Path, is_json: bool) -> miette::Result<ExitCode> {
     results.write(folder)?;
     Provenance::here().write(folder)?;
@@ -404,13 +407,38 @@ fn conclude(results: &Results, folder: &Path, is_json: bool) -> miette::Result<E
 
     name_defects(results);
     name_failures(results, folder);
-    let place = folder.display();
+    let verdict = name_verdicts(results);
+    let place = shell::path(folder);
     terminal::note(format_args!(
         "results in {place}; `cars experiment replay {place} N` records the unit N as a run"
     ));
     let is_whole = results.missing.is_empty() && results.failures.is_empty();
-    let is_good = is_whole && results.conflicts.is_empty();
-    Ok(ExitCode::from(u8::from(!is_good)))
+    if !is_whole || !results.conflicts.is_empty() {
+        return Ok(ExitCode::FAILURE);
+    }
+    Ok(ExitCode::from(verdict.exit_status()))
+}
+
+/// Names the expectations of the experiment that runs have not met, and returns the worst verdict.
+fn name_verdicts(results: &Results) -> Verdict {
+    let mut worst = Verdict::Pass;
+    for judged in results.judged() {
+        let verdict = judged.verdict();
+        worst = worst.max(verdict);
+        let units = match verdict {
+            Verdict::Pass => continue,
+            Verdict::Undecided => &judged.undecided,
+            Verdict::Fail => &judged.failed,
+        };
+        terminal::note(format_args!(
+            "{verdict}: {}: in {} of {} runs, the first is {}",
+            judged.expectation,
+            units.len(),
+            results.outcomes.len(),
+            results.plan.unit(units[0]).describe()
+        ));
+    }
+    worst
 }
 
 /// Names what of the results is missing or cannot be trusted.

@@ -13,6 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lab::hunt::{
     Budget, Coverage, Feature, Finding, Kind, Options, Progress, Report, Subject, hunt as go,
 };
+use lab::shell;
 use miette::IntoDiagnostic;
 use protocol::random::MAX_SEED;
 use terminal::OutputError;
@@ -44,7 +45,7 @@ pub(crate) struct HuntArgs {
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Vec<Kind>,
     /// Longest time of a fault, in simulated time. Walls and crowds are there for the whole run.
-    #[arg(long, value_name = "TIME", default_value = "60 s")]
+    #[arg(long, value_name = "TIME", default_value = "60 s", value_parser = parse_longest)]
     longest: Time,
     /// Name of an expectation to check; without it all are. Can be given several times.
     #[arg(long, value_name = "NAME")]
@@ -126,6 +127,15 @@ fn play(args: &HuntArgs) -> miette::Result<Report> {
     Ok(report)
 }
 
+fn parse_longest(text: &str) -> Result<Time, String> {
+    let time: Time = text.parse()?;
+    if time.0 > 0.0 {
+        Ok(time)
+    } else {
+        Err("a fault lasts for more than 0 s".to_owned())
+    }
+}
+
 impl HuntArgs {
     fn options(&self) -> Options<'static> {
         let budget = match (self.plans, self.time) {
@@ -200,7 +210,7 @@ fn finding_in_words(finding: &Finding) -> String {
     if !finding.is_minimal {
         text += "  not minimal: more --shrink-runs may make it smaller\n";
     }
-    text + &format!("  cars run {}\n", finding.file.display())
+    text + &format!("  cars run {}\n", shell::path(&finding.file))
 }
 
 fn coverage_in_words(coverage: &Coverage) -> String {

@@ -89,9 +89,15 @@ impl FileError {
         let text = place.source.inner();
         let before = text.get(..place.label.offset()).unwrap_or_default();
         let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
-        let reason = place.label.label().unwrap_or(&self.message);
 
-        format!("line {line}: {reason}")
+        format!("line {line}: {}", self.reason())
+    }
+
+    /// What is wrong, without the place.
+    #[must_use]
+    pub fn reason(&self) -> &str {
+        let label = self.place.as_ref().and_then(|place| place.label.label());
+        label.unwrap_or(&self.message)
     }
 
     /// The error of a file that another file names.

@@ -87,7 +87,7 @@ impl Changes {
         for change in &self.set {
             root = change
                 .apply(root)
-                .map_err(|reason| FileError::new(format!("--set {reason}")))?;
+                .map_err(|reason| FileError::new(format!("cannot set {reason}")))?;
         }
 
         if let Some(seed) = self.seed {

@@ -2,7 +2,8 @@
 //! run again ([`verify`]) and comparing two runs ([`diff`]), repeating runs and comparing teams ([`experiment`],
 //! [`statistics`]), judging recorded runs ([`judge`]), presenting results ([`table`], [`mod@diagram`], [`report`]), exporting runs
 //! ([`export`], [`trace`], [`emotionml`]), letting them go on otherwise ([`fork`]), hunting for faults under which
-//! expectations fail ([`hunt`]), and playing single robots from their records ([`replayed`]).
+//! expectations fail ([`hunt`]), playing single robots from their records ([`replayed`]),
+//! and writing commands that can be typed ([`shell`]).
 
 pub mod diagram;
 pub mod diff;
@@ -19,6 +20,7 @@ mod reexecution;
 pub mod replayed;
 pub mod report;
 pub mod run;
+pub mod shell;
 mod states;
 pub mod statistics;
 pub mod table;

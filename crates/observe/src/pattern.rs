@@ -42,6 +42,14 @@ pub enum PatternError {
         /// The fields that it has.
         fields: String,
     },
+    /// The list of values of a field is empty.
+    #[error("`{field}` of the event \"{kind}\" is none of no values: name at least one")]
+    NoValue {
+        /// The kind.
+        kind: String,
+        /// The field.
+        field: String,
+    },
     /// The field never has the value.
     #[error("`{field}` of the event \"{kind}\" is never {value}{known}")]
     UnknownValue {
@@ -186,6 +194,9 @@ impl TryFrom<BTreeMap<String, Value>> for Pattern {
                 Value::Array(several) => several,
                 one => vec![one],
             };
+            if values.is_empty() {
+                return Err(PatternError::NoValue { kind, field });
+            }
             if let Some(value) = values.iter().find(|value| !domain.has(value)) {
                 return Err(PatternError::UnknownValue {
                     kind,

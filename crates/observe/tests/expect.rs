@@ -522,10 +522,43 @@ fn what_cannot_be_checked_is_refused() {
             "never = { stalled = { progress = ['A.x'] } }",
             "missing field `for`",
         ),
+        ("never = { event = 'say', robot = [] }", "name at least one"),
+        (
+            "never = { robot = 'A', behavior = [] }",
+            "`behavior` names at least one",
+        ),
+        (
+            "never = { robot = 'A', emotion = [] }",
+            "`emotion` names at least one",
+        ),
+        (
+            "never = { robot = 'A', variable = 'x', at_least = 2, at_most = 1 }",
+            "no number is within",
+        ),
+        (
+            "never = { robot = 'A', variable = 'x', above = 1, at_most = 1 }",
+            "no number is within",
+        ),
+        (
+            "never = { robot = 'A', variable = 'x', at_least = 1, below = 1 }",
+            "no number is within",
+        ),
         ("sometimes = 1", "unknown field `sometimes`"),
     ] {
         let error = read(entry).expect_err(entry);
         assert!(error.contains(reason), "{entry}: {error}");
+    }
+}
+
+#[test]
+fn bounds_may_leave_one_number() {
+    for bounds in [
+        "at_least = 1, at_most = 1",
+        "above = 1, below = 2",
+        "at_least = 1, below = 2",
+    ] {
+        let entry = format!("never = {{ robot = 'A', variable = 'x', {bounds} }}");
+        assert!(read(&entry).is_ok(), "{bounds}");
     }
 }
 

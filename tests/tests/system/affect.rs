@@ -230,7 +230,8 @@ const COMPARED: [&str; 4] = ["emotions", "rules", "timer", "yoked"];
 
 /// The changes that the arm of a shipped experiment makes.
 fn changes_of(arm: &Arm) -> Vec<String> {
-    arm.set.iter().map(ToString::to_string).collect()
+    let changes = arm.set.iter().map(|setting| setting.change.to_string());
+    changes.collect()
 }
 
 /// The parameters of all robots of a team, but for the one that names what decides.

@@ -4,6 +4,7 @@
 mod folder;
 mod refused;
 mod teams;
+mod verdicts;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -48,9 +49,13 @@ fn json(args: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The standard error of a program, without the line breaks of a terminal and the bars at the beginnings of lines.
+/// The standard error of a program in one line.
 fn notes(output: &Output) -> String {
-    let text = String::from_utf8_lossy(&output.stderr);
+    in_one_line(&String::from_utf8_lossy(&output.stderr))
+}
+
+/// A text without the line breaks of a terminal and the bars at the beginnings of lines.
+fn in_one_line(text: &str) -> String {
     let words = text.split_whitespace().filter(|word| *word != "│");
     words.collect::<Vec<_>>().join(" ")
 }

@@ -1,5 +1,6 @@
 //! `cars hunt`: it finds known defects unaided, and shrinks them to what causes them.
 
+use std::os::unix::fs::PermissionsExt;
 use std::process::{Command, Stdio};
 
 use nix::sys::signal::Signal;
@@ -64,6 +65,10 @@ fn the_deadlock_from_one_lost_refill_is_found() {
             text.starts_with("# Expectation that fails: no stall\n"),
             "{text}"
         );
+        let mode = std::fs::metadata(file).unwrap().permissions().mode();
+        let plain = lab.write("plain", "");
+        let plain = std::fs::metadata(plain).unwrap().permissions().mode();
+        assert_eq!(mode, plain, "as readable as any other file");
         let run = format!("again-{seed}");
         let (status, printed) = lab.fails(&["run", file, "--run", &run]);
         assert_eq!(status, 1, "{printed}");
@@ -76,6 +81,41 @@ fn the_deadlock_from_one_lost_refill_is_found() {
         let judged = events_of(&lab, &run, "judged");
         assert_eq!(judged[0]["verdict"], "fail", "{judged:?}");
     }
+}
+
+/// The command of a finding can be typed as it is printed.
+#[test]
+fn a_command_that_is_printed_can_be_typed() {
+    let lab = Lab::new();
+    let folder = lab.out().join("what I found");
+    let out = folder.to_str().unwrap();
+    let args = affectless(&["--plans", "64", "-o", out]);
+    let args: Vec<&str> = args.into_iter().filter(|arg| *arg != "--json").collect();
+    let (status, printed) = lab.cars_without_out(&args);
+    assert_eq!(status, 1, "{printed}");
+
+    let command = printed
+        .lines()
+        .find(|line| line.trim().starts_with("cars run "));
+    let command = command.unwrap().trim().strip_prefix("cars ").unwrap();
+    let typed = format!(
+        "{} {command} --out {}",
+        programs().join("cars").display(),
+        lab.out().display()
+    );
+    let played = Command::new("sh").args(["-c", &typed]).output().unwrap();
+    assert_eq!(played.status.code(), Some(1), "{typed}: {played:?}");
+    assert!(
+        String::from_utf8_lossy(&played.stdout).contains("no stall"),
+        "{played:?}"
+    );
+}
+
+#[test]
+fn a_fault_lasts_for_some_time() {
+    let (status, printed) = Lab::new().cars_without_out(&["hunt", HALL, "--longest", "0 s"]);
+    assert_eq!(status, 2, "{printed}");
+    assert!(printed.contains("more than 0 s"), "{printed}");
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! What is done to every arm alike: the values of factors, named conditions, or every combination of both.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use config::Override;
 use config::units::Time;
+
+use super::setting::Setting;
 
 /// Name of the factor whose values are the named conditions.
 pub(super) const NAMED: &str = "condition";
@@ -25,6 +28,8 @@ pub struct Factor {
     pub name: String,
     /// Its values, in the order of the table.
     pub values: Vec<Value>,
+    /// Places of the values in the file, bytes.
+    pub(super) spans: Vec<Range<usize>>,
     /// Begin, simulated seconds. The value of a factor with a begin is its duration; a factor without one lasts for the
     /// whole run.
     pub begins_s: Option<f64>,
@@ -70,7 +75,7 @@ pub struct Condition {
     /// Names of the factors and their values in it; a named condition is a value of the factor "condition".
     pub levels: Vec<(String, String)>,
     /// Changes of the scenario.
-    pub set: Vec<Override>,
+    pub set: Vec<Setting>,
     /// Begin and end, simulated seconds; `None` if it lasts for the whole run. Several that are combined last from the first
     /// begin to the last end.
     pub time_s: Option<(f64, f64)>,
@@ -223,9 +228,9 @@ pub(super) fn check_levels(levels: &[Condition], duration_s: f64) -> Result<(), 
 }
 
 /// Checks that no two of these changes set the same value.
-fn check_each_apart(changes: &[Override]) -> Result<(), ConditionError> {
-    for (index, change) in changes.iter().enumerate() {
-        check_change(change, &changes[..index])?;
+fn check_each_apart(settings: &[Setting]) -> Result<(), ConditionError> {
+    for (index, setting) in settings.iter().enumerate() {
+        check_change(&setting.change, &settings[..index])?;
     }
     Ok(())
 }
@@ -234,8 +239,8 @@ fn check_each_apart(changes: &[Override]) -> Result<(), ConditionError> {
 pub(super) fn check_apart(one: &[Condition], other: &[Condition]) -> Result<(), ConditionError> {
     for level in one {
         for combined in other {
-            for change in &combined.set {
-                check_change(change, &level.set)?;
+            for setting in &combined.set {
+                check_change(&setting.change, &level.set)?;
             }
         }
     }
@@ -246,12 +251,12 @@ pub(super) fn check_apart(one: &[Condition], other: &[Condition]) -> Result<(), 
 pub(super) const OWN_OPTIONS: [&str; 2] = ["seed", "duration"];
 
 /// Checks that a change sets something else than these, and than the experiment.
-pub(super) fn check_change(change: &Override, others: &[Override]) -> Result<(), ConditionError> {
+pub(super) fn check_change(change: &Override, others: &[Setting]) -> Result<(), ConditionError> {
     if OWN_OPTIONS.contains(&change.top()) {
         return Err(ConditionError::Own(change.clone()));
     }
-    let overridden = others.iter().find(|other| other.overlaps(change));
-    match overridden {
+    let mut others = others.iter().map(|other| &other.change);
+    match others.find(|other| other.overlaps(change)) {
         Some(other) => Err(ConditionError::Overlap(other.clone(), change.clone())),
         None => Ok(()),
     }
@@ -281,6 +286,12 @@ impl Condition {
             (one, None) | (None, one) => one,
         };
         both
+    }
+
+    /// Whether both change the same values to the same.
+    fn makes_the_changes_of(&self, other: &Self) -> bool {
+        let own = self.set.iter().map(|setting| &setting.change);
+        own.eq(other.set.iter().map(|setting| &setting.change))
     }
 
     /// Names a combination, for example "crash, loss 0.1, guests 50".
@@ -330,15 +341,15 @@ impl Factor {
     /// The conditions that its values are, checked for a run of this duration.
     pub(super) fn levels(&self, duration_s: f64) -> Result<Vec<Condition>, ConditionError> {
         let mut levels: Vec<Condition> = Vec::new();
-        for value in &self.values {
-            levels.push(self.level(value)?);
+        for (value, span) in self.values.iter().zip(&self.spans) {
+            levels.push(self.level(value, span)?);
         }
         check_levels(&levels, duration_s)?;
 
         for (index, level) in levels.iter().enumerate() {
             let same = levels[..index]
                 .iter()
-                .position(|other| other.set == level.set);
+                .position(|other| other.makes_the_changes_of(level));
             if let Some(other) = same {
                 let values = &self.values;
                 return Err(ConditionError::Same(
@@ -350,19 +361,23 @@ impl Factor {
         Ok(levels)
     }
 
-    fn level(&self, value: &Value) -> Result<Condition, ConditionError> {
+    fn level(&self, value: &Value, span: &Range<usize>) -> Result<Condition, ConditionError> {
         let time_s = match (self.begins_s, value) {
             (Some(from_s), Value::Time(lasting_s)) => Some((from_s, from_s + lasting_s)),
             (None, _) => None,
             (Some(_), other) => return Err(ConditionError::NotATime(other.clone())),
         };
 
+        let mut set = Vec::new();
+        for change in self.target.changes(value, time_s)? {
+            set.push(Setting::at(change, span.clone()));
+        }
         let name = value.to_string();
         Ok(Condition {
             levels: vec![(self.name.clone(), name.clone())],
             name,
             what: String::new(),
-            set: self.target.changes(value, time_s)?,
+            set,
             time_s,
         })
     }
@@ -474,6 +489,7 @@ mod tests {
         let factor = Factor {
             name: "cut for".to_owned(),
             values: values.iter().copied().map(Value::Time).collect(),
+            spans: vec![0..0; values.len()],
             begins_s: Some(120.0),
             target: Target::Set {
                 changes: vec![partition.to_owned()],
@@ -490,10 +506,13 @@ mod tests {
     fn a_condition_says_what_is_changed_and_when() {
         let conditions = cut(&[0.0, 60.0]).list(600.0).unwrap();
 
-        assert_eq!(conditions[0].set[0].to_string(), "network.partition=[]");
+        assert_eq!(
+            conditions[0].set[0].change.to_string(),
+            "network.partition=[]"
+        );
         assert_eq!(conditions[1].name, "60 s");
         assert_eq!(conditions[1].time_s, Some((120.0, 180.0)));
-        let change = conditions[1].set[0].to_string();
+        let change = conditions[1].set[0].change.to_string();
         assert!(change.contains("until = \"180 s\""), "{change}");
     }
 
@@ -517,6 +536,7 @@ mod tests {
     fn at(path: &str, name: &str, values: Vec<Value>) -> Factor {
         Factor {
             name: name.to_owned(),
+            spans: vec![0..0; values.len()],
             values,
             begins_s: None,
             target: Target::Path(path.to_owned()),
@@ -528,7 +548,7 @@ mod tests {
             name: name.to_owned(),
             what: format!("what {name} is"),
             levels: vec![(NAMED.to_owned(), name.to_owned())],
-            set: vec![change.parse().unwrap()],
+            set: vec![Setting::at(change.parse().unwrap(), 0..0)],
             time_s,
         }
     }
@@ -566,7 +586,11 @@ mod tests {
         assert_eq!(last.levels, levels);
         assert_eq!(last.time_s, Some((100.0, 180.0)));
         let policy = "robot.Butler.params.policy=\"true\"";
-        assert_eq!(last.set[2].to_string(), policy, "a text stays a text");
+        assert_eq!(
+            last.set[2].change.to_string(),
+            policy,
+            "a text stays a text"
+        );
     }
 
     #[test]

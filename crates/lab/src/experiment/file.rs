@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use config::units::Time;
-use config::{FileError, Override, Source};
+use config::{FileError, Source};
 use observe::expect::check_all;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
@@ -18,6 +18,7 @@ use super::condition::{
     check_levels, parse,
 };
 use super::presentation::{Presentation, RawPresentation};
+use super::setting::Setting;
 
 /// Fewest runs of each arm under each condition; an interval needs two.
 const MIN_SEEDS: usize = 2;
@@ -76,6 +77,8 @@ pub struct Experiment {
     pub seeds: Vec<u64>,
     /// Simulated time of each run, seconds.
     pub duration_s: f64,
+    /// Place of the duration in the file, bytes; `None` if an option gives it.
+    pub duration_span: Option<Range<usize>>,
     /// The independent variables, the same for all arms.
     pub conditions: Conditions,
     /// The sets of changes that are compared.
@@ -102,7 +105,7 @@ pub struct Arm {
     /// Description for people.
     pub what: String,
     /// Changes of the scenario.
-    pub set: Vec<Override>,
+    pub set: Vec<Setting>,
     /// The arm whose emotions its robots show: those of its run with the next seed under the same condition.
     pub yoked_to: Option<String>,
 }
@@ -398,6 +401,7 @@ impl RawExperiment {
             scenario: folder.join(self.scenario.into_inner()),
             seeds,
             duration_s,
+            duration_span: Some(self.duration.span()),
             measures,
             expectations,
             report,
@@ -512,8 +516,8 @@ impl RawCondition {
             let span = change.span();
             let parsed = parse(change.get_ref(), time_s)
                 .and_then(|parsed| check_change(&parsed, &set).map(|()| parsed))
-                .map_err(|error| refuse(source, span, error))?;
-            set.push(parsed);
+                .map_err(|error| refuse(source, span.clone(), error))?;
+            set.push(Setting::at(parsed, span));
         }
         let name = name.into_inner();
         Ok(Condition {
@@ -575,15 +579,18 @@ impl RawFactor {
             return Err(refuse(source, values_span, reason));
         }
         let mut values = Vec::new();
+        let mut spans = Vec::new();
         for value in raw {
             let span = value.span();
             let value = value.into_inner().check();
-            values.push(value.map_err(|reason| refuse(source, span, reason))?);
+            values.push(value.map_err(|reason| refuse(source, span.clone(), reason))?);
+            spans.push(span);
         }
 
         Ok(Factor {
             name: name.into_inner(),
             values,
+            spans,
             begins_s: self.begins.map(|begins| begins.into_inner().0),
             target,
         })
@@ -631,17 +638,17 @@ fn parse_arms(
             return Err(refuse(source, name.span(), reason));
         }
 
-        let mut set: Vec<Override> = Vec::new();
+        let mut set: Vec<Setting> = Vec::new();
         for change in arm.set {
             let span = change.span();
-            let parsed = change.get_ref().parse::<Override>();
-            let parsed = parsed.map_err(|reason| refuse(source, span.clone(), reason))?;
+            let parsed = change.get_ref().parse();
+            let parsed = parsed.map_err(|reason: String| refuse(source, span.clone(), reason))?;
             let others = done.iter().map(|condition| condition.set.as_slice());
             for others in others.chain([set.as_slice()]) {
                 check_change(&parsed, others)
                     .map_err(|error| refuse(source, span.clone(), error))?;
             }
-            set.push(parsed);
+            set.push(Setting::at(parsed, span));
         }
 
         let yoked_to = arm.yoked_to.as_ref().map(|to| to.get_ref().clone());

@@ -16,6 +16,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::condition::{Condition, OWN_OPTIONS};
 use super::file::{Arm, Experiment};
 use super::script;
+use super::setting::{Case, Setting};
 use crate::export::draft::{Draft, unwritable};
 
 /// The plan in the folder of an experiment.
@@ -483,6 +484,27 @@ impl Plan {
         text
     }
 
+    /// An arm under a condition.
+    ///
+    /// # Errors
+    /// If its changes cannot be written into a scenario.
+    pub(super) fn case(&self, cell: usize) -> miette::Result<Case<'_>> {
+        let mut options = Vec::new();
+        for change in &self.written.set {
+            let change = change.parse::<Override>();
+            options.push(change.map_err(|reason| miette!("{reason}"))?);
+        }
+
+        let arms = &self.experiment.arms;
+        let condition = &self.conditions[cell / arms.len()];
+        Case::new(
+            &self.experiment,
+            &options,
+            condition,
+            &arms[cell % arms.len()],
+        )
+    }
+
     /// The scenario of a cell with a seed and further changes.
     ///
     /// # Errors
@@ -594,37 +616,24 @@ fn check_own_options(set: &[Override]) -> miette::Result<()> {
 fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> miette::Result<String> {
     let experiment = &request.experiment;
     let sources = [
-        ("the option --set".to_owned(), request.set.as_slice()),
-        (format!("the arm \"{}\"", arm.name), &arm.set),
+        ("the option --set".to_owned(), request.set.clone()),
+        (format!("the arm \"{}\"", arm.name), changes_of(&arm.set)),
         (
             format!("the condition \"{}\"", condition.name),
-            &condition.set,
+            changes_of(&condition.set),
         ),
     ];
     check_overlaps(&sources)?;
 
-    let mut set = Vec::new();
-    for (_, changes) in &sources {
-        set.extend_from_slice(changes);
-    }
-    let changes = Changes {
-        seed: experiment.seeds.first().copied(),
-        duration_s: Some(experiment.duration_s),
-        set,
-    };
-    let scenario = Scenario::load(&experiment.scenario, &changes);
-    let scenario = scenario.and_then(|scenario| experiment.complete(scenario));
-    let scenario = scenario.map_err(|error| {
-        let (arm, condition) = (&arm.name, &condition.name);
-        miette::Report::new(error).wrap_err(format!("arm \"{arm}\", condition \"{condition}\""))
-    })?;
+    let case = Case::new(experiment, &request.set, condition, arm)?;
+    let scenario = experiment.complete(case.scenario()?)?;
 
     if arm.yoked_to.is_some() {
         let mut yoke = Vec::new();
         for robot in scenario.robots.keys() {
             yoke.push(script::change(robot, "[]").map_err(|reason| miette!("{reason}"))?);
         }
-        let yoke = (format!("the yoke of \"{}\"", arm.name), yoke.as_slice());
+        let yoke = (format!("the yoke of \"{}\"", arm.name), yoke);
         for source in sources {
             check_overlaps(&[source, yoke.clone()])?;
         }
@@ -635,11 +644,19 @@ fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> miette::R
     toml::to_string(&table).into_diagnostic()
 }
 
+fn changes_of(settings: &[Setting]) -> Vec<Override> {
+    let mut changes = Vec::new();
+    for setting in settings {
+        changes.push(setting.change.clone());
+    }
+    changes
+}
+
 /// Checks that no two of these sources set the same value: one would silently override the other.
-fn check_overlaps(sources: &[(String, &[Override])]) -> miette::Result<()> {
+fn check_overlaps(sources: &[(String, Vec<Override>)]) -> miette::Result<()> {
     for (index, (name, changes)) in sources.iter().enumerate() {
         for (other, others) in &sources[index + 1..] {
-            for change in *changes {
+            for change in changes {
                 if let Some(overridden) = others.iter().find(|own| own.overlaps(change)) {
                     return Err(miette!(
                         help = "an experiment sets each value in one place",

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use config::FileError;
 use miette::IntoDiagnostic;
+use protocol::messages::Verdict;
 use serde::{Deserialize, Serialize};
 
 use super::contrast::Contrast;
@@ -51,6 +52,29 @@ pub struct Results {
     pub damages: Vec<String>,
     /// Numbers of units that were played several times and gave different runs.
     pub conflicts: Vec<usize>,
+}
+
+/// An expectation of an experiment, and the runs that do not meet it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Judged<'a> {
+    /// Its name.
+    pub expectation: &'a str,
+    /// Numbers of the units that fail it.
+    pub failed: Vec<usize>,
+    /// Numbers of the units that ended before it was certain.
+    pub undecided: Vec<usize>,
+}
+
+impl Judged<'_> {
+    /// The worst verdict of a run.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match (self.failed.is_empty(), self.undecided.is_empty()) {
+            (false, _) => Verdict::Fail,
+            (true, false) => Verdict::Undecided,
+            (true, true) => Verdict::Pass,
+        }
+    }
 }
 
 /// `results.json`.
@@ -110,6 +134,33 @@ impl Results {
             damages,
             conflicts,
         }
+    }
+
+    /// How the runs have met each expectation of the experiment file, in its order. What the scenario expects is in the tables
+    /// only: an experiment may be about how often that fails.
+    #[must_use]
+    pub fn judged(&self) -> Vec<Judged<'_>> {
+        let mut all = Vec::new();
+        for expectation in &self.plan.experiment.expectations {
+            let mut judged = Judged {
+                expectation: &expectation.name,
+                failed: Vec::new(),
+                undecided: Vec::new(),
+            };
+            for outcome in &self.outcomes {
+                match outcome.verdicts.get(&expectation.name) {
+                    Some(verdict) if verdict == Verdict::Fail.name() => {
+                        judged.failed.push(outcome.unit);
+                    }
+                    Some(verdict) if verdict == Verdict::Undecided.name() => {
+                        judged.undecided.push(outcome.unit);
+                    }
+                    _ => {}
+                }
+            }
+            all.push(judged);
+        }
+        all
     }
 
     /// Writes the tables and the estimates into the folder of the experiment. The same results give the same bytes.

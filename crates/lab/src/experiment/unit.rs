@@ -60,28 +60,30 @@ impl Plan {
     /// that has been saved has passed this.
     ///
     /// # Errors
-    /// If a robot does not, with the file, the arm and the condition.
+    /// If a robot does not, at the place of the change that it refuses, with the arm and the condition.
     pub fn check_begins(&self) -> miette::Result<()> {
         if *self.robots() != Robots::InProcess {
             return Ok(());
         }
 
         let run = RunName::new(RUN).into_diagnostic()?;
-        let arms = &self.experiment.arms;
-        let seed = self.unit(0).seed;
-        for cell in 0..self.cells() {
-            let scenario = self.scenario(cell, seed, Vec::new())?;
-            let begun = caught(|| {
+        let begin = |scenario: Scenario| {
+            caught(|| {
                 let mut local = Local::new(scenario, &run)?;
                 local.simulation.init(&mut local.robots).into_diagnostic()?;
                 Ok(())
-            });
-            begun.map_err(|reason| {
-                let file = &self.experiment.source().name;
-                let arm = &arms[cell % arms.len()].name;
-                let condition = &self.conditions()[cell / arms.len()].name;
-                miette!("{file}: arm \"{arm}\", condition \"{condition}\": {reason}")
-            })?;
+            })
+        };
+
+        let seed = self.unit(0).seed;
+        for cell in 0..self.cells() {
+            let scenario = self.scenario(cell, seed, Vec::new())?;
+            if let Err(reason) = begin(scenario) {
+                let case = self.case(cell)?;
+                return Err(case
+                    .refused(&reason, |scenario| begin(scenario).err())
+                    .into());
+            }
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 
-use miette::{IntoDiagnostic, WrapErr};
+use miette::IntoDiagnostic;
 use protocol::name::MAX_NAME_LEN;
 use protocol::plain::escape_line;
 use toml::Value;
@@ -11,6 +11,8 @@ use toml::Value;
 use super::case::Case;
 use super::fault::PlannedFault;
 use super::trial::{Played, Subject};
+use crate::export::draft::{Draft, unwritable};
+use crate::shell;
 
 /// What the file of a finding tells beside its case.
 #[derive(Debug, Clone, Copy)]
@@ -39,15 +41,11 @@ pub(super) fn write(
 
     let mut text = comment(path, subject, case, played, heading);
     text += &toml::to_string(&content).into_diagnostic()?;
-    let place = || format!("cannot write {}", path.display());
-    let mut file = tempfile::NamedTempFile::new_in(folder)
-        .into_diagnostic()
-        .wrap_err_with(place)?;
-    file.write_all(text.as_bytes())
-        .into_diagnostic()
-        .wrap_err_with(place)?;
-    file.as_file().sync_all().into_diagnostic()?;
-    file.persist(path).into_diagnostic().wrap_err_with(place)?;
+    let mut draft = Draft::create(path)?;
+    draft
+        .write_all(text.as_bytes())
+        .map_err(|error| unwritable(path, &error))?;
+    draft.publish()?;
     Ok(())
 }
 
@@ -84,7 +82,7 @@ fn comment(
         "Found by plan {} of `cars hunt` with the seed {}. {}",
         heading.plan, heading.seed, heading.shrunk
     ));
-    let file = path.display();
+    let file = shell::path(path);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     lines.push(String::new());
     lines.push(format!(

@@ -15,10 +15,11 @@ use super::figures::{Of, differences, distributions, estimates, heat_maps, survi
 use super::floor::occupancy;
 use super::study::{Study, label};
 use super::transitions::transitions;
-use super::words::{capitalized, counted, quoted, utc};
+use super::words::{capitalized, counted, utc};
 use crate::experiment::{Example, Outcome, Provenance, Results, Robots, Shown};
 use crate::folder::recorded_epoch;
 use crate::run::execute;
+use crate::shell;
 
 /// Units that are named one by one where there are more of them.
 const MOST_NAMED: usize = 10;
@@ -359,7 +360,7 @@ fn write_example(
         )),
         Part::code(format!(
             "cars experiment replay {} {}",
-            quoted(folder),
+            shell::path(folder),
             outcome.unit
         )),
     ]);
@@ -449,7 +450,7 @@ fn write_reproduction(
     provenance: Option<&Provenance>,
 ) {
     let plan = &study.results.plan;
-    let folder = quoted(folder);
+    let folder = shell::path(folder);
     page.section("Reproduction");
     page.paragraph(&[Part::text(
         "The numbers, from the runs that were played; the numbers of every run as a table; one run, recorded; this page:",
@@ -468,7 +469,7 @@ fn write_reproduction(
     if let Some(provenance) = provenance {
         let mut command = "cars".to_owned();
         for argument in &provenance.command {
-            command += &format!(" {}", quoted(Path::new(argument)));
+            command += &format!(" {}", shell::word(argument));
         }
         add("command", Cell::Code(command));
         let machine = &provenance.machine;

@@ -14,8 +14,9 @@ use super::facts::{Disturbance, RunFacts};
 use super::floor::occupancy;
 use super::limits::{MOST_PANELS, limited};
 use super::transitions::transitions;
-use super::words::{counted, quoted};
+use super::words::counted;
 use crate::folder::{read_summary, recorded_epoch};
+use crate::shell;
 
 /// Most runs of a report.
 pub const MOST_RUNS: usize = 64;
@@ -437,7 +438,7 @@ fn write_diagrams(page: &mut Page, runs: &[Run]) {
             )));
             caption.push(Part::code(format!(
                 "cars diagram {} --from {}",
-                quoted(&run.path),
+                shell::path(&run.path),
                 shown + 1
             )));
         }
@@ -454,7 +455,10 @@ fn write_diagrams(page: &mut Page, runs: &[Run]) {
                 "The diagrams of the other {} runs are left out. Draw one with ",
                 runs.len() - MOST_DIAGRAMS
             )),
-            Part::code(format!("cars diagram {} -o diagram.svg", quoted(&run.path))),
+            Part::code(format!(
+                "cars diagram {} -o diagram.svg",
+                shell::path(&run.path)
+            )),
             Part::text("."),
         ]);
     }
@@ -594,12 +598,15 @@ fn write_reproduction(page: &mut Page, runs: &[Run]) {
     )]);
     let mut commands = vec!["cars report".to_owned()];
     for run in runs {
-        commands[0] += &format!(" {}", quoted(&run.path));
+        commands[0] += &format!(" {}", shell::path(&run.path));
     }
     commands[0] += " -o report.html";
     if let Some(run) = runs.first() {
-        commands.push(format!("cars verify {}", quoted(&run.path)));
-        commands.push(format!("cars export {} --csv -o tables", quoted(&run.path)));
+        commands.push(format!("cars verify {}", shell::path(&run.path)));
+        commands.push(format!(
+            "cars export {} --csv -o tables",
+            shell::path(&run.path)
+        ));
     }
     page.commands(&commands);
 

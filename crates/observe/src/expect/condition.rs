@@ -45,6 +45,12 @@ pub enum ConditionError {
     /// A variable without a bound.
     #[error("`variable` needs `at_least`, `at_most`, `above` or `below`, with a finite number")]
     Bound,
+    /// No number is within the bounds.
+    #[error("no number is within the bounds of `variable`")]
+    NoNumber,
+    /// No behavior, or no emotion, is named.
+    #[error("`{0}` names at least one")]
+    NoName(&'static str),
     /// Fewer than two robots that could overlap.
     #[error("`overlap` is \"any\", or a list of at least two robots")]
     Overlap,
@@ -237,13 +243,16 @@ impl Table {
             (Some(robot), None, None) => {
                 let is = match (self.behavior, self.emotion, self.variable) {
                     (Some(names), None, None) if bounds == Bounds::default() => {
-                        Is::Behavior(names.into())
+                        Is::Behavior(at_least_one("behavior", names)?)
                     }
                     (None, Some(names), None) if bounds == Bounds::default() => {
-                        Is::Emotion(names.into())
+                        Is::Emotion(at_least_one("emotion", names)?)
                     }
                     (None, None, Some(_)) if bounds == Bounds::default() => {
                         return Err(ConditionError::Bound);
+                    }
+                    (None, None, Some(_)) if bounds.are_contradictory() => {
+                        return Err(ConditionError::NoNumber);
                     }
                     (None, None, Some(variable)) => Is::Variable(variable, bounds),
                     _ => return Err(ConditionError::Unknown),
@@ -256,6 +265,29 @@ impl Table {
             }
             _ => Err(ConditionError::Unknown),
         }
+    }
+}
+
+fn at_least_one(key: &'static str, names: Names) -> Result<Vec<String>, ConditionError> {
+    let names: Vec<String> = names.into();
+    if names.is_empty() {
+        return Err(ConditionError::NoName(key));
+    }
+    Ok(names)
+}
+
+impl Bounds {
+    /// Whether no number is within them.
+    fn are_contradictory(&self) -> bool {
+        let above = |low: f64| {
+            self.at_most.is_some_and(|high| high < low)
+                || self.below.is_some_and(|high| high <= low)
+        };
+        let strictly_above = |low: f64| {
+            self.at_most.is_some_and(|high| high <= low)
+                || self.below.is_some_and(|high| high <= low)
+        };
+        self.at_least.is_some_and(above) || self.above.is_some_and(strictly_above)
     }
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 
 use system_tests::{Lab, root};
 
-use super::{cars, yoked};
+use super::{cars, in_one_line, yoked};
 
 #[test]
 fn an_experiment_that_would_not_be_played_as_it_says_is_refused() {
@@ -98,30 +98,133 @@ fn cars_check_reads_experiments() {
     assert!(words.join(" ").contains("condition \"crash\""), "{text}");
 }
 
-/// What only the robots know is refused before anything runs, too.
+/// What only the scenario or a robot knows is refused before anything runs, too, at its place in the experiment file.
 #[test]
-fn parameters_that_a_robot_refuses_are_refused_before_anything_runs() {
+fn what_the_scenario_or_a_robot_refuses_is_shown_where_the_experiment_says_it() {
+    const GOOD: &str = r#"question = "?"
+duration = "300 s"
+seeds = 2
+
+[[condition]]
+name = "as it is"
+
+[[condition]]
+name = "odd"
+set = [
+    "on_late=continue",
+    "@condition@",
+]
+
+[[factor]]
+name = "level"
+path = "robot.Butler.params.caution"
+values = [0.25, 0.5, @value@]
+
+[[factor]]
+name = "pause"
+begins = "100 s"
+values = ["0 s", "@time@"]
+set = ['network.partition=[{ from = "{from}", until = "{until}", @part@ }]']
+set_at_zero = ["network.partition=[]"]
+
+[[arm]]
+name = "right"
+
+[[arm]]
+name = "wrong"
+set = [
+    "guests.count=10",
+    "@arm@",
+]
+
+[[measure]]
+name = "ticks"
+summary = "ticks"
+"#;
+    let parts = [
+        ("@condition@", "network.commands.loss=0.1"),
+        ("@value@", "0.75"),
+        ("@time@", "60 s"),
+        ("@part@", "groups = [[\"Butler\"], [\"Leguin\"]]"),
+        ("@arm@", "robot.Leguin.params.caution=1.0"),
+    ];
     let lab = Lab::new();
     let out = lab.out().join("results");
-    for (set, reason) in [
-        ("robot.Butler.params.cauton=0.5", "cauton"),
-        ("robot.Butler.params.policy=angry", "angry"),
-        ("robot.Butler.params.treat_mean_s=-1 s", "treat_mean_s"),
+    let scenario = root().join("configs/hors_doeuvres.toml");
+    let head = format!("scenario = {scenario:?}\n");
+
+    for (part, wrong, reason) in [
+        ("", "", ""),
+        ("@condition@", "network.commands.loss=1.5", "1.5"),
+        ("@condition@", "network.comands.loss=0.5", "comands"),
+        (
+            "@condition@",
+            "robot.Rosie.at=[\\\"1 m\\\", \\\"1 m\\\"]",
+            "Rosie",
+        ),
+        ("@value@", "-3.0", "caution"),
+        ("@value@", "\"much\"", "caution"),
+        ("@part@", "groops = []", "groops"),
+        ("@arm@", "guests.speed.mode=-1 ft/s", "speed"),
+        ("@arm@", "robot.Butler.params.policy=angry", "angry"),
+        ("@arm@", "robot.Butler.params.cauton=0.5", "cauton"),
     ] {
-        let file = lab.write(
-            "wrong.toml",
-            &format!(
-                "question = '?'\nscenario = '{}'\nduration = '60 s'\nseeds = 2\n\
-                 [[arm]]\nname = 'right'\n[[arm]]\nname = 'wrong'\nset = ['{set}']\n\
-                 [[measure]]\nname = 'ticks'\nsummary = 'ticks'\n",
-                root().join("configs/hors_doeuvres.toml").display()
-            ),
-        );
-        let args = ["run", file.to_str().unwrap(), "-o", out.to_str().unwrap()];
-        let (code, notes) = cars(&args);
-        assert_eq!(code, 1, "{notes}");
-        assert!(notes.contains("arm \"wrong\""), "{notes}");
-        assert!(notes.contains(reason), "{notes}");
-        assert!(!out.exists(), "{notes}");
+        let mut text = format!("{head}{GOOD}");
+        for (name, good) in parts {
+            text = text.replace(name, if name == part { wrong } else { good });
+        }
+        let file = lab.write("wrong.toml", &text);
+        let file = file.to_str().unwrap();
+
+        let run = cars(&["run", file, "--plan-only", "-o", out.to_str().unwrap()]);
+        let (code, check) = lab.cars_without_out(&["check", file]);
+        let check = (code, in_one_line(&check));
+        if part.is_empty() {
+            assert_eq!((run.0, check.0), (0, 0), "{run:?} {check:?}");
+            fs::remove_dir_all(&out).unwrap();
+            continue;
+        }
+
+        let place = if part == "@part@" { "\"60 s\"" } else { wrong };
+        let before = &text[..text.find(place).unwrap()];
+        let place = format!("wrong.toml:{}:", before.matches('\n').count() + 1);
+        for (code, notes) in [run, check] {
+            assert_eq!(code, 1, "{wrong}: {notes}");
+            assert!(notes.contains(&place), "{wrong}, at {place}: {notes}");
+            assert!(notes.contains(reason), "{wrong}: {notes}");
+            assert!(notes.contains("arm \""), "{wrong}: {notes}");
+        }
+        assert!(!out.exists(), "{wrong}");
     }
+}
+
+/// The scenario itself is shown where it is wrong; the command line is named.
+#[test]
+fn what_the_scenario_refuses_without_the_experiment_is_shown_in_the_scenario() {
+    let lab = Lab::new();
+    let hall = fs::read_to_string(root().join("configs/museum.toml")).unwrap();
+    let tick = hall
+        .lines()
+        .position(|line| line.starts_with("tick"))
+        .unwrap();
+    let odd = hall.lines().nth(tick).unwrap();
+    lab.write("hall.toml", &hall.replace(odd, "tick = \"-1 s\""));
+    let text = "question = '?'\nscenario = 'hall.toml'\nduration = '60 s'\nseeds = 2\n\
+                [[arm]]\nname = 'it'\n[[measure]]\nname = 'ticks'\nsummary = 'ticks'\n";
+    let file = lab.write("experiment.toml", text);
+    let (code, notes) = cars(&["run", file.to_str().unwrap()]);
+    assert_eq!(code, 1, "{notes}");
+    assert!(
+        notes.contains(&format!("hall.toml:{}:", tick + 1)),
+        "{notes}"
+    );
+
+    lab.write("hall.toml", &hall);
+    let option = "--set=guests.count=-3";
+    let (code, notes) = cars(&["run", file.to_str().unwrap(), option]);
+    assert_eq!(code, 1, "{notes}");
+    assert!(
+        notes.contains("the command line's guests.count=-3"),
+        "{notes}"
+    );
 }

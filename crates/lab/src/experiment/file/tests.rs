@@ -93,7 +93,7 @@ fn conditions_and_factors_make_a_grid() {
     let conditions = experiment.list_conditions().unwrap();
     assert_eq!(conditions.len(), 8);
     assert_eq!(conditions[1].name, "crash, guests 10, cut 60 s");
-    assert_eq!(conditions[1].set[1].to_string(), "guests.count=10");
+    assert_eq!(conditions[1].set[1].change.to_string(), "guests.count=10");
     assert_eq!(conditions[1].time_s, Some((120.0, 260.0)));
     assert_eq!(experiment.explained(), "");
 }
@@ -611,8 +611,9 @@ fn every_example_of_the_page_is_good() {
         let experiment = parse(&text).unwrap_or_else(|error| panic!("{block}: {error:?}"));
         for condition in experiment.list_conditions().unwrap() {
             for arm in &experiment.arms {
+                let settings = [condition.set.clone(), arm.set.clone()].concat();
                 let changes = config::Changes {
-                    set: [condition.set.clone(), arm.set.clone()].concat(),
+                    set: settings.into_iter().map(|setting| setting.change).collect(),
                     ..config::Changes::default()
                 };
                 let scenario = Scenario::load(&root.join("configs/hors_doeuvres.toml"), &changes);

@@ -1,6 +1,7 @@
 //! GNU parallel: one command for a shell.
 
-use super::tasks::{Tasks, quote};
+use super::tasks::Tasks;
+use crate::shell;
 
 /// What GNU parallel is asked for.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -17,13 +18,13 @@ impl Parallel {
     pub fn commands(&self, tasks: &Tasks) -> String {
         let mut command = "parallel".to_owned();
         if !self.hosts.is_empty() {
-            command += &format!(" --sshlogin {}", quote(&self.hosts.join(",")));
+            command += &format!(" --sshlogin {}", shell::word(&self.hosts.join(",")));
         }
         if let Some(at_a_time) = self.at_a_time {
             command += &format!(" --jobs {at_a_time}");
         }
         // A shell on the host reads the command once more.
-        command += &format!(" {} :::", quote(&tasks.unit_command("{}")));
+        command += &format!(" {} :::", shell::word(&tasks.unit_command("{}")));
         for task in 0..tasks.count() {
             let first = task * tasks.units_per_task;
             let last = tasks.units.min(first + tasks.units_per_task) - 1;

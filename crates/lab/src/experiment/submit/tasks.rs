@@ -1,5 +1,7 @@
 //! The units of an experiment, divided into tasks for other machines.
 
+use crate::shell;
+
 /// How many tasks an experiment is divided into, unless that is chosen: enough for the machines of a group, and few enough
 /// that starting them takes no time that counts.
 const TASKS: usize = 100;
@@ -36,8 +38,8 @@ impl Tasks {
 
     /// The command for a shell that plays a range of units, which is written as the shell reads it.
     pub(super) fn unit_command(&self, range: &str) -> String {
-        let program = quote(&self.program);
-        let folder = quote(&self.folder);
+        let program = shell::word(&self.program);
+        let folder = shell::word(&self.folder);
         let jobs = self.processors;
         format!("{program} experiment unit {folder} {range} --jobs {jobs}")
     }
@@ -55,8 +57,8 @@ impl Tasks {
 
     /// The command for a shell that writes the results of the units that have been played.
     pub(super) fn merge_command(&self) -> String {
-        let program = quote(&self.program);
-        let folder = quote(&self.folder);
+        let program = shell::word(&self.program);
+        let folder = shell::word(&self.folder);
         format!("{program} experiment merge {folder}")
     }
 
@@ -72,16 +74,6 @@ impl Tasks {
         let name = format!("cars-{name}");
         name.trim_end_matches('-').to_owned()
     }
-}
-
-/// Quotes a word for a shell if necessary.
-pub(super) fn quote(word: &str) -> String {
-    let mut characters = word.chars();
-    let is_plain = characters.all(|c| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c));
-    if is_plain && !word.is_empty() {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 #[cfg(test)]
@@ -131,12 +123,5 @@ mod tests {
             ..Tasks::example()
         };
         assert!(named.job_name().len() <= 63);
-    }
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        assert_eq!(quote("/a/b-1.toml"), "/a/b-1.toml");
-        assert_eq!(quote("it's $x"), r"'it'\''s $x'");
-        assert_eq!(quote(""), "''");
     }
 }

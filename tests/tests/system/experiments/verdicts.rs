@@ -1,0 +1,41 @@
+//! What an experiment expects of its runs decides about its exit status.
+
+use system_tests::{Lab, root};
+
+use super::{HALL, cars};
+
+/// The exit status of an experiment that expects this, and what it says.
+fn judged(expect: &str) -> (i32, String) {
+    let lab = Lab::new();
+    let scenario = root().join(HALL);
+    let text = format!(
+        "question = '?'\nscenario = {scenario:?}\nduration = '60 s'\nseeds = 3\n[[arm]]\nname = 'it'\n\
+         [[measure]]\nname = 'ticks'\nsummary = 'ticks'\n{expect}"
+    );
+    let file = lab.write("experiment.toml", &text);
+    let out = lab.out().join("results");
+    cars(&["run", file.to_str().unwrap(), "-o", out.to_str().unwrap()])
+}
+
+#[test]
+fn the_exit_status_is_that_of_the_worst_verdict_of_the_experiment() {
+    let served = "eventually = { robot = 'Butler', variable = 'served', at_least = 1 }";
+    let passes = format!("[[expect]]\nname = 'serves'\n{served}\nwithin = '60 s'\n");
+    let (status, notes) = judged(&passes);
+    assert_eq!(status, 0, "{notes}");
+    assert!(!notes.contains("serves"), "{notes}");
+
+    let undecided = "[[expect]]\nname = 'flies'\n\
+                     eventually = { robot = 'Butler', behavior = 'FLY' }\nwithin = '100 s'\n";
+    let (status, notes) = judged(&format!("{passes}{undecided}"));
+    assert_eq!(status, 2, "{notes}");
+    assert!(
+        notes.contains("undecided: flies: in 3 of 3 runs, the first is unit 0"),
+        "{notes}"
+    );
+
+    let fails = "[[expect]]\nname = 'nobody speaks'\nnever = { event = 'command_sent' }\n";
+    let (status, notes) = judged(&format!("{undecided}{fails}{passes}"));
+    assert_eq!(status, 1, "{notes}");
+    assert!(notes.contains("fail: nobody speaks: in "), "{notes}");
+}
