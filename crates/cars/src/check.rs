@@ -78,8 +78,8 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
         set: Vec::new(),
         robots: Robots::InProcess,
     })?;
-    let needs_processes = plan.check().is_err();
-    if !needs_processes {
+    let needs_processes = plan.needs_processes()?;
+    if needs_processes.is_none() {
         plan.check_begins()?;
     }
 
@@ -89,8 +89,8 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
     let measures = count(experiment.measures.len(), "measure", "measures");
     let seeds = experiment.seeds.len();
     let mut text = format!("{arms}, {conditions}, {seeds} seeds, {measures}");
-    if needs_processes {
-        text += "; to be played with --processes";
+    if let Some(reason) = needs_processes {
+        text += &format!("; to be played with --processes: {reason}");
     }
     Ok(text)
 }

@@ -78,6 +78,11 @@ fn errors_show_line_place_and_reason() {
             "1 │ duration",
             "must be more than zero",
         ),
+        (
+            "tick = \"0.5 s\"\nduration = \"0.2 s\"\n",
+            "2 │ duration",
+            "less than a tick, which lasts 0.5 s",
+        ),
         ("seed = 9007199254740992\n", "1 │ seed", "2^53"),
         (
             "on_late = \"panic\"\n",

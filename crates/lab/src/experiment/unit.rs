@@ -43,17 +43,31 @@ impl Plan {
     /// # Errors
     /// If a scenario has robots or faults that need processes, and there are none.
     pub fn check(&self) -> miette::Result<()> {
+        match self.needs_processes()? {
+            Some(reason) => Err(reason),
+            None => Ok(()),
+        }
+    }
+
+    /// Why the units cannot be played in this process, if they are to be and cannot.
+    ///
+    /// # Errors
+    /// If a scenario cannot be used.
+    pub fn needs_processes(&self) -> miette::Result<Option<miette::Report>> {
         if *self.robots() != Robots::InProcess {
-            return Ok(());
+            return Ok(None);
         }
 
         let seed = self.unit(0).seed;
         for cell in 0..self.cells() {
             let scenario = self.scenario(cell, seed, Vec::new())?;
-            check_faults(&scenario, 0)?;
-            make_robots(&scenario, &self.experiment.scenario)?;
+            let checked = check_faults(&scenario, 0)
+                .and_then(|()| make_robots(&scenario, &self.experiment.scenario));
+            if let Err(reason) = checked {
+                return Ok(Some(reason));
+            }
         }
-        Ok(())
+        Ok(None)
     }
 
     /// Checks that robots in this process begin with their parameters, in every arm under every condition: plays tick 0. A plan

@@ -217,9 +217,13 @@ impl Scenario {
         let duration = self.duration.as_ref();
         let duration_s = positive(source, duration, DURATION, "the duration")?.0;
         let ticks = (duration_s / tick_s).round();
+        let span = duration.map(Spanned::span);
         if ticks > MAX_TICKS {
-            let span = duration.map(Spanned::span);
             return Err(FileError::at(source, span, "more than a billion ticks"));
+        }
+        if ticks < 1.0 {
+            let reason = format!("less than a tick, which lasts {tick_s} s");
+            return Err(FileError::at(source, span, &reason));
         }
         Ok(ticks as Tick)
     }

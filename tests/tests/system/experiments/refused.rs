@@ -87,6 +87,20 @@ fn cars_check_reads_experiments() {
     assert_eq!(code, 0, "{text}");
     assert!(text.contains("8 arms, 9 conditions, 64 seeds"), "{text}");
 
+    let strange = format!(
+        "question = '?'\nscenario = {:?}\nduration = '60 s'\nseeds = 2\n\
+         [[arm]]\nname = 'it'\n[[measure]]\nname = 'ticks'\nsummary = 'ticks'\n",
+        root().join("configs/any_language.toml")
+    );
+    let strange = lab.write("strange.toml", &strange);
+    let (code, text) = lab.cars_without_out(&["check", strange.to_str().unwrap()]);
+    assert_eq!(code, 0, "{text}");
+    let reason = "can run in this process";
+    assert!(
+        text.contains("to be played with --processes") && text.contains(reason),
+        "{text}"
+    );
+
     let broken = yoked().replace("crash\", at", "die\", at");
     let broken = lab.write("broken.toml", &broken);
     let (code, text) = lab.cars_without_out(&["check", broken.to_str().unwrap()]);
