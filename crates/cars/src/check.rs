@@ -112,7 +112,7 @@ fn describe_run(folder: &Path) -> Result<String, FileError> {
 fn count_ticks(checked: &Checked) -> String {
     let tick = checked.tick;
     let rest = count(checked.incomplete_lines, "line", "lines");
-    match (checked.has_end, checked.incomplete_lines) {
+    match (checked.end.is_some(), checked.incomplete_lines) {
         (true, _) => format!("{tick} ticks to the end"),
         (false, 0) => format!("{tick} ticks, no end"),
         (false, _) => format!("{tick} ticks, no end, {rest} of a tick that was not completed"),

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use config::FileError;
 use protocol::event::log_line;
-use protocol::messages::{Awaited, LogRecord, Panel, Report};
+use protocol::messages::{Awaited, End, LogRecord, Panel, Report};
 use protocol::{Epoch, Event, Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
@@ -136,7 +136,7 @@ impl RunFolder {
         }
     }
 
-    /// Takes the folder of a run whose simulator has gone, to resume it, with the record of its last epoch, the files of which
+    /// Takes the folder of a run that was killed or stopped, to resume it, with the record of its last epoch, the files of which
     /// may not be there yet. The record is checked first.
     ///
     /// # Errors
@@ -150,9 +150,12 @@ impl RunFolder {
 
         let lock = self.lock()?;
         let files = self.last_epoch();
-        if files.events.exists() && seal::check(&files.events)?.has_end {
-            let error = FileError::new(format!("the run in {place} has ended"));
-            return Err(error.with_help("start it again without --resume"));
+        if files.events.exists() {
+            let end = seal::check(&files.events)?.end;
+            if end.is_some_and(|end| end != End::Stopped) {
+                let error = FileError::new(format!("the run in {place} has ended"));
+                return Err(error.with_help("start it again without --resume"));
+            }
         }
         Ok((lock, files))
     }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use config::FileError;
 use protocol::Tick;
 use protocol::event::{Event, Line};
+use protocol::messages::End;
 use xxhash_rust::xxh3::Xxh3;
 
 /// What a seal begins with, in the last field of a line.
@@ -62,8 +63,8 @@ pub struct Checked {
     pub lines: usize,
     /// The last complete tick.
     pub tick: Tick,
-    /// Whether the run has ended in order.
-    pub has_end: bool,
+    /// How the run has ended, if it has ended in order.
+    pub end: Option<End>,
     /// Lines after the last seal, of a tick that was never completed: the simulator was killed, or the run is in progress.
     pub incomplete_lines: usize,
 }
@@ -130,12 +131,12 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
     let mut checked = Checked {
         lines: 0,
         tick: 0,
-        has_end: false,
+        end: None,
         incomplete_lines: 0,
     };
     let mut seal = Seal::default();
     while let Some(raw) = lines.next()? {
-        if checked.has_end {
+        if checked.end.is_some() {
             return Err(damaged(
                 path,
                 &checked,
@@ -159,7 +160,9 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
             }
             checked.lines += std::mem::take(&mut checked.incomplete_lines);
             checked.tick = line.tick;
-            checked.has_end = matches!(line.event, Event::End { .. });
+            if let Event::End { reason, .. } = line.event {
+                checked.end = Some(reason);
+            }
         }
         seal.add(&raw.bytes);
     }

@@ -413,6 +413,42 @@ fn a_run_whose_simulator_was_killed_goes_on_as_if_nothing_had_happened() {
     assert!(said.contains("the same, 120 ticks to the end"), "{said}");
 }
 
+/// The simulator ends the run in order where its launcher is killed, or somebody stops it. The run goes on from there.
+#[test]
+fn a_run_whose_launcher_was_killed_or_that_was_stopped_is_resumed() {
+    let lab = Lab::new();
+    let run = "stopped";
+    let mut launch = start_hall(&lab, run, 20, &["--speed", "10"]);
+    launch.signal(Signal::SIGKILL);
+    launch.wait();
+    nobody_is_left(run);
+    let ticks = lab.summary(run)["ticks"].as_u64().unwrap();
+    assert_eq!(lab.events(run).pop().unwrap()["reason"], "stopped");
+
+    let resume = ["launch", "--no-console", "--resume", run];
+    let paced = [&resume[..], &["--speed", "10"]].concat();
+    let mut again = Running::start(lab.cars(&paced), run, lab.out().join(run));
+    let further = format!("{{\"tick\":{},\"event\":\"tick\"", ticks + 10);
+    eventually("further ticks", || {
+        let events = std::fs::read_to_string(lab.file(run, "events.jsonl")).ok()?;
+        events.contains(&further).then_some(())
+    });
+    lab.ctl(run, &["stop"]);
+    again.wait();
+    nobody_is_left(run);
+    assert_eq!(lab.events(run).pop().unwrap()["reason"], "stopped");
+
+    lab.ok(&[&resume[..], &["--speed", "max"]].concat());
+    lab.ok(&["run", HALL, "--run", "whole", "--duration", "60 s"]);
+    assert_same(("resumed", &lab.bytes(run)), ("whole", &lab.bytes("whole")));
+    let log = |run| std::fs::read_to_string(lab.file(run, "cars.log")).unwrap();
+    assert_eq!(log(run), log("whole"));
+    let said = verify(&lab, run);
+    assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+    let (_, refused) = lab.fails(&resume);
+    assert!(refused.contains("has ended"), "{refused}");
+}
+
 #[test]
 fn an_epoch_after_init_is_resumed_and_the_one_before_is_kept() {
     let lab = Lab::new();

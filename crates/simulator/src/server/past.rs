@@ -37,7 +37,7 @@ impl Past {
         let mut next = None;
         if files.events.exists() {
             let mut events = Record::of_events(&files.events)?;
-            next = events.next_entry()?;
+            next = next_tick(&mut events)?;
             record = Some(events);
         }
         Ok(Self {
@@ -81,7 +81,7 @@ impl Past {
         }
 
         if let Some(record) = &mut self.record {
-            self.next = record.next_entry()?;
+            self.next = next_tick(record)?;
         }
         if self.is_empty() {
             Ok(Repeated::Last)
@@ -89,4 +89,10 @@ impl Past {
             Ok(Repeated::Same)
         }
     }
+}
+
+/// The next tick of a record. The end of a run that was stopped is none: the run goes on after its last tick.
+fn next_tick(record: &mut Record) -> Result<Option<Entry>, FileError> {
+    let next = record.next_entry()?;
+    Ok(next.filter(|entry| !entry.is_end()))
 }
