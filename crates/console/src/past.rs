@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use protocol::{Epoch, RunName};
+use recording::RecordingError;
 
 use crate::playback::{OpenError, Recording};
 
@@ -96,7 +97,11 @@ impl Past {
         }
 
         open.last = None;
-        let last = Recording::open(&file, open.number + 1)?;
+        let opened = Recording::open(&file, open.number + 1);
+        let last = opened.map_err(|error| match error {
+            OpenError::Unreadable(RecordingError::Damaged { .. }) => error,
+            _ => OpenError::NotYet,
+        })?;
         if last.run() != run.as_str() {
             return Err(OpenError::OtherRun(file.display().to_string()));
         }

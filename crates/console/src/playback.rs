@@ -30,6 +30,9 @@ pub(crate) enum OpenError {
     /// It has no tick.
     #[error("{0}: no tick was completed")]
     Empty(String),
+    /// The folder of a run in progress has no recording that can be read.
+    #[error("nothing is recorded yet, or the scenario sets `frames = false` under [record]")]
+    NotYet,
     /// The folder has no recording of an epoch.
     #[error("this epoch has no recording")]
     NoEpoch,
