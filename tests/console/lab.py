@@ -96,7 +96,9 @@ class Launch:
 
     RUN = "console-test"
 
-    def __init__(self, folder, scenario="configs/hors_doeuvres.toml", robots=("Butler", "Leguin"), options=()):
+    def __init__(
+        self, folder, scenario="configs/hors_doeuvres.toml", robots=("Butler", "Leguin"), options=(), knows_folder=True
+    ):
         self.folder = folder
         self.run_folder = folder / "runs" / self.RUN
         self.processes = Processes(folder)
@@ -109,11 +111,16 @@ class Launch:
 
         self.simulator = self.start("cars-sim", scenario, "--out", folder / "runs", "--paused", "--no-verdict", *options)
         self.robots = {name: self.start(f"cars-{name.lower()}", "--name", name) for name in robots}
-        self.address = start_console(self.processes, environment=self.environment)
+        self.address = self.console(knows_folder)
         eventually("the robots", lambda: (self.status() or {}).get("phase") == "ready")
 
     def start(self, name, *arguments):
         return self.processes.start(name, *arguments, environment=self.environment)
+
+    def console(self, knows_folder=True):
+        """Starts a console and returns its address. The launcher tells it the run's folder; on another machine there is none."""
+        folder = ("--folder", self.run_folder) if knows_folder else ()
+        return start_console(self.processes, *folder, environment=self.environment)
 
     def kill(self, robot):
         self.robots[robot].send_signal(signal.SIGKILL)

@@ -76,7 +76,7 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
 # What is hidden before pages are compared, because the other one does not have it: commands of an operator and the answers,
 # and what a recording is played with: the bar with its tick, and the marks of that tick in the charts. The bar at the top,
 # which controls a run, is not compared.
-NOT_RECORDED = ".panel .buttons, #notice"
+NOT_RECORDED = ".panel .buttons, #notice, #scrub-bar"
 NOT_LIVE = "#scrub-bar, #bands .cursor, #chart .u-cursor-x"
 
 # By tab, what is compared while it is shown.

@@ -8,6 +8,7 @@ import { Controls, renderAwaiting } from "./controls.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
 import { Hover } from "./hover.js";
+import { renderEmotions } from "./legend.js";
 import { LogView } from "./log.js";
 import { Notices } from "./notices.js";
 import { Panels } from "./panels.js";
@@ -24,6 +25,7 @@ import { onThemeChange } from "./theme.js";
 import { Units } from "./units.js";
 import { renderVerdicts } from "./verdicts.js";
 import { Voice } from "./voice.js";
+import { TimeWindow } from "./window.js";
 
 /** @typedef {import("./types/messages.js").Control} Control */
 
@@ -117,9 +119,11 @@ const panels = new Panels(box("panels"), store, units, {
   send: sendCommand,
   choose,
 });
-const log = new LogView(box("panel-log"), store);
-const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, store);
-const bands = new Bands(box("bands"), store);
+const log = new LogView(box("panel-log"), store, ({ epoch, tick }) => player.seekIn(epoch, tick));
+const shownTime = new TimeWindow(() => store.history.range_s());
+const seekTime = (/** @type {number} */ time_s) => player.seekTime(time_s);
+const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, store, shownTime, seekTime);
+const bands = new Bands(box("bands"), store, shownTime, seekTime);
 const diagram = new DiagramView(box("panel-diagram"), player);
 const voice = new Voice(store);
 
@@ -165,10 +169,11 @@ function drawBar() {
   renderStranger(box("stranger"), store);
   renderVerdicts(box("verdicts"), store);
 
-  if (isRecording()) renderScrub(box("scrub-bar"), player);
+  renderScrub(box("scrub-bar"), player, shownTime);
+  renderEmotions(box("emotions"), store);
+  document.body.dataset.time = player.isLive ? "live" : "past";
   const isPast = isRecording() || store.replayOf !== null;
   box("tab-setup").hidden = isPast;
-  box("tab-diagram").hidden = !isRecording();
   if (isPast && openTab === "setup") tabList.select("log");
   box("voice-label").hidden = isRecording();
 
@@ -187,7 +192,8 @@ function drawBar() {
 }
 
 function drawLog() {
-  if (isRecording() && player.tick >= 0 && player.tick !== log.until) log.showUntil(player.tick);
+  if (player.isLive) log.showUntil(null);
+  else if (player.tick >= 0) log.showUntil({ epoch: player.epoch, tick: player.tick });
   log.render();
 }
 
@@ -215,6 +221,9 @@ function markStale(...names) {
 
 store.on("frame", () => setup.phase());
 store.on("frame", () => markStale("bar", "panels", "log", "charts", "diagram"));
+store.on("live", () => markStale("bar", "charts", "diagram"));
+shownTime.listeners.push(() => markStale("bar", "charts"));
+store.on("epoch", () => shownTime.reset());
 store.on("panel", () => markStale("panels"));
 store.on("log", () => markStale("log"));
 store.on("connection", () => markStale("bar", "panels", "log"));
@@ -245,10 +254,20 @@ store.on("connection", () => {
 });
 let isOpened = false;
 store.on("connection", () => {
-  if (!isRecording() || isOpened) return;
+  if (!store.isConnected) isOpened = isOpened && isRecording();
+  if (isOpened || !store.isConnected || !store.mode) return;
   isOpened = true;
+  if (!isRecording()) return player.connected();
   const { tick } = readLink(location.hash);
   player.open(tick ?? 0);
+});
+
+// As the keys of the bar at the top: not where one types.
+document.addEventListener("keydown", (event) => {
+  const { target } = event;
+  const isTyping = target instanceof HTMLElement && target.closest("input:not([type=range]), select, textarea, dialog[open]") !== null;
+  if (event.key.toLowerCase() !== "l" || isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
+  player.live();
 });
 
 /** Shows what a link leads to, if it is of this run. */
@@ -259,19 +278,21 @@ function follow() {
   const isKnown = store.frame?.robots.some((one) => one.name === robot) ?? false;
   if (robot && isKnown && robot !== plan.chosen) choose(robot);
   if (tick === null) return;
-  if (!isRecording()) notices.note("A tick is shown in recordings only: this run is in progress.");
-  else if (player.header && tick !== player.tick) player.step(tick - player.tick);
+  if (tick < player.first) notices.note(`Tick ${tick} cannot be shown: ${player.missing}.`);
+  else if (tick !== player.tick) player.step(tick - player.tick);
 }
 window.addEventListener("hashchange", follow);
 let isFollowed = false;
-store.on("frame", () => {
-  if (isFollowed || !store.frame) return;
-  isFollowed = true;
-  follow();
-});
+for (const topic of /** @type {const} */ (["frame", "live"])) {
+  store.on(topic, () => {
+    if (isFollowed || !store.frame || !player.isKnown) return;
+    isFollowed = true;
+    follow();
+  });
+}
 
 box("link").addEventListener("click", async () => {
-  const tick = isRecording() ? player.tick : null;
+  const tick = player.isLive ? null : player.tick;
   notices.note(await share({ run: store.run, tick, robot: plan.chosen }));
 });
 box("picture").addEventListener("click", async () => {
@@ -302,12 +323,17 @@ for (const [id, zoom] of /** @type {const} */ ([["zoom-in", 1.4], ["zoom-out", 1
   });
 }
 
-// For tests: positions, the frame rate and the newest frame.
+// For tests: positions, the frame rate, what is shown and what is known.
 Object.assign(window, {
   carsConsole: {
     toClient: (/** @type {number} */ x_m, /** @type {number} */ y_m) => plan.toClient(x_m, y_m),
     fps: () => plan.fps(),
     frame: () => store.frame,
+    history: () => store.history,
+    lines: () => store.log.length,
+    unlikeLines: () => new Set(store.log.map((line) => JSON.stringify(line))).size,
+    window: () => shownTime.range_s(),
+    chartScale: () => [charts.plot?.scales.x.min, charts.plot?.scales.x.max],
   },
 });
 

@@ -4,6 +4,7 @@
 import { GUTTER_PX, MARGIN_PX } from "./charts.js";
 import { stateClass } from "./palette.js";
 import { seconds } from "./units.js";
+import { steer } from "./window.js";
 import { html, nothing, render, svg } from "./vendor/lit-html.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -12,6 +13,8 @@ import { html, nothing, render, svg } from "./vendor/lit-html.js";
 const BAND_PX = 16;
 const GAP_PX = 3;
 const ROBOT_GAP_PX = 9;
+/** Spans that end closer to one another are drawn as one. */
+const LEAST_PX = 0.25;
 /** Approximate width of a letter. */
 const LETTER_PX = 6.2;
 
@@ -19,26 +22,32 @@ export class Bands {
   /**
    * @param {HTMLElement} place
    * @param {Store} store
+   * @param {import("./window.js").TimeWindow} shown
+   * @param {(time_s: number) => void} seek
    */
-  constructor(place, store) {
+  constructor(place, store, shown, seek) {
     this.place = place;
     this.store = store;
+    this.shown = shown;
+    this.drawing = place.appendChild(document.createElement("div"));
+    steer(place, shown, { left_px: GUTTER_PX, right_px: MARGIN_PX, seek });
   }
 
   render() {
     const width = this.place.clientWidth;
     const { states } = this.store.history;
-    const [first_s, last_s] = this.store.history.range_s();
+    const [first_s, last_s] = this.shown.range_s();
     const inner = width - GUTTER_PX - MARGIN_PX;
     if (inner <= 0) return;
 
-    const x = (/** @type {number} */ time_s) => GUTTER_PX + (inner * (Math.max(first_s, time_s) - first_s)) / (last_s - first_s);
+    const x = (/** @type {number} */ time_s) => GUTTER_PX + (inner * (Math.min(last_s, Math.max(first_s, time_s)) - first_s)) / (last_s - first_s);
+    const seen = (/** @type {Span[]} */ spans) => visible(spans, first_s, last_s, x);
     const rows = [...states].flatMap(([robot, { emotion, behavior }], i) => {
       const y = i * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
       return [
         svg`<text class="who" x="8" y=${y + BAND_PX + 5}>${robot.slice(0, 10)}</text>`,
-        ...emotion.map((span) => block(span, x, y, "emotion", robot)),
-        ...behavior.map((span) => block(span, x, y + BAND_PX + GAP_PX, "behavior", robot)),
+        ...seen(emotion).map((span) => block(span, x, y, "emotion", robot)),
+        ...seen(behavior).map((span) => block(span, x, y + BAND_PX + GAP_PX, "behavior", robot)),
       ];
     });
 
@@ -48,18 +57,19 @@ export class Bands {
       states.size
         ? html`<svg class="cars-diagram" width=${width} height=${height} role="img" aria-label=${this.words()}>${rows}${this.now(x, height)}</svg>`
         : nothing,
-      this.place,
+      this.drawing,
     );
   }
 
   /**
-   * In a recording, marks the time that the plan shows.
+   * In the past, marks the time that the plan shows.
    * @param {(time_s: number) => number} x
    * @param {number} height
    */
   now(x, height) {
-    const { frame, mode } = this.store;
-    if (mode !== "recording" || !frame) return nothing;
+    const { frame, isChosenTick } = this.store;
+    const [first_s, last_s] = this.shown.range_s();
+    if (!isChosenTick || !frame || frame.time_s < first_s || frame.time_s > last_s) return nothing;
     const at = x(frame.time_s);
     return svg`<line class="cursor" x1=${at} x2=${at} y1="0" y2=${height}></line>`;
   }
@@ -70,6 +80,22 @@ export class Bands {
     );
     return `Emotion and behavior over time; last: ${now.join("; ")}`;
   }
+}
+
+/**
+ * The spans of a window, without those that others of the same pixel would cover.
+ * @param {Span[]} spans
+ * @param {number} first_s
+ * @param {number} last_s
+ * @param {(time_s: number) => number} x
+ */
+function visible(spans, first_s, last_s, x) {
+  let end = -Infinity;
+  return spans.filter(({ from_s, to_s }) => {
+    if (to_s < first_s || from_s > last_s || x(to_s) - end < LEAST_PX) return false;
+    end = x(to_s);
+    return true;
+  });
 }
 
 /**

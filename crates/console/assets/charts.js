@@ -4,6 +4,7 @@
 import { robotColor } from "./palette.js";
 import { onThemeChange, readTheme } from "./theme.js";
 import { short } from "./units.js";
+import { steer } from "./window.js";
 import { html, render } from "./vendor/lit-html.js";
 import uPlot from "./vendor/uPlot.esm.js";
 
@@ -18,11 +19,14 @@ export class Charts {
   /**
    * @param {{select: HTMLElement, chart: HTMLElement}} places
    * @param {Store} store
+   * @param {import("./window.js").TimeWindow} shown
+   * @param {(time_s: number) => void} seek
    */
-  constructor({ select, chart }, store) {
+  constructor({ select, chart }, store, shown, seek) {
     this.select = select;
     this.chart = chart;
     this.store = store;
+    this.shown = shown;
     this.variable = "";
     /** @type {uPlot | null} */
     this.plot = null;
@@ -30,6 +34,7 @@ export class Charts {
     this.made = "";
     /** Index of the sample under the pointer. @type {number | null} */
     this.pointed = null;
+    steer(chart, shown, { left_px: GUTTER_PX, right_px: MARGIN_PX, seek });
     chart.addEventListener("pointermove", () => this.point(this.plot?.cursor.idx ?? null));
     chart.addEventListener("pointerleave", () => this.point(null));
     new ResizeObserver(() => this.resize()).observe(chart);
@@ -74,7 +79,7 @@ export class Charts {
       this.chart.setAttribute("role", "img");
     }
 
-    const [first_s, last_s] = history.range_s();
+    const [first_s, last_s] = this.shown.range_s();
     this.plot?.setData([history.times_s, ...robots.values()], false);
     this.plot?.batch(() => {
       this.plot?.setScale("x", { min: first_s, max: last_s });
@@ -85,17 +90,22 @@ export class Charts {
     this.chart.setAttribute("aria-label", `${this.variable} over time; last: ${now.join(", ")}`);
   }
 
-  /** In a recording, marks the time that the plan shows. */
+  /** In the past, marks the time that the plan shows. */
   cursor() {
-    const { frame, mode } = this.store;
-    if (mode !== "recording" || !frame || !this.plot) return;
+    const { frame, isChosenTick } = this.store;
+    if (!this.plot) return;
+    if (!isChosenTick || !frame) {
+      // The mark of a tick that is shown no more.
+      if (this.pointed === null) this.plot.setCursor({ left: -10, top: -10 }, false);
+      return;
+    }
     this.plot.setCursor({ left: this.plot.valToPos(frame.time_s, "x"), top: 10 }, false);
   }
 
   /** The color of each robot, with its value at the pointer or else the last one. */
   key() {
-    const { history, frame, mode } = this.store;
-    const shown = mode === "recording" && frame ? history.indexAt(frame.time_s) : history.times_s.length - 1;
+    const { history, frame, isChosenTick } = this.store;
+    const shown = isChosenTick && frame ? history.indexAt(frame.time_s) : history.times_s.length - 1;
     const index = this.pointed ?? shown;
 
     return [...(history.variables.get(this.variable) ?? [])].map(
@@ -119,6 +129,8 @@ export class Charts {
             ${names.map((name) => html`<option value=${name} ?selected=${name === this.variable}>${name} (${robots(name)})</option>`)}
           </select></label>
         <span class="muted" ?hidden=${names.length > 0}>No robot has published a number yet.</span>
+        <button type="button" data-testid="window-all" title="show the whole run (double click)" ?hidden=${this.shown.isWhole}
+          @click=${() => this.shown.reset()}>Whole run</button>
         <ul class="key">${this.key()}</ul>`,
       this.select,
     );

@@ -1,5 +1,5 @@
 // @ts-check
-// The space-time diagram of a recording: the server draws a window of it, a click seeks.
+// The space-time diagram of what is recorded, also while the run goes on: the server draws a window of it, a click seeks.
 
 import { html, nothing, render } from "./vendor/lit-html.js";
 
@@ -39,16 +39,18 @@ export class DiagramView {
     new ResizeObserver(() => this.render()).observe(this.picture);
   }
 
+  /** The last tick that is recorded. */
   get last() {
-    return this.player.last;
+    return this.player.recorded;
   }
 
   /** Shows the window, which follows the tick of playback. */
   render() {
     const { clientWidth } = this.picture;
-    if (!this.player.header || clientWidth === 0) return;
+    if (clientWidth === 0) return;
+    if (!this.player.header) return this.explain();
 
-    const { tick } = this.player;
+    const tick = Math.min(this.last, this.player.tick);
     const isOutside = tick < this.from || tick >= this.from + this.ticks;
     // A window that was moved is ahead of playback, which follows.
     if (tick !== this.followed && isOutside) this.begin(tick - Math.floor(this.ticks / 4));
@@ -56,6 +58,14 @@ export class DiagramView {
     this.renderBar();
     this.request(Math.min(MOST_WIDTH_PX, Math.max(LEAST_WIDTH_PX, clientWidth - 16)));
     this.mark();
+  }
+
+  /** Says why there is no diagram. */
+  explain() {
+    const { missing } = this.player;
+    render(html`<p class="muted" data-testid="no-diagram">${missing ? `There is no diagram: ${missing}.` : "No tick is recorded yet."}</p>`, this.bar);
+    this.picture.replaceChildren();
+    this.shown = "";
   }
 
   /** Begins the window with a tick, as far as the run has one. @param {number} tick */
@@ -67,7 +77,7 @@ export class DiagramView {
   move(ticks) {
     const before = this.from;
     this.begin(this.from + ticks);
-    const tick = Math.min(this.last, Math.max(0, this.player.tick + this.from - before));
+    const tick = Math.min(this.last, Math.max(0, Math.min(this.last, this.player.tick) + this.from - before));
     this.player.isPlaying = false;
     this.player.seek(tick);
     this.render();
@@ -75,9 +85,10 @@ export class DiagramView {
 
   /** Makes the window longer or shorter; the tick of playback stays in it. @param {number} factor */
   zoom(factor) {
-    const share = (this.player.tick - this.from) / this.ticks;
+    const tick = Math.min(this.last, this.player.tick);
+    const share = (tick - this.from) / this.ticks;
     this.ticks = Math.round(Math.min(MOST_TICKS, Math.max(LEAST_TICKS, this.ticks * factor)));
-    this.begin(Math.round(this.player.tick - share * this.ticks));
+    this.begin(Math.round(tick - share * this.ticks));
     this.render();
   }
 
@@ -110,8 +121,11 @@ export class DiagramView {
       count: String(this.ticks),
       width: String(Math.floor(width)),
       queries: String(this.hasQueries),
+      epoch: String(this.player.header?.epoch ?? 0),
     });
-    const wanted = query.toString();
+    // The window of a run in progress is drawn anew until it is complete.
+    const complete = Math.min(this.last, this.from + this.ticks);
+    const wanted = `${query} ${complete} ${this.player.header?.number}`;
     if (wanted === this.shown || !this.player.store.isConnected) return;
     this.shown = wanted;
 
@@ -140,7 +154,7 @@ export class DiagramView {
 
   /** Marks the tick of playback. */
   mark() {
-    const x = String(along(this.knots, 1, 0, this.player.tick));
+    const x = String(along(this.knots, 1, 0, Math.min(this.last, this.player.tick)));
     this.cursor?.setAttribute("x1", x);
     this.cursor?.setAttribute("x2", x);
   }

@@ -7,11 +7,13 @@
 /** A period of time in one state. @typedef {{state: string, from_s: number, to_s: number}} Span */
 /** Places at the times of the history. @typedef {{x_m: (number | null)[], y_m: (number | null)[]}} Track */
 
-/** Most samples; beyond, every second one is dropped, so that the whole run stays visible. */
+/** Most samples; beyond, older ones are dropped where they are close together, so that the whole run stays visible. */
 const MOST_SAMPLES = 6000;
-const MOST_SPANS = 1000;
+const MOST_SPANS = 4000;
 /** Most variables of all robots: a robot can publish any number of names. */
 const MOST_VARIABLES = 256;
+/** Most names of emotions that are listed: a robot can have any. */
+const MOST_EMOTIONS = 64;
 
 export class History {
   constructor() {
@@ -27,8 +29,17 @@ export class History {
     this.tracks = new Map();
     /** @type {Map<string, {emotion: Span[], behavior: Span[]}>} */
     this.states = new Map();
+    /** The emotions that robots have had. @type {Set<string>} */
+    this.emotions = new Set();
     /** @type {number} */
     this.variableCount = 0;
+    /** Whether nothing is known of the time before the next sample. @type {boolean} */
+    this.isBroken = false;
+  }
+
+  /** What comes next does not follow what was added last: the page was not connected in between. */
+  break() {
+    this.isBroken = this.times_s.length > 0;
   }
 
   /**
@@ -40,11 +51,17 @@ export class History {
     const last_s = this.times_s.at(-1) ?? -Infinity;
     if (time_s <= last_s) return;
 
+    const isBroken = this.isBroken;
+    this.isBroken = false;
+    if (isBroken) {
+      this.times_s.push((last_s + time_s) / 2);
+      this.align();
+    }
     this.times_s.push(time_s);
 
     for (const robot of robots) {
       this.place(robot);
-      this.note(robot, time_s);
+      this.note(robot, time_s, isBroken);
       for (const [variable, value] of Object.entries(robot.state_variables)) {
         if (typeof value === "number") this.series(variable, robot.name)?.push(value);
       }
@@ -87,12 +104,30 @@ export class History {
   /**
    * @param {Pick<RobotFrame, "name" | "emotion_state" | "behavior_state">} robot
    * @param {number} time_s
+   * @param {boolean} isBroken
    */
-  note({ name, emotion_state, behavior_state }, time_s) {
+  note({ name, emotion_state, behavior_state }, time_s, isBroken) {
     const states = this.states.get(name) ?? { emotion: [], behavior: [] };
     this.states.set(name, states);
-    extend(states.emotion, emotion_state, time_s);
-    extend(states.behavior, behavior_state, time_s);
+    if (this.emotions.size < MOST_EMOTIONS) this.emotions.add(emotion_state);
+    extend(states.emotion, emotion_state, time_s, isBroken);
+    extend(states.behavior, behavior_state, time_s, isBroken);
+  }
+
+  /**
+   * Forgets a time and all that is later, for samples that are more exact.
+   * @param {number} time_s
+   */
+  cutFrom(time_s) {
+    const kept = this.indexAt(time_s, false) + 1;
+    for (const values of [this.times_s, ...this.all()]) values.length = Math.min(values.length, kept);
+    for (const { emotion, behavior } of this.states.values()) {
+      for (const spans of [emotion, behavior]) {
+        while ((spans.at(-1)?.from_s ?? -Infinity) >= time_s) spans.pop();
+        const last = spans.at(-1);
+        if (last) last.to_s = Math.min(last.to_s, time_s);
+      }
+    }
   }
 
   /** A series without a value in the last sample gets a gap there. */
@@ -104,10 +139,10 @@ export class History {
   }
 
   thin() {
+    const kept = spread(this.times_s);
     for (const values of [this.times_s, ...this.all()]) {
-      let kept = 0;
-      for (let i = 0; i < values.length; i += 2) values[kept++] = values[i];
-      values.length = kept;
+      kept.forEach((from, to) => (values[to] = values[from]));
+      values.length = kept.length;
     }
   }
 
@@ -127,14 +162,15 @@ export class History {
   /**
    * Index of the last sample that is not later.
    * @param {number} time_s
+   * @param {boolean} isIncluded whether one at this time counts
    */
-  indexAt(time_s) {
+  indexAt(time_s, isIncluded = true) {
     let low = 0;
     let high = this.times_s.length;
 
     while (low < high) {
       const middle = (low + high) >> 1;
-      if (this.times_s[middle] <= time_s) low = middle + 1;
+      if (this.times_s[middle] < time_s || (isIncluded && this.times_s[middle] === time_s)) low = middle + 1;
       else high = middle;
     }
 
@@ -143,12 +179,29 @@ export class History {
 }
 
 /**
+ * Chooses about half of the samples: those that are spread over the whole time, and the newest ones.
+ * @param {number[]} times in order
+ * @returns {number[]} their indices
+ */
+export function spread(times) {
+  const recent = times.length - Math.ceil(times.length / 8);
+  const least = (times[recent] - times[0]) / (times.length * (3 / 8));
+  let last = -Infinity;
+  return [...times.keys()].filter((i) => {
+    const isKept = i >= recent || times[i] - last >= least;
+    if (isKept) last = times[i];
+    return isKept;
+  });
+}
+
+/**
  * @param {Span[]} spans
  * @param {string} state
  * @param {number} time_s
+ * @param {boolean} isBroken whether the state before is not known
  */
-function extend(spans, state, time_s) {
-  const last = spans.at(-1);
+function extend(spans, state, time_s, isBroken) {
+  const last = isBroken ? undefined : spans.at(-1);
   if (last) last.to_s = time_s;
   if (last?.state === state) return;
   spans.push({ state, from_s: time_s, to_s: time_s });

@@ -5,6 +5,7 @@ import { html, render } from "./vendor/lit-html.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
+/** @typedef {{epoch: number, tick: number}} Moment */
 
 /** Most rows in the page. */
 const MOST_ROWS = 2000;
@@ -21,15 +22,22 @@ export class LogView {
   /**
    * @param {HTMLElement} place
    * @param {Store} store
+   * @param {(line: LogRecord) => void} seek
    */
-  constructor(place, store) {
+  constructor(place, store, seek) {
     this.store = store;
+    this.seek = seek;
     this.robot = "";
     this.kind = "";
     /** Number of lines so far that are in the page or were filtered out. */
     this.seen = 0;
-    /** Last tick that is shown; in a recording, the tick that is played. */
-    this.until = Infinity;
+    /** The last moment that is shown: in the past, the tick that is. @type {Moment | null} */
+    this.until = null;
+    /** The moment of the line that was clicked: the lines after it stay. @type {Moment | null} */
+    this.picked = null;
+    /** The lines of the rows. @type {WeakMap<Element, LogRecord>} */
+    this.lines = new WeakMap();
+    this.edits = 0;
     this.isFollowing = true;
     this.waiting = 0;
     /** Epoch of the last row. @type {number | null} */
@@ -44,6 +52,7 @@ export class LogView {
     this.rows.tabIndex = 0;
     this.rows.setAttribute("role", "log");
     this.rows.setAttribute("aria-label", "Log");
+    this.rows.addEventListener("click", (event) => this.click(event));
     this.rows.addEventListener("scroll", () => this.scrolled(), { passive: true });
     place.append(this.bar, this.rows);
   }
@@ -75,6 +84,7 @@ export class LogView {
 
   /** Renders all rows again, after a change of filter or time. */
   rebuild() {
+    this.edits = this.store.logEdits;
     this.rows.replaceChildren();
     this.epoch = null;
     this.seen = this.store.logCount - this.store.log.length;
@@ -85,7 +95,7 @@ export class LogView {
 
   render() {
     const { store } = this;
-    if (store.logCount < this.seen) return this.rebuild();
+    if (store.logCount < this.seen || store.logEdits !== this.edits) return this.rebuild();
 
     const first = store.logCount - store.log.length;
     const fresh = store.log.slice(Math.max(0, this.seen - first)).filter((line) => this.isShown(line));
@@ -95,23 +105,48 @@ export class LogView {
   }
 
   /**
-   * Shows the lines up to this tick of a recording.
-   * @param {number} tick
+   * Shows the lines up to a moment of the past; without one, all. After a click the lines stay.
+   * @param {Moment | null} moment
    */
-  showUntil(tick) {
-    const isForward = tick >= this.until && this.until !== Infinity;
+  showUntil(moment) {
+    if (moment && this.picked && isAlike(moment, this.picked)) return this.mark(this.picked);
+    this.picked = null;
+    this.mark(null);
+    if (isAlike(moment, this.until)) return;
+
     const from = this.until;
-    this.until = tick;
+    const isForward = moment !== null && from !== null && isAfter(moment, from) && moment.epoch === from.epoch;
+    this.until = moment;
     if (!isForward) return this.rebuild();
 
-    this.append(this.store.log.filter((line) => line.tick > from && this.isShown(line)));
+    this.append(this.store.log.filter((line) => isAfter(line, from) && this.isShown(line)));
     this.renderBar();
+  }
+
+  /** Shows the tick of the line. Who marks text for copying does not seek. @param {MouseEvent} event */
+  click(event) {
+    const line = this.lines.get(/** @type {Element} */ (event.target).closest(".line") ?? this.rows);
+    const marked = getSelection();
+    if (!line || (marked?.isCollapsed === false && this.rows.contains(marked.anchorNode))) return;
+    this.picked = { epoch: line.epoch, tick: line.tick };
+    this.isFollowing = false;
+    this.seek(line);
+  }
+
+  /** Marks the lines of a moment. @param {Moment | null} moment */
+  mark(moment) {
+    for (const row of this.rows.querySelectorAll(".line.picked")) row.classList.remove("picked");
+    if (!moment) return;
+    for (const row of this.rows.children) {
+      const line = this.lines.get(row);
+      if (line && isAlike(line, moment)) row.classList.add("picked");
+    }
   }
 
   /** @param {LogRecord} line */
   isShown(line) {
     const isOfKind = this.kind === "" || line.kind === this.kind || (this.kind === "network" && FATE.test(line.text));
-    return line.tick <= this.until && (this.robot === "" || line.source === this.robot) && isOfKind;
+    return (!this.until || !isAfter(line, this.until)) && (this.robot === "" || line.source === this.robot) && isOfKind;
   }
 
   /** @param {LogRecord[]} lines */
@@ -133,7 +168,9 @@ export class LogView {
   withEpoch(line) {
     const isNext = this.epoch !== null && line.epoch !== this.epoch;
     this.epoch = line.epoch;
-    return isNext ? [division(line.epoch), row(line)] : [row(line)];
+    const element = row(line);
+    this.lines.set(element, line);
+    return isNext ? [division(line.epoch), element] : [element];
   }
 
   /** To be called when the tab is shown again: a hidden element does not scroll. */
@@ -170,6 +207,22 @@ export class LogView {
       this.bar,
     );
   }
+}
+
+/**
+ * @param {Moment} one
+ * @param {Moment} other
+ */
+function isAfter(one, other) {
+  return one.epoch > other.epoch || (one.epoch === other.epoch && one.tick > other.tick);
+}
+
+/**
+ * @param {Moment | null} one
+ * @param {Moment | null} other
+ */
+function isAlike(one, other) {
+  return one?.epoch === other?.epoch && one?.tick === other?.tick;
 }
 
 /** @param {number} epoch */

@@ -1,5 +1,8 @@
 // @ts-check
-// A recorded run: fetched in chunks, played through the same store as a live one.
+// The time line of a run: what is recorded of it, and what was seen of it while it goes on. A tick of either is shown through
+// the same store as the newest one.
+
+import { History } from "./history.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./types/messages.js").Awaited} Awaited */
@@ -11,21 +14,32 @@
 /** @typedef {import("./types/messages.js").Standing} Standing */
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /**
- * What does not change; `ticks` is the last tick.
- * @typedef {{run: string, epoch: number, seed: number, tick_s: number, field_m: [number, number], body_m: number,
- *   obstacles: [number, number][], ticks: number}} RecordingHeader
+ * An epoch that is recorded; `ticks` is its last tick so far, `number` tells it from a recording that took its place, and
+ * `epochs` are all that have one.
+ * @typedef {{run: string, epoch: number, seed: number, tick_s: number, duration_s: number, field_m: [number, number],
+ *   body_m: number, obstacles: [number, number][], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
  */
 /**
  * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], cuts: Cut[], awaiting: Awaited[],
  *   expectations: Standing[]}} RecordedTick
  */
 /** A panel and the tick in which it arrived. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
-/** @typedef {{ticks: RecordedTick[], panels: RecordedPanel[], flights: Flight[], log: LogRecord[]}} Chunk */
+/** Ticks before `end`. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], flights: Flight[], log: LogRecord[]}} Chunk */
 
 /** Ticks in a chunk: few, because a seek waits for a whole one. */
 const CHUNK = 32;
 /** Most numbers of guests' places that are kept; the least recently used chunks are dropped first. */
 const MOST_NUMBERS = 12_000_000;
+/** Most chunks that are kept. */
+const MOST_CHUNKS = 2000;
+/** Ticks of which charts and log are read at once. */
+const READ_AT_ONCE = 4096;
+/** About as many ticks of an epoch are in charts, beside those in which a robot's state changed. */
+const SAMPLES = 3000;
+/** Lines of earlier epochs are read as long as there are fewer. */
+const ENOUGH_LINES = 10_000;
+/** How often it is asked what has been recorded since; after a request that takes long, later. */
+const FOLLOW_MS = 1000;
 /** Least time between two frames. */
 const FRAME_MS = 33;
 /** How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states. */
@@ -41,46 +55,249 @@ export class Player {
   constructor(store, client) {
     this.store = store;
     this.client = client;
-    /** @type {RecordingHeader | null} */
+    /** The newest epoch that is recorded. @type {Recorded | null} */
+    this.newest = null;
+    /** The epoch that is shown, if it is recorded. @type {Recorded | null} */
     this.header = null;
-    /** By number, in order of their last use. @type {Map<number, Promise<Chunk>>} */
+    /** Why nothing is recorded. */
+    this.missing = "";
+    /** The last tick of the newest epoch that charts and log have from its recording. */
+    this.readTo = -1;
+    /** The recording of which the log has the epochs before. */
+    this.earlierOf = 0;
+    /** Chunks of the epoch that is shown by number, in order of their last use. @type {Map<number, Promise<Chunk>>} */
     this.chunks = new Map();
     this.numbers = 0;
     /** Position of playback, in ticks, with a fraction. */
     this.position = 0;
-    this.tick = -1;
+    /** The chosen tick. */
+    this.chosen = -1;
     this.isPlaying = false;
     /** @type {number | null} */
     this.factor = 5;
     this.seeks = 0;
     this.playedAt_ms = 0;
+    this.isFollowing = false;
+
+    store.on("live-epoch", () => this.restart());
   }
 
+  get isRecording() {
+    return this.store.mode === "recording";
+  }
+
+  /** Whether the newest tick of a run in progress is shown. */
+  get isLive() {
+    return this.store.mode === "live" && !this.store.isBack;
+  }
+
+  /** Whether the epoch in progress is shown, or an earlier tick of it. */
+  get isOfLive() {
+    const { live } = this.store;
+    return live !== null && (this.isLive || this.epoch === live.epoch);
+  }
+
+  /** Whether it is known what is recorded. */
+  get isKnown() {
+    return this.newest !== null || this.missing !== "";
+  }
+
+  /** The epoch that is shown. */
+  get epoch() {
+    return this.store.frame?.epoch ?? this.header?.epoch ?? 0;
+  }
+
+  /** All epochs that can be shown. */
+  get epochs() {
+    const live = this.store.live?.epoch;
+    return [...new Set([...(this.newest?.epochs ?? []), ...(live === undefined ? [] : [live])])];
+  }
+
+  get tick_s() {
+    return this.store.frame?.tick_s ?? this.header?.tick_s ?? 0;
+  }
+
+  /** The tick that is shown. */
+  get tick() {
+    return this.isLive ? (this.store.live?.tick ?? -1) : this.chosen;
+  }
+
+  /** The first tick of the epoch that can be shown. */
+  get first() {
+    return this.header ? 0 : Math.min(this.store.memory.first, this.last);
+  }
+
+  /** The last tick of the epoch that can be shown. */
   get last() {
-    return this.header?.ticks ?? 0;
+    return Math.max(this.recorded, this.isOfLive ? (this.store.live?.tick ?? 0) : 0);
+  }
+
+  /** The last tick of the epoch that is recorded. */
+  get recorded() {
+    return this.header?.ticks ?? (this.isRecording ? 0 : -1);
   }
 
   /** @param {number} tick that is shown first, as far as the run has it */
   async open(tick) {
     try {
-      this.header = await get("recording");
+      await this.learn();
+      if (!this.header) throw new Error(this.missing);
       await this.seek(Math.min(this.last, tick));
-      await this.readAll();
+      await this.read(this.header, this.store.history);
+      await this.readEarlier(this.header);
     } catch (error) {
-      this.client.failed(String(error instanceof Error ? error.message : error));
+      this.client.failed(reasonOf(error));
     }
   }
 
-  /** Reads the whole run once, in order, for charts and log. */
-  async readAll() {
-    if (!this.header) return;
-
-    for (let number = 0; number * CHUNK <= this.last; number += 1) {
-      const { ticks, log } = await this.chunk(number);
-      for (const { tick, robots } of ticks) this.store.history.add(tick * this.header.tick_s, robots);
-      this.store.addLines(log);
-      this.store.emit("frame");
+  /** Learns what is recorded. */
+  async learn() {
+    /** @type {Recorded | {missing: string}} */
+    const answer = await get("recording");
+    const { live } = this.store;
+    const missing = "missing" in answer ? answer.missing : "";
+    const isOther = "seed" in answer && answer.epoch === live?.epoch && answer.seed !== live.seed;
+    if ("missing" in answer || isOther) {
+      this.missing = missing || "the folder has the recording of another run";
+      this.newest = null;
+      if (this.isLive) this.header = null;
+      return;
     }
+
+    this.missing = "";
+    this.newest = answer;
+    const shown = this.isRecording ? answer.epoch : this.isLive ? live?.epoch : this.epoch;
+    if (answer.epoch === shown) this.header = answer;
+  }
+
+  /** A new epoch of a run in progress has begun: what is recorded is of the one before, and is not read on. */
+  restart() {
+    this.readTo = -1;
+    if (!this.isLive && this.header) return;
+    this.header = null;
+    this.forgetChunks();
+    if (this.store.isBack) this.live();
+  }
+
+  /** The page is connected to a run in progress, perhaps again: everything that is recorded is read. */
+  connected() {
+    this.readTo = -1;
+    this.earlierOf = 0;
+    if (!this.isFollowing) this.follow();
+  }
+
+  /** Reads on while the run goes on. */
+  async follow() {
+    this.isFollowing = true;
+    for (;;) {
+      const begun_ms = performance.now();
+      try {
+        if (this.store.isConnected && !document.hidden) await this.catchUp();
+      } catch (error) {
+        // The console ends, or a chunk is damaged: the page says so while it lasts.
+        this.missing = reasonOf(error);
+      }
+      const taken_ms = performance.now() - begun_ms;
+      await new Promise((resolve) => setTimeout(resolve, Math.max(FOLLOW_MS, 3 * taken_ms)));
+    }
+  }
+
+  /** Takes in what has been recorded since. */
+  async catchUp() {
+    const before = this.newest;
+    await this.learn();
+    const { newest, store } = this;
+    store.emit("live");
+    if (!newest || newest.epoch !== store.live?.epoch) return;
+
+    if (before && before.number !== newest.number && before.epoch >= newest.epoch) {
+      // Another run of the same name.
+      store.forgetLog();
+      this.connected();
+      this.forgetChunks();
+    }
+    await this.refill(newest);
+    if (this.earlierOf === newest.number) return;
+    this.earlierOf = newest.number;
+    await this.readEarlier(newest);
+  }
+
+  /** @param {Recorded} epoch in progress */
+  async refill(epoch) {
+    while (this.readTo < epoch.ticks) {
+      const from = this.readTo + 1;
+      const range = await samples(epoch, from);
+      // A new epoch has begun, or everything is to be read again.
+      if (this.readTo + 1 !== from || this.store.live?.epoch !== epoch.epoch) return;
+      if (range.end <= from) return;
+
+      const times = range.ticks.map(({ tick, robots }) => ({ time_s: tick * epoch.tick_s, robots }));
+      this.readTo = range.end - 1;
+      this.store.refill(from * epoch.tick_s, times, this.readTo);
+      this.store.addRecorded(range.log);
+      this.store.memory.forget(this.readTo);
+      this.store.emit("live");
+    }
+  }
+
+  /**
+   * Reads an epoch that has ended, in order, for charts and log.
+   * @param {Recorded} epoch
+   * @param {History | null} history
+   * @param {(() => boolean)} isWanted
+   */
+  async read(epoch, history, isWanted = () => true) {
+    for (let from = 0; from <= epoch.ticks && isWanted(); ) {
+      const range = await samples(epoch, from, history ? undefined : epoch.ticks + 1);
+      if (range.end <= from) return;
+      for (const { tick, robots } of range.ticks) history?.add(tick * epoch.tick_s, robots);
+      this.store.addRecorded(range.log);
+      this.store.emit("live");
+      from = range.end;
+    }
+  }
+
+  /** Reads the log of the epochs before, the latest first. @param {Recorded} newest */
+  async readEarlier(newest) {
+    for (const epoch of [...newest.epochs].reverse()) {
+      if (epoch === newest.epoch || this.store.log.length >= ENOUGH_LINES) continue;
+      const earlier = await get("recording", new URLSearchParams({ epoch: String(epoch) }));
+      if (!("missing" in earlier)) await this.read(earlier, null);
+    }
+  }
+
+  /** Shows an epoch from its beginning. @param {number} epoch */
+  async choose(epoch) {
+    try {
+      this.isPlaying = false;
+      if (epoch === this.store.live?.epoch) return this.live();
+      const header = await get("recording", new URLSearchParams({ epoch: String(epoch) }));
+      if ("missing" in header) throw new Error(header.missing);
+      this.forgetChunks();
+      this.header = header;
+      this.store.history = new History();
+      await this.seek(0);
+      await this.read(header, this.store.history, () => this.header?.epoch === epoch);
+    } catch (error) {
+      this.client.failed(reasonOf(error));
+    }
+  }
+
+  /** Shows the newest tick of a run in progress again. */
+  live() {
+    if (this.store.mode !== "live") return;
+    this.seeks += 1;
+    this.isPlaying = false;
+    const { newest, store } = this;
+    if (this.header !== newest) this.forgetChunks();
+    this.header = newest?.epoch === store.live?.epoch ? newest : null;
+    store.showLive();
+    this.client.sought();
+  }
+
+  forgetChunks() {
+    this.chunks.clear();
+    this.numbers = 0;
   }
 
   /**
@@ -96,8 +313,10 @@ export class Player {
     }
 
     if (!this.store.isConnected) return Promise.reject(new Error("The console of this recording is not reachable."));
-    const query = new URLSearchParams({ from: String(number * CHUNK), count: String(CHUNK) });
+    const query = new URLSearchParams({ from: String(number * CHUNK), count: String(CHUNK), epoch: String(this.header?.epoch ?? 0) });
+    /** @type {Promise<Chunk>} */
     const fetched = get("recording/ticks", query).then((/** @type {Chunk} */ chunk) => {
+      if (this.chunks.get(number) !== fetched) return chunk;
       this.numbers += numbersIn(chunk);
       this.makeRoom(number);
       return chunk;
@@ -110,24 +329,48 @@ export class Player {
     return fetched;
   }
 
+  /**
+   * @param {number} number
+   * @param {Chunk} chunk
+   */
+  drop(number, chunk) {
+    if (this.chunks.delete(number)) this.numbers -= numbersIn(chunk);
+  }
+
   /** @param {number} kept */
   async makeRoom(kept) {
     for (const [number, chunk] of this.chunks) {
-      if (this.numbers <= MOST_NUMBERS) return;
-      if (number === kept) continue;
-      this.chunks.delete(number);
-      this.numbers -= numbersIn(await chunk);
+      if (this.numbers <= MOST_NUMBERS && this.chunks.size <= MOST_CHUNKS) return;
+      if (number !== kept) this.drop(number, await chunk);
     }
   }
 
   /**
-   * Shows a tick, unless another one is requested while its chunk is fetched.
+   * Shows a tick, unless another one is requested while its chunk is fetched. Where the run goes on, its newest tick is live.
    * @param {number} tick
    */
   async seek(tick) {
+    if (this.isOfLive && tick >= this.last) return this.live();
     this.position = tick;
-    await this.show(tick, false);
-    this.client.sought();
+    try {
+      await this.show(tick, false);
+      this.client.sought();
+    } catch (error) {
+      this.client.failed(reasonOf(error));
+    }
+  }
+
+  /** Stops playback and shows the tick of a simulated time, as far as there is one. @param {number} time_s */
+  seekTime(time_s) {
+    this.isPlaying = false;
+    return this.seek(Math.min(this.last, Math.max(this.first, Math.round(time_s / (this.tick_s || 1)))));
+  }
+
+  /** Shows a moment that a line of the log names. @param {number} epoch @param {number} tick */
+  async seekIn(epoch, tick) {
+    this.isPlaying = false;
+    if (epoch !== this.epoch) await this.choose(epoch);
+    if (epoch === this.epoch) await this.seek(Math.min(this.last, Math.max(this.first, tick)));
   }
 
   /**
@@ -135,28 +378,44 @@ export class Player {
    * @param {boolean} isPlayed whether the commands since the tick before are shown
    */
   async show(tick, isPlayed) {
-    const header = this.header;
-    if (!header) return;
-
     const seek = ++this.seeks;
-    const chunk = await this.chunk(Math.floor(tick / CHUNK));
+    if (this.isOfLive && (!this.header || tick > this.recorded)) return this.showSeen(tick);
+
+    const { header } = this;
+    if (!header) return;
+    const number = Math.floor(tick / CHUNK);
+    let chunk = await this.chunk(number);
+    if (chunk.end <= tick && this.recorded >= tick && this.isOfLive) {
+      // It was fetched when it had fewer ticks.
+      this.drop(number, chunk);
+      chunk = await this.chunk(number);
+    }
     const record = chunk.ticks.find((one) => one.tick === tick) ?? chunk.ticks.at(-1);
     if (seek !== this.seeks || !record) return;
 
-    const flights = isPlayed ? chunk.flights.filter((flight) => flight.tick > this.tick && flight.tick <= tick) : [];
-    this.tick = record.tick;
-    this.store.setPanels(panelsAt(chunk, record.tick, header.tick_s));
-    this.store.show(this.frame(header, record, flights));
+    const flights = isPlayed ? chunk.flights.filter((flight) => flight.tick > this.chosen && flight.tick <= tick) : [];
+    this.chosen = record.tick;
+    this.store.showPast(this.frame(header, record, flights), panelsAt(chunk, record.tick, header.tick_s));
+  }
+
+  /** Shows what the page saw of a tick, or of one before. @param {number} tick */
+  showSeen(tick) {
+    const { live, memory } = this.store;
+    const seen = memory.at(tick);
+    if (!live || !seen) return;
+    this.chosen = seen.frame.tick;
+    this.store.showPast({ ...seen.frame, phase: live.phase, speed: live.speed, awaiting: [], flights: [] }, seen.panels);
   }
 
   /**
-   * @param {RecordingHeader} header
+   * @param {Recorded} header
    * @param {RecordedTick} record
    * @param {Flight[]} flights
    * @returns {WorldFrame}
    */
   frame(header, record, flights) {
     const { guests_mm } = record;
+    const { live } = this.store;
     /** @type {[number, number][]} */
     const guests = [];
 
@@ -168,9 +427,9 @@ export class Player {
       ...header,
       tick: record.tick,
       time_s: record.tick * header.tick_s,
-      duration_s: this.last * header.tick_s,
-      speed: this.factor,
-      phase: this.isPlaying ? "running" : record.tick >= this.last ? "ended" : "paused",
+      duration_s: this.isRecording ? this.last * header.tick_s : header.duration_s,
+      speed: live ? live.speed : this.factor,
+      phase: live ? live.phase : this.isPlaying ? "running" : record.tick >= this.last ? "ended" : "paused",
       awaiting: record.awaiting,
       guests,
       flights,
@@ -182,7 +441,7 @@ export class Player {
 
   toggle() {
     if (this.isPlaying) return this.pause();
-    if (this.position >= this.last) this.position = 0;
+    if (this.position >= this.last) this.position = this.first;
     this.isPlaying = true;
     this.playedAt_ms = performance.now();
     this.play();
@@ -196,26 +455,44 @@ export class Player {
   /** @param {number} ticks forward, or back if negative */
   step(ticks) {
     this.isPlaying = false;
-    this.seek(Math.min(this.last, Math.max(0, this.tick + ticks)));
+    this.seek(Math.min(this.last, Math.max(this.first, this.tick + ticks)));
+  }
+
+  /** How fast it is played: a run in progress as fast as it goes. */
+  get pace() {
+    return (this.store.live ? this.store.live.speed : this.factor) ?? FASTEST;
   }
 
   async play() {
-    while (this.isPlaying && this.header) {
+    while (this.isPlaying) {
       const now_ms = performance.now();
       const passed_s = Math.min(0.5, (now_ms - this.playedAt_ms) / 1000);
       this.playedAt_ms = now_ms;
-      this.position = Math.min(this.last, this.position + (passed_s * (this.factor ?? FASTEST)) / this.header.tick_s);
+      this.position = Math.min(this.last, this.position + (passed_s * this.pace) / this.tick_s);
       const tick = Math.floor(this.position);
       if (tick >= this.last) this.isPlaying = false;
+      if (!this.isPlaying && this.isOfLive) return this.live();
       try {
         if (tick !== this.tick || !this.isPlaying) await this.show(tick, true);
       } catch (error) {
         this.isPlaying = false;
-        this.client.failed(String(error instanceof Error ? error.message : error));
+        this.client.failed(reasonOf(error));
       }
       await new Promise((resolve) => setTimeout(resolve, FRAME_MS));
     }
   }
+}
+
+/**
+ * Ticks for charts, and the log of all ticks.
+ * @param {Recorded} epoch
+ * @param {number} from
+ * @param {number} every how many ticks one is taken
+ * @returns {Promise<Chunk>}
+ */
+function samples(epoch, from, every = Math.ceil((epoch.ticks + 1) / SAMPLES)) {
+  const query = { from, count: READ_AT_ONCE, every, epoch: epoch.epoch };
+  return get("recording/ticks", new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)])));
 }
 
 /**
@@ -237,6 +514,11 @@ function panelsAt(chunk, tick, tick_s) {
 /** @param {Chunk} chunk */
 function numbersIn(chunk) {
   return chunk.ticks.reduce((sum, tick) => sum + tick.guests_mm.length, 0);
+}
+
+/** @param {unknown} error */
+function reasonOf(error) {
+  return String(error instanceof Error ? error.message : error);
 }
 
 /**

@@ -2,13 +2,16 @@
 // The state of the page. Only this module changes it; views subscribe to topics and read.
 
 import { History } from "./history.js";
+import { Marks } from "./marks.js";
+import { Memory } from "./memory.js";
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./types/messages.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 /** @typedef {import("./types/messages.js").Status} Status */
 /** @typedef {import("./connection.js").Broadcast} Broadcast */
-/** What listeners subscribe to. @typedef {"connection" | "frame" | "panel" | "log" | "epoch"} Topic */
+/** What listeners subscribe to; "live" is of a run in progress, whatever is shown.
+ * @typedef {"connection" | "frame" | "panel" | "log" | "epoch" | "live" | "live-epoch"} Topic */
 
 /** Most log lines that are kept for scrolling back and filtering. */
 const MOST_LINES = 10000;
@@ -29,21 +32,37 @@ export class Store {
     this.stranger = null;
     this.isConnected = false;
     this.isSimulatorPresent = false;
-    /** @type {WorldFrame | null} */
+    /** What is shown. @type {WorldFrame | null} */
     this.frame = null;
-    /** When the frame arrived, in the time of `performance.now()`. */
+    /** The newest frame of a run in progress. @type {WorldFrame | null} */
+    this.live = null;
+    /** Whether an earlier tick of a run in progress is shown. */
+    this.isBack = false;
+    /** What was seen of the run in progress. */
+    this.memory = new Memory();
+    /** When the newest frame arrived, in the time of `performance.now()`. */
     this.frameAt_ms = 0;
     /** The newest status that answered a request. @type {Status | null} */
     this.status = null;
     /** @type {Map<string, Panel>} */
     this.panels = new Map();
+    /** The newest panels of a run in progress. @type {Map<string, Panel>} */
+    this.livePanels = this.panels;
     /** @type {LogRecord[]} */
     this.log = [];
+    /** How often lines were inserted before others. */
+    this.logEdits = 0;
+    /** The last line that a recording had. Lines up to its tick may arrive once more. @type {LogRecord | null} */
+    this.recordedLine = null;
+    this.marks = new Marks();
     /** Number of lines so far, including those no longer kept. */
     this.logCount = 0;
     /** Number of lines that the server dropped because this browser was too slow. */
     this.logMissed = 0;
+    /** Of the epoch that is shown. */
     this.history = new History();
+    /** Of the epoch in progress. */
+    this.liveHistory = this.history;
     /** @type {Map<Topic, (() => void)[]>} */
     this.listeners = new Map();
   }
@@ -93,12 +112,12 @@ export class Store {
         this.emit("connection");
         break;
       case "frame":
-        this.show(message.frame);
+        this.receive(message.frame);
         break;
       case "panel":
-        if (this.panels.size < MOST_PANELS || this.panels.has(message.robot)) {
-          this.panels.set(message.robot, message.panel);
-          this.emit("panel");
+        if (this.livePanels.size < MOST_PANELS || this.livePanels.has(message.robot)) {
+          this.livePanels.set(message.robot, message.panel);
+          if (!this.isBack) this.emit("panel");
         }
         break;
       case "log":
@@ -121,27 +140,83 @@ export class Store {
     this.log = [];
     this.logCount = 0;
     this.logMissed = 0;
+    this.recordedLine = null;
+    this.liveHistory.break();
     this.emit("connection");
     this.emit("log");
   }
 
   /**
-   * Replaces the frame. A new epoch clears the history.
+   * A frame of a run in progress. A new epoch clears what was seen, and is shown.
    * @param {WorldFrame} frame
    */
-  show(frame) {
-    const last = this.frame;
-    const isNew = !last || frame.epoch !== last.epoch || frame.run !== last.run;
-    this.frame = frame;
+  receive(frame) {
+    const last = this.live;
+    const isNew = !last || !isSameEpoch(frame, last);
+    const isBackward = isNew || frame.tick < last.tick;
+    const isChanged = isNew || frame.phase !== last.phase || frame.speed !== last.speed;
+    this.live = frame;
     this.frameAt_ms = performance.now();
+    if (isBackward) this.forget();
+    // Another run of the name, or a replay that has been moved.
+    if (last && compare(frame, last) < 0) this.marks.restart(this.log);
 
-    if (this.mode === "live") {
-      if (isNew || frame.tick < last.tick) this.history.clear();
-      this.history.add(frame.time_s, frame.robots);
-    }
+    this.liveHistory.add(frame.time_s, frame.robots);
+    this.memory.add(frame, this.livePanels);
+    if (!this.isBack) this.show(frame);
+    else if (isChanged && this.frame) this.show({ ...this.frame, phase: frame.phase, speed: frame.speed, flights: [] });
+    if (isNew) this.emit("live-epoch");
+    this.emit("live");
+  }
+
+  /** Forgets what was seen of an epoch that is over. */
+  forget() {
+    const isShown = this.history === this.liveHistory && !this.isBack;
+    this.liveHistory = new History();
+    if (isShown) this.history = this.liveHistory;
+    this.memory.clear();
+  }
+
+  /** @param {WorldFrame} frame */
+  show(frame) {
+    const isNew = !this.frame || !isSameEpoch(frame, this.frame);
+    this.frame = frame;
 
     if (isNew) this.emit("epoch");
     this.emit("frame");
+  }
+
+  /**
+   * Shows an earlier tick of a run in progress, or a tick of a recording.
+   * @param {WorldFrame} frame
+   * @param {Map<string, Panel>} panels
+   */
+  showPast(frame, panels) {
+    this.isBack = this.mode === "live";
+    this.panels = panels;
+    this.emit("panel");
+    this.show(frame);
+  }
+
+  /** Shows the newest frame again. */
+  showLive() {
+    this.isBack = false;
+    this.history = this.liveHistory;
+    this.panels = this.livePanels;
+    this.emit("panel");
+    if (this.live) this.show(this.live);
+  }
+
+  /**
+   * Takes in ticks of the epoch in progress that have been recorded, in place of what was seen of them.
+   * @param {number} from_s when they begin
+   * @param {{time_s: number, robots: import("./types/messages.js").RobotFrame[]}[]} samples
+   * @param {number} last tick of the samples
+   */
+  refill(from_s, samples, last) {
+    this.liveHistory.cutFrom(from_s);
+    for (const { time_s, robots } of samples) this.liveHistory.add(time_s, robots);
+    for (const { time_s, robots } of this.memory.after(last)) this.liveHistory.add(time_s, robots);
   }
 
   /**
@@ -150,28 +225,76 @@ export class Store {
    */
   applyStatus(status) {
     this.status = status;
-    const frame = this.frame;
-    if (frame && frame.epoch === status.epoch && frame.tick === status.tick) {
-      this.frame = { ...frame, phase: status.phase, speed: status.speed, awaiting: status.awaiting, flights: [] };
+    const { live } = this;
+    if (live && live.epoch === status.epoch && live.tick === status.tick) {
+      this.live = { ...live, phase: status.phase, speed: status.speed, awaiting: status.awaiting, flights: [] };
       this.frameAt_ms = performance.now();
+      if (!this.isBack) this.frame = this.live;
     }
 
     this.emit("frame");
   }
 
+  /** @param {LogRecord[]} lines */
+  addLines(lines) {
+    const last = this.recordedLine;
+    if (last && lines.some((line) => compare(line, last) <= 0)) return this.mergeLines(lines);
+    this.append(lines);
+  }
+
   /**
-   * Replaces all panels, where a recording is shown at another tick.
-   * @param {Map<string, Panel>} panels
+   * Takes in lines of the record, of which some are known.
+   * @param {LogRecord[]} lines in order
    */
-  setPanels(panels) {
-    this.panels = panels;
-    this.emit("panel");
+  addRecorded(lines) {
+    const last = lines.at(-1);
+    if (last && compare(last, this.recordedLine) > 0) this.recordedLine = last;
+    this.mergeLines(lines);
+  }
+
+  /** Forgets the log: another run has taken the name of this one. */
+  forgetLog() {
+    this.log = [];
+    this.logCount = 0;
+    this.logMissed = 0;
+    this.recordedLine = null;
+    this.marks.clear();
+    this.emit("log");
+  }
+
+  /** Adds those of the lines that are not known, each where it belongs. @param {LogRecord[]} lines in order */
+  mergeLines(lines) {
+    const [first] = lines;
+    if (!first) return;
+    const begin = this.log.findIndex((line) => compare(line, first) >= 0);
+    const later = begin < 0 ? [] : this.log.slice(begin);
+    /** @type {Map<string, number>} */
+    const known = new Map();
+    for (const line of later) known.set(keyOf(line), (known.get(keyOf(line)) ?? 0) + 1);
+    const fresh = lines.filter((line) => {
+      const count = known.get(keyOf(line)) ?? 0;
+      known.set(keyOf(line), count - 1);
+      return count <= 0;
+    });
+    if (later.length === 0 || fresh.length === 0) return this.append(fresh);
+
+    // The order within a tick is that of the record.
+    const all = [...fresh, ...later].sort(compare);
+    this.log.splice(begin, later.length, ...all);
+    this.logEdits += 1;
+    this.counted(fresh);
   }
 
   /** @param {LogRecord[]} lines */
-  addLines(lines) {
-    this.log.push(...lines);
+  append(lines) {
+    for (const line of lines) this.log.push(line);
+    this.counted(lines);
+  }
+
+  /** @param {LogRecord[]} lines that were added */
+  counted(lines) {
     this.logCount += lines.length;
+    this.marks.add(lines);
     if (this.log.length > MOST_LINES) this.log.splice(0, this.log.length - MOST_LINES);
     this.emit("log");
   }
@@ -181,7 +304,7 @@ export class Store {
    * before a pause may be missing.
    */
   get isBehind() {
-    const { frame } = this;
+    const frame = this.now;
     if (!frame) return false;
 
     const newest = [this.status, this.log.at(-1)].filter((one) => !!one);
@@ -191,13 +314,23 @@ export class Store {
     return isNextEpoch || (isLaterTick && frame.phase !== "running");
   }
 
+  /** The newest frame of a run in progress, or what a recording shows. */
+  get now() {
+    return this.mode === "recording" ? this.frame : this.live;
+  }
+
+  /** Whether a chosen tick is shown, and not the newest one. */
+  get isChosenTick() {
+    return this.mode === "recording" || this.isBack;
+  }
+
   /** Name of the recorded run of which this is a replay. */
   get replayOf() {
-    return this.frame?.replay_of ?? this.status?.replay_of ?? null;
+    return this.now?.replay_of ?? this.status?.replay_of ?? null;
   }
 
   get phase() {
-    return this.frame?.phase ?? this.status?.phase ?? null;
+    return this.now?.phase ?? this.status?.phase ?? null;
   }
 
   /** Whether what is shown is not the state of now: there is no simulator any more. */
@@ -212,15 +345,38 @@ export class Store {
 
   /**
    * The robots that the clock waits for, with seconds of wall clock as of now. In every tick the clock waits a short time
-   * for each robot; only late ones are listed. In a recording, the robots for which the clock was held in the tick.
+   * for each robot; only late ones are listed. In the past, the robots for which the clock was held in the tick.
    * @returns {import("./types/messages.js").Awaited[]}
    */
   awaiting() {
-    if (this.mode === "recording") return this.frame?.awaiting ?? [];
+    if (this.isChosenTick) return this.frame?.awaiting ?? [];
     if (!this.isLive) return [];
     const since_s = this.frame ? (performance.now() - this.frameAt_ms) / 1000 : 0;
     const awaiting = this.frame?.awaiting ?? this.status?.awaiting ?? [];
     const late = this.phase === "gathering" ? awaiting : awaiting.filter((awaited) => awaited.since_s >= LATE_S);
     return late.map((awaited) => ({ ...awaited, since_s: awaited.since_s + since_s }));
   }
+}
+
+/**
+ * @param {WorldFrame} one
+ * @param {WorldFrame} other
+ */
+function isSameEpoch(one, other) {
+  return one.run === other.run && one.epoch === other.epoch;
+}
+
+/** @typedef {{epoch: number, tick: number}} Moment */
+/**
+ * Which one is of an earlier tick; negative if the first one is.
+ * @param {Moment} one
+ * @param {Moment | null} other without it, the first one is later
+ */
+function compare(one, other) {
+  return other ? one.epoch - other.epoch || one.tick - other.tick : 1;
+}
+
+/** @param {LogRecord} line */
+function keyOf({ epoch, tick, source, kind, text }) {
+  return JSON.stringify([epoch, tick, source, kind, text]);
 }

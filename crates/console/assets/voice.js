@@ -33,7 +33,8 @@ export class Voice {
   }
 
   update() {
-    if (!this.isOn) return;
+    // What is said is of now.
+    if (!this.isOn || this.store.isBack) return;
 
     for (const [robot, panel] of this.store.panels) {
       const why = (panel.widgets ?? []).find((widget) => widget?.widget === "text" && widget.label === LABEL);

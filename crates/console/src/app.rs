@@ -6,7 +6,7 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watc
 
 use crate::guard::Guard;
 use crate::live::Live;
-use crate::playback::Recording;
+use crate::past::Past;
 
 /// Most browsers at a time.
 pub(crate) const MAX_BROWSERS: usize = 32;
@@ -19,8 +19,8 @@ const MAX_READS: usize = 2;
 pub(crate) enum Mode {
     /// A run in progress, or one that has not started yet.
     Live(Arc<Live>),
-    /// A recorded run.
-    Recording(Box<Recording>),
+    /// The recording of this run.
+    Recording(String),
 }
 
 /// The state that all connections share.
@@ -29,6 +29,8 @@ pub(crate) struct App {
     pub(crate) guard: Guard,
     /// What is shown.
     pub(crate) mode: Mode,
+    /// What is recorded of it; none if its folder is not known.
+    pub(crate) past: Option<Past>,
     browsers: Arc<Semaphore>,
     requests: Arc<Semaphore>,
     reads: Semaphore,
@@ -38,10 +40,11 @@ pub(crate) struct App {
 
 impl App {
     /// A console that shows `mode` to clients that `guard` admits.
-    pub(crate) fn new(guard: Guard, mode: Mode) -> Self {
+    pub(crate) fn new(guard: Guard, mode: Mode, past: Option<Past>) -> Self {
         Self {
             guard,
             mode,
+            past,
             browsers: Arc::new(Semaphore::new(MAX_BROWSERS)),
             requests: Arc::new(Semaphore::new(MAX_REQUESTS)),
             reads: Semaphore::new(MAX_READS),

@@ -188,7 +188,7 @@ impl Browser {
     async fn send_hello(&mut self) -> Result<(), Disconnect> {
         let (mode, run, endpoint) = match &self.app.mode {
             Mode::Live(live) => ("live", live.run(), Some(live.endpoint())),
-            Mode::Recording(recording) => ("recording", recording.run(), None),
+            Mode::Recording(run) => ("recording", run.as_str(), None),
         };
         let hello = ServerMessage::Hello {
             mode,

@@ -4,7 +4,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use diagram::{Diagram, Options, State, TooMuch};
-use protocol::Tick;
+use protocol::{Epoch, Tick};
 use recording::{Recording, RecordingError};
 use serde::Deserialize;
 
@@ -27,6 +27,8 @@ pub(crate) struct Window {
     /// Whether lost queries are drawn.
     #[serde(default)]
     pub(crate) queries: bool,
+    /// The epoch; none for the last one.
+    pub(crate) epoch: Option<Epoch>,
 }
 
 impl Window {

@@ -11,6 +11,7 @@ mod guard;
 mod live;
 mod opening;
 mod page;
+mod past;
 mod playback;
 mod server;
 
@@ -31,7 +32,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use app::{App, Mode};
 use guard::Guard;
 use live::Live;
-use playback::Recording;
+use past::Past;
 
 /// The address to serve at without `--bind`.
 const DEFAULT_BIND: &str = "127.0.0.1:7007";
@@ -63,6 +64,9 @@ struct Args {
     /// Show the recording in this run's folder, or this recording, instead of a run in progress.
     #[arg(long, value_name = "RUN-FOLDER")]
     recording: Option<PathBuf>,
+    /// The folder of the run in progress, if it is on this machine: the page shows from it what has happened before.
+    #[arg(long, value_name = "RUN-FOLDER", conflicts_with = "recording")]
+    folder: Option<PathBuf>,
     /// Open the page in a browser.
     #[arg(long)]
     open: bool,
@@ -86,23 +90,29 @@ fn main() -> ExitCode {
 }
 
 fn run(args: Args) -> Result<(), String> {
-    let mode = match args.recording {
+    let (mode, past) = match args.recording {
         Some(path) => open_recording(&path)?,
-        None => Mode::Live(Live::start(args.run, args.connect, args.zenoh_config)?),
+        None => {
+            let run = args.run.clone();
+            let past = args.folder.map(|folder| Past::growing(folder, run));
+            let live = Live::start(args.run, args.connect, args.zenoh_config)?;
+            (Mode::Live(live), past)
+        }
     };
     let runtime = build_runtime()?;
 
-    let outcome = runtime.block_on(serve(args.bind, mode, args.open));
+    let outcome = runtime.block_on(serve(args.bind, mode, past, args.open));
 
     // Requests that still wait for the simulator get no answer any more.
     runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
     outcome
 }
 
-fn open_recording(path: &std::path::Path) -> Result<Mode, String> {
-    Recording::open(path)
-        .map(|recording| Mode::Recording(Box::new(recording)))
-        .map_err(|error| error.to_string())
+fn open_recording(path: &std::path::Path) -> Result<(Mode, Option<Past>), String> {
+    let past = Past::finished(path).map_err(|error| error.to_string())?;
+    let last = past.last().map_err(|error| error.to_string())?;
+    let run = last.run().to_owned();
+    Ok((Mode::Recording(run), Some(past)))
 }
 
 fn build_runtime() -> Result<Runtime, String> {
@@ -114,14 +124,19 @@ fn build_runtime() -> Result<Runtime, String> {
 }
 
 /// Serves until the process receives SIGTERM or SIGINT.
-async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), String> {
+async fn serve(
+    bind: Option<SocketAddr>,
+    mode: Mode,
+    past: Option<Past>,
+    opens: bool,
+) -> Result<(), String> {
     let listener = listen(bind).await?;
     let address = listener
         .local_addr()
         .map_err(|error| format!("cannot serve: {error}"))?;
     let guard = Guard::new(address).map_err(|error| format!("cannot create a token: {error}"))?;
     let url = guard.url();
-    let app = Arc::new(App::new(guard, mode));
+    let app = Arc::new(App::new(guard, mode, past));
     let mut terminate = handle(SignalKind::terminate())?;
     let mut interrupt = handle(SignalKind::interrupt())?;
 

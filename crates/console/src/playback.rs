@@ -1,10 +1,11 @@
-//! A recorded run, as the page shows it.
+//! A recorded epoch, as the page shows it. That of a run in progress grows.
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
 use protocol::messages::{Flight, LogRecord, Point, Presence};
-use protocol::{RobotName, Tick};
+use protocol::{Epoch, Event, RobotName, Tick};
 use recording::{Header, Json, PlacedRobot, RawTick, RecordingError};
 use serde::Serialize;
 
@@ -12,6 +13,8 @@ use crate::diagrams::{DiagramError, Diagrams, Window};
 
 /// Most ticks in one answer.
 pub(crate) const MAX_TICKS: u64 = 512;
+/// Most ticks that one answer samples.
+pub(crate) const MAX_SAMPLED_TICKS: u64 = 4096;
 /// Most bytes in one answer, as they are recorded; an answer has at least one tick.
 const MAX_BYTES: u64 = 32 << 20;
 
@@ -27,28 +30,47 @@ pub(crate) enum OpenError {
     /// It has no tick.
     #[error("{0}: no tick was completed")]
     Empty(String),
+    /// The folder of a run in progress has no recording that can be read.
+    #[error("nothing is recorded yet, or the scenario sets `frames = false` under [record]")]
+    NotYet,
+    /// The folder has no recording of an epoch.
+    #[error("this epoch has no recording")]
+    NoEpoch,
+    /// The folder is that of another run.
+    #[error("{0} is of another run")]
+    OtherRun(String),
 }
 
-/// A recorded run.
+/// A recorded epoch.
 #[derive(Debug)]
 pub(crate) struct Recording {
-    file: recording::Recording,
+    header: Header,
+    /// Which one of the recordings with this epoch it is: a run may be started anew.
+    number: u64,
+    file: RwLock<recording::Recording>,
     diagrams: Diagrams,
 }
 
 /// The header of a recording, and its length.
 #[derive(Debug, Serialize)]
-pub(crate) struct Summary<'a> {
+struct Summary<'a> {
     #[serde(flatten)]
     header: &'a Header,
     /// The last tick.
     ticks: Tick,
+    /// Whether no more ticks follow.
+    is_finished: bool,
+    number: u64,
+    /// The epochs that have a recording.
+    epochs: &'a [Epoch],
 }
 
 /// What happened in a range of ticks, as a JSON object. Reports and panels are in it as they were recorded: to decode them and
 /// encode them again would take most of the time of a seek.
 #[derive(Debug, Default)]
 struct Range {
+    /// The tick after the range.
+    end: Tick,
     /// Elements of a list: each tick as a frame of a run in progress shows it.
     ticks: List,
     /// Panels that arrived in these ticks, or shortly before.
@@ -70,54 +92,121 @@ struct RobotHead<'a> {
     presence: Presence,
 }
 
+/// Which ticks are asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted {
+    /// The first one.
+    pub(crate) from: Tick,
+    /// Number of ticks.
+    pub(crate) count: u64,
+    /// If set, samples for charts: of the ticks those that this number divides, and those in which a state of a robot changed,
+    /// without guests, panels and commands. The log is complete.
+    pub(crate) every: Option<u64>,
+}
+
+impl Wanted {
+    /// Whether the request is within its limits.
+    pub(crate) fn is_valid(&self) -> bool {
+        match self.every {
+            None => self.count <= MAX_TICKS,
+            Some(every) => every > 0 && self.count <= MAX_SAMPLED_TICKS,
+        }
+    }
+
+    fn is_sampled(&self, recorded: &RawTick) -> bool {
+        let changes =
+            |event: &Event| matches!(event, Event::Emotion { .. } | Event::Behavior { .. });
+        self.every.is_none_or(|every| {
+            recorded.tick().is_multiple_of(every) || recorded.events.iter().any(changes)
+        })
+    }
+}
+
 impl Recording {
-    /// Opens the recording in a run's folder, or a recording file: `RUN/run-epoch1.mcap` is the recording of an epoch that
-    /// `init` ended.
+    /// Opens a recording. `number` tells it from others of its epoch.
     ///
     /// # Errors
     /// [`OpenError`] names the file.
-    pub(crate) fn open(path: &Path) -> Result<Self, OpenError> {
-        let path = if path.is_dir() {
-            path.join(recording::FILE)
-        } else {
-            path.to_owned()
-        };
-
-        let file = recording::Recording::open(&path)?;
+    pub(crate) fn open(path: &Path, number: u64) -> Result<Self, OpenError> {
+        let file = recording::Recording::open(path)?;
         if file.is_empty() {
             return Err(OpenError::Empty(path.display().to_string()));
         }
-        let diagrams = Diagrams::of(&file);
-        Ok(Self { file, diagrams })
+
+        Ok(Self {
+            header: file.header().clone(),
+            number,
+            diagrams: Diagrams::of(&file),
+            file: RwLock::new(file),
+        })
+    }
+
+    fn file(&self) -> RwLockReadGuard<'_, recording::Recording> {
+        self.file.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes in what has become complete since.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if the file is damaged.
+    pub(crate) fn grow(&self) -> Result<(), RecordingError> {
+        let mut file = self.file.write().unwrap_or_else(PoisonError::into_inner);
+        file.grow()
+    }
+
+    /// Whether it is the file at this path.
+    pub(crate) fn is_at(&self, path: &Path) -> bool {
+        self.file().is_at(path)
     }
 
     /// Name of the run.
     pub(crate) fn run(&self) -> &str {
-        self.file.header().run.as_str()
+        self.header.run.as_str()
     }
 
-    /// What holds for the whole recording.
-    pub(crate) fn summary(&self) -> Summary<'_> {
-        Summary {
-            header: self.file.header(),
-            ticks: self.file.len() - 1,
-        }
+    /// The epoch.
+    pub(crate) fn epoch(&self) -> Epoch {
+        self.header.epoch
     }
 
-    /// What happened in `count` ticks from tick `from` on, as JSON; fewer if the recording ends before, or if they are too
-    /// much for one answer.
+    /// What holds for the whole recording, as JSON. `epochs` are those that have a recording.
+    pub(crate) fn summary(&self, epochs: &[Epoch]) -> Vec<u8> {
+        let file = self.file();
+        to_json(&Summary {
+            header: &self.header,
+            ticks: file.len().saturating_sub(1),
+            is_finished: file.is_finished(),
+            number: self.number,
+            epochs,
+        })
+    }
+
+    /// What happened in a range of ticks, as JSON; fewer ticks if the recording ends before, or if they are too much for one
+    /// answer.
     ///
     /// # Errors
     /// [`RecordingError`] if the file is damaged.
-    pub(crate) fn range(&self, from: Tick, count: u64) -> Result<Vec<u8>, RecordingError> {
-        let to = from.saturating_add(count.min(MAX_TICKS));
-        let to = self.file.fitting(from, to, MAX_BYTES);
+    pub(crate) fn range(&self, wanted: Wanted) -> Result<Vec<u8>, RecordingError> {
+        let file = self.file();
+        let Wanted { from, count, every } = wanted;
+        let to = file.fitting(from, from.saturating_add(count), MAX_BYTES);
+        let begin = if every.is_none() {
+            self.header.first_of_panels(from)
+        } else {
+            from
+        };
 
-        let header = self.file.header();
-        let mut range = Range::default();
+        let mut range = Range {
+            end: to.min(file.len()).max(from),
+            ..Range::default()
+        };
         let mut last_reports = BTreeMap::new();
-        for recorded in self.file.read_raw(header.first_of_panels(from), to)? {
+        for mut recorded in file.read_raw(begin, to)? {
             let tick = recorded.tick();
+            if every.is_some() {
+                recorded.panels.clear();
+                recorded.frame.guests_mm.clear();
+            }
             for (robot, panel) in &recorded.panels {
                 range.add_panel(tick, robot, panel);
             }
@@ -125,11 +214,15 @@ impl Recording {
                 continue;
             }
 
-            for event in &recorded.events {
-                range.flights.extend(event.flight(tick));
+            if every.is_none() {
+                for event in &recorded.events {
+                    range.flights.extend(event.flight(tick));
+                }
             }
-            range.log.extend(recorded.log(header));
-            self.add_tick(recorded, &mut last_reports, &mut range)?;
+            range.log.extend(recorded.log(&self.header));
+            if wanted.is_sampled(&recorded) {
+                add_tick(&file, recorded, &mut last_reports, &mut range)?;
+            }
         }
         Ok(range.into_json())
     }
@@ -139,49 +232,49 @@ impl Recording {
     /// # Errors
     /// [`DiagramError`] if the file is damaged or the window has too much.
     pub(crate) fn diagram(&self, window: Window) -> Result<String, DiagramError> {
-        self.diagrams.draw(&self.file, window)
+        self.diagrams.draw(&self.file(), window)
     }
+}
 
-    /// Adds a tick as the page shows it. `last_reports` has the last report of each robot in the ticks before, as far as they
-    /// have been read.
-    fn add_tick(
-        &self,
-        mut recorded: RawTick,
-        last_reports: &mut BTreeMap<RobotName, Json>,
-        range: &mut Range,
-    ) -> Result<(), RecordingError> {
-        let tick = recorded.tick();
-        last_reports.append(&mut recorded.reports);
+/// Adds a tick as the page shows it. `last_reports` has the last report of each robot in the ticks before, as far as they
+/// have been read.
+fn add_tick(
+    file: &recording::Recording,
+    mut recorded: RawTick,
+    last_reports: &mut BTreeMap<RobotName, Json>,
+    range: &mut Range,
+) -> Result<(), RecordingError> {
+    let tick = recorded.tick();
+    last_reports.append(&mut recorded.reports);
 
-        let mut robots = List::default();
-        for robot in &recorded.frame.robots {
-            let last_report = robot.missed.and_then(|missed| missed.last_report);
-            if let Some(tick) = last_report
-                && !last_reports.contains_key(&robot.name)
-                && let Some(report) = self.file.report(&robot.name, tick)?
-            {
-                last_reports.insert(robot.name.clone(), report);
-            }
-            // A robot is shown from its first report on.
-            if let Some(report) = last_reports.get(&robot.name) {
-                robots.add_robot(robot, report);
-            }
+    let mut robots = List::default();
+    for robot in &recorded.frame.robots {
+        let last_report = robot.missed.and_then(|missed| missed.last_report);
+        if let Some(tick) = last_report
+            && !last_reports.contains_key(&robot.name)
+            && let Some(report) = file.report(&robot.name, tick)?
+        {
+            last_reports.insert(robot.name.clone(), report);
         }
-
-        range.ticks.add_object(&[
-            ("tick", &to_json(&tick)),
-            ("robots", &robots.into_json()),
-            ("guests_mm", &to_json(&recorded.frame.guests_mm)),
-            ("cuts", &to_json(&recorded.frame.cuts)),
-            (
-                "expectations",
-                &to_json(&recorded.frame.standings(&recorded.events)),
-            ),
-            // Robots for which the clock was held.
-            ("awaiting", &to_json(&recorded.wall.awaited)),
-        ]);
-        Ok(())
+        // A robot is shown from its first report on.
+        if let Some(report) = last_reports.get(&robot.name) {
+            robots.add_robot(robot, report);
+        }
     }
+
+    range.ticks.add_object(&[
+        ("tick", &to_json(&tick)),
+        ("robots", &robots.into_json()),
+        ("guests_mm", &to_json(&recorded.frame.guests_mm)),
+        ("cuts", &to_json(&recorded.frame.cuts)),
+        (
+            "expectations",
+            &to_json(&recorded.frame.standings(&recorded.events)),
+        ),
+        // Robots for which the clock was held.
+        ("awaiting", &to_json(&recorded.wall.awaited)),
+    ]);
+    Ok(())
 }
 
 impl Range {
@@ -197,6 +290,7 @@ impl Range {
     fn into_json(self) -> Vec<u8> {
         let mut range = List::default();
         range.add_object(&[
+            ("end", &to_json(&self.end)),
             ("ticks", &self.ticks.into_json()),
             ("panels", &self.panels.into_json()),
             ("flights", &to_json(&self.flights)),

@@ -16,17 +16,17 @@ use axum::routing::get;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use protocol::Tick;
+use protocol::{Epoch, Tick};
 use rust_embed::Embed;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::app::{App, Ending, Mode};
+use crate::app::{App, Ending};
 use crate::browser;
 use crate::diagrams::{DiagramError, MAX_WINDOW_TICKS, Window};
 use crate::guard::{ENTRANCE, HEADERS, Refusal};
-use crate::playback::MAX_TICKS;
+use crate::playback::{MAX_SAMPLED_TICKS, MAX_TICKS, Recording, Wanted};
 
 /// Most connections at a time; a browser uses one for its WebSocket and up to six for HTTP requests.
 const MAX_CONNECTIONS: usize = 256;
@@ -34,6 +34,9 @@ const MAX_CONNECTIONS: usize = 256;
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(20);
 /// Pause after a failed accept.
 const ACCEPT_RETRY: Duration = Duration::from_millis(100);
+
+/// Why there is no past of a run whose folder the console was not given.
+const NO_FOLDER: &str = "this console was not told the run's folder (--folder RUN-FOLDER)";
 
 /// The style sheet of diagrams, which is not a file: the crate that draws them has it.
 const DIAGRAM_STYLE: &str = "diagram.css";
@@ -203,11 +206,65 @@ async fn socket(State(app): State<Arc<App>>, upgrade: WebSocketUpgrade) -> Respo
         .on_upgrade(|socket| browser::serve(socket, app))
 }
 
-async fn recording(State(app): State<Arc<App>>) -> Response {
-    match &app.mode {
-        Mode::Recording(recording) => json(&recording.summary()),
-        Mode::Live(_) => not_found(),
+/// Which epoch is asked for, as a query string states it.
+#[derive(Deserialize)]
+struct WhichEpoch {
+    /// None for the last one.
+    epoch: Option<Epoch>,
+}
+
+/// What a run in progress has not recorded is no failure of a request: the page shows why.
+#[derive(Serialize)]
+struct Missing {
+    missing: String,
+}
+
+async fn recording(
+    State(app): State<Arc<App>>,
+    query: Result<Query<WhichEpoch>, QueryRejection>,
+) -> Response {
+    let Ok(Query(WhichEpoch { epoch })) = query else {
+        return bad_range();
+    };
+    read(app, move |app| summarize(app, epoch)).await
+}
+
+/// Reads from the recording's files; blocks.
+fn summarize(app: &App, epoch: Option<Epoch>) -> Response {
+    let Some(past) = &app.past else {
+        return json(&Missing {
+            missing: NO_FOLDER.to_owned(),
+        });
+    };
+    let found = past.epoch(epoch).and_then(|found| {
+        let last = past.last()?;
+        Ok(found.summary(&past.epochs(last.epoch())))
+    });
+
+    match found {
+        Ok(summary) => json_text(summary),
+        Err(error) => json(&Missing {
+            missing: error.to_string(),
+        }),
     }
+}
+
+/// Answers a request from the recording's files, not many at a time.
+async fn read(app: Arc<App>, answer: impl FnOnce(&App) -> Response + Send + 'static) -> Response {
+    let Some(_permit) = app.admit_read().await else {
+        return not_found();
+    };
+
+    let reader = app.clone();
+    let read = tokio::task::spawn_blocking(move || answer(&reader));
+    read.await.unwrap_or_else(|error| internal_error(&error))
+}
+
+/// The recording of an epoch, or the answer that there is none.
+fn find(app: &App, epoch: Option<Epoch>) -> Result<Arc<Recording>, Response> {
+    let past = app.past.as_ref().ok_or_else(not_found)?;
+    past.epoch(epoch)
+        .map_err(|error| (StatusCode::NOT_FOUND, format!("{error}\n")).into_response())
 }
 
 /// A range of ticks, as the query string of a request states it.
@@ -215,37 +272,36 @@ async fn recording(State(app): State<Arc<App>>) -> Response {
 struct TickRange {
     from: Tick,
     count: u64,
+    every: Option<u64>,
+    epoch: Option<Epoch>,
 }
 
 async fn ticks(
     State(app): State<Arc<App>>,
     query: Result<Query<TickRange>, QueryRejection>,
 ) -> Response {
-    let range = match query {
-        Ok(Query(range)) if range.count <= MAX_TICKS => range,
-        _ => return bad_range(),
+    let Ok(Query(TickRange {
+        from,
+        count,
+        every,
+        epoch,
+    })) = query
+    else {
+        return bad_range();
     };
-    if matches!(app.mode, Mode::Live(_)) {
-        return not_found();
+    let wanted = Wanted { from, count, every };
+    if !wanted.is_valid() {
+        return bad_range();
     }
-    let Some(_permit) = app.admit_read().await else {
-        return not_found();
-    };
-
-    let reader = app.clone();
-    let read = tokio::task::spawn_blocking(move || read_ticks(&reader, &range));
-    read.await.unwrap_or_else(|error| internal_error(&error))
+    read(app, move |app| read_ticks(app, epoch, wanted)).await
 }
 
 /// Reads from the recording's files; blocks.
-fn read_ticks(app: &App, range: &TickRange) -> Response {
-    let Mode::Recording(recording) = &app.mode else {
-        return not_found();
-    };
-
-    match recording.range(range.from, range.count) {
-        Ok(range) => json_text(range),
-        Err(error) => internal_error(&error),
+fn read_ticks(app: &App, epoch: Option<Epoch>, wanted: Wanted) -> Response {
+    match find(app, epoch).map(|recording| recording.range(wanted)) {
+        Ok(Ok(range)) => json_text(range),
+        Ok(Err(error)) => internal_error(&error),
+        Err(answer) => answer,
     }
 }
 
@@ -265,22 +321,14 @@ async fn diagram(
         Ok(Query(window)) if window.is_valid() => window,
         _ => return bad_window(),
     };
-    if matches!(app.mode, Mode::Live(_)) {
-        return not_found();
-    }
-    let Some(_permit) = app.admit_read().await else {
-        return not_found();
-    };
-
-    let reader = app.clone();
-    let draw = tokio::task::spawn_blocking(move || draw_diagram(&reader, window));
-    draw.await.unwrap_or_else(|error| internal_error(&error))
+    read(app, move |app| draw_diagram(app, window)).await
 }
 
 /// Reads from the recording's files; blocks.
 fn draw_diagram(app: &App, window: Window) -> Response {
-    let Mode::Recording(recording) = &app.mode else {
-        return not_found();
+    let recording = match find(app, window.epoch) {
+        Ok(recording) => recording,
+        Err(answer) => return answer,
     };
 
     match recording.diagram(window) {
@@ -300,7 +348,9 @@ fn bad_window() -> Response {
 }
 
 fn bad_range() -> Response {
-    let reason = format!("Request ?from=TICK&count=N with N up to {MAX_TICKS}.\n");
+    let reason = format!(
+        "Request ?from=TICK&count=N with N up to {MAX_TICKS}, or ?from=TICK&count=N&every=K with N up to {MAX_SAMPLED_TICKS}.\n"
+    );
     (StatusCode::BAD_REQUEST, reason).into_response()
 }
 

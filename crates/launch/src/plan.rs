@@ -113,7 +113,9 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
     }
 
     if let Some(process) = file.console.as_ref().filter(|_| execution.has_console) {
-        let mut args = Vec::new();
+        // What has happened before a page was opened is in the folder.
+        let folder = RunFolder::new(execution.out, execution.run);
+        let mut args = vec![format!("--folder={}", folder.path().display())];
         if execution.opens_browser {
             args.push("--open".to_owned());
         }

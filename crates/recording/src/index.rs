@@ -1,8 +1,9 @@
 //! Where the parts of a file are: read from the index at its end, or found record by record in a file that has none.
 
 use std::fmt::Display;
-use std::fs::File;
-use std::os::unix::fs::FileExt;
+use std::fs::{File, Metadata};
+use std::os::unix::fs::{FileExt, MetadataExt};
+use std::path::Path;
 
 use mcap::MAGIC;
 use mcap::records::{ChunkHeader, Record, op};
@@ -44,6 +45,8 @@ pub(crate) struct Index {
     pub(crate) scenario: Option<u64>,
     /// Whether the file was finished.
     pub(crate) is_finished: bool,
+    /// Where a file without an index goes on.
+    pub(crate) end: u64,
 }
 
 /// A record, not decoded.
@@ -62,6 +65,25 @@ impl Bytes {
             name,
             file,
         })
+    }
+
+    /// Whether the file is at this path: another one may have taken its name.
+    pub(crate) fn is_at(&self, path: &Path) -> bool {
+        let identity = |metadata: Metadata| (metadata.dev(), metadata.ino());
+        let own = self.file.metadata().map(identity);
+        let there = path.metadata().map(identity);
+        matches!((own, there), (Ok(own), Ok(there)) if own == there)
+    }
+
+    /// Finds the parts that have been written from `end` on, which another call has returned.
+    pub(crate) fn grown(&mut self, end: u64) -> Result<Index, RecordingError> {
+        let metadata = self.file.metadata();
+        let metadata = metadata.map_err(|error| self.name.unreadable(error))?;
+        self.len = metadata.len();
+
+        let mut index = self.scan(end)?;
+        index.is_finished = self.summary()?.is_some();
+        Ok(index)
     }
 
     /// Reads bytes that are within the file.
@@ -109,7 +131,7 @@ impl Bytes {
         // An index that is damaged is not needed.
         match self.summary()?.and_then(|summary| self.indexed(&summary)) {
             Some(index) => Ok(index),
-            None => self.scan(),
+            None => self.scan(MAGIC.len() as u64),
         }
     }
 
@@ -170,11 +192,12 @@ impl Bytes {
         Some(index)
     }
 
-    /// Finds the parts of a file that was not finished, up to where it is cut off.
-    fn scan(&self) -> Result<Index, RecordingError> {
+    /// Finds the parts of a file that was not finished, from an offset up to where it is cut off.
+    fn scan(&self, from: u64) -> Result<Index, RecordingError> {
         let mut index = Index::default();
-        let mut offset = MAGIC.len() as u64;
+        let mut offset = from;
         while let Some(record) = self.record_at(offset)? {
+            index.end = offset;
             match record.op {
                 op::CHUNK => {
                     let header = self.chunk_header(&record)?;
@@ -195,6 +218,7 @@ impl Bytes {
             }
             offset = record.body + record.len;
         }
+        index.end = offset;
 
         if self.has_end()? {
             return Err(self.name.damaged(offset, &"a length is wrong"));

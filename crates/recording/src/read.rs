@@ -27,6 +27,8 @@ pub struct Recording {
     chunks: Vec<TickChunk>,
     scenario: Option<u64>,
     is_finished: bool,
+    /// Where a file that is not finished goes on.
+    end: u64,
 }
 
 /// A chunk and its first and last tick.
@@ -68,16 +70,40 @@ impl Recording {
         let mut chunks = index.chunks.into_iter();
         let preamble = chunks.next().ok_or_else(|| bytes.name.headless())?;
         let (header, topics) = read_preamble(&bytes, &preamble)?;
-        let chunks = tick_chunks(&bytes.name, &header, chunks)?;
 
-        Ok(Self {
+        let mut recording = Self {
             bytes,
             header,
             topics,
-            chunks,
+            chunks: Vec::new(),
             scenario: index.scenario,
             is_finished: index.is_finished,
-        })
+            end: index.end,
+        };
+        recording.add_chunks(chunks)?;
+        Ok(recording)
+    }
+
+    /// Adds the ticks that have become complete since, where the run is in progress.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if the file cannot be read or is damaged. The ticks before stay.
+    pub fn grow(&mut self) -> Result<(), RecordingError> {
+        if self.is_finished {
+            return Ok(());
+        }
+
+        let grown = self.bytes.grown(self.end)?;
+        self.add_chunks(grown.chunks)?;
+        self.end = grown.end;
+        self.is_finished = grown.is_finished;
+        Ok(())
+    }
+
+    /// Whether the recording is the file at this path: a later epoch or another run may have taken its name.
+    #[must_use]
+    pub fn is_at(&self, path: &Path) -> bool {
+        self.bytes.is_at(path)
     }
 
     /// What does not change during the epoch.
@@ -304,6 +330,27 @@ impl Recording {
         Ok(ticks.pop().and_then(|mut tick| tick.reports.remove(robot)))
     }
 
+    /// Adds chunks with their ticks, of which none may be left out. The end of a run may be in a chunk of its own, with the
+    /// last tick.
+    fn add_chunks(
+        &mut self,
+        chunks: impl IntoIterator<Item = Chunk>,
+    ) -> Result<(), RecordingError> {
+        for chunk in chunks {
+            let first = self.header.tick_at(chunk.start_ns);
+            let last = self.header.tick_at(chunk.end_ns);
+            let before = self.chunks.last().map(|chunk| chunk.last);
+            let due = before.map_or(0, |tick| tick.saturating_add(1));
+            let goes_on = before == Some(first) && first == last;
+            if last < first || (first != due && !goes_on) {
+                let reason = format!("ticks {first} to {last} where tick {due} is due");
+                return Err(self.bytes.name.damaged(chunk.offset, &reason));
+            }
+            self.chunks.push(TickChunk { chunk, first, last });
+        }
+        Ok(())
+    }
+
     fn damaged(&self, chunk: &TickChunk, reason: &dyn Display) -> RecordingError {
         self.bytes.name.damaged(chunk.chunk.offset, reason)
     }
@@ -360,29 +407,6 @@ fn read_preamble(
         }
     }
     Err(bytes.name.headless())
-}
-
-/// The chunks with their ticks, of which none may be left out. The end of a run may be in a chunk of its own, with the last
-/// tick.
-fn tick_chunks(
-    name: &Name,
-    header: &Header,
-    chunks: impl Iterator<Item = Chunk>,
-) -> Result<Vec<TickChunk>, RecordingError> {
-    let mut found: Vec<TickChunk> = Vec::new();
-    for chunk in chunks {
-        let first = header.tick_at(chunk.start_ns);
-        let last = header.tick_at(chunk.end_ns);
-        let before = found.last().map(|chunk| chunk.last);
-        let due = before.map_or(0, |tick| tick.saturating_add(1));
-        let goes_on = before == Some(first) && first == last;
-        if last < first || (first != due && !goes_on) {
-            let reason = format!("ticks {first} to {last} where tick {due} is due");
-            return Err(name.damaged(chunk.offset, &reason));
-        }
-        found.push(TickChunk { chunk, first, last });
-    }
-    Ok(found)
 }
 
 /// The records of a chunk, each with its operation code; `None` if a length is wrong.

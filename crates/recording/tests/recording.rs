@@ -296,3 +296,73 @@ fn a_damaged_byte_is_an_error_that_names_the_place_or_changes_nothing() {
     }
     assert!(errors > 50, "{errors}");
 }
+
+/// The offset after each record of a file and, of every record, whether a reader sees it whole there.
+fn record_ends(bytes: &[u8]) -> Vec<usize> {
+    let mut ends = Vec::new();
+    let mut at = 8;
+    while at + 9 <= bytes.len() - 8 {
+        let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        at += 9 + len as usize;
+        ends.push(at);
+    }
+    ends
+}
+
+#[test]
+fn a_recording_is_read_while_it_grows() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(write(folder.path(), TICKS)).unwrap();
+    let path = folder.path().join("growing.mcap");
+    let whole = |recording: &Recording| {
+        let len = recording.len();
+        let from = len.saturating_sub(5);
+        for (number, tick) in (from..).zip(recording.read(from, len).unwrap()) {
+            assert!(tick == expected(number, TICKS) || tick == self::tick(number));
+        }
+        len
+    };
+
+    // It is written in pieces that end anywhere: within records, and at the end of each.
+    let mut cuts: Vec<usize> = (500..bytes.len()).step_by(bytes.len() / 40).collect();
+    cuts.extend(record_ends(&bytes));
+    cuts.sort_unstable();
+    let mut growing: Option<Recording> = None;
+    let mut before = 0;
+    for cut in cuts {
+        std::fs::write(&path, &bytes[..cut]).unwrap();
+        match &mut growing {
+            Some(recording) => recording.grow().unwrap(),
+            None => growing = Recording::open(&path).ok(),
+        }
+        let Some(recording) = &growing else { continue };
+        let len = whole(recording);
+        assert!(len >= before, "{len} ticks after {before}");
+        // It has what a reader that opens the file now has.
+        assert_eq!(len, Recording::open(&path).unwrap().len());
+        assert!(!recording.is_finished() || cut == bytes.len());
+        before = len;
+    }
+
+    std::fs::write(&path, &bytes).unwrap();
+    let mut recording = growing.unwrap();
+    recording.grow().unwrap();
+    assert_eq!(whole(&recording), TICKS);
+    assert!(recording.is_finished());
+    recording.grow().unwrap();
+    assert_eq!(recording.len(), TICKS);
+}
+
+#[test]
+fn a_file_that_another_one_replaced_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), 10);
+    let recording = Recording::open(&path).unwrap();
+    assert!(recording.is_at(&path));
+
+    std::fs::rename(&path, folder.path().join("run-epoch2.mcap")).unwrap();
+    assert!(!recording.is_at(&path));
+    write(folder.path(), 10);
+    assert!(!recording.is_at(&path));
+    assert_eq!(recording.read(0, 10).unwrap().len(), 10);
+}

@@ -142,13 +142,6 @@ fn nothing_but_the_page_can_be_read() {
         assert_eq!(answer.status, 404, "{path}");
         assert_eq!(answer.body, "Not found.\n", "{path}");
     }
-
-    let answer = console.get("recording");
-    assert_eq!(
-        answer.status, 404,
-        "a run in progress has no recording: {}",
-        answer.body
-    );
 }
 
 #[test]

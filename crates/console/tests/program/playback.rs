@@ -477,3 +477,174 @@ fn a_large_range_is_answered_in_part() {
     assert!((6..40).contains(&count), "{count} ticks of a megabyte each");
     assert_eq!(ticks(&range["log"]).last(), ticks_in_range.last());
 }
+
+/// A console of a run in progress whose folder is known. No simulator answers.
+fn open_growing(folder: &Path, run: &str) -> Console {
+    Console::start(&[
+        "--bind",
+        "127.0.0.1:0",
+        "--connect",
+        "tcp/127.0.0.1:1",
+        "--run",
+        run,
+        "--folder",
+        folder.to_str().unwrap(),
+    ])
+}
+
+/// A recording of an epoch that goes on.
+fn begin(folder: &Path, epoch: u32) -> Writer {
+    let header = Header { epoch, ..header() };
+    Writer::create(&file(folder), &header, "").unwrap()
+}
+
+/// Records ticks and waits until they can be read.
+fn go_on(writer: &mut Writer, ticks: std::ops::Range<u64>) {
+    for tick in ticks {
+        writer.tick(&recorded_tick(tick).view()).unwrap();
+    }
+    writer.sync().unwrap();
+}
+
+#[test]
+fn a_run_in_progress_has_the_past_that_is_recorded_so_far() {
+    let folder = tempfile::tempdir().unwrap();
+    let console = open_growing(folder.path(), "past");
+    let missing = console.get("recording").json();
+    let reason = missing["missing"].as_str().unwrap();
+    assert!(reason.contains("nothing is recorded yet"), "{reason}");
+
+    let mut writer = begin(folder.path(), 1);
+    for end in [1_u64, 30, 31, 700] {
+        let begin = console.get("recording").json()["ticks"].as_u64();
+        go_on(&mut writer, begin.map_or(0, |last| last + 1)..end);
+
+        let summary = console.get("recording").json();
+        assert_eq!(summary["ticks"], end - 1, "{summary}");
+        assert_eq!(summary["is_finished"], false);
+        assert_eq!(summary["epochs"], json!([1]));
+        assert_eq!(summary["number"], 1);
+        let range = get_range(&console, end - 1, 9);
+        assert_eq!(ticks(&range["ticks"]), [end - 1]);
+        assert_eq!(range["end"], end);
+        let diagram = console.get(&format!(
+            "recording/diagram?from={}&count=20&width=900",
+            end - 1
+        ));
+        assert_eq!(diagram.status, 200, "{diagram:?}");
+    }
+
+    writer.finish().unwrap();
+    assert_eq!(console.get("recording").json()["is_finished"], true);
+}
+
+#[test]
+fn earlier_epochs_stay_and_another_run_of_the_name_is_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let console = open_growing(folder.path(), "past");
+    for epoch in 1..=7 {
+        let mut writer = begin(folder.path(), epoch);
+        go_on(&mut writer, 0..u64::from(epoch) * 10);
+        let summary = console.get("recording").json();
+        assert_eq!(summary["epoch"], epoch);
+        assert_eq!(summary["epochs"], json!((1..=epoch).collect::<Vec<_>>()));
+
+        drop(writer);
+        let ended = folder.path().join(format!("run-epoch{epoch}.mcap"));
+        std::fs::rename(file(folder.path()), ended).unwrap();
+    }
+    let mut writer = begin(folder.path(), 8);
+    go_on(&mut writer, 0..1);
+
+    // More than are kept open, and again.
+    for epoch in (1..=7_u64).chain(1..=7) {
+        let summary = console.get(&format!("recording?epoch={epoch}")).json();
+        assert_eq!(summary["ticks"], epoch * 10 - 1);
+        let query = format!(
+            "recording/ticks?from={}&count=1&epoch={epoch}",
+            epoch * 10 - 1
+        );
+        assert_eq!(
+            ticks(&console.get(&query).json()["ticks"]),
+            [epoch * 10 - 1]
+        );
+    }
+    let missing = console.get("recording?epoch=9").json();
+    assert!(
+        missing["missing"].as_str().unwrap().contains("epoch9"),
+        "{missing}"
+    );
+    assert_eq!(
+        console.get("recording/ticks?from=0&count=1&epoch=9").status,
+        404
+    );
+
+    let number = console.get("recording").json()["number"].as_u64();
+    std::fs::remove_file(file(folder.path())).unwrap();
+    let mut anew = begin(folder.path(), 8);
+    go_on(&mut anew, 0..2);
+    let summary = console.get("recording").json();
+    assert_eq!(summary["ticks"], 1);
+    assert!(summary["number"].as_u64() > number);
+}
+
+#[test]
+fn the_folder_of_another_run_is_not_shown() {
+    let folder = run_folder(10);
+    let console = open_growing(folder.path(), "other");
+    let missing = console.get("recording").json();
+    assert!(
+        missing["missing"].as_str().unwrap().contains("another run"),
+        "{missing}"
+    );
+    assert_eq!(console.get("recording/ticks?from=0&count=1").status, 404);
+}
+
+#[test]
+fn without_its_folder_a_run_in_progress_has_no_past() {
+    let console = Console::live();
+    let missing = console.get("recording").json();
+    assert!(
+        missing["missing"].as_str().unwrap().contains("--folder"),
+        "{missing}"
+    );
+    for part in ["ticks?from=0&count=1", "diagram?from=0&count=9&width=900"] {
+        assert_eq!(console.get(&format!("recording/{part}")).status, 404);
+    }
+}
+
+#[test]
+fn samples_have_every_change_of_state_and_the_whole_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let ticks_with_changes = (0..9000).map(|tick| {
+        let mut recorded = recorded_tick(tick);
+        if tick == 1234 {
+            recorded.events.push(Event::Emotion {
+                robot: robot("Butler"),
+                from: Some("HAPPY".to_owned()),
+                to: "ANGRY".to_owned(),
+            });
+        }
+        recorded
+    });
+    write(&file(folder.path()), ticks_with_changes);
+    let console = open(folder.path());
+
+    let range = console
+        .get("recording/ticks?from=1000&count=4096&every=500")
+        .json();
+    let expected = [1000, 1234, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5000];
+    assert_eq!(ticks(&range["ticks"]), expected);
+    assert_eq!(range["end"], 5096);
+    let tick = &range["ticks"][0];
+    assert_eq!(tick["guests_mm"], json!([]));
+    assert_eq!(tick["robots"][0]["state_variables"]["treats"], 1000.0);
+    assert_eq!(range["flights"], json!([]));
+    // A line of each tick, the commands, and the change.
+    assert_eq!(ticks(&range["log"]).len(), 4096 + 410 + 1);
+
+    for query in ["count=4097&every=9", "count=9&every=0", "count=9&every=-1"] {
+        let answer = console.get(&format!("recording/ticks?from=0&{query}"));
+        assert_eq!(answer.status, 400, "{query}: {answer:?}");
+    }
+}

@@ -1,0 +1,26 @@
+// @ts-check
+// The emotions of the legend, each with its color: those that robots have had in what is shown.
+
+import { stateClass } from "./palette.js";
+import { html, render } from "./vendor/lit-html.js";
+
+/** Most emotions in the legend: a robot may have any. */
+const MOST_EMOTIONS = 15;
+
+/**
+ * @param {HTMLElement} place
+ * @param {import("./store.js").Store} store
+ */
+export function renderEmotions(place, store) {
+  const now = (store.frame?.robots ?? []).map((robot) => robot.emotion_state);
+  const names = [...new Set([...store.history.emotions, ...now])].filter(Boolean).sort();
+  const more = names.length - MOST_EMOTIONS;
+
+  render(
+    html`${names.slice(0, MOST_EMOTIONS).map(
+      (name) => html`<span class="emotion" data-testid="legend-emotion"><svg class="cars-diagram symbol" viewBox="0 0 16 16"
+          aria-hidden="true"><rect class=${stateClass("emotion", name)} width="16" height="16"></rect></svg>${name}</span>`,
+    )}${more > 0 ? html`<span>and ${more} more</span>` : ""}`,
+    place,
+  );
+}

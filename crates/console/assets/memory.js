@@ -1,0 +1,86 @@
+// @ts-check
+// What the page itself has seen of a run in progress, in bounded memory: the newest ticks, which no recording has yet, or
+// all there is where the console does not have the run's folder.
+
+import { spread } from "./history.js";
+
+/** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
+/** @typedef {import("./types/messages.js").Panel} Panel */
+/** A frame, and the panels at that time. @typedef {{frame: WorldFrame, panels: Map<string, Panel>}} Seen */
+
+/** Most frames; beyond, older ones are dropped where they are close together, so that the whole time stays in reach. */
+const MOST_FRAMES = 3000;
+/** Most guests and robots in all frames. */
+const MOST_BODIES = 500_000;
+/** A robot has as much as this many guests. */
+const ROBOT_WEIGHT = 10;
+
+export class Memory {
+  constructor() {
+    /** In order of their ticks, all of one epoch. @type {Seen[]} */
+    this.seen = [];
+    this.bodies = 0;
+  }
+
+  clear() {
+    this.seen = [];
+    this.bodies = 0;
+  }
+
+  /**
+   * @param {WorldFrame} frame
+   * @param {Map<string, Panel>} panels
+   */
+  add(frame, panels) {
+    const last = this.seen.at(-1);
+    if (last && frame.tick <= last.frame.tick) return;
+
+    // Most frames bring no panel, or not of many robots: those that are alike are kept once.
+    const isAlike = last && last.panels.size === panels.size && [...panels].every(([robot, panel]) => last.panels.get(robot) === panel);
+    this.seen.push({ frame, panels: isAlike ? last.panels : new Map(panels) });
+    this.bodies += weight(frame);
+    if (this.seen.length > MOST_FRAMES || this.bodies > MOST_BODIES) this.thin();
+  }
+
+  /** Drops about half of the frames, and not the newest ones. */
+  thin() {
+    const kept = new Set(spread(this.seen.map(({ frame }) => frame.tick)));
+    this.keep((_, i) => kept.has(i));
+  }
+
+  /** Forgets what a recording has. @param {number} tick the last one that it has */
+  forget(tick) {
+    if (this.first <= tick) this.keep(({ frame }, i) => frame.tick > tick || i === this.seen.length - 1);
+  }
+
+  /** @param {(seen: Seen, index: number) => boolean} isKept */
+  keep(isKept) {
+    this.seen = this.seen.filter(isKept);
+    this.bodies = this.seen.reduce((sum, { frame }) => sum + weight(frame), 0);
+  }
+
+  /** The oldest tick; infinite if there is none. */
+  get first() {
+    return this.seen[0]?.frame.tick ?? Infinity;
+  }
+
+  /**
+   * The newest frame of a tick or before; the oldest one if all are later.
+   * @param {number} tick
+   * @returns {Seen | undefined}
+   */
+  at(tick) {
+    const later = this.seen.findIndex(({ frame }) => frame.tick > tick);
+    return this.seen[later < 0 ? this.seen.length - 1 : Math.max(0, later - 1)];
+  }
+
+  /** The frames after a tick. @param {number} tick */
+  after(tick) {
+    return this.seen.filter(({ frame }) => frame.tick > tick).map(({ frame }) => frame);
+  }
+}
+
+/** @param {WorldFrame} frame */
+function weight(frame) {
+  return frame.guests.length + ROBOT_WEIGHT * frame.robots.length;
+}

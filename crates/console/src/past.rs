@@ -1,0 +1,168 @@
+//! The recorded past of a run: the recordings in its folder, of which the last one may grow.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use protocol::{Epoch, RunName};
+use recording::RecordingError;
+
+use crate::playback::{OpenError, Recording};
+
+/// Recordings of earlier epochs that are kept open.
+const MAX_EARLIER: usize = 4;
+/// Most epochs that are listed, the newest ones.
+const MAX_EPOCHS: usize = 100;
+
+/// The recorded epochs of a run.
+#[derive(Debug)]
+pub(crate) struct Past {
+    place: Place,
+    open: Mutex<Open>,
+}
+
+/// Where the recordings are.
+#[derive(Debug)]
+enum Place {
+    /// A run that is over, or the recording of one epoch.
+    Finished {
+        /// Folder of the other epochs; none if one epoch was asked for.
+        folder: Option<PathBuf>,
+    },
+    /// The folder of a run in progress.
+    Growing {
+        /// The folder, which may not be there yet.
+        folder: PathBuf,
+        /// The run.
+        run: RunName,
+    },
+}
+
+#[derive(Debug, Default)]
+struct Open {
+    last: Option<Arc<Recording>>,
+    earlier: BTreeMap<Epoch, Arc<Recording>>,
+    /// Number of recordings that were the last one so far.
+    number: u64,
+}
+
+impl Past {
+    /// The recording in a run's folder and those of its earlier epochs, or a recording alone: `RUN/run-epoch1.mcap`.
+    ///
+    /// # Errors
+    /// [`OpenError`] names the file.
+    pub(crate) fn finished(path: &Path) -> Result<Self, OpenError> {
+        let (file, folder) = if path.is_dir() {
+            (path.join(recording::FILE), Some(path.to_owned()))
+        } else {
+            (path.to_owned(), None)
+        };
+
+        let last = Arc::new(Recording::open(&file, 1)?);
+        Ok(Self {
+            place: Place::Finished { folder },
+            open: Mutex::new(Open {
+                last: Some(last),
+                ..Open::default()
+            }),
+        })
+    }
+
+    /// What a run in progress has recorded in its folder.
+    pub(crate) fn growing(folder: PathBuf, run: RunName) -> Self {
+        Self {
+            place: Place::Growing { folder, run },
+            open: Mutex::default(),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Open> {
+        self.open.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The recording of the last epoch, as far as it is complete now.
+    ///
+    /// # Errors
+    /// [`OpenError`] if there is none, or it cannot be read.
+    pub(crate) fn last(&self) -> Result<Arc<Recording>, OpenError> {
+        let mut open = self.lock();
+        let Place::Growing { folder, run } = &self.place else {
+            return open.last.clone().ok_or(OpenError::NoEpoch);
+        };
+
+        let file = folder.join(recording::FILE);
+        if let Some(last) = open.last.as_ref().filter(|last| last.is_at(&file)) {
+            last.grow()?;
+            return Ok(last.clone());
+        }
+
+        open.last = None;
+        let opened = Recording::open(&file, open.number + 1);
+        let last = opened.map_err(|error| match error {
+            OpenError::Unreadable(RecordingError::Damaged { .. }) => error,
+            _ => OpenError::NotYet,
+        })?;
+        if last.run() != run.as_str() {
+            return Err(OpenError::OtherRun(file.display().to_string()));
+        }
+        open.number += 1;
+        open.earlier.clear();
+        Ok(open.last.insert(Arc::new(last)).clone())
+    }
+
+    /// The recording of an epoch; of the last one without a number.
+    ///
+    /// # Errors
+    /// [`OpenError`] if there is none, or it cannot be read.
+    pub(crate) fn epoch(&self, epoch: Option<Epoch>) -> Result<Arc<Recording>, OpenError> {
+        let last = self.last();
+        let Some(epoch) = epoch else {
+            return last;
+        };
+        if let Ok(last) = last
+            && last.epoch() == epoch
+        {
+            return Ok(last);
+        }
+
+        let mut open = self.lock();
+        if let Some(known) = open.earlier.get(&epoch) {
+            return Ok(known.clone());
+        }
+        let folder = self.folder().ok_or(OpenError::NoEpoch)?;
+        let file = folder.join(earlier_name(epoch));
+        let earlier = Arc::new(Recording::open(&file, open.number)?);
+        if open.earlier.len() == MAX_EARLIER {
+            open.earlier.pop_first();
+        }
+        open.earlier.insert(epoch, earlier.clone());
+        Ok(earlier)
+    }
+
+    /// The epochs that have a recording, in order: the newest [`MAX_EPOCHS`].
+    pub(crate) fn epochs(&self, last: Epoch) -> Vec<Epoch> {
+        let mut epochs = Vec::new();
+        for epoch in (1..last).rev().take(MAX_EPOCHS) {
+            let file = self.folder().map(|folder| folder.join(earlier_name(epoch)));
+            if file.is_some_and(|file| file.exists()) {
+                epochs.push(epoch);
+            }
+        }
+        epochs.reverse();
+        epochs.push(last);
+        epochs
+    }
+
+    fn folder(&self) -> Option<&Path> {
+        match &self.place {
+            Place::Finished { folder } => folder.as_deref(),
+            Place::Growing { folder, .. } => Some(folder),
+        }
+    }
+}
+
+/// The recording of an epoch that `init` has ended.
+fn earlier_name(epoch: Epoch) -> String {
+    let stem = recording::FILE.trim_end_matches(".mcap");
+    format!("{stem}-epoch{epoch}.mcap")
+}

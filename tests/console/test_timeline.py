@@ -1,0 +1,632 @@
+"""The past of a run: one time line for runs in progress and recorded ones, and pages that refill what they missed."""
+
+import re
+import signal
+import subprocess
+
+import pytest
+from playwright.sync_api import expect
+
+from lab import PATIENCE_S, ROOT, Processes, eventually, free_port, start_console, until
+
+TICK = "window.carsConsole.frame()?.tick"
+
+
+def tick(page):
+    return page.evaluate(TICK)
+
+
+def newest(page):
+    """The last tick of the time line."""
+    return int(page.get_by_test_id("scrub").get_attribute("max"))
+
+
+def scrub(page, to):
+    page.get_by_test_id("scrub").evaluate(
+        "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true})); }", to
+    )
+
+
+def step_to(page, last):
+    for step in range(tick(page) + 1, last + 1):
+        page.get_by_test_id("btn-step").click()
+        expect(page.get_by_test_id("tick")).to_have_text(str(step))
+
+
+def samples(page):
+    """Times and states of the history that the page draws charts and bands of."""
+    return page.evaluate(
+        "(() => { const {times_s, states} = window.carsConsole.history();"
+        " return [times_s, Object.fromEntries([...states].map(([robot, {emotion, behavior}]) => [robot, {emotion, behavior}]))]; })()"
+    )
+
+
+def test_a_run_in_progress_is_scrubbed_while_it_goes_on(launch, open_page, screenshots):
+    run = launch(options=("--speed", "10"))
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-start").click()
+    until(page, f"{TICK} > 60")
+    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_test_id("past-note")).to_have_count(0)
+
+    scrub(page, 20)
+    expect(page.get_by_test_id("tick")).to_have_text("20")
+    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "false")
+    # The run goes on, and the page stays at its tick.
+    before = newest(page)
+    eventually("the run goes on", lambda: newest(page) > before + 20)
+    expect(page.get_by_test_id("tick")).to_have_text("20")
+    expect(page.get_by_test_id("phase")).to_have_text("running")
+    at_20 = page.evaluate("window.carsConsole.frame()")
+    reports = [event for event in run.events() if event["tick"] <= 20 and event["event"] == "emotion"]
+    emotions = {event["robot"]: event["to"] for event in reports}
+    assert {robot["name"]: robot["emotion_state"] for robot in at_20["robots"]} == emotions
+    expect(page.get_by_test_id("panel-Butler").locator(".buttons")).to_be_hidden()
+    page.screenshot(path=screenshots / "timeline-live-1280x720-light.png")
+
+    page.get_by_test_id("live").click()
+    until(page, f"{TICK} > {before + 20}")
+    scrub(page, 30)
+    expect(page.get_by_test_id("tick")).to_have_text("30")
+    page.keyboard.press("l")
+    until(page, f"{TICK} > {before + 20}")
+
+    # A link to a tick leads there, also on another page.
+    other = page.context.new_page()
+    other.goto(f"{page.url}#tick=25")
+    expect(other.get_by_test_id("tick")).to_have_text("25")
+
+    # It is played from the past on.
+    page.get_by_test_id("btn-pause").click()
+    expect(page.get_by_test_id("phase")).to_have_text("paused")
+    scrub(page, newest(page) - 20)
+    page.get_by_test_id("play").click()
+    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "true")
+    assert tick(page) == newest(page)
+
+
+def test_clicks_seek(launch, open_page):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 40)
+
+    line = page.locator("[data-testid=log] .line", has_text="behavior").last
+    count = page.locator("[data-testid=log] .line").count()
+    words = line.inner_text()
+    line.click()
+    time_s = float(re.match(r"\s*([\d.]+) s", words)[1])
+    until(page, f"window.carsConsole.frame().time_s === {time_s}")
+    expect(page.locator(".line.picked").first).to_be_visible()
+    # The lines after it stay, for the next click.
+    expect(page.locator("[data-testid=log] .line")).to_have_count(count)
+    page.get_by_test_id("live").click()
+    expect(page.get_by_test_id("tick")).to_have_text("40")
+    expect(page.locator(".line.picked")).to_have_count(0)
+
+    page.get_by_test_id("tab-charts").click()
+    for test_id in ("chart", "bands"):
+        place = page.locator(f"#{test_id}")
+        box = place.bounding_box()
+        left, right = 76, box["width"] - 24
+        place.click(position={"x": left + 0.25 * (right - left), "y": 20})
+        expect(page.get_by_test_id("tick")).to_have_text("10")
+        expect(page.locator("#bands .cursor")).to_have_count(1)
+        page.keyboard.press("l")
+        expect(page.get_by_test_id("tick")).to_have_text("40")
+        expect(page.locator("#bands .cursor")).to_have_count(0)
+
+
+def window(page):
+    return [round(value, 2) for value in page.evaluate("window.carsConsole.window()")]
+
+
+def test_charts_and_bands_zoom_together(launch, open_page, screenshots):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 40)
+    page.get_by_test_id("tab-charts").click()
+    expect(page.locator("#bands .band").first).to_be_visible()
+    assert window(page) == [0, 20]
+
+    def drag(place, begin, end):
+        box = page.locator(place).bounding_box()
+        left, width = box["x"] + 76, box["width"] - 100
+        page.mouse.move(left + begin * width, box["y"] + 20)
+        page.mouse.down()
+        page.mouse.move(left + (begin + end) / 2 * width, box["y"] + 20)
+        page.mouse.move(left + end * width, box["y"] + 20)
+        page.mouse.up()
+
+    def drawn():
+        """First and last time of chart and bands."""
+        scale = page.evaluate("window.carsConsole.chartScale()")
+        return [round(value, 2) for value in scale]
+
+    for place in ("#chart", "#bands"):
+        drag(place, 0.25, 0.75)
+        eventually("the window", lambda: abs(window(page)[0] - 5) < 0.1 and abs(window(page)[1] - 15) < 0.1)
+        eventually("the chart", lambda: drawn() == window(page))
+        expect(page.get_by_test_id("span")).to_have_count(1)
+        expect(page.get_by_test_id("tick")).to_have_text("40")
+        page.screenshot(path=screenshots / f"timeline-zoom-{place[1:]}.png")
+        page.locator(place).dblclick(position={"x": 300, "y": 20})
+        eventually("the whole run", lambda: window(page) == [0, 20] and drawn() == [0, 20])
+        expect(page.get_by_test_id("tick")).to_have_text("40")
+
+        box = page.locator(place).bounding_box()
+        page.mouse.move(box["x"] + 76 + (box["width"] - 100) / 2, box["y"] + 20)
+        page.mouse.wheel(0, -300)
+        eventually("a shorter window", lambda: window(page)[1] - window(page)[0] < 10)
+        middle = sum(window(page)) / 2
+        assert abs(middle - 10) < 0.5
+        page.get_by_test_id("window-all").click()
+        eventually("the whole run", lambda: window(page) == [0, 20])
+
+    # A click within a window seeks, and the window stays.
+    drag("#bands", 0.5, 0.75)
+    eventually("the window", lambda: abs(window(page)[0] - 10) < 0.1)
+    box = page.locator("#bands").bounding_box()
+    page.mouse.click(box["x"] + 76 + (box["width"] - 100) * 0.4, box["y"] + 20)
+    expect(page.get_by_test_id("tick")).to_have_text("24")
+    assert abs(window(page)[0] - 10) < 0.1
+
+
+def test_a_page_that_is_opened_late_has_everything(launch, open_page):
+    run = launch(options=("--speed", "max"))
+    first = open_page(run.address)
+    expect(first.get_by_test_id("tick")).to_have_text("0")
+    first.get_by_test_id("btn-start").click()
+    until(first, f"{TICK} > 1000")
+    first.get_by_test_id("btn-pause").click()
+    expect(first.get_by_test_id("phase")).to_have_text("paused")
+    eventually("the last tick", lambda: run.settled() and tick(first) == run.settled()["tick"])
+    last = tick(first)
+
+    late = open_page(run.address)
+    until(late, f"{TICK} === {last}")
+    assert_complete(run, late, last)
+    # The page that was there has what it skipped, too: it shows few of so many ticks.
+    assert_complete(run, first, last)
+
+
+def assert_complete(run, page, last):
+    """Charts, bands and log have every tick of the record up to the last one."""
+
+    def has_all():
+        times, _ = samples(page)
+        return times[0] == 0 and times[-1] == last / 2 and len(times) > 0.9 * min(3000, last)
+
+    eventually("all samples", has_all)
+    events = run.events()
+    for kind in ("emotion", "behavior"):
+        changes = {"Butler": [], "Leguin": []}
+        for event in events:
+            if event["event"] == kind:
+                changes[event["robot"]].append([event["to"], event["tick"] / 2])
+
+        def spans():
+            _, states = samples(page)
+            return {robot: [[span["state"], span["from_s"]] for span in of[kind]] for robot, of in states.items()}
+
+        eventually(f"the spans of {kind}", lambda: spans() == changes)
+
+    said = sum(event["event"] in ("emotion", "behavior", "command_sent", "joined", "init") for event in events)
+    eventually("the log", lambda: page.evaluate("window.carsConsole.lines()") >= said)
+    unlike = page.evaluate("window.carsConsole.unlikeLines()")
+    assert unlike == page.evaluate("window.carsConsole.lines()"), "a line is there twice"
+
+
+def test_a_console_that_was_killed_is_replaced_without_loss(launch, browser):
+    run = launch(options=("--speed", "20"))
+    # What a browser says when its server is gone is expected.
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    page.goto(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-start").click()
+    until(page, f"{TICK} > 100")
+    console = run.processes.all[-1]
+    console.send_signal(signal.SIGKILL)
+    console.wait(PATIENCE_S)
+    expect(page.get_by_test_id("connection")).to_have_text("console not reachable")
+    lost_at = tick(page)
+    eventually("the run goes on", lambda: run.status()["tick"] > lost_at + 100)
+
+    page.goto(run.console())
+    until(page, f"{TICK} > {lost_at + 100}")
+    page.get_by_test_id("btn-pause").click()
+    expect(page.get_by_test_id("phase")).to_have_text("paused")
+    eventually("the last tick", lambda: run.settled() and tick(page) == run.settled()["tick"])
+    assert_complete(run, page, tick(page))
+    scrub(page, lost_at + 50)
+    expect(page.get_by_test_id("tick")).to_have_text(str(lost_at + 50))
+    context.close()
+
+
+def test_the_launcher_tells_the_console_the_folder(tmp_path, open_page):
+    processes = Processes(tmp_path)
+    try:
+        options = ("--run", "told", "--out", tmp_path / "runs", "--speed", "20", "--listen", f"tcp/127.0.0.1:{free_port()}")
+        environment = {"CARS_CONSOLE_BIND": "127.0.0.1:0"}
+        processes.start("cars", "launch", ROOT / "launch/hors_doeuvres.toml", *options, environment=environment, stdout=subprocess.DEVNULL)
+        log = tmp_path / "runs" / "told" / "logs" / "console.log"
+        url = eventually("the console", lambda: log.exists() and re.search(r"console: (http://\S+)\n", log.read_text()))[1]
+        events = log.parents[1] / "events.jsonl"
+        eventually("some ticks", lambda: events.exists() and events.read_text().count('"event":"tick"') > 60)
+
+        page = open_page(url)
+        until(page, f"{TICK} > 60")
+        scrub(page, 10)
+        expect(page.get_by_test_id("tick")).to_have_text("10")
+        eventually("the charts from the beginning", lambda: samples(page)[0][0] == 0)
+    finally:
+        processes.end()
+
+
+def test_a_reconnected_page_fills_the_gap(launch, browser):
+    run = launch(options=("--speed", "20"))
+    context = browser.new_context()
+    sockets = []
+    is_open = [True]
+
+    def relay(socket):
+        if not is_open[0]:
+            socket.close()
+            return
+        socket.connect_to_server()
+        sockets.append(socket)
+
+    page = context.new_page()
+    page.route_web_socket("**/ws", relay)
+    page.goto(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-start").click()
+    until(page, f"{TICK} > 50")
+    is_open[0] = False
+    sockets[-1].close()
+    expect(page.get_by_test_id("connection")).to_have_text("console not reachable")
+    lost_at = tick(page)
+    eventually("the run goes on", lambda: run.status()["tick"] > lost_at + 100)
+    is_open[0] = True
+    until(page, f"{TICK} > {lost_at + 100}")
+    page.get_by_test_id("btn-pause").click()
+    expect(page.get_by_test_id("phase")).to_have_text("paused")
+    eventually("the last tick", lambda: run.settled() and tick(page) == run.settled()["tick"])
+    assert_complete(run, page, tick(page))
+    context.close()
+
+
+def test_without_the_folder_the_page_has_what_it_saw_and_says_so(launch, open_page, screenshots):
+    run = launch(knows_folder=False)
+    first = open_page(run.address, 1280, 720)
+    expect(first.get_by_test_id("tick")).to_have_text("0")
+    step_to(first, 20)
+    late = open_page(run.address, 1280, 720)
+    expect(late.get_by_test_id("tick")).to_have_text("20")
+    expect(late.get_by_test_id("past-note")).to_contain_text("from 10.0 s on")
+    expect(late.get_by_test_id("past-note")).to_contain_text("--folder")
+    step_to(late, 30)
+
+    assert late.get_by_test_id("scrub").get_attribute("min") == "20"
+    at_24 = None
+    for page in (first, late):
+        expect(page.get_by_test_id("tick")).to_have_text("30")
+        scrub(page, 24)
+        expect(page.get_by_test_id("tick")).to_have_text("24")
+        frame = page.evaluate("(({guests, robots}) => [guests, robots])(window.carsConsole.frame())")
+        assert at_24 is None or frame == at_24
+        at_24 = frame
+    late.screenshot(path=screenshots / "timeline-memory-1280x720.png")
+    late.get_by_test_id("tab-diagram").click()
+    expect(late.get_by_test_id("no-diagram")).to_contain_text("--folder")
+    scrub(first, 5)
+    expect(first.get_by_test_id("tick")).to_have_text("5")
+    first.get_by_test_id("live").click()
+    expect(first.get_by_test_id("tick")).to_have_text("30")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_marks_are_the_events_of_the_record(launch, open_page, screenshots, scheme):
+    run = launch(scenario="configs/partition.toml", options=("--speed", "max"))
+    page = open_page(run.address, 1280, 720, scheme)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-start").click()
+    expect(page.get_by_test_id("phase")).to_have_text("ended")
+    events = run.events()
+
+    def marks(of, kind):
+        return [int(mark.get_attribute("data-tick")) for mark in of.get_by_test_id(f"mark-{kind}").all()]
+
+    cuts = sorted({event["tick"] for event in events if event["event"] in ("link_cut", "link_healed")})
+    exchanges = {event["tick"] for event in events if event["event"] == "behavior" and event["to"] == "EXCHANGE"}
+    assert len(cuts) == 2 and exchanges
+    eventually("the cuts", lambda: marks(page, "cut") == cuts)
+    eventually("the exchanges", lambda: marks(page, "exchange") and set(marks(page, "exchange")) <= exchanges)
+    expect(page.get_by_test_id("mark-epoch").first).to_have_attribute("title", re.compile("epoch 1 initialized"))
+    first = page.get_by_test_id("mark-cut").first
+    expect(first).to_have_attribute("title", re.compile("Butler to Leguin are cut"))
+    first.click()
+    expect(page.get_by_test_id("tick")).to_have_text(str(cuts[0]))
+    page.screenshot(path=screenshots / f"timeline-marks-1280x720-{scheme}.png")
+
+    other = open_page(start_console(run.processes, "--recording", run.run_folder), 390, 844, scheme)
+    expect(other.get_by_test_id("tick")).to_have_text("0")
+    eventually("the cuts", lambda: marks(other, "cut") == cuts)
+    eventually("the exchanges", lambda: marks(other, "exchange") and set(marks(other, "exchange")) <= exchanges)
+    expect(other.get_by_test_id("live")).to_have_count(0)
+    other.screenshot(path=screenshots / f"timeline-marks-390x844-{scheme}.png", full_page=True)
+
+
+def test_a_crash_and_the_return_are_marked(launch, open_page):
+    run = launch(options=("--set", "on_late=continue", "--set", "deadline=0.5 s"))
+    page = open_page(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 3)
+    run.kill("Leguin")
+    eventually("the loss", lambda: page.get_by_test_id("btn-step").click() or any(e["event"] == "lost" for e in run.events()))
+    expect(page.get_by_test_id("mark-fault").first).to_have_attribute("title", re.compile("Leguin is lost"))
+
+
+def test_epochs_are_chosen(launch, open_page, screenshots):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    expect(page.get_by_test_id("epoch")).to_have_count(0)
+    step_to(page, 12)
+    page.get_by_test_id("btn-init").click()
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    until(page, "window.carsConsole.frame().epoch === 2")
+    step_to(page, 5)
+
+    page.get_by_test_id("epoch").select_option("1")
+    until(page, "window.carsConsole.frame().epoch === 1")
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    scrub(page, 12)
+    expect(page.get_by_test_id("tick")).to_have_text("12")
+    eventually("the charts of the epoch", lambda: samples(page)[0][-1] == 6)
+    page.screenshot(path=screenshots / "timeline-epochs-1280x720.png")
+    page.get_by_test_id("live").click()
+    until(page, "window.carsConsole.frame().epoch === 2")
+    expect(page.get_by_test_id("tick")).to_have_text("5")
+    eventually("the charts of now", lambda: samples(page)[0][-1] == 2.5)
+
+    # A late page and a recording have both epochs, and the log of both.
+    for other in (open_page(run.address), open_page(start_console(run.processes, "--recording", run.run_folder))):
+        expect(other.get_by_test_id("epoch")).to_be_visible()
+        expect(other.get_by_test_id("epoch")).to_have_value("2")
+        other.get_by_test_id("epoch").select_option("1")
+        until(other, "window.carsConsole.frame().epoch === 1")
+        scrub(other, 11)
+        expect(other.get_by_test_id("tick")).to_have_text("11")
+        expect(other.get_by_test_id("log")).to_contain_text("initialized")
+
+
+def test_the_diagram_of_a_run_in_progress(launch, open_page, screenshots):
+    run = launch(options=("--speed", "10", "--set", "network.commands.loss=0.4"))
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-start").click()
+    until(page, f"{TICK} > 150")
+    page.get_by_test_id("tab-diagram").click()
+    expect(page.locator(".diagram svg")).to_be_visible()
+
+    def end():
+        return int(page.locator(".diagram svg").get_attribute("data-to"))
+
+    seen = end()
+    eventually("further ticks", lambda: end() > seen)
+    page.get_by_test_id("btn-pause").click()
+    expect(page.get_by_test_id("phase")).to_have_text("paused")
+    last = eventually("the last tick", lambda: run.settled() and run.settled()["tick"])
+    eventually("the last tick in the diagram", lambda: end() == last)
+
+    page.get_by_test_id("diagram-out").click()
+    eventually("a longer window", lambda: int(page.locator(".diagram svg").get_attribute("data-from")) == 0)
+    sent = [event["tick"] for event in run.events() if event["event"] == "command_sent"]
+    expect(page.locator(".diagram .command")).to_have_count(len(sent))
+    page.locator(".diagram .command").first.locator(".start").click()
+    expect(page.get_by_test_id("tick")).to_have_text(str(sent[0]))
+    page.screenshot(path=screenshots / "timeline-diagram-1280x720.png")
+
+
+def test_a_diagram_of_ten_thousand_events_is_drawn_window_by_window(launch, open_page):
+    run = launch(options=("--speed", "max", "--duration", "3000 s", "--set", "network.queries.loss=0.9"))
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-start").click()
+    expect(page.get_by_test_id("phase")).to_have_text("ended", timeout=PATIENCE_S * 1000)
+    last = tick(page)
+    assert len(run.events()) > 10_000
+
+    page.get_by_test_id("tab-diagram").click()
+    expect(page.locator(".diagram svg")).to_have_attribute("data-to", str(last))
+    page.get_by_test_id("diagram-queries").check()
+    expect(page.locator(".diagram .query").first).to_be_visible()
+    things = page.locator(".diagram svg *").count()
+    assert things < 5000, "a window has what is in it, and no more"
+    # Everything at once is drawn, or the page says why it is not and keeps what it showed.
+    while page.get_by_test_id("diagram-out").is_enabled():
+        page.get_by_test_id("diagram-out").click()
+    page.get_by_test_id("diagram-queries").uncheck()
+    eventually("the whole run", lambda: page.locator(".diagram svg").get_attribute("data-from") == str(max(0, last + 1 - 4096)))
+    page.get_by_test_id("scrub").focus()
+    scrub(page, 40)
+    expect(page.get_by_test_id("tick")).to_have_text("40")
+
+
+@pytest.mark.parametrize("width, height, scheme", [(1280, 720, "dark"), (390, 844, "light"), (390, 844, "dark")])
+def test_everything_has_room(launch, open_page, screenshots, width, height, scheme):
+    run = launch(options=("--speed", "max"))
+    page = open_page(run.address, width, height, scheme)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-start").click()
+    until(page, f"{TICK} > 400")
+    page.get_by_test_id("btn-pause").click()
+    expect(page.get_by_test_id("phase")).to_have_text("paused")
+    scrub(page, 200)
+    expect(page.get_by_test_id("tick")).to_have_text("200")
+    for tab in ("charts", "diagram", "log"):
+        page.get_by_test_id(f"tab-{tab}").click()
+        if tab == "diagram":
+            expect(page.locator(".diagram svg")).to_be_visible()
+        too_wide = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+        assert too_wide <= 0, f"{tab} is {too_wide} px wider than the window"
+        page.screenshot(path=screenshots / f"timeline-{tab}-{width}x{height}-{scheme}.png", full_page=width < 1000)
+    for test_id in ("scrub", "live", "play", "step"):
+        box = page.get_by_test_id(test_id).bounding_box()
+        assert box and box["x"] >= 0 and box["x"] + box["width"] <= width, f"{test_id}: {box}"
+
+
+def test_the_legend_names_the_emotions_by_color(launch, open_page):
+    run = launch()
+    page = open_page(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 10)
+    names = {event["to"] for event in run.events() if event["event"] == "emotion"}
+    entries = page.get_by_test_id("legend-emotion")
+    eventually("the emotions", lambda: {text.strip() for text in entries.all_inner_texts()} == names)
+    page.get_by_test_id("tab-charts").click()
+    for entry in entries.all():
+        fill = entry.locator("rect").evaluate("rect => getComputedStyle(rect).fill")
+        band = page.locator(f"#bands .band[data-state={entry.inner_text().strip()}] rect").first
+        assert band.evaluate("rect => getComputedStyle(rect).fill") == fill
+
+
+MODULES = """async () => {
+  const [{Memory}, {Marks}, {History}, {TimeWindow}, {Store}] = await Promise.all(
+    ['memory', 'marks', 'history', 'window', 'store'].map((name) => import(`./assets/${name}.js`)));
+  const BODY
+}"""
+
+
+def run_module(page, body):
+    return page.evaluate(MODULES.replace("const BODY", body))
+
+
+@pytest.fixture
+def page(launch, open_page):
+    page = open_page(launch(knows_folder=False).address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    return page
+
+
+def test_what_a_page_keeps_is_bounded(page):
+    """At the bound every second frame goes, the newest one stays, and every time stays in reach."""
+    found = run_module(
+        page,
+        """
+        const frame = (tick, guests) => ({tick, epoch: 1, guests: Array(guests).fill([0, 0]), robots: []});
+        const memory = new Memory();
+        const sizes = [];
+        for (let tick = 0; tick < 20000; tick += 1) { memory.add(frame(tick, 1), new Map()); sizes.push(memory.seen.length); }
+        const gap = Math.max(...memory.seen.slice(1).map((one, i) => one.frame.tick - memory.seen[i].frame.tick));
+        const crowd = new Memory();
+        for (let tick = 0; tick < 300; tick += 1) crowd.add(frame(tick, 10000), new Map());
+        const bodies = crowd.seen.reduce((sum, one) => sum + one.frame.guests.length, 0);
+        memory.forget(19990);
+        return [Math.max(...sizes), memory.at(5).frame.tick, gap, crowd.seen.length, bodies, crowd.seen.at(-1).frame.tick, memory.first];
+        """,
+    )
+    most, _, gap, crowd, bodies, newest_tick, first = found
+    assert most <= 3000
+    assert gap <= 40
+    assert bodies <= 500_000 and crowd >= 20 and newest_tick == 299
+    assert first > 19990
+
+    marks = run_module(
+        page,
+        """
+        const line = (tick) => ({epoch: 1, tick, time_s: tick / 2, source: 'Butler', kind: 'membership', text: 'is lost'});
+        const marks = new Marks();
+        for (let tick = 0; tick < 5000; tick += 1) { marks.add([line(tick)]); marks.add([line(tick)]); }
+        const drawn = marks.of(1, 0, 4999, 100);
+        return [marks.lines.size, marks.isCut, drawn.length, drawn.at(-1).tick, drawn.at(-1).words.split('\\n').length];
+        """,
+    )
+    assert marks[0] == 2000 and marks[1]
+    assert marks[2] <= 101 and marks[3] > 4900 and marks[4] <= 7
+
+
+def test_lines_of_record_and_of_the_run_are_merged_once(page):
+    found = run_module(
+        page,
+        """
+        const line = (tick, text, epoch = 1) => ({epoch, tick, time_s: tick / 2, source: 'Butler', kind: 'say', text});
+        const texts = (store) => store.log.map(({tick, text}) => `${tick}${text}`).join(' ');
+        const store = new Store();
+        // The run tells its last lines, the record has all before and, here, some of them.
+        store.addLines([line(5, 'b'), line(6, 'a'), line(6, 'a'), line(7, 'late')]);
+        store.addRecorded([line(0, 'a'), line(4, 'x'), line(5, 'a'), line(5, 'b'), line(6, 'a'), line(6, 'a')]);
+        const first = texts(store);
+        // What the record had already arrives from the run, too.
+        store.addRecorded([line(8, 'c'), line(8, 'd')]);
+        store.addLines([line(8, 'c')]);
+        store.addLines([line(8, 'd'), line(9, 'e'), line(0, 'next', 2)]);
+        const second = texts(store);
+        // At the bound the oldest ones go.
+        store.addRecorded(Array.from({length: 30000}, (_, i) => line(i, `m${i}`, 3)));
+        return [first, second, store.log.length, store.log[0].text, store.logCount];
+        """,
+    )
+    assert found[0] == "0a 4x 5a 5b 6a 6a 7late"
+    assert found[1] == "0a 4x 5a 5b 6a 6a 7late 8c 8d 9e 0next"
+    assert found[2:4] == [10000, "m20000"]
+
+
+def test_samples_of_the_record_replace_what_was_seen(page):
+    found = run_module(
+        page,
+        """
+        const robot = (emotion, value) => [{name: 'B', location: {x: value, y: 0}, emotion_state: emotion, behavior_state: 'S', state_variables: {v: value}}];
+        const history = new History();
+        history.add(0, robot('A', 0));
+        history.add(10, robot('C', 10));
+        history.break();
+        history.add(20, robot('C', 20));
+        const gap = [history.times_s.slice(), history.variables.get('v').get('B').slice(), structuredClone(history.states.get('B').emotion)];
+        history.cutFrom(5);
+        for (const [time, emotion] of [[5, 'A'], [7, 'B'], [10, 'C'], [15, 'C'], [20, 'C']]) history.add(time, robot(emotion, time));
+        const exact = [history.times_s.slice(), history.variables.get('v').get('B').slice(), structuredClone(history.states.get('B').emotion)];
+        history.cutFrom(0);
+        const empty = [history.times_s.length, history.states.get('B').emotion.length];
+        for (let i = 0; i < 50000; i += 1) history.add(i, robot(`E${i}`, i));
+        return [gap, exact, empty, history.times_s.length, history.states.get('B').emotion.length];
+        """,
+    )
+    gap, exact, empty, most_samples, most_spans = found
+    assert gap[0] == [0, 10, 15, 20] and gap[1] == [0, 10, None, 20]
+    assert [[span["state"], span["from_s"], span["to_s"]] for span in gap[2]] == [["A", 0, 10], ["C", 10, 10], ["C", 20, 20]]
+    assert exact[0] == [0, 5, 7, 10, 15, 20] and exact[1] == exact[0]
+    assert [[span["state"], span["from_s"], span["to_s"]] for span in exact[2]] == [["A", 0, 7], ["B", 7, 10], ["C", 10, 20]]
+    assert empty == [0, 0]
+    assert most_samples <= 6000 and most_spans <= 4000
+
+
+def test_the_window_stays_within_the_run(page):
+    found = run_module(
+        page,
+        """
+        let last = 100;
+        const shown = new TimeWindow(() => [0, last]);
+        const at = () => shown.range_s().map((one) => Math.round(100 * one) / 100).join(' ');
+        const seen = [at()];
+        shown.show(20, 40); seen.push(at());
+        shown.zoom(0.5, 20); seen.push(at());
+        shown.move(-500); seen.push(at());
+        shown.move(500); seen.push(at());
+        last = 200; seen.push(at());
+        shown.zoom(0.0001); seen.push(at());
+        shown.zoom(1e9); seen.push(at() + shown.isWhole);
+        shown.show(30, 30.01); seen.push(at());
+        shown.reset(); seen.push(at());
+        return seen;
+        """,
+    )
+    assert found == [
+        "0 100", "20 40", "20 30", "0 10", "90 100",
+        # It was at the end, and goes on with the run.
+        "190 200", "199 200", "0 200true", "30 31", "0 200",
+    ]
