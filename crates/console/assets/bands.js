@@ -19,15 +19,17 @@ export class Bands {
   /**
    * @param {HTMLElement} place
    * @param {Store} store
+   * @param {(robot: string) => boolean} isShown
    */
-  constructor(place, store) {
+  constructor(place, store, isShown) {
     this.place = place;
     this.store = store;
+    this.isShown = isShown;
   }
 
   render() {
     const width = this.place.clientWidth;
-    const { states } = this.store.history;
+    const states = new Map([...this.store.history.states].filter(([robot]) => this.isShown(robot)));
     const [first_s, last_s] = this.store.history.range_s();
     const inner = width - GUTTER_PX - MARGIN_PX;
     if (inner <= 0) return;
@@ -65,7 +67,7 @@ export class Bands {
   }
 
   words() {
-    const now = [...this.store.history.states].map(([robot, { emotion, behavior }]) =>
+    const now = [...this.store.history.states].filter(([robot]) => this.isShown(robot)).map(([robot, { emotion, behavior }]) =>
       [robot, emotion.at(-1)?.state, behavior.at(-1)?.state].join(" "),
     );
     return `Emotion and behavior over time; last: ${now.join("; ")}`;

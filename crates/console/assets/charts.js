@@ -2,9 +2,10 @@
 // A state variable of the robots over simulated time.
 
 import { robotColor } from "./palette.js";
+import { rank } from "./roster.js";
 import { onThemeChange, readTheme } from "./theme.js";
 import { short } from "./units.js";
-import { html, render } from "./vendor/lit-html.js";
+import { html, nothing, render } from "./vendor/lit-html.js";
 import uPlot from "./vendor/uPlot.esm.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -14,15 +15,26 @@ export const GUTTER_PX = 76;
 /** Space on the right. */
 export const MARGIN_PX = 24;
 
+/** Robots that are named in the list of variables; of more, their number. */
+const MOST_NAMED = 3;
+/** Robots that are shown before anybody has chosen: as many as have a color of their own. */
+const FIRST_SHOWN = 8;
+
 export class Charts {
   /**
    * @param {{select: HTMLElement, chart: HTMLElement}} places
    * @param {Store} store
+   * @param {() => void} onChoose another choice of robots
    */
-  constructor({ select, chart }, store) {
+  constructor({ select, chart }, store, onChoose) {
     this.select = select;
     this.chart = chart;
     this.store = store;
+    this.onChoose = onChoose;
+    /** The robots that a person has chosen. @type {Set<string> | null} */
+    this.chosen = null;
+    /** What the plot shows, to draw nothing twice. */
+    this.drawn = "";
     this.variable = "";
     /** @type {uPlot | null} */
     this.plot = null;
@@ -46,11 +58,34 @@ export class Charts {
     this.plot?.destroy();
     this.plot = null;
     this.made = "";
+    this.drawn = "";
+  }
+
+  /** @param {string} robot */
+  isShown(robot) {
+    return this.chosen ? this.chosen.has(robot) : rank(robot) < FIRST_SHOWN;
+  }
+
+  /**
+   * @param {string[]} robots all that can be shown
+   * @param {(robot: string) => boolean} isChosen
+   */
+  choose(robots, isChosen) {
+    this.chosen = new Set(robots.filter(isChosen));
+    this.render();
+    this.onChoose();
+  }
+
+  /** The series of the robots that are shown. */
+  series() {
+    const robots = this.store.history.variables.get(this.variable) ?? new Map();
+    return new Map([...robots].filter(([robot]) => this.isShown(robot)));
   }
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.chart;
     if (width > 0 && height > 0) this.plot?.setSize({ width, height });
+    if (!this.plot) this.render();
   }
 
   render() {
@@ -58,13 +93,16 @@ export class Charts {
     const names = [...history.variables.keys()].sort();
     if (!history.variables.has(this.variable)) this.variable = liveliest(history) ?? "";
     this.renderSelect(names);
-    const robots = history.variables.get(this.variable);
-    const { clientWidth: width, clientHeight: height } = this.chart;
+    const robots = this.series();
+    if (robots.size === 0) return this.forget();
 
-    if (!robots || width === 0 || height === 0) {
-      if (!robots) this.forget();
-      return;
-    }
+    const { frame, mode } = this.store;
+    const cursor_s = mode === "recording" ? frame?.time_s : undefined;
+    const drawn = [this.variable, ...robots.keys(), frame?.epoch, history.times_s.length, ...history.range_s(), cursor_s].join("\n");
+    if (drawn === this.drawn) return;
+
+    const { clientWidth: width, clientHeight: height } = this.chart;
+    if (width === 0 || height === 0) return;
 
     const made = [this.variable, ...robots.keys()].join("\n");
     if (made !== this.made) {
@@ -81,6 +119,7 @@ export class Charts {
       this.cursor();
     });
 
+    this.drawn = drawn;
     const now = [...robots].map(([robot, values]) => `${robot} ${short(values.at(-1) ?? NaN)}`);
     this.chart.setAttribute("aria-label", `${this.variable} over time; last: ${now.join(", ")}`);
   }
@@ -98,9 +137,28 @@ export class Charts {
     const shown = mode === "recording" && frame ? history.indexAt(frame.time_s) : history.times_s.length - 1;
     const index = this.pointed ?? shown;
 
-    return [...(history.variables.get(this.variable) ?? [])].map(
+    return [...this.series()].map(
       ([robot, values]) => html`<li>${dot(robotColor(robot))}${robot} <b>${short(values[index] ?? NaN, 3)}</b></li>`,
     );
+  }
+
+  /** The choice of robots, which says how many are shown. */
+  chooser() {
+    const all = [...(this.store.history.variables.get(this.variable)?.keys() ?? [])];
+    const shown = all.filter((robot) => this.isShown(robot));
+    if (all.length < 2) return nothing;
+
+    const toggle = (/** @type {string} */ robot) => this.choose(all, (one) => (one === robot ? !this.isShown(one) : this.isShown(one)));
+    return html`
+      <details class="chooser" data-testid="chart-robots"><summary>${shown.length} of ${all.length} robots</summary>
+        <div class="choices" role="group" aria-label="Robots that are shown">
+          <div class="row"><button type="button" data-testid="chart-all" @click=${() => this.choose(all, () => true)}>All</button>
+            <button type="button" data-testid="chart-none" @click=${() => this.choose(all, () => false)}>None</button></div>
+          ${all.map(
+            (robot) => html`<label class="check"><input type="checkbox" .checked=${this.isShown(robot)}
+              @change=${() => toggle(robot)} />${dot(robotColor(robot))}${robot}</label>`,
+          )}
+        </div></details>`;
   }
 
   /** @param {string[]} names */
@@ -110,7 +168,11 @@ export class Charts {
       this.render();
     };
 
-    const robots = (/** @type {string} */ name) => [...(this.store.history.variables.get(name)?.keys() ?? [])].join(", ");
+    const { history } = this.store;
+    const robots = (/** @type {string} */ name) => {
+      const all = [...(history.variables.get(name)?.keys() ?? [])];
+      return all.length > MOST_NAMED ? `${all.length} robots` : all.join(", ");
+    };
 
     render(
       html`
@@ -118,7 +180,9 @@ export class Charts {
           <select data-testid="chart-variable" @change=${choose}>
             ${names.map((name) => html`<option value=${name} ?selected=${name === this.variable}>${name} (${robots(name)})</option>`)}
           </select></label>
+        ${this.chooser()}
         <span class="muted" ?hidden=${names.length > 0}>No robot has published a number yet.</span>
+        <span class="muted" ?hidden=${history.dropped === 0}>${history.dropped} variables more are not kept.</span>
         <ul class="key">${this.key()}</ul>`,
       this.select,
     );

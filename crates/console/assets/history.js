@@ -9,9 +9,11 @@
 
 /** Most samples; beyond, every second one is dropped, so that the whole run stays visible. */
 const MOST_SAMPLES = 6000;
+/** Most numbers of all series together: with many robots there are fewer samples of each, and no robot is left out. */
+const MOST_NUMBERS = 3_000_000;
 const MOST_SPANS = 1000;
 /** Most variables of all robots: a robot can publish any number of names. */
-const MOST_VARIABLES = 256;
+const MOST_VARIABLES = 16_384;
 
 export class History {
   constructor() {
@@ -29,6 +31,8 @@ export class History {
     this.states = new Map();
     /** @type {number} */
     this.variableCount = 0;
+    /** How many variables are not kept, because there are too many. @type {number} */
+    this.dropped = 0;
   }
 
   /**
@@ -51,7 +55,8 @@ export class History {
     }
 
     this.align();
-    if (this.times_s.length > MOST_SAMPLES) this.thin();
+    const most = Math.min(MOST_SAMPLES, MOST_NUMBERS / (this.variableCount + 2 * this.tracks.size));
+    if (this.times_s.length > Math.max(2, most)) this.thin();
   }
 
   /** @param {Pick<RobotFrame, "name" | "location">} robot */
@@ -70,6 +75,7 @@ export class History {
   series(variable, robot) {
     const robots = this.variables.get(variable) ?? new Map();
     let values = robots.get(robot);
+    if (!values && this.variableCount >= MOST_VARIABLES) this.dropped += 1;
     if (!values && this.variableCount < MOST_VARIABLES) {
       this.variableCount += 1;
       values = this.unknown();
