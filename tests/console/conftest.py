@@ -27,10 +27,10 @@ def launch(tmp_path):
     """Starts launches and ends them with the test."""
     started = []
 
-    def start(**options):
+    def start(kind=Launch, **options):
         folder = tmp_path / f"launch-{len(started)}"
         folder.mkdir()
-        started.append(Launch(folder, **options))
+        started.append(kind(folder, **options))
         return started[-1]
 
     yield start

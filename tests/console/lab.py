@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import os
 import pathlib
 import re
@@ -110,7 +111,7 @@ class Launch:
         }
 
         self.simulator = self.start("cars-sim", scenario, "--out", folder / "runs", "--paused", "--no-verdict", *options)
-        self.robots = {name: self.start(f"cars-{name.lower()}", "--name", name) for name in robots}
+        self.robots = self.start_robots(robots)
         self.address = self.console(knows_folder)
         eventually("the robots", lambda: (self.status() or {}).get("phase") == "ready")
 
@@ -121,6 +122,13 @@ class Launch:
         """Starts a console and returns its address. The launcher tells it the run's folder; on another machine there is none."""
         folder = ("--folder", self.run_folder) if knows_folder else ()
         return start_console(self.processes, *folder, environment=self.environment)
+    def start_robots(self, names):
+        return {name: self.start(f"cars-{name.lower()}", "--name", name) for name in names}
+
+    def control(self, *request):
+        """Sends a request to the simulator, as a person does."""
+        command = [BIN / "cars", "ctl", *request, "--run", self.RUN, "--connect", self.endpoint]
+        subprocess.run(command, check=True, capture_output=True, timeout=PATIENCE_S, cwd=self.folder)
 
     def kill(self, robot):
         self.robots[robot].send_signal(signal.SIGKILL)
@@ -154,3 +162,27 @@ class Launch:
 
     def end(self):
         self.processes.end()
+
+
+class Crowd(Launch):
+    """Many robots on a wide field: Butler and refillers, all refillers in one process."""
+
+    def __init__(self, folder, robots=64, guests=1000, options=()):
+        names = ["Butler", *(f"Leguin{number}" for number in range(1, robots))]
+        side = math.ceil(math.sqrt(robots))
+        width = f"{max(8 * side, math.ceil(1.5 * math.sqrt(guests)))} m"
+        lines = ["seed = 2002", 'duration = "100000 s"', "[field]", f'size = ["{width}", "{width}"]', "[guests]", f"count = {guests}"]
+        lines += ["[[obstacle]]", 'at = ["2 ft", "2 ft"]']
+        for number, name in enumerate(names):
+            row, column = divmod(number, side)
+            lines += ["[[robot]]", f'name = "{name}"', f'at = ["{8 * column + 4} m", "{8 * row + 4} m"]']
+        scenario = folder / "crowd.toml"
+        scenario.write_text("\n".join(lines) + "\n")
+
+        # What is looked at is the page: the recording of a crowd would only be work for the machine.
+        super().__init__(folder, scenario, names, ("--set", "record.frames=false", *options))
+
+    def start_robots(self, names):
+        butler, *refillers = names
+        several = [argument for name in refillers for argument in ("--name", name)]
+        return {butler: self.start("cars-butler", "--name", butler), "refillers": self.start("cars-leguin", *several)}

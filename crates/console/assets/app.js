@@ -8,10 +8,12 @@ import { Controls, renderAwaiting } from "./controls.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
 import { Hover } from "./hover.js";
+import { classesIn } from "./known.js";
 import { renderEmotions } from "./legend.js";
 import { LogView } from "./log.js";
 import { Notices } from "./notices.js";
 import { Panels } from "./panels.js";
+import { picture } from "./picture.js";
 import { Plan } from "./plan.js";
 import { Player } from "./recording.js";
 import { renderScrub } from "./scrub.js";
@@ -119,11 +121,20 @@ const panels = new Panels(box("panels"), store, units, {
   send: sendCommand,
   choose,
 });
+store.on("epoch", async () => {
+  if (!store.isLive) return;
+  const answer = await connection.control({ do: "setup" });
+  if (answer.answer === "setup") panels.classes = classesIn(answer.scenario);
+  markStale("panels");
+});
 const log = new LogView(box("panel-log"), store, ({ epoch, tick }) => player.seekIn(epoch, tick));
 const shownTime = new TimeWindow(() => store.history.range_s());
 const seekTime = (/** @type {number} */ time_s) => player.seekTime(time_s);
-const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, store, shownTime, seekTime);
-const bands = new Bands(box("bands"), store, shownTime, seekTime);
+const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, store, shownTime, {
+  seek: seekTime,
+  onChoose: () => bands.render(),
+});
+const bands = new Bands(box("bands"), store, shownTime, { seek: seekTime, isShown: (robot) => charts.isShown(robot) });
 const diagram = new DiagramView(box("panel-diagram"), player);
 const voice = new Voice(store);
 
@@ -136,8 +147,9 @@ function choose(robot) {
   panels.render();
 
   if (!chosen) return;
-  const panel = document.querySelector(`[data-testid="panel-${CSS.escape(chosen)}"]`);
-  panel?.scrollIntoView({ block: "nearest" });
+  for (const part of ["line", "panel"]) {
+    document.querySelector(`[data-testid="${part}-${CSS.escape(chosen)}"]`)?.scrollIntoView({ block: "nearest" });
+  }
 }
 
 let openTab = "log";
@@ -145,6 +157,7 @@ const tabList = tabs(box("tabs"), (name) => {
   openTab = name;
   document.body.dataset.tab = name;
   setup.open(name === "setup");
+  if (name === "log") drawLog();
   if (name === "log") log.shown();
   if (name === "charts") [charts, bands].forEach((view) => view.render());
   if (name === "diagram") diagram.render();
@@ -192,6 +205,7 @@ function drawBar() {
 }
 
 function drawLog() {
+  if (openTab !== "log") return;
   if (player.isLive) log.showUntil(null);
   else if (player.tick >= 0) log.showUntil({ epoch: player.epoch, tick: player.tick });
   log.render();
@@ -297,6 +311,10 @@ box("link").addEventListener("click", async () => {
 });
 box("picture").addEventListener("click", async () => {
   download(await plan.picture(), `${store.run}-tick-${store.frame?.tick ?? 0}.png`);
+});
+box("vector").addEventListener("click", () => {
+  const svg = new Blob([picture(plan, store.panels)], { type: "image/svg+xml" });
+  download(svg, `${store.run}-tick-${store.frame?.tick ?? 0}.svg`);
 });
 box("full-screen").addEventListener("click", () => {
   if (document.fullscreenElement) document.exitFullscreen();

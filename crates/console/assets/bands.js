@@ -23,19 +23,20 @@ export class Bands {
    * @param {HTMLElement} place
    * @param {Store} store
    * @param {import("./window.js").TimeWindow} shown
-   * @param {(time_s: number) => void} seek
+   * @param {{seek: (time_s: number) => void, isShown: (robot: string) => boolean}} ways to seek, and the robots that are chosen
    */
-  constructor(place, store, shown, seek) {
+  constructor(place, store, shown, { seek, isShown }) {
     this.place = place;
     this.store = store;
     this.shown = shown;
+    this.isShown = isShown;
     this.drawing = place.appendChild(document.createElement("div"));
     steer(place, shown, { left_px: GUTTER_PX, right_px: MARGIN_PX, seek });
   }
 
   render() {
     const width = this.place.clientWidth;
-    const { states } = this.store.history;
+    const states = new Map([...this.store.history.states].filter(([robot]) => this.isShown(robot)));
     const [first_s, last_s] = this.shown.range_s();
     const inner = width - GUTTER_PX - MARGIN_PX;
     if (inner <= 0) return;
@@ -75,7 +76,7 @@ export class Bands {
   }
 
   words() {
-    const now = [...this.store.history.states].map(([robot, { emotion, behavior }]) =>
+    const now = [...this.store.history.states].filter(([robot]) => this.isShown(robot)).map(([robot, { emotion, behavior }]) =>
       [robot, emotion.at(-1)?.state, behavior.at(-1)?.state].join(" "),
     );
     return `Emotion and behavior over time; last: ${now.join("; ")}`;

@@ -2,10 +2,11 @@
 // A state variable of the robots over simulated time.
 
 import { robotColor } from "./palette.js";
+import { rank } from "./roster.js";
 import { onThemeChange, readTheme } from "./theme.js";
 import { short } from "./units.js";
 import { steer } from "./window.js";
-import { html, render } from "./vendor/lit-html.js";
+import { html, nothing, render } from "./vendor/lit-html.js";
 import uPlot from "./vendor/uPlot.esm.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -15,18 +16,30 @@ export const GUTTER_PX = 76;
 /** Space on the right. */
 export const MARGIN_PX = 24;
 
+/** Robots that are named in the list of variables; of more, their number. */
+const MOST_NAMED = 3;
+/** Robots that are shown before anybody has chosen: as many as have a color of their own. */
+const FIRST_SHOWN = 8;
+
 export class Charts {
   /**
    * @param {{select: HTMLElement, chart: HTMLElement}} places
    * @param {Store} store
    * @param {import("./window.js").TimeWindow} shown
-   * @param {(time_s: number) => void} seek
+   * @param {{seek: (time_s: number) => void, onChoose: () => void}} ways to seek, and what is done at another choice of robots
    */
-  constructor({ select, chart }, store, shown, seek) {
+  constructor({ select, chart }, store, shown, { seek, onChoose }) {
     this.select = select;
     this.chart = chart;
     this.store = store;
     this.shown = shown;
+    this.onChoose = onChoose;
+    /** The robots that a person has chosen. @type {Set<string> | null} */
+    this.chosen = null;
+    /** What the plot shows, to draw nothing twice. */
+    this.drawn = "";
+    /** The history that it is of. @type {import("./history.js").History | null} */
+    this.drawnOf = null;
     this.variable = "";
     /** @type {uPlot | null} */
     this.plot = null;
@@ -51,11 +64,34 @@ export class Charts {
     this.plot?.destroy();
     this.plot = null;
     this.made = "";
+    this.drawn = "";
+  }
+
+  /** @param {string} robot */
+  isShown(robot) {
+    return this.chosen ? this.chosen.has(robot) : rank(robot) < FIRST_SHOWN;
+  }
+
+  /**
+   * @param {string[]} robots all that can be shown
+   * @param {(robot: string) => boolean} isChosen
+   */
+  choose(robots, isChosen) {
+    this.chosen = new Set(robots.filter(isChosen));
+    this.render();
+    this.onChoose();
+  }
+
+  /** The series of the robots that are shown. */
+  series() {
+    const robots = this.store.history.variables.get(this.variable) ?? new Map();
+    return new Map([...robots].filter(([robot]) => this.isShown(robot)));
   }
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.chart;
     if (width > 0 && height > 0) this.plot?.setSize({ width, height });
+    if (!this.plot) this.render();
   }
 
   render() {
@@ -63,13 +99,17 @@ export class Charts {
     const names = [...history.variables.keys()].sort();
     if (!history.variables.has(this.variable)) this.variable = liveliest(history) ?? "";
     this.renderSelect(names);
-    const robots = history.variables.get(this.variable);
-    const { clientWidth: width, clientHeight: height } = this.chart;
+    const robots = this.series();
+    if (robots.size === 0) return this.forget();
 
-    if (!robots || width === 0 || height === 0) {
-      if (!robots) this.forget();
-      return;
-    }
+    const { frame, isChosenTick } = this.store;
+    const cursor_s = isChosenTick ? frame?.time_s : undefined;
+    const [first_s, last_s] = this.shown.range_s();
+    const drawn = [this.variable, ...robots.keys(), history.changes, first_s, last_s, cursor_s].join("\n");
+    if (drawn === this.drawn && history === this.drawnOf) return;
+
+    const { clientWidth: width, clientHeight: height } = this.chart;
+    if (width === 0 || height === 0) return;
 
     const made = [this.variable, ...robots.keys()].join("\n");
     if (made !== this.made) {
@@ -79,13 +119,14 @@ export class Charts {
       this.chart.setAttribute("role", "img");
     }
 
-    const [first_s, last_s] = this.shown.range_s();
     this.plot?.setData([history.times_s, ...robots.values()], false);
     this.plot?.batch(() => {
       this.plot?.setScale("x", { min: first_s, max: last_s });
       this.cursor();
     });
 
+    this.drawn = drawn;
+    this.drawnOf = history;
     const now = [...robots].map(([robot, values]) => `${robot} ${short(values.at(-1) ?? NaN)}`);
     this.chart.setAttribute("aria-label", `${this.variable} over time; last: ${now.join(", ")}`);
   }
@@ -108,9 +149,28 @@ export class Charts {
     const shown = isChosenTick && frame ? history.indexAt(frame.time_s) : history.times_s.length - 1;
     const index = this.pointed ?? shown;
 
-    return [...(history.variables.get(this.variable) ?? [])].map(
+    return [...this.series()].map(
       ([robot, values]) => html`<li>${dot(robotColor(robot))}${robot} <b>${short(values[index] ?? NaN, 3)}</b></li>`,
     );
+  }
+
+  /** The choice of robots, which says how many are shown. */
+  chooser() {
+    const all = [...(this.store.history.variables.get(this.variable)?.keys() ?? [])];
+    const shown = all.filter((robot) => this.isShown(robot));
+    if (all.length < 2) return nothing;
+
+    const toggle = (/** @type {string} */ robot) => this.choose(all, (one) => (one === robot ? !this.isShown(one) : this.isShown(one)));
+    return html`
+      <details class="chooser" data-testid="chart-robots"><summary>${shown.length} of ${all.length} robots</summary>
+        <div class="choices" role="group" aria-label="Robots that are shown">
+          <div class="row"><button type="button" data-testid="chart-all" @click=${() => this.choose(all, () => true)}>All</button>
+            <button type="button" data-testid="chart-none" @click=${() => this.choose(all, () => false)}>None</button></div>
+          ${all.map(
+            (robot) => html`<label class="check"><input type="checkbox" .checked=${this.isShown(robot)}
+              @change=${() => toggle(robot)} />${dot(robotColor(robot))}${robot}</label>`,
+          )}
+        </div></details>`;
   }
 
   /** @param {string[]} names */
@@ -120,7 +180,11 @@ export class Charts {
       this.render();
     };
 
-    const robots = (/** @type {string} */ name) => [...(this.store.history.variables.get(name)?.keys() ?? [])].join(", ");
+    const { history } = this.store;
+    const robots = (/** @type {string} */ name) => {
+      const all = [...(history.variables.get(name)?.keys() ?? [])];
+      return all.length > MOST_NAMED ? `${all.length} robots` : all.join(", ");
+    };
 
     render(
       html`
@@ -128,9 +192,11 @@ export class Charts {
           <select data-testid="chart-variable" @change=${choose}>
             ${names.map((name) => html`<option value=${name} ?selected=${name === this.variable}>${name} (${robots(name)})</option>`)}
           </select></label>
+        ${this.chooser()}
         <span class="muted" ?hidden=${names.length > 0}>No robot has published a number yet.</span>
         <button type="button" data-testid="window-all" title="show the whole run (double click)" ?hidden=${this.shown.isWhole}
           @click=${() => this.shown.reset()}>Whole run</button>
+        <span class="muted" ?hidden=${history.dropped === 0}>${history.dropped} variables more are not kept.</span>
         <ul class="key">${this.key()}</ul>`,
       this.select,
     );

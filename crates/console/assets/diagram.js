@@ -35,6 +35,8 @@ export class DiagramView {
     this.picture = place.appendChild(document.createElement("div"));
     this.picture.className = "diagram";
     this.picture.dataset.testid = "diagram";
+    // It scrolls, also by keys.
+    this.picture.tabIndex = 0;
     this.picture.addEventListener("click", (event) => this.seek(event));
     new ResizeObserver(() => this.render()).observe(this.picture);
   }

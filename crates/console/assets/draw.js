@@ -10,7 +10,11 @@ import { barrier, cross, disk, envelope, line, nose, ring, text } from "./shapes
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./history.js").Track} Track */
 /** @typedef {{x: number, y: number}} Place */
-/** @typedef {{context: CanvasRenderingContext2D, camera: Camera, theme: Theme}} Pen */
+/** A canvas, or what writes SVG in its place. @typedef {import("./shapes.js").Paper} Paper */
+/** @typedef {{context: Paper, camera: Camera, theme: Theme}} Pen */
+/** How a robot looks, wherever it is and goes.
+ * @typedef {{letters: string, radius: number, presence: RobotFrame["presence"], emotion: string, isLate: boolean, isChosen: boolean}} Look */
+/** What is drawn of a robot beside its body. @typedef {Pick<RobotFrame, "presence" | "blocked" | "direction_rad" | "speed_mps">} Drawn */
 
 const FULL_TURN = 2 * Math.PI;
 /** Smallest radius at which the letters in a robot can be read. */
@@ -19,11 +23,19 @@ const SMALLEST_ROBOT_PX = 9;
 const RING_PX = 4.5;
 /** Guests with a smaller radius are drawn as squares, which are faster than circles. */
 const SMALLEST_ROUND_PX = 1.7;
+/** Guests with a larger radius are pale, with an edge, so that robots stand out among them. */
+const SMALLEST_PALE_PX = 5;
 /** More small guests than this are drawn as two crossed bars: twice as fast as circles, and hardly different. */
 const MANY_GUESTS = 2000;
 const LARGEST_CROSS_PX = 5;
 /** Circles per path: one path for all is slow, and so is one for each. */
 const CIRCLES_IN_PATH = 60;
+
+/** What is around the field. @param {Pen} pen */
+export function outside({ context, camera, theme }) {
+  context.fillStyle = theme.outside;
+  context.fillRect(0, 0, camera.width_px, camera.height_px);
+}
 
 /**
  * The field with lines at whole steps.
@@ -94,15 +106,32 @@ export function guests({ context, camera, theme }, places_m, body_m) {
   context.fillStyle = theme.guest;
   if (radius < SMALLEST_ROUND_PX) squares(context, seen, Math.max(0.75, radius));
   else if (seen.length / 2 > MANY_GUESTS && radius < LARGEST_CROSS_PX) crosses(context, seen, radius);
-  else circles(context, seen, radius);
+  else if (radius < SMALLEST_PALE_PX) circles(context, seen, radius, () => context.fill());
+  else guestCircles({ context, theme }, seen, radius);
 }
 
-/** @type {(context: CanvasRenderingContext2D, at: number[], radius: number) => void} */
+/**
+ * Pale circles with an edge, which has the contrast.
+ * @param {Omit<Pen, "camera">} pen
+ * @param {number[]} at x and y in turn
+ * @param {number} radius
+ */
+export function guestCircles({ context, theme }, at, radius) {
+  context.fillStyle = theme.guestFill;
+  context.strokeStyle = theme.guest;
+  context.lineWidth = 1.5;
+  circles(context, at, radius - 0.75, () => {
+    context.fill();
+    context.stroke();
+  });
+}
+
+/** @type {(context: Paper, at: number[], radius: number) => void} */
 function squares(context, at, radius) {
   for (let i = 0; i < at.length; i += 2) context.fillRect(at[i] - radius, at[i + 1] - radius, 2 * radius, 2 * radius);
 }
 
-/** @type {(context: CanvasRenderingContext2D, at: number[], radius: number) => void} */
+/** @type {(context: Paper, at: number[], radius: number) => void} */
 function crosses(context, at, radius) {
   const narrow = 0.55 * radius;
   for (let i = 0; i < at.length; i += 2) {
@@ -111,15 +140,15 @@ function crosses(context, at, radius) {
   }
 }
 
-/** @type {(context: CanvasRenderingContext2D, at: number[], radius: number) => void} */
-function circles(context, at, radius) {
+/** @type {(context: Paper, at: number[], radius: number, paint: () => void) => void} */
+function circles(context, at, radius, paint) {
   for (let first = 0; first < at.length; first += 2 * CIRCLES_IN_PATH) {
     context.beginPath();
     for (let i = first; i < Math.min(at.length, first + 2 * CIRCLES_IN_PATH); i += 2) {
       context.moveTo(at[i] + radius, at[i + 1]);
       context.arc(at[i], at[i + 1], radius, 0, FULL_TURN);
     }
-    context.fill();
+    paint();
   }
 }
 
@@ -156,40 +185,59 @@ export function trail({ context, camera }, name, track, from, to, end) {
   context.globalAlpha = 1;
 }
 
-/**
- * A red circle with the initials, in a ring in the color of the emotion, and marks around it. A draft of the set-up has no emotion.
- * @param {Pen} pen
- * @param {Pick<RobotFrame, "name" | "emotion_state" | "blocked" | "presence" | "direction_rad" | "speed_mps">} robot
- * @param {Place} place
- * @param {number} body_m
- * @param {{isLate: boolean, isChosen: boolean}} marks
- */
-export function robot({ context, camera, theme }, robot, place, body_m, { isLate, isChosen }) {
-  const x = camera.x(place.x);
-  const y = camera.y(place.y);
-  const radius = Math.max(SMALLEST_ROBOT_PX, (body_m * camera.scale) / 2);
-  if (isOutside(camera, x, y, 3 * radius)) return;
+/** How a robot looks. A draft of the set-up has no emotion. @type {(robot: Pick<RobotFrame, "name" | "emotion_state" | "presence">, camera: {scale: number}, body_m: number, marks: {isLate: boolean, isChosen: boolean}) => Look} */
+export function lookOf({ name, emotion_state, presence }, camera, body_m, { isLate, isChosen }) {
+  const letters = initials(name);
+  const least = letters.length > 2 ? SMALLEST_ROBOT_PX + 1 : SMALLEST_ROBOT_PX;
+  const radius = Math.max(least, (body_m * camera.scale) / 2);
+  return { letters, radius, presence, emotion: emotion_state, isLate, isChosen };
+}
 
-  const isHere = robot.presence === "here";
+/** Half the side of a square around a robot's look. @param {Look} look */
+export function reach({ radius }) {
+  return Math.ceil(radius * 1.15 + RING_PX + 8);
+}
+
+/**
+ * A red circle with the initials, in a ring in the color of the emotion, and rings around it.
+ * @param {Omit<Pen, "camera">} pen
+ * @param {Look} look
+ * @param {number} x
+ * @param {number} y
+ */
+export function body({ context, theme }, { letters, radius, presence, emotion, isLate, isChosen }, x, y) {
+  const isHere = presence === "here";
   const outside = radius + RING_PX;
   if (isChosen) ring(context, x, y, outside + 5, theme.accent, 2);
   if (isLate && isHere) ring(context, x, y, outside + 2.5, theme.warning, 2.5, [4, 4]);
-  if (isHere && robot.emotion_state) {
+  if (isHere && emotion) {
     disk(context, x, y, outside, theme.muted);
-    disk(context, x, y, outside - 0.75, stateColors("emotion", robot.emotion_state).fill);
+    disk(context, x, y, outside - 0.75, stateColors("emotion", emotion).fill);
     disk(context, x, y, radius + 0.75, theme.field);
   }
   disk(context, x, y, radius, isHere ? theme.robot : theme.absentFill);
-  if (!isHere) ring(context, x, y, radius - 1, robot.presence === "lost" ? theme.absent : theme.robot, 2.25, [3, 3]);
-  if (isHere && robot.speed_mps > 0) nose(context, x, y, outside, robot.direction_rad, theme.robot);
-  if (isHere && robot.blocked) barrier(context, x, y, outside, robot.direction_rad, theme.warning);
+  if (!isHere) ring(context, x, y, radius - 1, presence === "lost" ? theme.absent : theme.robot, 2.25, [3, 3]);
   context.fillStyle = isHere ? theme.robotText : theme.absent;
-  const letters = initials(robot.name);
-  context.font = `650 ${Math.max(10, Math.min(22, radius * (letters.length > 2 ? 0.75 : 0.95)))}px ${theme.font}`;
+  const size = letters.length > 2 ? Math.max(8.5, radius * 0.75) : Math.max(10, radius * 0.95);
+  context.font = `650 ${Math.min(22, size)}px ${theme.font}`;
   context.textAlign = "center";
   context.textBaseline = "middle";
   context.fillText(letters, x, y + 0.5);
-  if (robot.presence === "lost") cross(context, x, y, radius * 1.15, theme.absent);
+  if (presence === "lost") cross(context, x, y, radius * 1.15, theme.absent);
+}
+
+/**
+ * Where a robot goes, and what is in its way.
+ * @param {Omit<Pen, "camera">} pen
+ * @param {Drawn} robot
+ * @param {Look} look
+ * @param {number} x
+ * @param {number} y
+ */
+export function course({ context, theme }, { presence, blocked, direction_rad, speed_mps }, { radius }, x, y) {
+  if (presence !== "here") return;
+  if (speed_mps > 0) nose(context, x, y, radius + RING_PX, direction_rad, theme.robot);
+  if (blocked) barrier(context, x, y, radius + RING_PX, direction_rad, theme.warning);
 }
 
 /**
@@ -279,6 +327,6 @@ export function scaleBar({ context, camera, theme }, length_m, label) {
 }
 
 /** @type {(camera: Camera, x: number, y: number, margin: number) => boolean} */
-function isOutside(camera, x, y, margin) {
+export function isOutside(camera, x, y, margin) {
   return x < -margin || y < -margin || x > camera.width_px + margin || y > camera.height_px + margin;
 }

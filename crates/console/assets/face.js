@@ -34,10 +34,12 @@ const FACES = {
 };
 
 /**
+ * The lines and areas of a face, each with its class, from the back to the front.
  * @param {Face} face
  * @param {number} intensity 0 to 1
+ * @returns {{name: string, d: string, opacity?: number}[]}
  */
-export function drawFace(face, intensity) {
+export function faceShapes(face, intensity) {
   const full = Object.hasOwn(FACES, face) ? FACES[face] : NEUTRAL;
   // Without intensity a face is neutral; a weak expression is made stronger, so that it is visible.
   const part = Math.sqrt(Math.min(1, Math.max(0, Number.isFinite(intensity) ? intensity : 0)));
@@ -47,13 +49,30 @@ export function drawFace(face, intensity) {
     )
   );
 
-  return svg`
-    <circle class="skin" cx="50" cy="50" r="45"></circle>
-    <path class="brow" d=${brow(m, 33, 1)}></path><path class="brow" d=${brow(m, 67, -1)}></path>
-    <ellipse class="eye" cx="34" cy="44" rx="5" ry=${m.eye}></ellipse><ellipse class="eye" cx="66" cy="44" rx="5" ry=${m.eye}></ellipse>
-    <path class="lid" d=${lid(m, 34)}></path><path class="lid" d=${lid(m, 66)}></path>
-    <path class="wrinkle" opacity=${m.nose} d="M43 54l4 3M57 54l-4 3M45 60l3 1M55 60l-3 1"></path>
-    <path class="mouth" d=${mouth(m)}></path>`;
+  return [
+    { name: "skin", d: ellipse(50, 50, 45, 45) },
+    { name: "brow", d: brow(m, 33, 1) },
+    { name: "brow", d: brow(m, 67, -1) },
+    { name: "eye", d: ellipse(34, 44, 5, m.eye) },
+    { name: "eye", d: ellipse(66, 44, 5, m.eye) },
+    { name: "lid", d: lid(m, 34) },
+    { name: "lid", d: lid(m, 66) },
+    { name: "wrinkle", d: "M43 54l4 3M57 54l-4 3M45 60l3 1M55 60l-3 1", opacity: m.nose },
+    { name: "mouth", d: mouth(m) },
+  ].filter(({ d, opacity }) => d && opacity !== 0);
+}
+
+/**
+ * @param {Face} face
+ * @param {number} intensity 0 to 1
+ */
+export function drawFace(face, intensity) {
+  return faceShapes(face, intensity).map(({ name, d, opacity }) => svg`<path class=${name} d=${d} opacity=${opacity ?? 1}></path>`);
+}
+
+/** @type {(x: number, y: number, rx: number, ry: number) => string} */
+function ellipse(x, y, rx, ry) {
+  return `M${x - rx} ${y}A${rx} ${ry} 0 1 1 ${x + rx} ${y}A${rx} ${ry} 0 1 1 ${x - rx} ${y}Z`;
 }
 
 /**

@@ -29,6 +29,8 @@ export class Gestures {
     this.pointers = new Map();
     this.travel_px = 0;
     this.isEditing = false;
+    /** What a touch does, as it was set last. */
+    this.action = "";
 
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
@@ -40,7 +42,9 @@ export class Gestures {
 
   /** One finger scrolls the page while the whole field is visible and not edited. */
   touch() {
-    this.canvas.style.touchAction = this.camera.isWhole && !this.client.editor.isActive ? "pan-y" : "none";
+    const action = this.camera.isWhole && !this.client.editor.isActive ? "pan-y" : "none";
+    if (action !== this.action) this.canvas.style.touchAction = action;
+    this.action = action;
   }
 
   /** @param {MouseEvent} event */

@@ -9,9 +9,11 @@
 
 /** Most samples; beyond, older ones are dropped where they are close together, so that the whole run stays visible. */
 const MOST_SAMPLES = 6000;
+/** Most numbers of all series together: with many robots there are fewer samples of each, and no robot is left out. */
+const MOST_NUMBERS = 3_000_000;
 const MOST_SPANS = 4000;
 /** Most variables of all robots: a robot can publish any number of names. */
-const MOST_VARIABLES = 256;
+const MOST_VARIABLES = 16_384;
 /** Most names of emotions that are listed: a robot can have any. */
 const MOST_EMOTIONS = 64;
 
@@ -35,6 +37,10 @@ export class History {
     this.variableCount = 0;
     /** Whether nothing is known of the time before the next sample. @type {boolean} */
     this.isBroken = false;
+    /** How many variables of the last sample are not kept, because there are too many. @type {number} */
+    this.dropped = 0;
+    /** How often it has changed. @type {number} */
+    this.changes = (this.changes ?? 0) + 1;
   }
 
   /** What comes next does not follow what was added last: the page was not connected in between. */
@@ -50,6 +56,7 @@ export class History {
   add(time_s, robots) {
     const last_s = this.times_s.at(-1) ?? -Infinity;
     if (time_s <= last_s) return;
+    this.changes += 1;
 
     const isBroken = this.isBroken;
     this.isBroken = false;
@@ -59,6 +66,7 @@ export class History {
     }
     this.times_s.push(time_s);
 
+    this.dropped = 0;
     for (const robot of robots) {
       this.place(robot);
       this.note(robot, time_s, isBroken);
@@ -68,7 +76,8 @@ export class History {
     }
 
     this.align();
-    if (this.times_s.length > MOST_SAMPLES) this.thin();
+    const most = Math.min(MOST_SAMPLES, MOST_NUMBERS / (this.variableCount + 2 * this.tracks.size));
+    if (this.times_s.length > Math.max(2, most)) this.thin();
   }
 
   /** @param {Pick<RobotFrame, "name" | "location">} robot */
@@ -87,6 +96,7 @@ export class History {
   series(variable, robot) {
     const robots = this.variables.get(variable) ?? new Map();
     let values = robots.get(robot);
+    if (!values && this.variableCount >= MOST_VARIABLES) this.dropped += 1;
     if (!values && this.variableCount < MOST_VARIABLES) {
       this.variableCount += 1;
       values = this.unknown();
@@ -119,6 +129,7 @@ export class History {
    * @param {number} time_s
    */
   cutFrom(time_s) {
+    this.changes += 1;
     const kept = this.indexAt(time_s, false) + 1;
     for (const values of [this.times_s, ...this.all()]) values.length = Math.min(values.length, kept);
     for (const { emotion, behavior } of this.states.values()) {

@@ -26,6 +26,8 @@ export class Motion {
     this.arrivedAt_ms = 0;
     this.length_ms = SHORTEST_MS;
     this.isMoving = false;
+    /** How far the fastest robot or guest moves in the glide, meters. */
+    this.farthest_m = 0;
   }
 
   /**
@@ -46,6 +48,32 @@ export class Motion {
     this.length_ms = isGlide ? length_ms(frame, leap, now_ms - this.arrivedAt_ms) : 0;
     this.arrivedAt_ms = now_ms;
     this.isMoving = true;
+    this.farthest_m = isGlide ? this.farthest(frame) : 0;
+  }
+
+  /** @param {WorldFrame} frame */
+  farthest(frame) {
+    let most = 0;
+    frame.guests.forEach(([x, y], i) => {
+      most = Math.max(most, Math.abs(x - this.from_m[2 * i]), Math.abs(y - this.from_m[2 * i + 1]));
+    });
+    for (const { name, location } of frame.robots) {
+      const from = this.robotsFrom.get(name) ?? location;
+      most = Math.max(most, Math.abs(location.x - from.x), Math.abs(location.y - from.y));
+    }
+
+    return most;
+  }
+
+  /**
+   * How far anything moves in a time, meters; infinitely far if a glide ends in it.
+   * @param {number} from_ms
+   * @param {number} to_ms
+   */
+  travel_m(from_ms, to_ms) {
+    if (!this.isMoving) return 0;
+    if (to_ms >= this.arrivedAt_ms + this.length_ms) return Infinity;
+    return (this.farthest_m * (to_ms - from_ms)) / this.length_ms;
   }
 
   /**

@@ -1,7 +1,10 @@
 // @ts-check
-// A panel for each robot. The page has no knowledge of particular robots: it renders the widgets that they publish.
+// A panel for each robot; of many, a list, and the panel of the one that is chosen. The page has no knowledge of particular
+// robots: it renders the widgets that they publish.
 
+import { generic, heldUp, intensityOf, lastCommands } from "./known.js";
 import { presence } from "./presence.js";
+import { RobotList } from "./robot-list.js";
 import { initials } from "./roster.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 import { drawWidget } from "./widgets.js";
@@ -10,8 +13,13 @@ import { drawWidget } from "./widgets.js";
 /** @typedef {import("./units.js").Units} Units */
 /** @typedef {import("./types/messages.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
+/** @typedef {import("./types/messages.js").Widget} Widget */
 
 const MOST_WIDGETS = 64;
+/** More robots than this are a list. */
+const MOST_PANELS = 4;
+/** Widgets that are folded, unless a panel has nothing else. */
+const DETAILS = ["table", "sparkline"];
 
 export class Panels {
   /**
@@ -27,14 +35,77 @@ export class Panels {
     this.actions = actions;
     /** @type {string | null} */
     this.chosen = null;
+    /** Robots whose details are unfolded. @type {Set<string>} */
+    this.unfolded = new Set();
+    /** Since when a robot's moves have been refused, simulated seconds. @type {Map<string, number>} */
+    this.blockedSince_s = new Map();
+    /** The class of each robot, if it is known. @type {Map<string, string>} */
+    this.classes = new Map();
+    this.list = new RobotList({ choose: (robot) => actions.choose(robot), changed: () => this.render() });
+    store.on("epoch", () => this.blockedSince_s.clear());
+    store.on("frame", () => this.note());
+  }
+
+  note() {
+    const { frame } = this.store;
+    for (const { name, blocked } of frame?.robots ?? []) {
+      const since_s = this.blockedSince_s.get(name) ?? Infinity;
+      if (!blocked) this.blockedSince_s.delete(name);
+      else if (frame) this.blockedSince_s.set(name, Math.min(since_s, frame.time_s));
+    }
   }
 
   render() {
     const robots = this.store.frame?.robots ?? [];
     const awaiting = this.store.awaiting();
-    this.place.classList.toggle("many", robots.length > 3);
+    const isMany = robots.length > MOST_PANELS;
+    const shown = isMany ? robots.filter(({ name }) => name === this.chosen) : robots;
+    this.place.classList.toggle("many", isMany);
+    this.place.classList.toggle("one-open", isMany && shown.length > 0);
+    if (isMany) this.list.render(robots.map((robot) => this.line(robot, awaiting)), this.chosen);
+
     const placeholder = html`<p class="panels-empty">Each robot's emotion, behavior and state appear here.</p>`;
-    render(robots.length ? robots.map((robot) => this.panel(robot, awaiting)) : placeholder, this.place);
+    const panels = robots.length ? shown.map((robot) => this.panel(robot, awaiting)) : placeholder;
+    render(html`${isMany ? this.list.place : nothing}${panels}`, this.place);
+  }
+
+  /**
+   * @param {RobotFrame} robot
+   * @param {import("./types/messages.js").Awaited[]} awaiting
+   * @returns {import("./robot-list.js").Line}
+   */
+  line(robot, awaiting) {
+    const { name, emotion_state, behavior_state } = robot;
+    const since_s = this.blockedSince_s.get(name) ?? Infinity;
+    const { words, badness } = heldUp(robot, awaiting, Math.max(0, (this.store.frame?.time_s ?? 0) - since_s));
+
+    return {
+      name,
+      emotion: emotion_state,
+      intensity: intensityOf(robot, this.store.panels.get(name)),
+      behavior: behavior_state,
+      held: words,
+      badness,
+      isAbsent: robot.presence !== "here",
+    };
+  }
+
+  /**
+   * What a panel shows, what it folds, and its buttons: the robot's own widgets, or else what is known of it.
+   * @param {RobotFrame} robot
+   * @returns {{widgets: Widget[], details: Widget[], buttons: Widget[]}}
+   */
+  content(robot) {
+    const own = this.store.panels.get(robot.name)?.widgets;
+    const all = (Array.isArray(own) ? own : []).slice(0, MOST_WIDGETS);
+    const buttons = all.filter((widget) => widget?.widget === "button");
+    const others = all.filter((widget) => widget?.widget !== "button");
+    if (others.length) return { ...split(others), buttons };
+
+    const { frame, log } = this.store;
+    const { epoch = 0, tick = 0 } = frame ?? {};
+    const known = { className: this.classes.get(robot.name) ?? "", commands: lastCommands(log, robot.name, epoch, tick), isBegun: tick > 0 };
+    return { ...generic(robot, known), buttons };
   }
 
   /**
@@ -46,24 +117,30 @@ export class Panels {
     // Nothing is known of a robot without its simulator.
     const seen = this.store.isPast ? "" : tone;
     const { name } = robot;
-    const own = this.store.panels.get(name)?.widgets;
-    const all = Array.isArray(own) && own.length ? own : generic(robot).widgets;
-    const widgets = all.slice(0, MOST_WIDGETS);
-    const [buttons, others] = split(widgets);
+    const { widgets, details, buttons } = this.content(robot);
     const send = (/** @type {string} */ command) => this.actions.send(name, command);
+    const fold = (/** @type {Event} */ event) => {
+      if (/** @type {HTMLDetailsElement} */ (event.target).open) this.unfolded.add(name);
+      else this.unfolded.delete(name);
+      this.render();
+    };
 
     return html`
       <section class="panel ${word} ${name === this.chosen ? "chosen" : ""}" data-testid="panel-${name}" aria-label=${name}>
         <header>
-          <button type="button" class="name" title="show on the plan" @click=${() => this.actions.choose(name)}>
-            <span class="initials" aria-hidden="true">${initials(name)}</span><h2>${name}</h2></button>
+          <button type="button" class="name" title=${name} aria-pressed=${name === this.chosen} @click=${() => this.actions.choose(name)}>
+            <span class="initials ${initials(name).length > 2 ? "three" : ""}" aria-hidden="true">${initials(name)}</span><h2>${name}</h2></button>
           <span class="presence ${seen}" title=${detail}><span class="dot ${seen}"></span><span
             data-testid="presence">${word}</span>${since ? html` <span class="since">${since}</span>` : nothing}</span>
         </header>
         <p class="where">${this.units.length(robot.location.x)}, ${this.units.length(robot.location.y)}
           <span>${this.units.speed(robot.speed_mps)}</span>
           ${robot.blocked ? html`<span class="blocked">blocked</span>` : nothing}</p>
-        <div class="widgets">${others.map((widget) => drawWidget(widget, send))}</div>
+        <div class="widgets">${widgets.map((widget) => drawWidget(widget, send))}</div>
+        ${details.length
+          ? html`<details class="details" data-testid="details" ?open=${this.unfolded.has(name)} @toggle=${fold}><summary>Details</summary>
+              <div class="widgets">${this.unfolded.has(name) ? details.map((widget) => drawWidget(widget, send)) : nothing}</div></details>`
+          : nothing}
         ${buttons.length && this.store.mode === "live" && !this.store.replayOf
           ? html`<div class="buttons" role="group" aria-label="Commands">${buttons.map((button) => drawWidget(button, send))}</div>`
           : nothing}
@@ -72,27 +149,11 @@ export class Panels {
 }
 
 /**
- * Separates the buttons, which are rendered in one row below the rest.
- * @param {Panel["widgets"]} widgets
+ * @param {Widget[]} all
+ * @returns {{widgets: Widget[], details: Widget[]}}
  */
-function split(widgets) {
-  const isButton = (/** @type {Panel["widgets"][0]} */ widget) => widget?.widget === "button";
-  return [widgets.filter(isButton), widgets.filter((widget) => !isButton(widget))];
-}
-
-/**
- * The panel of a robot without one, or without widgets: its published state.
- * @param {RobotFrame} robot
- * @returns {Panel}
- */
-function generic(robot) {
-  const show = (/** @type {unknown} */ value) =>
-    typeof value === "number" ? String(Number(value.toPrecision(5))) : value === true ? "yes" : value === false ? "no" : String(value);
-  return {
-    widgets: [
-      { widget: "badge", label: "emotion", text: robot.emotion_state, tone: "neutral" },
-      { widget: "badge", label: "behavior", text: robot.behavior_state, tone: "neutral" },
-      { widget: "table", rows: Object.entries(robot.state_variables).map(([name, value]) => [name, show(value)]) },
-    ],
-  };
+function split(all) {
+  const details = all.filter((widget) => DETAILS.includes(widget?.widget));
+  if (details.length === all.length) return { widgets: all, details: [] };
+  return { widgets: all.filter((widget) => !details.includes(widget)), details };
 }

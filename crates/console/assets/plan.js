@@ -6,6 +6,7 @@ import * as draw from "./draw.js";
 import { Flights } from "./flights.js";
 import { Gestures } from "./gestures.js";
 import { Motion } from "./motion.js";
+import { Ground, Sprites } from "./sprites.js";
 import { onThemeChange, readTheme } from "./theme.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -19,6 +20,8 @@ import { onThemeChange, readTheme } from "./theme.js";
 /** Samples in a trail. */
 const TRAIL_SAMPLES = 240;
 const CALM = matchMedia("(prefers-reduced-motion: reduce)");
+/** What has moved less far is not painted anew. */
+const LEAST_TRAVEL_PX = 0.25;
 /** The window of the frame rate. */
 const RATE_WINDOW_MS = 1000;
 
@@ -35,6 +38,12 @@ export class Plan {
     if (!context) throw new Error("this browser draws no canvas");
 
     this.canvas = canvas;
+    this.context = context;
+    /** CSS pixels. */
+    this.width_px = 1;
+    this.height_px = 1;
+    this.ground = new Ground();
+    this.sprites = new Sprites();
     this.store = store;
     this.units = units;
     this.editor = editor;
@@ -60,6 +69,7 @@ export class Plan {
     store.on("epoch", () => this.flights.clear());
     onThemeChange(() => {
       this.pen.theme = readTheme();
+      this.sprites.clear();
       this.touch();
     });
 
@@ -83,11 +93,15 @@ export class Plan {
   }
 
   resize() {
+    // Read here and nowhere else: reading them makes the browser lay the page out.
     const { clientWidth, clientHeight } = this.canvas;
+    this.width_px = clientWidth;
+    this.height_px = clientHeight;
     const ratio = Math.min(2, devicePixelRatio || 1);
     this.canvas.width = Math.max(1, Math.round(clientWidth * ratio));
     this.canvas.height = Math.max(1, Math.round(clientHeight * ratio));
-    this.pen.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.sprites.scale(ratio);
     this.aim();
     this.paint(performance.now());
   }
@@ -96,7 +110,7 @@ export class Plan {
   aim() {
     const field_m = this.editor.draft?.field_m ?? this.motion.to?.field_m;
     const isField = field_m && field_m[0] > 0 && field_m[1] > 0;
-    this.camera.fit(isField ? field_m : this.camera.field_m, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.camera.fit(isField ? field_m : this.camera.field_m, this.width_px, this.height_px);
   }
 
   /** @param {number} now_ms */
@@ -104,8 +118,14 @@ export class Plan {
     requestAnimationFrame((next_ms) => this.loop(next_ms));
     this.drawnAt_ms.push(now_ms);
     while (this.drawnAt_ms[0] < now_ms - RATE_WINDOW_MS) this.drawnAt_ms.shift();
-    if (this.isStale || this.motion.isMoving || this.flights.isMoving) this.paint(performance.now());
-    this.lastDraw_ms = performance.now();
+    if (this.isDue(performance.now())) this.paint(performance.now());
+    if (!this.motion.isMoving) this.lastDraw_ms = performance.now();
+  }
+
+  /** Whether anybody would see a difference. @param {number} now_ms */
+  isDue(now_ms) {
+    const travel_px = this.motion.travel_m(this.lastDraw_ms, now_ms) * this.camera.scale;
+    return this.isStale || this.flights.isMoving || travel_px >= LEAST_TRAVEL_PX;
   }
 
   /** Animation frames in the last second, including those that needed no painting. */
@@ -118,14 +138,13 @@ export class Plan {
     this.isStale = false;
     this.aim();
     this.gestures.touch();
-    const { context, theme } = this.pen;
+    this.motion.advance(now_ms);
     // The same frame has the same pixels, whatever was painted before.
-    context.save();
-    context.fillStyle = theme.outside;
-    context.fillRect(0, 0, this.camera.width_px, this.camera.height_px);
+    this.context.save();
     if (this.editor.draft) this.paintDraft(this.editor.draft);
     else if (this.motion.to) this.paintRun(this.motion.to, now_ms);
-    context.restore();
+    else draw.outside(this.pen);
+    this.context.restore();
   }
 
   /**
@@ -133,14 +152,22 @@ export class Plan {
    * @param {number} now_ms
    */
   paintRun(frame, now_ms) {
-    const { pen, motion } = this;
-    motion.advance(now_ms);
     this.flights.advance(Math.min(100, now_ms - this.lastDraw_ms), CALM.matches);
     this.lastDraw_ms = now_ms;
-    draw.field(pen, this.step_m());
+    this.ground.draw(this.pen, this.canvas, frame.obstacles, frame.body_m, this.step_m());
+    this.paintMoving(this.pen, frame, this.drawRobot);
+  }
+
+  /**
+   * All that moves, on the canvas or in a picture.
+   * @param {draw.Pen} pen
+   * @param {WorldFrame} frame
+   * @param {(pen: draw.Pen, robot: draw.Drawn, look: draw.Look, place: Place) => void} drawRobot
+   */
+  paintMoving(pen, frame, drawRobot) {
+    const { motion } = this;
     draw.guests(pen, motion.now_m, frame.body_m);
-    draw.obstacles(pen, frame.obstacles, frame.body_m);
-    if (this.hasTrails) this.paintTrails(frame);
+    if (this.hasTrails) this.paintTrails(pen, frame);
 
     for (const { from, to, label } of cutPairs(frame.cuts ?? [])) {
       const a = motion.robotsNow.get(from);
@@ -152,7 +179,8 @@ export class Plan {
 
     for (const robot of frame.robots) {
       const marks = { isLate: late.has(robot.name), isChosen: robot.name === this.chosen };
-      draw.robot(pen, robot, motion.robotsNow.get(robot.name) ?? robot.location, frame.body_m, marks);
+      const look = draw.lookOf(robot, this.camera, frame.body_m, marks);
+      drawRobot(pen, robot, look, motion.robotsNow.get(robot.name) ?? robot.location);
     }
 
     for (const flight of this.flights.airborne.values()) {
@@ -162,43 +190,57 @@ export class Plan {
       if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to, CALM.matches);
     }
 
-    this.paintScale();
+    this.paintScale(pen);
   }
 
-  /** @param {WorldFrame} frame */
-  paintTrails(frame) {
+  /** On the canvas, a robot's body is a picture that was drawn before. @type {(pen: draw.Pen, robot: draw.Drawn, look: draw.Look, place: Place) => void} */
+  drawRobot = (pen, robot, look, place) => {
+    const x = this.camera.x(place.x);
+    const y = this.camera.y(place.y);
+    if (draw.isOutside(this.camera, x, y, draw.reach(look))) return;
+    this.sprites.body(this.context, pen.theme, look, x, y);
+    draw.course(pen, robot, look, x, y);
+  };
+
+  /**
+   * @param {draw.Pen} pen
+   * @param {WorldFrame} frame
+   */
+  paintTrails(pen, frame) {
     const { history } = this.store;
     const end = history.indexAt(frame.time_s);
 
     for (const robot of frame.robots) {
       const track = history.tracks.get(robot.name);
       const place = this.motion.robotsNow.get(robot.name);
-      if (track && place) draw.trail(this.pen, robot.name, track, Math.max(0, end - TRAIL_SAMPLES), end, place);
+      if (track && place) draw.trail(pen, robot.name, track, Math.max(0, end - TRAIL_SAMPLES), end, place);
     }
   }
 
   /** @param {import("./types/messages.js").Setup} draft */
   paintDraft(draft) {
     const body_m = this.motion.to?.body_m ?? 0.6096;
-    draw.field(this.pen, this.step_m());
+    const obstacles = draft.obstacles.map(({ x, y }) => /** @type {[number, number]} */ ([x, y]));
+    this.ground.draw(this.pen, this.canvas, obstacles, body_m, this.step_m());
     // The simulator places the guests: those of a changed set-up have no places yet.
     if (this.editor.isAsApplied && this.motion.to?.tick === 0) draw.guests(this.pen, this.motion.now_m, body_m);
-    draw.obstacles(this.pen, draft.obstacles.map(({ x, y }) => [x, y]), body_m);
 
     for (const [name, place] of Object.entries(draft.robots)) {
       const robot = { name, emotion_state: "", blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
-      draw.robot(this.pen, robot, place, body_m, { isLate: this.editor.faulty(name), isChosen: name === this.chosen });
+      const marks = { isLate: this.editor.faulty(name), isChosen: name === this.chosen };
+      this.drawRobot(this.pen, robot, draw.lookOf(robot, this.camera, body_m, marks), place);
     }
 
-    this.paintScale();
+    this.paintScale(this.pen);
   }
 
-  paintScale() {
+  /** @param {draw.Pen} pen */
+  paintScale(pen) {
     const { unit, unit_m } = this.units;
     const wanted = 90 / this.camera.scale / unit_m;
     const power = 10 ** Math.floor(Math.log10(wanted));
     const length = [5, 2, 1].map((n) => n * power).find((n) => n <= wanted) ?? power;
-    draw.scaleBar(this.pen, length * unit_m, `${Number(length.toPrecision(1))} ${unit}`);
+    draw.scaleBar(pen, length * unit_m, `${Number(length.toPrecision(1))} ${unit}`);
   }
 
   /** Distance between grid lines. */
@@ -216,6 +258,27 @@ export class Plan {
     const reach_m = Math.max((this.motion.to?.body_m ?? 0) / 2, 12 / this.camera.scale);
     const isHit = (/** @type {Place} */ at) => Math.hypot(at.x - place.x, at.y - place.y) <= reach_m;
     return [...this.motion.robotsNow].find(([, at]) => isHit(at))?.[0] ?? null;
+  }
+
+  /**
+   * Draws what the canvas shows on another paper.
+   * @param {draw.Paper} paper
+   */
+  drawOn(paper) {
+    const pen = { ...this.pen, context: paper };
+    const frame = this.motion.to;
+    draw.outside(pen);
+    if (!frame) return;
+
+    draw.field(pen, this.step_m());
+    draw.obstacles(pen, frame.obstacles, frame.body_m);
+    this.paintMoving(pen, frame, (_, robot, look, place) => {
+      const x = this.camera.x(place.x);
+      const y = this.camera.y(place.y);
+      if (draw.isOutside(this.camera, x, y, draw.reach(look))) return;
+      draw.body(pen, look, x, y);
+      draw.course(pen, robot, look, x, y);
+    });
   }
 
   /** A picture of what is shown. @returns {Promise<Blob | null>} */

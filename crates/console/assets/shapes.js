@@ -1,12 +1,16 @@
 // @ts-check
-// Small symbols on a canvas, in CSS pixels.
+// Small symbols on a canvas or in a picture, in CSS pixels.
 
 /** @typedef {import("./theme.js").Theme} Theme */
+/** What is drawn on: a canvas, or what writes SVG in its place (`vector.js`).
+ * @typedef {Pick<CanvasRenderingContext2D, "fillStyle" | "strokeStyle" | "lineWidth" | "lineCap" | "lineJoin" | "globalAlpha" | "font"
+ *   | "textAlign" | "textBaseline" | "beginPath" | "moveTo" | "lineTo" | "arc" | "rect" | "fill" | "stroke" | "fillRect" | "strokeRect"
+ *   | "fillText" | "strokeText" | "setLineDash">} Paper */
 
 const FULL_TURN = 2 * Math.PI;
 
 /**
- * @param {CanvasRenderingContext2D} context
+ * @param {Paper} context
  * @param {Theme} theme
  * @param {string} words
  * @param {number} x
@@ -25,13 +29,13 @@ export function text(context, theme, words, x, y, color) {
   context.fillText(words.slice(0, 60), x, y);
 }
 
-/** @type {(context: CanvasRenderingContext2D, x1: number, y1: number, x2: number, y2: number) => void} */
+/** @type {(context: Paper, x1: number, y1: number, x2: number, y2: number) => void} */
 export function line(context, x1, y1, x2, y2) {
   context.moveTo(x1, y1);
   context.lineTo(x2, y2);
 }
 
-/** @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, color: string) => void} */
+/** @type {(context: Paper, x: number, y: number, radius: number, color: string) => void} */
 export function disk(context, x, y, radius, color) {
   context.beginPath();
   context.arc(x, y, radius, 0, FULL_TURN);
@@ -39,7 +43,7 @@ export function disk(context, x, y, radius, color) {
   context.fill();
 }
 
-/** @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, color: string, width: number, dash?: number[]) => void} */
+/** @type {(context: Paper, x: number, y: number, radius: number, color: string, width: number, dash?: number[]) => void} */
 export function ring(context, x, y, radius, color, width, dash = []) {
   context.beginPath();
   context.arc(x, y, radius, 0, FULL_TURN);
@@ -50,7 +54,7 @@ export function ring(context, x, y, radius, color, width, dash = []) {
   context.setLineDash([]);
 }
 
-/** @type {(context: CanvasRenderingContext2D, x: number, y: number, size: number, color: string) => void} */
+/** @type {(context: Paper, x: number, y: number, size: number, color: string) => void} */
 export function cross(context, x, y, size, color) {
   context.strokeStyle = color;
   context.lineWidth = 2;
@@ -60,7 +64,7 @@ export function cross(context, x, y, size, color) {
   context.stroke();
 }
 
-/** The direction of motion. @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
+/** The direction of motion. @type {(context: Paper, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
 export function nose(context, x, y, radius, angle_rad, color) {
   const at = (/** @type {number} */ turn, /** @type {number} */ distance) =>
     /** @type {const} */ ([x + Math.cos(angle_rad + turn) * distance, y - Math.sin(angle_rad + turn) * distance]);
@@ -72,7 +76,7 @@ export function nose(context, x, y, radius, angle_rad, color) {
   context.fill();
 }
 
-/** A robot that is blocked. @type {(context: CanvasRenderingContext2D, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
+/** A robot that is blocked. @type {(context: Paper, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
 export function barrier(context, x, y, radius, angle_rad, color) {
   context.beginPath();
   context.arc(x, y, radius + 4, -angle_rad - 0.8, -angle_rad + 0.8);
@@ -82,7 +86,7 @@ export function barrier(context, x, y, radius, angle_rad, color) {
   context.stroke();
 }
 
-/** @type {(context: CanvasRenderingContext2D, x: number, y: number, color: string, paper: string) => void} */
+/** @type {(context: Paper, x: number, y: number, color: string, paper: string) => void} */
 export function envelope(context, x, y, color, paper) {
   context.fillStyle = paper;
   context.strokeStyle = color;

@@ -1,8 +1,8 @@
 // @ts-check
 // The colors of the style sheet for canvases; they follow light and dark mode.
 
-/** @typedef {Record<"field" | "outside" | "grid" | "edge" | "obstacle" | "obstacleEdge" | "guest" | "robot" | "robotText"
- *   | "absent" | "absentFill" | "accent" | "warning" | "bad" | "muted" | "text" | "font", string>} Theme */
+/** @typedef {Record<"field" | "outside" | "grid" | "edge" | "obstacle" | "obstacleEdge" | "guest" | "guestFill" | "robot" | "robotText"
+ *   | "absent" | "absentFill" | "accent" | "warning" | "bad" | "muted" | "text" | "font" | "skin" | "ink", string>} Theme */
 
 /** Names in the style sheet. @type {[keyof Theme, string][]} */
 const NAMES = [
@@ -13,6 +13,7 @@ const NAMES = [
   ["obstacle", "--obstacle"],
   ["obstacleEdge", "--obstacle-edge"],
   ["guest", "--guest"],
+  ["guestFill", "--guest-fill"],
   ["robot", "--robot"],
   ["robotText", "--robot-text"],
   ["absent", "--absent"],
@@ -23,6 +24,8 @@ const NAMES = [
   ["muted", "--muted"],
   ["text", "--text"],
   ["font", "--font"],
+  ["skin", "--skin"],
+  ["ink", "--ink"],
 ];
 
 /** @returns {Theme} */

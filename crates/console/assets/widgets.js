@@ -14,7 +14,11 @@ const TONES = ["good", "neutral", "warning", "bad"];
 /** Limits of a table. */
 const MOST_ROWS = 60;
 const MOST_CELLS = 12;
+/** Rows that are shown without scrolling. */
+const SHORT_TABLE = 10;
 const MOST_POINTS = 1000;
+/** Characters of a text that is scrolled. */
+const LONG_TEXT = 420;
 /** Characters. */
 const LARGEST_SVG = 500_000;
 
@@ -25,7 +29,7 @@ const LARGEST_SVG = 500_000;
 export function drawWidget(widget, send) {
   switch (widget?.widget) {
     case "text":
-      return html`<div class="widget text"><span class="label">${widget.label}</span><p>${widget.text}</p></div>`;
+      return text(widget);
     case "badge":
       return html`
         <div class="widget pair"><span class="label">${widget.label}</span>
@@ -51,6 +55,13 @@ export function drawWidget(widget, send) {
     default:
       return nothing;
   }
+}
+
+/** All of a text can be read: a long one is scrolled. @param {Extract<Widget, {widget: "text"}>} widget */
+function text({ label, text }) {
+  const isLong = String(text).length > LONG_TEXT;
+  return html`<div class="widget text"><span class="label">${label}</span>
+    <p class=${isLong ? "long" : ""} tabindex=${isLong ? "0" : nothing}>${text}</p></div>`;
 }
 
 /** An emotion and a behavior have their own color, as in the bands, whatever the tone. @param {Extract<Widget, {widget: "badge"}>} widget */
@@ -106,8 +117,10 @@ function table(rows) {
   const cells = (/** @type {string[]} */ row) => (Array.isArray(row) ? row : []).slice(0, MOST_CELLS);
   const isPairs = rows.every((row) => row?.length === 2);
 
+  const isLong = rows.length > SHORT_TABLE;
+
   return html`
-    <div class="widget table"><table class=${isPairs ? "pairs" : ""}><tbody>
+    <div class="widget table" tabindex=${isLong ? "0" : nothing}><table class=${isPairs ? "pairs" : ""}><tbody>
       ${rows.slice(0, MOST_ROWS).map((row) => html`<tr>${cells(row).map((cell) => html`<td>${cell}</td>`)}</tr>`)}
     </tbody></table>
     ${rows.length > MOST_ROWS ? html`<p class="muted">and ${rows.length - MOST_ROWS} rows more</p>` : nothing}</div>`;

@@ -1,0 +1,201 @@
+// @ts-check
+// The plan as an SVG, with what one needs to read it: the robots with their faces, the emotions, and the signs.
+
+import * as draw from "./draw.js";
+import { faceShapes } from "./face.js";
+import { intensityOf } from "./known.js";
+import { stateColors } from "./palette.js";
+import { barrier, cross, disk, envelope, line, ring } from "./shapes.js";
+import { Vector } from "./vector.js";
+
+/** @typedef {import("./types/messages.js").Face} Face */
+/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
+/** @typedef {import("./theme.js").Theme} Theme */
+
+const SIDE_PX = 264;
+const PAD_PX = 18;
+const ROBOT_PX = 74;
+const SIGN_PX = 22;
+const FACE_PX = 52;
+/** Robots with a face beside the plan; of more, it is told how many there are. */
+const MOST_ROBOTS = 6;
+const MOST_EMOTIONS = 8;
+
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {Map<string, Panel>} panels
+ * @returns {string} an SVG
+ */
+export function picture(plan, panels) {
+  const { camera } = plan;
+  const theme = plan.pen.theme;
+  const frame = plan.motion.to;
+  const robots = frame?.robots ?? [];
+  const field = new Vector();
+  plan.drawOn(field);
+
+  const side = new Vector();
+  const words = new Words(side, theme);
+  words.bold(frame ? `${frame.run}, ${frame.time_s.toFixed(1)} s` : "", PAD_PX, 26, 15);
+  let y = 44;
+  for (const robot of robots.slice(0, MOST_ROBOTS)) {
+    person(side, words, theme, robot, panels.get(robot.name), y);
+    y += ROBOT_PX;
+  }
+  if (robots.length > MOST_ROBOTS) {
+    words.muted(`and ${robots.length - MOST_ROBOTS} robots more`, PAD_PX, y + 10);
+    y += 28;
+  }
+
+  y = legend(side, words, theme, robots, plan.hasTrails, y + 6);
+  const width = camera.width_px + SIDE_PX;
+  const height = Math.max(camera.height_px, y + 6);
+  const whole = new Vector();
+  whole.fillStyle = theme.outside;
+  whole.fillRect(0, 0, width, height);
+  whole.put(field.element(0, (height - camera.height_px) / 2, camera.width_px, camera.height_px));
+  whole.put(side.element(camera.width_px, 0, SIDE_PX, height));
+  return whole.document(width, height, sentence(robots));
+}
+
+/** What is to be seen, for those who do not see it. @param {RobotFrame[]} robots */
+function sentence(robots) {
+  const some = robots.slice(0, MOST_ROBOTS).map(({ name, emotion_state, behavior_state }) => [name, emotion_state, behavior_state].filter(Boolean).join(" "));
+  return `The plan; ${some.join("; ")}${robots.length > MOST_ROBOTS ? ` and ${robots.length - MOST_ROBOTS} robots more` : ""}`;
+}
+
+/** Text in the styles of the picture. */
+class Words {
+  /**
+   * @param {Vector} paper
+   * @param {Theme} theme
+   */
+  constructor(paper, theme) {
+    this.paper = paper;
+    this.theme = theme;
+  }
+
+  /** @type {(words: string, x: number, y: number, size?: number) => void} */
+  bold(words, x, y, size = 15) {
+    this.put(words, x, y, `650 ${size}px`, this.theme.text);
+  }
+
+  /** @type {(words: string, x: number, y: number) => void} */
+  muted(words, x, y) {
+    this.put(words, x, y, "12.5px", this.theme.muted);
+  }
+
+  /** @type {(words: string, x: number, y: number, font: string, color: string) => void} */
+  put(words, x, y, font, color) {
+    this.paper.textAlign = "left";
+    this.paper.textBaseline = "middle";
+    this.paper.font = `${font} ${this.theme.font}`;
+    this.paper.fillStyle = color;
+    this.paper.fillText(words, x, y);
+  }
+}
+
+/**
+ * A robot: face, initials, name, emotion and behavior.
+ * @type {(paper: Vector, words: Words, theme: Theme, robot: RobotFrame, panel: Panel | undefined, y: number) => void}
+ */
+function person(paper, words, theme, robot, panel, y) {
+  const { name, emotion_state: emotion, behavior_state } = robot;
+  const known = faceOf(robot, panel);
+  const scale = FACE_PX / 100;
+  const styles = faceStyles(theme);
+  paper.put(`<g transform="translate(${PAD_PX - 4} ${y}) scale(${scale})">`);
+  for (const shape of faceShapes(known.face, known.intensity)) {
+    paper.shape(shape.d, `${styles[shape.name]}${shape.opacity === undefined ? "" : ` opacity="${shape.opacity}"`}`);
+  }
+  paper.put("</g>");
+
+  const left = PAD_PX + FACE_PX + 8;
+  const look = { ...draw.lookOf(robot, { scale: 0 }, 1, { isLate: false, isChosen: false }), emotion: "" };
+  draw.body({ context: paper, theme }, look, left + look.radius, y + 11);
+  words.bold(name.slice(0, 24), left + 2 * look.radius + 7, y + 11);
+  if (emotion) {
+    const { fill } = stateColors("emotion", emotion);
+    disk(paper, left + 6, y + 32, 6, fill);
+    words.put(emotion.slice(0, 24), left + 18, y + 32, "600 12.5px", theme.text);
+  }
+  words.muted((behavior_state || "has not acted yet").slice(0, 28), left, y + 50);
+}
+
+/**
+ * @type {(robot: RobotFrame, panel: Panel | undefined) => {face: Face, intensity: number}}
+ */
+function faceOf(robot, panel) {
+  const widget = (panel?.widgets ?? []).find((one) => one?.widget === "face");
+  const own = robot.state_variables.face;
+  const face = widget?.widget === "face" ? widget.face : typeof own === "string" ? /** @type {Face} */ (own) : "neutral";
+  return { face, intensity: intensityOf(robot, panel) ?? 0 };
+}
+
+/** The style of each part of a face, as in the style sheet. @param {Theme} theme @returns {Record<string, string>} */
+function faceStyles({ skin, ink }) {
+  const drawn = `fill="none" stroke="${ink}" stroke-linecap="round"`;
+  return {
+    skin: `fill="${skin}" stroke="${ink}" stroke-width="1.5"`,
+    brow: `${drawn} stroke-width="3"`,
+    eye: `fill="${ink}"`,
+    lid: `fill="${skin}"`,
+    wrinkle: `${drawn} stroke-width="1.75"`,
+    mouth: `fill="${ink}" stroke="${ink}" stroke-width="3" stroke-linejoin="round"`,
+  };
+}
+
+/**
+ * The signs of the plan, drawn by what draws them there.
+ * @type {(paper: Vector, words: Words, theme: Theme, robots: RobotFrame[], hasTrails: boolean, y: number) => number} where it ends
+ */
+function legend(paper, words, theme, robots, hasTrails, y) {
+  const x = PAD_PX + 12;
+  /** @type {(draw: (y: number) => void, label: string) => void} */
+  const row = (sign, label) => {
+    sign(y);
+    words.muted(label, PAD_PX + 36, y);
+    y += SIGN_PX;
+  };
+
+  const emotions = [...new Set(robots.map((robot) => robot.emotion_state))].filter(Boolean);
+  const first = emotions[0] ?? "";
+  const look = /** @type {const} */ ({ letters: "", radius: 6, presence: "here", isLate: false, isChosen: false });
+  y += 6;
+  row((at) => draw.body({ context: paper, theme }, { ...look, emotion: first }, x, at), first ? "robot, and its emotion" : "robot");
+  for (const emotion of emotions.slice(0, MOST_EMOTIONS)) {
+    const count = robots.filter((robot) => robot.emotion_state === emotion).length;
+    row((at) => disk(paper, x + 26, at, 5.5, stateColors("emotion", emotion).fill), "");
+    words.muted(`${emotion.slice(0, 22)}${robots.length > MOST_ROBOTS ? ` (${count})` : ""}`, x + 40, y - SIGN_PX);
+  }
+  row((at) => draw.guestCircles({ context: paper, theme }, [x, at], 6), "guest");
+  row((at) => {
+    paper.fillStyle = theme.obstacle;
+    paper.fillRect(x - 5.5, at - 5.5, 11, 11);
+    paper.strokeStyle = theme.obstacleEdge;
+    paper.lineWidth = 1;
+    paper.strokeRect(x - 5.5, at - 5.5, 11, 11);
+  }, "obstacle");
+  row((at) => barrier(paper, x - 8, at, 6, 0, theme.warning), "blocked");
+  row((at) => envelope(paper, x, at, theme.accent, theme.field), "command");
+  row((at) => {
+    envelope(paper, x, at, theme.bad, theme.field);
+    cross(paper, x, at, 6, theme.bad);
+  }, "lost command");
+  row((at) => {
+    paper.strokeStyle = theme.bad;
+    paper.lineWidth = 1.75;
+    paper.setLineDash([4, 3]);
+    paper.beginPath();
+    line(paper, x - 14, at, x + 14, at);
+    paper.stroke();
+    paper.setLineDash([]);
+    disk(paper, x, at, 6, theme.field);
+    ring(paper, x, at, 6, theme.bad, 1.5);
+    cross(paper, x, at, 3, theme.bad);
+  }, "cut off");
+  if (hasTrails) words.muted("A line is the way of a robot.", PAD_PX, y);
+
+  return hasTrails ? y + SIGN_PX : y;
+}

@@ -1,0 +1,70 @@
+"""Accessibility: axe, which knows the rules of WCAG, finds nothing on any tab, at the sizes of a phone and of a laptop."""
+
+import os
+
+import pytest
+from playwright.sync_api import expect
+
+from lab import PATIENCE_S, ROOT, Crowd, start_console
+
+AXE = ROOT / "crates" / "console" / "check" / "node_modules" / "axe-core" / "axe.min.js"
+SIZES = [(390, 844), (1366, 768)]
+TABS = ("log", "charts", "setup")
+# Levels A and AA of WCAG 2.2, and what is good practice beyond.
+RUN = """() => axe.run(document, {resultTypes: ['violations']}).then(({violations}) =>
+    violations.map(({id, nodes}) => `${id}: ${nodes.slice(0, 4).map((node) => node.html.slice(0, 160) + ' ' + (node.any[0]?.message ?? '')).join(' | ')}`))"""
+
+
+@pytest.fixture(scope="module")
+def axe():
+    if not AXE.exists() and "CI" not in os.environ:
+        pytest.skip("needs axe-core: npm --prefix crates/console/check install")
+    return AXE.read_text()
+
+
+def violations(page, axe):
+    # Colors are judged when they have arrived.
+    page.evaluate("Promise.all(document.getAnimations().map((one) => one.finished))")
+    page.evaluate(f"() => {{ {axe} }}")
+    return page.evaluate(RUN)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width, height", SIZES)
+@pytest.mark.parametrize("many", [False, True])
+def test_axe_finds_nothing_in_a_run(launch, open_page, axe, many, width, height, scheme):
+    run = launch(kind=Crowd, robots=12, guests=20) if many else launch()
+    page = open_page(run.address, width, height, scheme)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    found = [f"before the first tick: {one}" for one in violations(page, axe)]
+    page.get_by_test_id("btn-step").click()
+    expect(page.get_by_test_id("tick")).to_have_text("1")
+    if many:
+        page.get_by_test_id("line-Leguin3").click()
+    page.locator(".panel summary").first.click()
+
+    for tab in TABS:
+        page.get_by_test_id(f"tab-{tab}").click()
+        expect(page.locator(f"#panel-{tab}")).to_be_visible()
+        found += [f"{tab}: {one}" for one in violations(page, axe)]
+    assert found == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width, height", SIZES)
+def test_axe_finds_nothing_in_a_recording(launch, open_page, axe, width, height, scheme):
+    run = launch(options=("--speed", "max", "--duration", "50 s"))
+    run.control("start")
+    assert run.simulator.wait(PATIENCE_S) == 0
+    page = open_page(start_console(run.processes, "--recording", run.run_folder), width, height, scheme)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    found = []
+    for tab in ("log", "charts", "diagram"):
+        page.get_by_test_id(f"tab-{tab}").click()
+        expect(page.locator(f"#panel-{tab}")).to_be_visible()
+        if tab == "diagram":
+            expect(page.locator(".diagram svg")).to_be_visible()
+        found += [f"{tab}: {one}" for one in violations(page, axe)]
+    page.get_by_test_id("keys").click()
+    found += [f"keys: {one}" for one in violations(page, axe)]
+    assert found == []
