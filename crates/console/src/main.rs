@@ -8,6 +8,7 @@ mod browser;
 mod diagrams;
 mod feed;
 mod guard;
+mod kept;
 mod live;
 mod opening;
 mod page;
@@ -30,6 +31,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use app::{App, Mode};
 use guard::Guard;
+use kept::Kept;
 use live::Live;
 use playback::Recording;
 
@@ -66,6 +68,10 @@ struct Args {
     /// Open the page in a browser.
     #[arg(long)]
     open: bool,
+    /// Keep address and token in this file, and take those that it has: browsers that were admitted stay so when a console that
+    /// was killed is started again.
+    #[arg(long, env = "CARS_CONSOLE_KEEP", value_name = "FILE")]
+    keep: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -92,7 +98,7 @@ fn run(args: Args) -> Result<(), String> {
     };
     let runtime = build_runtime()?;
 
-    let outcome = runtime.block_on(serve(args.bind, mode, args.open));
+    let outcome = runtime.block_on(serve(args.bind, mode, args.open, args.keep));
 
     // Requests that still wait for the simulator get no answer any more.
     runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
@@ -114,19 +120,37 @@ fn build_runtime() -> Result<Runtime, String> {
 }
 
 /// Serves until the process receives SIGTERM or SIGINT.
-async fn serve(bind: Option<SocketAddr>, mode: Mode, opens: bool) -> Result<(), String> {
-    let listener = listen(bind).await?;
+async fn serve(
+    bind: Option<SocketAddr>,
+    mode: Mode,
+    opens: bool,
+    keep: Option<PathBuf>,
+) -> Result<(), String> {
+    let kept = keep.as_deref().and_then(Kept::read);
+    let listener = match &kept {
+        Some(kept) => listen_again(kept.address, bind).await?,
+        None => listen(bind).await?,
+    };
     let address = listener
         .local_addr()
         .map_err(|error| format!("cannot serve: {error}"))?;
-    let guard = Guard::new(address).map_err(|error| format!("cannot create a token: {error}"))?;
+    let was_open = kept.is_some();
+    let guard = match kept {
+        Some(kept) => Guard::again(address, kept.token, &kept.path),
+        None => Guard::new(address).map_err(|error| format!("cannot create a token: {error}"))?,
+    };
+    if let Some(file) = &keep
+        && let Err(error) = Kept::of(&guard).write(file)
+    {
+        tracing::warn!("{}: {error}", file.display());
+    }
     let url = guard.url();
     let app = Arc::new(App::new(guard, mode));
     let mut terminate = handle(SignalKind::terminate())?;
     let mut interrupt = handle(SignalKind::interrupt())?;
 
     announce(address, &url);
-    if opens {
+    if opens && !was_open {
         opening::open(&url, app.clone());
     }
 
@@ -172,6 +196,17 @@ async fn listen(requested: Option<SocketAddr>) -> Result<TcpListener, String> {
         Ok(listener) => Ok(listener),
         Err(error) if error.kind() == ErrorKind::AddrInUse => listen_on_free_port().await,
         Err(error) => Err(bind_error(DEFAULT_BIND, &error)),
+    }
+}
+
+/// Binds the address of a console that was here before, or another one.
+async fn listen_again(
+    before: SocketAddr,
+    requested: Option<SocketAddr>,
+) -> Result<TcpListener, String> {
+    match TcpListener::bind(before).await {
+        Ok(listener) => Ok(listener),
+        Err(_) => listen(requested).await,
     }
 }
 
