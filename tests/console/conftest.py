@@ -6,7 +6,7 @@ import pathlib
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from lab import ROOT, Launch
+from lab import ROOT, Launch, Launched
 
 CHROMIUM = "/usr/bin/chromium"
 SCREENSHOTS = pathlib.Path(os.environ.get("CARS_SCREENSHOTS", ROOT / "target" / "console-screenshots"))
@@ -38,6 +38,24 @@ def launch(tmp_path):
     for one in started:
         one.end()
         print(one.processes.logs())
+
+
+@pytest.fixture
+def launched(tmp_path):
+    """Starts launches by `cars launch` and ends them with the test."""
+    started = []
+
+    def start(*options):
+        folder = tmp_path / f"launched-{len(started)}"
+        folder.mkdir()
+        started.append(Launched(folder, *options))
+        return started[-1]
+
+    yield start
+
+    for one in started:
+        one.end()
+        print(one.output())
 
 
 @pytest.fixture

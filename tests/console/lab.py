@@ -186,3 +186,47 @@ class Crowd(Launch):
         butler, *refillers = names
         several = [argument for name in refillers for argument in ("--name", name)]
         return {butler: self.start("cars-butler", "--name", butler), "refillers": self.start("cars-leguin", *several)}
+
+
+class Launched:
+    """A run that `cars launch` has started, with its console: it can stop, kill and restart processes."""
+
+    RUN = "console-launched"
+
+    def __init__(self, folder, *options):
+        self.folder = folder
+        self.run_folder = folder / "runs" / self.RUN
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        file = folder / "launch.toml"
+        file.write_text(
+            f'scenario = "{ROOT / "configs/hors_doeuvres.toml"}"\n[console]\nbind = "127.0.0.1:0"\n'
+            '[[process]]\nname = "Butler"\ncommand = ["cars-butler"]\n'
+            '[[process]]\nname = "Leguin"\ncommand = ["cars-leguin"]\n'
+        )
+        arguments = ("launch", file, "--run", self.RUN, "--out", folder / "runs", "--listen", self.endpoint, *options)
+        self.printed = folder / "launched.txt"
+        command = [str(BIN / "cars"), *map(str, arguments)]
+        with open(self.printed, "wb") as printed:
+            self.process = subprocess.Popen(command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed)
+        found = eventually("the address", lambda: re.search(r"console: (http://\S+)", self.output()))
+        self.address = found[1]
+
+    def output(self):
+        return self.printed.read_text(errors="replace")
+
+    status = Launch.status
+    events = Launch.events
+
+    def pid(self, program):
+        """The newest process of a program below this launch."""
+        found = subprocess.run(["pgrep", "--newest", "--parent", str(self.process.pid), program], capture_output=True)
+        return int(found.stdout) if found.returncode == 0 else None
+
+    def verify(self):
+        command = [BIN / "cars", "verify", self.RUN, "--out", self.folder / "runs"]
+        return subprocess.run(command, capture_output=True, timeout=PATIENCE_S, cwd=ROOT, text=True)
+
+    def end(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGQUIT)
+        self.process.wait(timeout=PATIENCE_S)

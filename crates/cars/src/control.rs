@@ -7,7 +7,9 @@ use config::{Changes, Speed};
 use miette::{IntoDiagnostic, miette};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Command, Control, ControlAnswer, LogRecord, OnLate, Presence, Status};
+use protocol::messages::{
+    Command, Control, ControlAnswer, FaultKind, Intervention, LogRecord, OnLate, Presence, Status,
+};
 use protocol::{Message, RobotName, RunName, Tick, decode, encode};
 use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
 use simulator::{RunFolder, Scenario};
@@ -158,6 +160,47 @@ enum Request {
         #[arg(long, value_name = "TIME")]
         deadline: Option<Time>,
     },
+    /// Cut the links between two robots, or two groups of robots.
+    Cut(BetweenArgs),
+    /// Heal links that are cut; without robots all of them.
+    Heal {
+        /// A robot, or several, separated by commas.
+        #[arg(value_delimiter = ',', num_args = 0..=1, requires = "to")]
+        from: Vec<RobotName>,
+        /// Another one, or several.
+        #[arg(value_delimiter = ',', num_args = 0..=1)]
+        to: Vec<RobotName>,
+        /// Only messages from the former to the latter pass again.
+        #[arg(long)]
+        one_way: bool,
+    },
+    /// Lose the next command from one robot to another.
+    Lose {
+        /// Its sender.
+        from: RobotName,
+        /// Its target.
+        to: RobotName,
+    },
+    /// Kill the process of a robot.
+    Crash(FaultArgs),
+    /// Stop the process of a robot.
+    Hang(FaultArgs),
+    /// Kill the process of a robot and start it again, between two ticks.
+    Restart {
+        /// Name of the robot.
+        robot: RobotName,
+    },
+    /// Let the process of a robot go on that is stopped, or start it that is killed.
+    Recover {
+        /// Name of the robot.
+        robot: RobotName,
+    },
+    /// Change parameters, network or faults from the next tick on, as a `[[change]]` of the scenario does.
+    Set {
+        /// For example `robot.Butler.params.policy=rules`.
+        #[arg(required = true, value_name = "PATH=VALUE")]
+        set: Vec<String>,
+    },
     /// Print tick, phase and robots.
     Status,
     /// Return to tick 0 with another scenario for the same robots.
@@ -165,8 +208,42 @@ enum Request {
         /// The scenario file.
         file: PathBuf,
     },
-    /// Print the scenario of the run as a file.
+    /// Print the scenario of the run as a file, with what was done by hand as `[[change]]`.
     Scenario,
+}
+
+/// Two robots, or two groups of robots.
+#[derive(Debug, Args)]
+struct BetweenArgs {
+    /// A robot, or several, separated by commas.
+    #[arg(required = true, value_delimiter = ',', num_args = 1)]
+    from: Vec<RobotName>,
+    /// Another one, or several.
+    #[arg(required = true, value_delimiter = ',', num_args = 1)]
+    to: Vec<RobotName>,
+    /// Cut only messages from the former to the latter.
+    #[arg(long)]
+    one_way: bool,
+}
+
+/// A fault of a process.
+#[derive(Debug, Args)]
+struct FaultArgs {
+    /// Name of the robot.
+    robot: RobotName,
+    /// How long it lasts, wall clock, at most an hour, where the clock waits for the robot; otherwise it lasts until `recover`.
+    #[arg(long = "for", value_name = "TIME")]
+    lasting: Option<Time>,
+}
+
+impl FaultArgs {
+    fn intervention(&self, kind: FaultKind) -> Intervention {
+        Intervention::Fault {
+            robot: self.robot.clone(),
+            kind,
+            for_s: self.lasting.map(|lasting| lasting.0),
+        }
+    }
 }
 
 /// What the clock does about a robot that is late.
@@ -192,10 +269,14 @@ impl From<LateMode> for OnLate {
 
 impl Request {
     fn control(&self) -> miette::Result<Control> {
+        if let Some(what) = self.intervention() {
+            return Ok(Control::Intervene { what });
+        }
         Ok(match self {
             Self::Init { seed } => Control::Init {
                 seed: *seed,
                 setup: None,
+                epoch: None,
             },
             Self::Start => Control::Start,
             Self::Pause => Control::Pause,
@@ -218,6 +299,46 @@ impl Request {
                 scenario: Scenario::load(file, &Changes::default())?.to_toml()?,
             },
             Self::Scenario => Control::Setup,
+            Self::Cut(_)
+            | Self::Heal { .. }
+            | Self::Lose { .. }
+            | Self::Crash(_)
+            | Self::Hang(_)
+            | Self::Restart { .. }
+            | Self::Recover { .. }
+            | Self::Set { .. } => unreachable!("it is an intervention"),
+        })
+    }
+
+    /// What is done to the run by hand; `None` for any other request.
+    fn intervention(&self) -> Option<Intervention> {
+        Some(match self {
+            Self::Cut(BetweenArgs { from, to, one_way }) => Intervention::Cut {
+                from: from.clone(),
+                to: to.clone(),
+                one_way: *one_way,
+            },
+            Self::Heal { from, to, one_way } => Intervention::Heal {
+                from: from.clone(),
+                to: to.clone(),
+                one_way: *one_way,
+            },
+            Self::Lose { from, to } => Intervention::Lose {
+                from: from.clone(),
+                to: to.clone(),
+            },
+            Self::Crash(fault) => fault.intervention(FaultKind::Crash),
+            Self::Hang(fault) => fault.intervention(FaultKind::Hang),
+            Self::Restart { robot } => Intervention::Fault {
+                robot: robot.clone(),
+                kind: FaultKind::Restart,
+                for_s: None,
+            },
+            Self::Recover { robot } => Intervention::Recover {
+                robot: robot.clone(),
+            },
+            Self::Set { set } => Intervention::Set { set: set.clone() },
+            _ => return None,
         })
     }
 }

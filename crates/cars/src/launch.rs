@@ -45,6 +45,10 @@ pub(crate) struct LaunchArgs {
     /// Open the console in a browser.
     #[arg(long, conflicts_with = "no_console")]
     open: bool,
+    /// Keep the processes when the run is over, so that `init` begins the next one. While a browser shows the run they are kept
+    /// anyway. Ctrl-C or `stop` ends them.
+    #[arg(long)]
+    stay: bool,
     /// Start no console.
     #[arg(long)]
     no_console: bool,
@@ -147,6 +151,7 @@ impl LaunchArgs {
             is_insecure: self.insecure,
             grace: self.grace,
             replayed,
+            stays: self.stay,
         };
 
         match (self.resume, self.roster, self.file) {

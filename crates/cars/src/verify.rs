@@ -77,10 +77,10 @@ fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result
             "the run has several epochs, which were begun by hand"
         ));
     };
-    if has_commands_of_operator(files)? {
+    if was_handled(files)? {
         return Err(miette!(
-            help = "`cars verify` without --processes sends them again",
-            "the run has commands of an operator"
+            help = "`cars verify` without --processes does these again",
+            "the run has commands of an operator, or changes by hand"
         ));
     }
 
@@ -112,11 +112,12 @@ fn conclude(text: &str, are_same: bool) -> miette::Result<ExitCode> {
     }
 }
 
-fn has_commands_of_operator(files: &EpochFiles) -> Result<bool, FileError> {
+/// Whether a person sent commands or changed something.
+fn was_handled(files: &EpochFiles) -> Result<bool, FileError> {
     let operator = RobotName::operator();
     let mut record = Record::of_events(&files.events)?;
     while let Some(entry) = record.next_entry()? {
-        if !entry.commands_of(&operator).is_empty() {
+        if !entry.commands_of(&operator).is_empty() || !entry.changes_by_hand().is_empty() {
             return Ok(true);
         }
     }
@@ -145,6 +146,7 @@ fn quiet_options(out: &Path) -> LaunchOptions {
         is_insecure: false,
         grace: Time(GRACE_S),
         replayed: BTreeMap::new(),
+        stays: false,
     }
 }
 

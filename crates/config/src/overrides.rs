@@ -108,6 +108,21 @@ impl Changes {
 }
 
 impl Override {
+    /// A change of the value at a path.
+    #[must_use]
+    pub fn new(path: &[&str], value: toml::Value) -> Self {
+        Self {
+            path: path.iter().map(|part| (*part).to_owned()).collect(),
+            value,
+        }
+    }
+
+    /// Whether both set the value at the same path.
+    #[must_use]
+    pub fn has_path_of(&self, other: &Self) -> bool {
+        self.path == other.path
+    }
+
     /// First part of the path: the key at the top of the file.
     #[must_use]
     pub fn top(&self) -> &str {

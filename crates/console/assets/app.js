@@ -8,6 +8,7 @@ import { Controls, renderAwaiting } from "./controls.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
 import { Hover } from "./hover.js";
+import { Interventions } from "./interventions.js";
 import { classesIn } from "./known.js";
 import { renderEmotions } from "./legend.js";
 import { LogView } from "./log.js";
@@ -100,11 +101,12 @@ const controls = new Controls(box("bar"), store, {
     else act({ do: store.phase === "running" ? "pause" : "start" });
   },
   help: () => element("help", HTMLDialogElement).showModal(),
+  draft: () => (setup.isChanged ? setup : null),
   step: () => (isRecording() ? player.step(1) : act({ do: "step", n: 1 })),
 });
 
 const editor = new Editor({
-  changed: () => setup.moved(),
+  changed: (what) => setup.moved(what),
   note: (text) => notices.note(text),
   body_m: () => setup.body_m,
   hasFault: (field) => setup.faults().has(field),
@@ -115,7 +117,49 @@ setup.onChange = () => {
   plan.touch();
   box("hint").hidden = editor.draft === null;
   box("legend").hidden = editor.draft !== null;
+  drawDraft();
 };
+element("plan", HTMLCanvasElement).addEventListener("keydown", (event) => editor.key(event), { capture: true });
+new ResizeObserver(() => drawDraft()).observe(box("plan"));
+
+/** Says that the plan shows a draft, and where its cursor is. */
+function drawDraft() {
+  box("draft").hidden = editor.draft === null || editor.isAsApplied;
+  box("tab-setup").classList.toggle("changed", setup.isChanged);
+
+  const { cursor } = editor;
+  const mark = box("cursor");
+  mark.hidden = editor.draft === null || cursor === null;
+  if (!cursor) return;
+  const frame = box("plan").getBoundingClientRect();
+  const half_m = setup.body_m / 2;
+  const from = plan.toClient(cursor.x - half_m, cursor.y + half_m);
+  const to = plan.toClient(cursor.x + half_m, cursor.y - half_m);
+  const side_px = Math.max(10, to.x - from.x);
+  Object.assign(mark.style, { left: `${from.x - frame.left}px`, top: `${from.y - frame.top}px`, width: `${side_px}px`, height: `${side_px}px` });
+  /** @type {HTMLElement} */ (mark.firstElementChild).textContent = editor.atCursor;
+}
+
+const interventions = new Interventions({ menu: box("experiment-menu"), effects: box("effects") }, store, {
+  act: (control, note) => act(control, note),
+  save: () => setup.save(),
+});
+box("experiment").addEventListener("click", () => interventions.open(!interventions.isOpen, plan.chosen));
+document.addEventListener("keydown", (event) => {
+  const { target } = event;
+  const isTyping = target instanceof HTMLElement && target.closest("input:not([type=range]), select, textarea, dialog[open]") !== null;
+  if (event.key.toLowerCase() !== "e" || isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  interventions.open(!interventions.isOpen, plan.chosen);
+});
+element("plan", HTMLCanvasElement).addEventListener("contextmenu", (event) => {
+  if (editor.draft || !interventions.isPossible) return;
+  const frame = box("plan").getBoundingClientRect();
+  const robot = plan.robotAt(plan.camera.place(event.clientX - frame.left, event.clientY - frame.top));
+  if (!robot) return;
+  event.preventDefault();
+  interventions.open(true, robot);
+});
 new Hover(box("hover"), plan);
 const panels = new Panels(box("panels"), store, units, {
   send: sendCommand,
@@ -178,7 +222,11 @@ const views = new Map([
 
 function drawBar() {
   controls.render();
-  renderAwaiting(box("awaiting"), store);
+  renderAwaiting(box("awaiting"), store, (robot) => {
+    act({ do: "late", robot, on_late: "continue" }, `The clock goes on without ${robot} when it is late.`);
+  });
+  interventions.render();
+  box("experiment").hidden = !interventions.isPossible;
   renderStranger(box("stranger"), store);
   renderVerdicts(box("verdicts"), store);
 
@@ -220,6 +268,7 @@ function drawCharts() {
 /** @param {number} now_ms */
 function draw(now_ms) {
   requestAnimationFrame(draw);
+  if (editor.draft && editor.cursor) drawDraft();
   for (const [name, view] of views) {
     if (!stale.has(name) || now_ms - view.last_ms < view.every_ms) continue;
     stale.delete(name);

@@ -22,7 +22,17 @@ const PLAYING = { running: "playing", ended: "at the end" };
  * @property {() => void} toggle start or pause
  * @property {() => void} step
  * @property {() => void} help shows the keys
+ * @property {() => Draft | null} draft the changes of the set-up that are not applied; null if there are none
  */
+
+/**
+ * @typedef {object} Draft
+ * @property {() => Promise<boolean>} apply begins the next epoch with them; resolves with whether it was accepted
+ * @property {() => void} revert gives them up
+ */
+
+/** A question before something is done. @typedef {{label: string, text: string, back: string, answers: Answer[]}} Question */
+/** @typedef {{name: string, label: string, tone: "" | "primary" | "danger", act: () => void}} Answer */
 
 export class Controls {
   /**
@@ -34,14 +44,15 @@ export class Controls {
     this.place = place;
     this.store = store;
     this.transport = transport;
-    this.isStopAsked = false;
+    /** The question that is open. @type {Question | null} */
+    this.question = null;
 
     document.addEventListener("keydown", (event) => this.key(event));
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    if (event.key === "Escape" && this.isStopAsked) return this.askStop(false);
+    if (event.key === "Escape" && this.question) return this.ask(null);
 
     // The keys of a list or a question that is open are its own.
     if (document.querySelector("dialog[open]")) return;
@@ -53,7 +64,8 @@ export class Controls {
 
     if (event.key === " " && !isPressing) {
       event.preventDefault();
-      this.transport.toggle();
+      if (this.store.mode === "live" && this.store.phase !== "running") this.begin("start");
+      else this.transport.toggle();
     } else if (event.key === ".") {
       this.transport.step();
     } else if (event.key === "?") {
@@ -61,12 +73,39 @@ export class Controls {
     }
   }
 
-  /** @param {boolean} isAsked */
-  askStop(isAsked) {
-    this.isStopAsked = isAsked;
+  /** Asks, or takes a question back. @param {Question | null} question */
+  ask(question) {
+    const back = this.question?.back;
+    this.question = question;
     this.render();
-    const next = isAsked ? "btn-stop-confirm" : "btn-stop";
-    /** @type {HTMLElement | null} */ (this.place.querySelector(`[data-testid="${next}"]`))?.focus();
+    const next = question ? question.answers[0].name : back;
+    if (next) /** @type {HTMLElement | null} */ (this.place.querySelector(`[data-testid="${next}"]`))?.focus();
+  }
+
+  /** Starts the clock or begins the next epoch; changes of the set-up that are not applied are asked about. @param {"start" | "init"} what */
+  begin(what) {
+    const { control, draft } = this.transport;
+    const changed = draft();
+    if (!changed) return control({ do: what });
+
+    const isStart = what === "start";
+    const apply = async () => {
+      const isAccepted = await changed.apply();
+      if (isAccepted && isStart) control({ do: "start" });
+    };
+    const discard = () => {
+      changed.revert();
+      control({ do: what });
+    };
+    this.ask({
+      label: "Changes of the set-up",
+      text: "The set-up has changes that are not applied. They take effect with the next epoch, from tick 0 on.",
+      back: `btn-${what}`,
+      answers: [
+        { name: "draft-apply", label: isStart ? "Apply them and start" : "Apply them", tone: "primary", act: apply },
+        { name: "draft-discard", label: isStart ? "Start without them" : "Init without them", tone: "", act: discard },
+      ],
+    });
   }
 
   render() {
@@ -122,11 +161,11 @@ export class Controls {
     const phase = this.store.phase;
     /** @type {Button[]} */
     const buttons = [
-      { name: "init", label: "Init", hint: "back to tick 0: the next epoch", act: () => control({ do: "init" }) },
-      { name: "start", label: "Start", hint: "let the clock run (space)", act: () => control({ do: "start" }) },
+      { name: "init", label: "Init", hint: "back to tick 0: the next epoch", act: () => this.begin("init") },
+      { name: "start", label: "Start", hint: "let the clock run (space)", act: () => this.begin("start") },
       { name: "pause", label: "Pause", hint: "hold the clock (space)", act: () => control({ do: "pause" }) },
       { name: "step", label: "Step", hint: "one tick (.)", act: () => control({ do: "step", n: 1 }) },
-      { name: "stop", label: "Stop", hint: "end the run for good", act: () => this.askStop(!this.isStopAsked) },
+      { name: "stop", label: "Stop", hint: "end the run for good", act: () => this.ask(this.question ? null : this.stopQuestion()) },
     ];
 
     const next = phase === "running" ? "pause" : phase === "ended" ? "init" : "start";
@@ -140,23 +179,39 @@ export class Controls {
               ${ICONS[/** @type {keyof typeof ICONS} */ (name)]}<span>${label}</span>
             </button>`,
         )}
-        ${this.isStopAsked ? this.stopQuestion() : nothing}
+        ${this.question ? this.open(this.question) : nothing}
       </div>`;
   }
 
+  /** @returns {Question} */
   stopQuestion() {
-    const stop = () => {
-      this.askStop(false);
-      this.transport.control({ do: "stop" });
+    return {
+      label: "Stop",
+      text: "End this run for good? The simulator and its robots end; what was recorded stays.",
+      back: "btn-stop",
+      answers: [
+        { name: "btn-stop-confirm", label: "End the run", tone: "danger", act: () => this.transport.control({ do: "stop" }) },
+        { name: "btn-stop-cancel", label: "Keep it", tone: "", act: () => {} },
+      ],
+    };
+  }
+
+  /** @param {Question} question */
+  open({ label, text, answers }) {
+    const answer = (/** @type {Answer} */ { act }) => {
+      this.ask(null);
+      act();
     };
 
     return html`
-      <div class="question" role="alertdialog" aria-label="Stop">
-        <p>End this run for good? The simulator and its robots end; what was recorded stays.</p>
-        <div class="row">
-          <button type="button" class="danger" data-testid="btn-stop-confirm" @click=${stop}>End the run</button>
-          <button type="button" data-testid="btn-stop-cancel" @click=${() => this.askStop(false)}>Keep it</button>
-        </div>
+      <div class="question" role="alertdialog" aria-label=${label} data-testid="question">
+        <p>${text}</p>
+        <div class="row">${answers.map(
+          (one) => html`<button type="button" class=${one.tone} data-testid=${one.name} @click=${() => answer(one)}>${one.label}</button>`,
+        )}
+        ${answers.some(({ name }) => name.endsWith("cancel"))
+          ? nothing
+          : html`<button type="button" data-testid="question-cancel" @click=${() => this.ask(null)}>Cancel</button>`}</div>
       </div>`;
   }
 
@@ -190,13 +245,16 @@ export class Controls {
  * The robots that the clock waits for, since when and why.
  * @param {HTMLElement} place
  * @param {Store} store
+ * @param {(robot: string) => void} goOn has the clock go on without a robot
  */
-export function renderAwaiting(place, store) {
+export function renderAwaiting(place, store, goOn) {
   const awaiting = store.awaiting();
   place.hidden = awaiting.length === 0;
+  const isOpen = store.mode === "live" && !store.replayOf && store.phase !== "gathering";
   const who = awaiting.map(
     ({ name, since_s, because: why }) =>
-      html`<li><b>${name}</b> (${because(why)}) for <span class="since">${since_s.toFixed(0)} s</span></li>`,
+      html`<li><b>${name}</b> (${because(why)}) for <span class="since">${since_s.toFixed(0)} s</span>
+        ${isOpen ? html`<button type="button" data-testid="go-on-${name}" @click=${() => goOn(name)}>Go on without it</button>` : nothing}</li>`,
   );
 
   render(awaiting.length ? html`<span>The clock has been waiting for</span><ul>${who}</ul>` : nothing, place);

@@ -7,13 +7,14 @@ import { isWithin, overlaps } from "./draft.js";
 /** @typedef {import("./types/messages.js").Setup} Setup */
 /** @typedef {{x: number, y: number}} Place */
 /** What a drag does. @typedef {{kind: "build", start: Place, at: Place} | {kind: "clear"} | {kind: "robot", name: string}} Drag */
+/** What the keys carry, and from where; an obstacle if it is no robot. @typedef {{robot: string | null, from: Place}} Carried */
 
 /** A drag that begins this far from a robot's body still moves the robot. */
 const GRIP_M = 0.15;
 const MOST_OBSTACLES = 5000;
 
 export class Editor {
-  /** @param {{changed: () => void, note: (text: string) => void, body_m: () => number, hasFault: (field: string) => boolean}} client */
+  /** @param {{changed: (what: string) => void, note: (text: string) => void, body_m: () => number, hasFault: (field: string) => boolean}} client */
   constructor(client) {
     this.client = client;
     /** Shown on the plan while not null. @type {Setup | null} */
@@ -22,6 +23,116 @@ export class Editor {
     this.isAsApplied = true;
     /** @type {Drag | null} */
     this.drag = null;
+    /** Number of the drag, so that what belongs to one drag is undone together. */
+    this.drags = 0;
+    /** Where the keys act; none before the first one. @type {Place | null} */
+    this.cursor = null;
+    /** What the arrow keys move; none if they move the cursor alone. @type {Carried | null} */
+    this.carried = null;
+  }
+
+  /** Told of a change. */
+  changed() {
+    this.client.changed(`drag ${this.drags}`);
+  }
+
+  /**
+   * Edits by keys: arrows move the cursor, Enter places or removes an obstacle, M takes up or puts down what is there.
+   * @param {KeyboardEvent} event
+   */
+  key(event) {
+    if (!this.draft || event.ctrlKey || event.metaKey || event.altKey) return;
+    const step_m = (this.client.body_m() / 2) * (event.shiftKey ? 4 : 1);
+    /** @type {Record<string, () => void>} */
+    const keys = {
+      ArrowLeft: () => this.go(-step_m, 0),
+      ArrowRight: () => this.go(step_m, 0),
+      ArrowUp: () => this.go(0, step_m),
+      ArrowDown: () => this.go(0, -step_m),
+      Enter: () => (this.carried ? this.putDown() : this.toggle()),
+      Delete: () => this.deleteHere(),
+      Backspace: () => this.deleteHere(),
+      m: () => (this.carried ? this.putDown() : this.takeUp()),
+      Escape: () => this.putBack(),
+    };
+    const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act || (event.key === "Escape" && !this.carried && !this.cursor)) return;
+
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    this.drags += 1;
+    act();
+    this.changed();
+  }
+
+  /** The middle of the field, if there is no cursor yet. */
+  here() {
+    const [width_m, height_m] = this.draft?.field_m ?? [0, 0];
+    this.cursor ??= this.snap({ x: width_m / 2, y: height_m / 2 });
+    return this.cursor;
+  }
+
+  /**
+   * @param {number} dx_m
+   * @param {number} dy_m
+   */
+  go(dx_m, dy_m) {
+    const isNew = this.cursor === null;
+    const { x, y } = this.here();
+    if (!isNew) this.cursor = this.snap({ x: x + dx_m, y: y + dy_m });
+  }
+
+  toggle() {
+    const here = this.here();
+    if (this.remove(here)) return;
+    const reason = this.place(here);
+    if (reason) this.client.note(reason);
+  }
+
+  deleteHere() {
+    if (this.carried) this.carried = null;
+    else if (!this.remove(this.here())) this.client.note("There is no obstacle to remove.");
+  }
+
+  takeUp() {
+    const here = this.here();
+    const name = this.robotAt(here);
+    if (name && this.draft) this.carried = { robot: name, from: this.draft.robots[name] };
+    else if (this.remove(here)) this.carried = { robot: null, from: here };
+    else this.client.note("There is nothing to move here.");
+  }
+
+  putDown() {
+    const { carried, draft } = this;
+    const here = this.here();
+    if (!carried || !draft) return;
+    if (carried.robot) {
+      draft.robots[carried.robot] = here;
+      this.carried = null;
+      return;
+    }
+
+    const reason = this.place(here);
+    if (reason) this.client.note(reason);
+    else this.carried = null;
+  }
+
+  /** Puts what is carried back, or hides the cursor. */
+  putBack() {
+    if (this.carried && !this.carried.robot) this.place(this.carried.from);
+    else if (!this.carried) this.cursor = null;
+    this.carried = null;
+  }
+
+  /** What is at the cursor, in words. */
+  get atCursor() {
+    const { carried, cursor } = this;
+    if (!cursor) return "";
+    if (carried) return `moving ${carried.robot ?? "an obstacle"}: M puts it down`;
+    const robot = this.robotAt(cursor);
+    if (robot) return `${robot}: M moves it`;
+    const isObstacle = this.obstacleAt(cursor) >= 0;
+    return isObstacle ? "obstacle: Enter removes it, M moves it" : "free: Enter places an obstacle";
   }
 
   get isActive() {
@@ -38,6 +149,7 @@ export class Editor {
     const { draft } = this;
     if (!draft) return false;
 
+    this.drags += 1;
     const name = this.robotAt(place);
     if (name) {
       this.drag = { kind: "robot", name };
@@ -50,7 +162,7 @@ export class Editor {
       if (reason) this.client.note(reason);
     }
 
-    this.client.changed();
+    this.changed();
 
     return true;
   }
@@ -63,7 +175,7 @@ export class Editor {
     if (drag.kind === "robot") draft.robots[drag.name] = this.inside(place);
     else if (drag.kind === "clear") this.remove(place);
     else this.wall(drag, place);
-    this.client.changed();
+    this.changed();
   }
 
   up() {
@@ -117,11 +229,16 @@ export class Editor {
    * @param {Place} place
    */
   remove(place) {
+    const index = this.obstacleAt(place);
+    if (index >= 0) this.draft?.obstacles.splice(index, 1);
+    return index >= 0;
+  }
+
+  /** @param {Place} place */
+  obstacleAt(place) {
     const half_m = this.client.body_m() / 2;
     const list = this.draft?.obstacles ?? [];
-    const index = list.findIndex(({ x, y }) => Math.abs(x - place.x) <= half_m && Math.abs(y - place.y) <= half_m);
-    if (index >= 0) list.splice(index, 1);
-    return index >= 0;
+    return list.findIndex(({ x, y }) => Math.abs(x - place.x) <= half_m && Math.abs(y - place.y) <= half_m);
   }
 
   /** @param {Place} place */

@@ -19,6 +19,8 @@ const MOST_EMOTIONS = 64;
 
 export class History {
   constructor() {
+    /** How often it has changed. */
+    this.changes = 0;
     this.clear();
   }
 
@@ -39,8 +41,7 @@ export class History {
     this.isBroken = false;
     /** How many variables of the last sample are not kept, because there are too many. @type {number} */
     this.dropped = 0;
-    /** How often it has changed. @type {number} */
-    this.changes = (this.changes ?? 0) + 1;
+    this.changes += 1;
   }
 
   /** What comes next does not follow what was added last: the page was not connected in between. */

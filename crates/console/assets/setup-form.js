@@ -15,8 +15,13 @@ import { html, nothing } from "./vendor/lit-html.js";
  * @property {(name: string, value: number, kind: Kind) => string} text
  * @property {(name: string, text: string, kind: Kind) => number} number
  * @property {(field: string, change: (draft: Setup) => void) => void} edit
+ * @property {boolean} isOvertaken
+ * @property {{past: unknown[], future: unknown[]}} undo
  * @property {() => void} apply
  * @property {() => void} refresh
+ * @property {() => void} revert
+ * @property {() => void} keepMine
+ * @property {(isBack: boolean) => void} step
  * @property {() => void} drawSeed
  * @property {() => void} save
  * @property {(file: File) => Promise<void>} load
@@ -45,6 +50,7 @@ export function form(view, faults) {
 
   return html`
     <form class="setup" novalidate autocomplete="off" @submit=${submit}>
+      ${view.isOvertaken ? overtaken(view) : nothing}
       <div class="setup-fields">
         ${group(`Field, ${unit}`, "field_m", faults, [
           number(view, "field-width", "width", draft.field_m[0], "length", (d, v) => (d.field_m[0] = v), "field_m"),
@@ -67,6 +73,18 @@ export function form(view, faults) {
       </div>
       ${actions(view, faults)}
     </form>`;
+}
+
+/** Another set-up has been applied since this one was edited. @param {SetupView} view */
+function overtaken(view) {
+  return html`
+    <div class="overtaken" role="alert" data-testid="setup-overtaken">
+      <p>Another set-up has been applied meanwhile, by another browser or a command.</p>
+      <div class="row">
+        <button type="button" data-testid="setup-take-theirs" @click=${() => view.refresh()}>Take that one</button>
+        <button type="button" data-testid="setup-keep-mine" @click=${() => view.keepMine()}>Keep my changes</button>
+      </div>
+    </div>`;
 }
 
 /**
@@ -149,7 +167,7 @@ function obstacles(view, draft, faults) {
     html`<span data-testid="setup-obstacles">${count === 1 ? "1 obstacle" : `${count} obstacles`}</span>`,
     html`<button type="button" data-testid="setup-obstacles-clear" ?disabled=${count === 0}
       @click=${() => view.edit("obstacles", (d) => (d.obstacles = []))}>Remove all</button>`,
-    html`<span class="hint">on the plan: a click places or removes one, a drag builds a wall</span>`,
+    html`<span class="hint">on the plan: a click places or removes one, a drag builds a wall; or with the keys: arrows, Enter, M</span>`,
   ]);
 }
 
@@ -196,7 +214,9 @@ function actions(view, faults) {
   return html`
     <div class="setup-actions">
       <button type="submit" class="primary" data-testid="setup-apply">Apply and init</button>
-      <button type="button" data-testid="setup-revert" ?disabled=${!view.isChanged} @click=${() => view.refresh()}>Undo changes</button>
+      <button type="button" data-testid="setup-undo" title="Ctrl+Z" ?disabled=${view.undo.past.length === 0} @click=${() => view.step(true)}>Undo</button>
+      <button type="button" data-testid="setup-redo" title="Ctrl+Shift+Z" ?disabled=${view.undo.future.length === 0} @click=${() => view.step(false)}>Redo</button>
+      <button type="button" data-testid="setup-revert" title="back to the set-up of the run" ?disabled=${!view.isChanged} @click=${() => view.revert()}>Revert</button>
       <span class="form-state">${faults.size > 0 ? html`<span class="fault">${faults.size === 1 ? "1 thing" : `${faults.size} things`} to correct</span>`
         : view.isChanged ? html`<span class="muted">changed, not applied</span>` : nothing}</span>
       <label class="button">Load …<input type="file" accept=".toml,text/plain" class="hidden-file" data-testid="setup-load" @change=${load} /></label>

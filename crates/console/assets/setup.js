@@ -3,7 +3,8 @@
 
 import { faultsOf } from "./draft.js";
 import { form } from "./setup-form.js";
-import { short } from "./units.js";
+import { Undo } from "./undo.js";
+import { inUnit, short } from "./units.js";
 import { render } from "./vendor/lit-html.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -35,6 +36,9 @@ export class SetupView {
     this.applied = null;
     /** The set-up as it is edited. @type {Setup | null} */
     this.draft = null;
+    /** The epoch that has the applied set-up. */
+    this.epoch = 0;
+    this.undo = new Undo();
     /** The text of a field that was edited, by name. @type {Map<string, string>} */
     this.typed = new Map();
     /** Reasons of the simulator's refusal, by field. @type {Map<string, string>} */
@@ -44,6 +48,7 @@ export class SetupView {
       this.typed.clear();
       this.render();
     });
+    document.addEventListener("keydown", (event) => this.key(event));
 
     store.on("epoch", () => this.fetch());
     store.on("connection", () => this.fetch());
@@ -76,6 +81,64 @@ export class SetupView {
     this.changed();
   }
 
+  /** Whether another set-up has been applied since this one was edited: another browser, or `cars ctl`. */
+  get isOvertaken() {
+    return this.isChanged && this.store.isLive && this.nowEpoch > this.epoch;
+  }
+
+  get nowEpoch() {
+    return Math.max(this.store.status?.epoch ?? 0, this.store.frame?.epoch ?? 0);
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    if (!this.isOpen || !(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const key = event.key.toLowerCase();
+    const isBack = key === "z" && !event.shiftKey;
+    const isForward = key === "y" || (key === "z" && event.shiftKey);
+    if (!isBack && !isForward) return;
+    event.preventDefault();
+    this.step(isBack);
+  }
+
+  /** Undoes an edit, or does it again. @param {boolean} isBack */
+  step(isBack) {
+    const draft = /** @type {Setup | null} */ (isBack ? this.undo.back() : this.undo.forward());
+    if (!draft) return;
+    this.draft = draft;
+    this.typed.clear();
+    this.refused.clear();
+    this.changed();
+  }
+
+  /** Gives the changes up: the draft is the set-up of the run again. */
+  revert() {
+    if (this.isOvertaken || !this.applied) return this.refresh();
+    this.draft = structuredClone(this.applied);
+    this.undo.note(this.draft, "", performance.now());
+    this.typed.clear();
+    this.refused.clear();
+    this.changed();
+  }
+
+  /** Keeps the changes although another set-up has been applied meanwhile. */
+  async keepMine() {
+    const applied = await this.ask();
+    if (!applied) return;
+    this.applied = applied.setup;
+    this.epoch = applied.epoch;
+    this.changed();
+  }
+
+  /** The set-up of the run, and its epoch or an earlier one: then it is requested once more when the epoch is seen. */
+  async ask() {
+    const status = await this.request({ do: "status" });
+    const answer = await this.request({ do: "setup" });
+    if (answer.answer === "setup" && status.answer === "done") return { setup: answer.setup, epoch: status.epoch };
+    this.notices.show(status.answer === "refused" ? status : answer);
+    return null;
+  }
+
   /** Requests the set-up of the run, unless there are unapplied changes. */
   async fetch() {
     if (!this.isOpen || !this.store.isLive || this.isChanged) return this.changed();
@@ -84,15 +147,19 @@ export class SetupView {
 
   /** Replaces the draft with the set-up of the run. */
   async refresh() {
-    const answer = await this.request({ do: "setup" });
-    if (answer.answer === "setup") this.take(answer.setup);
-    else if (answer.answer === "refused") this.notices.show(answer);
+    const applied = await this.ask();
+    if (applied) this.take(applied.setup, applied.epoch);
   }
 
-  /** @param {Setup} setup */
-  take(setup) {
+  /**
+   * @param {Setup} setup
+   * @param {number} epoch
+   */
+  take(setup, epoch) {
     this.applied = setup;
+    this.epoch = epoch;
     this.draft = structuredClone(setup);
+    this.undo.begin(setup);
     this.typed.clear();
     this.refused.clear();
     this.changed();
@@ -113,8 +180,9 @@ export class SetupView {
     if (this.isOpen && isRunning === (this.editor.draft !== null)) this.changed();
   }
 
-  /** To be called when the draft was edited on the plan. */
-  moved() {
+  /** To be called when the draft was edited on the plan. What belongs to one drag is one step. */
+  moved(what = "") {
+    this.undo.note(this.draft, what, performance.now());
     for (const name of this.typed.keys()) {
       if (name.startsWith("robot-")) this.typed.delete(name);
     }
@@ -150,7 +218,7 @@ export class SetupView {
     this.typed.set(name, text);
     const trimmed = text.trim().replace(",", ".");
     const value = trimmed === "" ? NaN : Number(trimmed);
-    return kind === "length" ? Number((value * this.units.unit_m).toFixed(6)) : value;
+    return kind === "length" ? value * this.units.unit_m : value;
   }
 
   /**
@@ -161,30 +229,39 @@ export class SetupView {
     if (!this.draft) return;
     this.refused.delete(field);
     change(this.draft);
+    this.undo.note(this.draft, field, performance.now());
     this.changed();
   }
 
+  /** Begins the next epoch with the draft; resolves with whether that was accepted. */
   async apply() {
     const { draft } = this;
-    if (!draft) return;
+    if (!draft) return false;
+    if (this.isOvertaken) {
+      this.notices.refusal("Not applied: another set-up has been applied meanwhile. Choose one of both first.");
+      return false;
+    }
 
     this.refused.clear();
     const faults = this.faults();
     if (faults.size > 0) {
       this.notices.refusal(`Not applied: ${[...faults.values()][0]}`);
-      return this.showFirstFault();
+      this.showFirstFault();
+      return false;
     }
 
-    const answer = await this.request({ do: "init", setup: draft });
+    const answer = await this.request({ do: "init", setup: draft, epoch: this.epoch });
     if (answer.answer === "refused") {
       this.refused = new Map((answer.fields ?? []).map(({ field, reason }) => [field, reason]));
       this.notices.show(answer);
       this.changed();
-      return this.showFirstFault();
+      this.showFirstFault();
+      return false;
     }
 
     this.notices.note("Applied: the next epoch is ready at tick 0.");
     await this.refresh();
+    return true;
   }
 
   showFirstFault() {
@@ -197,7 +274,7 @@ export class SetupView {
     if (answer.answer !== "setup") return this.notices.show(answer);
 
     const anchor = document.createElement("a");
-    anchor.href = URL.createObjectURL(new Blob([answer.scenario], { type: "application/toml" }));
+    anchor.href = URL.createObjectURL(new Blob([inUnit(answer.scenario, this.units)], { type: "application/toml" }));
     anchor.download = `${this.store.run || "scenario"}.toml`;
     anchor.click();
     URL.revokeObjectURL(anchor.href);

@@ -28,6 +28,19 @@ export function seconds(time_s) {
   return `${time_s.toFixed(1)} s`;
 }
 
+/**
+ * The text of a scenario with lengths and speeds in the chosen unit, where that says exactly the same.
+ * @param {string} text
+ * @param {Units} units
+ */
+export function inUnit(text, { unit, unit_m }) {
+  if (unit === "m") return text;
+  return text.replace(/"(-?[\d.]+(?:e-?\d+)?) m(\/s)?"/g, (whole, number, per = "") => {
+    const typed = short(Number(number) / unit_m, 4);
+    return Number(typed) * unit_m === Number(number) ? `"${typed} ${unit}${per}"` : whole;
+  });
+}
+
 /** The chosen unit, kept in the browser's local storage if that is allowed. */
 export class Units {
   constructor() {

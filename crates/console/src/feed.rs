@@ -406,6 +406,7 @@ mod tests {
             obstacles: Vec::new(),
             flights: vec![flight],
             cuts: Vec::new(),
+            faults: Vec::new(),
             expectations: Vec::new(),
         }
     }

@@ -78,6 +78,26 @@ impl Guard {
         })
     }
 
+    /// A guard with the token and the path of a console that was here before.
+    pub(crate) fn again(address: SocketAddr, token: String, path: &str) -> Self {
+        Self {
+            address,
+            token,
+            path: path.to_owned(),
+            cookie_name: format!("cars-console-{}", address.port()),
+        }
+    }
+
+    /// What is served.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The secret that admits a browser.
+    pub(crate) fn token(&self) -> &str {
+        &self.token
+    }
+
     /// The URL that admits a browser, with the token.
     pub(crate) fn url(&self) -> String {
         let mut address = self.address;

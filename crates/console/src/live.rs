@@ -438,8 +438,8 @@ impl Live {
         Ok([token, log])
     }
 
-    /// Subscribes to what is published only for subscribers.
-    fn subscribe_for_viewers(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
+    /// Subscribes to what is published only for subscribers, and says that there are viewers.
+    fn subscribe_for_viewers(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 3], BusError> {
         let live = self.clone();
         let world = bus.subscribe(&self.keys.world(), move |_, payload| {
             live.enqueue(Sample::World(payload.to_vec()));
@@ -453,7 +453,9 @@ impl Live {
             });
         })?;
 
-        Ok([world, panels])
+        // The simulator stays after the end of a run while there are viewers.
+        let viewer = bus.token(&self.keys.alive_viewer())?;
+        Ok([world, panels, viewer])
     }
 
     /// Keeps the subscribers declared while there are viewers, until the console ends.

@@ -8,6 +8,7 @@ mod browser;
 mod diagrams;
 mod feed;
 mod guard;
+mod kept;
 mod live;
 mod opening;
 mod page;
@@ -31,6 +32,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use app::{App, Mode};
 use guard::Guard;
+use kept::Kept;
 use live::Live;
 use past::Past;
 
@@ -70,6 +72,10 @@ struct Args {
     /// Open the page in a browser.
     #[arg(long)]
     open: bool,
+    /// Keep address and token in this file, and take those that it has: browsers that were admitted stay so when a console that
+    /// was killed is started again.
+    #[arg(long, env = "CARS_CONSOLE_KEEP", value_name = "FILE")]
+    keep: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -101,7 +107,7 @@ fn run(args: Args) -> Result<(), String> {
     };
     let runtime = build_runtime()?;
 
-    let outcome = runtime.block_on(serve(args.bind, mode, past, args.open));
+    let outcome = runtime.block_on(serve(args.bind, mode, past, args.open, args.keep));
 
     // Requests that still wait for the simulator get no answer any more.
     runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
@@ -129,19 +135,33 @@ async fn serve(
     mode: Mode,
     past: Option<Past>,
     opens: bool,
+    keep: Option<PathBuf>,
 ) -> Result<(), String> {
-    let listener = listen(bind).await?;
+    let kept = keep.as_deref().and_then(Kept::read);
+    let listener = match &kept {
+        Some(kept) => listen_again(kept.address, bind).await?,
+        None => listen(bind).await?,
+    };
     let address = listener
         .local_addr()
         .map_err(|error| format!("cannot serve: {error}"))?;
-    let guard = Guard::new(address).map_err(|error| format!("cannot create a token: {error}"))?;
+    let was_open = kept.is_some();
+    let guard = match kept {
+        Some(kept) => Guard::again(address, kept.token, &kept.path),
+        None => Guard::new(address).map_err(|error| format!("cannot create a token: {error}"))?,
+    };
+    if let Some(file) = &keep
+        && let Err(error) = Kept::of(&guard).write(file)
+    {
+        tracing::warn!("{}: {error}", file.display());
+    }
     let url = guard.url();
     let app = Arc::new(App::new(guard, mode, past));
     let mut terminate = handle(SignalKind::terminate())?;
     let mut interrupt = handle(SignalKind::interrupt())?;
 
     announce(address, &url);
-    if opens {
+    if opens && !was_open {
         opening::open(&url, app.clone());
     }
 
@@ -187,6 +207,17 @@ async fn listen(requested: Option<SocketAddr>) -> Result<TcpListener, String> {
         Ok(listener) => Ok(listener),
         Err(error) if error.kind() == ErrorKind::AddrInUse => listen_on_free_port().await,
         Err(error) => Err(bind_error(DEFAULT_BIND, &error)),
+    }
+}
+
+/// Binds the address of a console that was here before, or another one.
+async fn listen_again(
+    before: SocketAddr,
+    requested: Option<SocketAddr>,
+) -> Result<TcpListener, String> {
+    match TcpListener::bind(before).await {
+        Ok(listener) => Ok(listener),
+        Err(_) => listen(requested).await,
     }
 }
 

@@ -163,6 +163,7 @@ fn draw_faults(picture: &mut Picture, items: &Items) {
             FaultKind::Crash => "crash",
             FaultKind::Hang => "hang",
             FaultKind::Slow => "slow",
+            FaultKind::Restart => "restart",
         };
         picture.open("fault", fault.period.begin, &title);
         picture.rect(class, left, lane.top, width, STRIP_PX - 1.5);

@@ -112,7 +112,7 @@ impl State {
             | Event::CommandDuplicated { .. }
             | Event::CommandDelivered { .. }
             | Event::CommandDropped { .. } => self.command(tick, event, items),
-            Event::Changed { set } => items.changes.push(Change {
+            Event::Changed { set, .. } => items.changes.push(Change {
                 tick,
                 set: set.clone(),
             }),

@@ -71,6 +71,7 @@ pub(crate) fn fault(kind: FaultKind) -> &'static str {
         FaultKind::Crash => "crash",
         FaultKind::Hang => "hang",
         FaultKind::Slow => "slow",
+        FaultKind::Restart => "restart",
     }
 }
 
@@ -164,6 +165,7 @@ impl Titles {
             FaultKind::Crash => "crash: the process is killed, and started again at the end",
             FaultKind::Hang => "hang: the process is stopped",
             FaultKind::Slow => "slow: the process is stopped for most of the time",
+            FaultKind::Restart => "restart: the process is killed and started again",
         };
         format!("{}: {what}; {}", fault.robot, self.period(fault.period))
     }

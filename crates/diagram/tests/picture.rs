@@ -522,7 +522,13 @@ fn a_change_of_the_scenario_is_a_line_with_what_is_set() {
         events.push((0, event));
     }
     let set = "network.commands.loss=0.5".to_owned();
-    events.push((7, Event::Changed { set: set.clone() }));
+    events.push((
+        7,
+        Event::Changed {
+            set: set.clone(),
+            by_hand: false,
+        },
+    ));
 
     let text = draw(&events, 0, 20);
     let document = Document::parse(&text).unwrap();

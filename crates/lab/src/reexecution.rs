@@ -95,7 +95,7 @@ impl Reexecution {
         }
 
         if recorded.tick > 0 {
-            self.repeat_inputs(recorded);
+            self.repeat_inputs(recorded)?;
         }
         self.repeat_membership(recorded);
         self.check_script(recorded)?;
@@ -119,16 +119,25 @@ impl Reexecution {
         })
     }
 
-    /// What the simulation was given between this tick and the one before: faults that were due, and the operator's commands.
-    fn repeat_inputs(&mut self, recorded: &Entry) {
+    /// What the simulation was given between this tick and the one before: what was changed by hand, faults that were due, and
+    /// the operator's commands.
+    fn repeat_inputs(&mut self, recorded: &Entry) -> miette::Result<()> {
         let simulation = &mut self.local.simulation;
+        let changes = recorded.changes_by_hand();
+        simulation.repeat_changes(&changes).map_err(|reason| {
+            miette!(
+                "what was changed by hand before tick {} cannot be changed again: {reason}",
+                recorded.tick
+            )
+        })?;
         let orders = simulation.faults_due();
-        let lateness = simulation.scenario().lateness.clone();
+        let lateness = simulation.scenario().lateness_at(recorded.tick).clone();
         simulation.note_faults(&orders, |robot| lateness.of(robot));
 
         for sent in recorded.commands_of(&RobotName::operator()) {
             simulation.command(&sent.to, &sent.command.command);
         }
+        Ok(())
     }
 
     /// Lets robots go and come as they did.

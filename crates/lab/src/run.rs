@@ -41,7 +41,7 @@ pub fn execute(
         Ok(())
     })?;
 
-    let recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
+    let mut recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
 
     Ok(recorder.finish(&simulation)?)
 }
@@ -177,7 +177,8 @@ impl Local {
     /// As [`Self::carry_out_faults`].
     pub fn carry_out_faults_by(&mut self, run: &RunName, maker: Maker) -> miette::Result<()> {
         let orders = self.simulation.faults_due();
-        let lateness = self.simulation.scenario().lateness.clone();
+        let next = self.simulation.tick() + 1;
+        let lateness = self.simulation.scenario().lateness_at(next).clone();
         self.simulation
             .note_faults(&orders, |robot| lateness.of(robot));
 
@@ -218,9 +219,11 @@ pub fn check_faults(scenario: &Scenario, after: Tick) -> miette::Result<()> {
     let changed = scenario.changes.iter().flat_map(|change| &change.faults);
     for fault in scenario.faults.iter().chain(changed) {
         let is_simulated = !matches!(fault.end, FaultEnd::After(_));
-        let goes_on = scenario.lateness.of(&fault.robot) == OnLate::Continue;
+        let lateness = scenario.lateness_at(fault.at);
+        let goes_on = lateness.of(&fault.robot) == OnLate::Continue;
         let is_absence = matches!(fault.kind, FaultKind::Crash | FaultKind::Hang);
-        let is_played = is_absence && is_simulated && goes_on;
+        let is_restart = fault.kind == FaultKind::Restart;
+        let is_played = is_restart || (is_absence && is_simulated && goes_on);
         if fault.at > after && !is_played {
             return Err(miette!(
                 help = "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash or hang with `until`, under \

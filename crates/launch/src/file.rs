@@ -402,6 +402,7 @@ fn console(raw: RawConsole) -> Process {
     Process {
         env: raw.env,
         is_required: false,
+        restart: Restart::OnFailure,
         ..Process::new(CONSOLE, command)
     }
 }

@@ -65,6 +65,8 @@ pub struct LaunchOptions {
     pub grace: Time,
     /// Robots that are played from their records, with the folders of the recorded runs.
     pub replayed: BTreeMap<RobotName, PathBuf>,
+    /// Whether the processes are kept when the run is over, also while no browser shows it.
+    pub stays: bool,
 }
 
 /// A launch that has been read and checked.
@@ -246,6 +248,7 @@ impl Launch {
             speed: self.speed(),
             is_paused: self.options.is_paused,
             is_resumed: self.is_resumed,
+            stays: self.options.stays,
             has_console: self.options.has_console,
             opens_browser: self.options.opens_browser,
         };
@@ -378,9 +381,9 @@ impl Launch {
             config: self.observer_config(),
             wants_world,
             screen: screen.handle(),
-            faults: has_faults.then(|| supervisor.queue()),
+            faults: supervisor.queue(),
         };
-        let is_needed = !self.options.is_quiet || has_faults;
+        let is_needed = !self.options.is_quiet || has_faults || self.options.has_console;
         let observer = is_needed.then(|| Observer::start(watch));
         let outcome = runtime
             .block_on(async {

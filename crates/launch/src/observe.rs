@@ -29,8 +29,8 @@ pub(super) struct Watch {
     /// Whether to subscribe to frames, for the progress bar.
     pub(super) wants_world: bool,
     pub(super) screen: ScreenHandle,
-    /// The supervisor's queue, for faults of processes; `None` if the scenario has none.
-    pub(super) faults: Option<UnboundedSender<SupervisorEvent>>,
+    /// The supervisor's queue, for faults of processes: those of the scenario, and those that a person wants.
+    pub(super) faults: UnboundedSender<SupervisorEvent>,
 }
 
 /// A running observer.
@@ -74,9 +74,7 @@ impl Watch {
         if self.wants_world {
             declared.push(self.subscribe_world(&bus, &keys)?);
         }
-        if let Some(queue) = &self.faults {
-            declared.push(subscribe_faults(&bus, &keys, queue.clone())?);
-        }
+        declared.push(subscribe_faults(&bus, &keys, self.faults.clone())?);
         declared.push(watch_token(&bus, &keys, end)?);
 
         if self.wants_world {

@@ -8,7 +8,7 @@ use bus::endpoint::connectable;
 use config::FileError;
 use protocol::{RobotName, RunName};
 use simulator::RunFolder;
-use simulator::recorder::SCENARIO;
+use simulator::recorder::{LOGS, SCENARIO};
 
 use super::child::{self, AtExit};
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
@@ -19,6 +19,12 @@ use config::Speed;
 
 /// Environment variable with a zenoh configuration file; every program of the project reads it.
 pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
+
+/// Environment variable with the file in which the console keeps its address and its token, so that browsers find it again when
+/// it was killed and is started again.
+const KEEP_VARIABLE: &str = "CARS_CONSOLE_KEEP";
+/// Name of that file, among the logs.
+const CONSOLE_KEPT: &str = "console.kept";
 
 /// A command line with its environment.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,10 +102,19 @@ pub(super) struct Execution<'a> {
     pub(super) is_paused: bool,
     /// Whether the run in the folder is resumed.
     pub(super) is_resumed: bool,
+    /// Whether the simulator stays when the run is over, also while no browser shows it.
+    pub(super) stays: bool,
     /// Whether the console is started.
     pub(super) has_console: bool,
     /// Whether the console opens a browser.
     pub(super) opens_browser: bool,
+}
+
+impl Execution<'_> {
+    /// The folder of the run.
+    fn folder(&self) -> RunFolder {
+        RunFolder::new(self.out, self.run)
+    }
 }
 
 /// All processes of a launch file, the simulator first.
@@ -119,7 +134,10 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
         if execution.opens_browser {
             args.push("--open".to_owned());
         }
-        let command = client(file, process, args, execution, &places)?;
+        let mut command = client(file, process, args, execution, &places)?;
+        let kept = execution.folder().file(LOGS).join(CONSOLE_KEPT);
+        let kept = kept.display().to_string();
+        command.env.entry(KEEP_VARIABLE.to_owned()).or_insert(kept);
         planned.push(Planned {
             part: Part::Observer,
             ..prepare(process, command)
@@ -202,7 +220,7 @@ fn simulator(
     places: &Places,
 ) -> Result<Planned, FileError> {
     let process = &file.simulator;
-    let scenario = RunFolder::new(execution.out, execution.run).file(SCENARIO);
+    let scenario = execution.folder().file(SCENARIO);
     let mut args = process.command[1..].to_vec();
     args.extend([
         scenario.display().to_string(),
@@ -216,6 +234,11 @@ fn simulator(
 
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
     args.extend(execution.is_resumed.then(|| "--resume".to_owned()));
+    if execution.stays {
+        args.push("--stay=always".to_owned());
+    } else if execution.has_console && file.console.is_some() {
+        args.push("--stay=viewed".to_owned());
+    }
     args.extend(execution.is_insecure.then(|| "--insecure".to_owned()));
 
     let mut env = process.env.clone();

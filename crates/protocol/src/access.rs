@@ -99,6 +99,7 @@ pub fn of_operator(keys: &Keys) -> Vec<Grant> {
                 keys.robot("*", STATE),
             ],
         ),
+        grant("is there", &["liveliness_token"], vec![keys.alive_viewer()]),
         grant("sees who is there", PRESENCE, vec![keys.alive()]),
     ]
 }
@@ -164,7 +165,11 @@ mod tests {
         assert!(keys_of(&grants, "query").contains(&"cars/*/control"));
         assert!(keys_of(&grants, "declare_subscriber").contains(&"cars/*/robot/*/panel"));
         assert_eq!(keys_of(&grants, "put"), ["cars/*/robot/*/command/operator"]);
-        for message in ["delete", "reply", "declare_queryable", "liveliness_token"] {
+        assert_eq!(
+            keys_of(&grants, "liveliness_token"),
+            ["cars/*/alive/viewer"]
+        );
+        for message in ["delete", "reply", "declare_queryable"] {
             assert!(keys_of(&grants, message).is_empty(), "{message}");
         }
     }

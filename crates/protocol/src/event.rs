@@ -4,12 +4,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::messages::is_false;
 use crate::messages::{
     End, Fate, FaultKind, Flight, LogKind, LogRecord, Performative, Point, Verdict,
 };
 use crate::name::RobotName;
 use crate::plain::escape_line;
 use crate::{Epoch, Generation, Seq, Tick};
+
+/// Longest line of the log about a change.
+const MAX_CHANGE_CHARS: usize = 400;
 
 /// One line of `events.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -176,6 +180,9 @@ pub enum Event {
     Changed {
         /// What is set, as `path=value`.
         set: String,
+        /// Whether a person did it, and not the scenario.
+        #[serde(default, skip_serializing_if = "is_false")]
+        by_hand: bool,
     },
     /// A robot wrote a line to the log.
     Say {
@@ -397,6 +404,7 @@ impl Event {
                     FaultKind::Crash => "the process is killed",
                     FaultKind::Hang => "the process is stopped",
                     FaultKind::Slow => "the process is slowed down",
+                    FaultKind::Restart => "the process is killed and started again",
                 };
                 let text = if *begins {
                     format!("fault: {what}")
@@ -476,7 +484,10 @@ impl Event {
                 LogKind::Network,
                 format!("messages from {from} to {to} pass again"),
             ),
-            Self::Changed { set } => simulator(LogKind::Run, format!("from now on {set}")),
+            Self::Changed { set, by_hand } => {
+                let who = if *by_hand { "by hand, " } else { "" };
+                simulator(LogKind::Run, shorten(format!("{who}from now on {set}")))
+            }
             Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
             Self::Judged {
                 expectation,
@@ -498,6 +509,15 @@ impl Event {
             Self::Blocked { .. } | Self::QueryLost { .. } | Self::Tick { .. } => None,
         }
     }
+}
+
+/// Cuts a line that is longer than the log has use for: lists of robots can be any length.
+fn shorten(mut text: String) -> String {
+    if let Some((end, _)) = text.char_indices().nth(MAX_CHANGE_CHARS) {
+        text.truncate(end);
+        text.push('…');
+    }
+    text
 }
 
 fn change(what: &str, from: Option<&String>, to: &str) -> String {

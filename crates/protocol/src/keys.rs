@@ -199,6 +199,12 @@ impl Keys {
         format!("{}/alive/robot/*", self.root)
     }
 
+    /// Liveliness token of a console, while a browser shows the run there.
+    #[must_use]
+    pub fn alive_viewer(&self) -> String {
+        format!("{}/alive/viewer", self.root)
+    }
+
     /// The robot that a key under `…/robot/{name}` is about.
     #[must_use]
     pub fn robot_of(key: &str) -> Option<&str> {

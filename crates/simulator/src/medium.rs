@@ -110,7 +110,7 @@ pub struct Medium {
     bursts: BTreeMap<(Kind, Pair), BurstState>,
     /// Links that are cut now.
     cut: BTreeMap<Pair, Scope>,
-    /// Number of commands sent so far, of those among which the scenario names single ones.
+    /// Number of commands sent so far on each link, and of those with texts that the scenario names.
     counts: BTreeMap<Counted, u64>,
 }
 
@@ -175,12 +175,29 @@ impl Medium {
         medium
     }
 
-    /// Counts from now on the commands among which a network names single ones. A network that takes effect in the middle of
-    /// a run is given at the beginning, because it names commands by their number in the run.
+    /// Counts from now on the commands with texts that a network names; those on a link are counted anyway. A network that takes
+    /// effect in the middle of a run is given at the beginning, because it names commands by their number in the run.
     pub fn count_for(&mut self, network: &Network) {
-        for lost in &network.lost {
+        for lost in network
+            .lost
+            .iter()
+            .filter(|lost| lost.counted.text.is_some())
+        {
             self.counts.entry(lost.counted.clone()).or_default();
         }
+    }
+
+    /// Whether all commands among which a network names single ones have been counted from the beginning.
+    #[must_use]
+    pub fn has_counted_for(&self, network: &Network) -> bool {
+        let mut counted = network.lost.iter().map(|lost| &lost.counted);
+        counted.all(|counted| counted.text.is_none() || self.counts.contains_key(counted))
+    }
+
+    /// Number of commands of a set on which has been decided.
+    #[must_use]
+    pub fn count(&self, counted: &Counted) -> u64 {
+        self.counts.get(counted).copied().unwrap_or_default()
     }
 
     /// Replaces the rules of the network, from the next decision on. Commands under way stay under way.
@@ -339,14 +356,25 @@ impl Medium {
 
     /// Counts a command; returns whether the scenario names it as lost.
     fn is_named(&mut self, command: &SentCommand) -> bool {
+        let on_the_link = Counted {
+            from: command.from.clone(),
+            to: command.to.clone(),
+            text: None,
+        };
+        let with_its_text = Counted {
+            text: Some(command.text.command.clone()),
+            ..on_the_link.clone()
+        };
+        self.counts.entry(on_the_link.clone()).or_default();
+
         let mut is_named = false;
-        for (counted, count) in &mut self.counts {
-            if !counted.contains(command) {
+        for counted in [on_the_link, with_its_text] {
+            let Some(count) = self.counts.get_mut(&counted) else {
                 continue;
-            }
+            };
             *count += 1;
             let mut lost = self.network.lost.iter();
-            is_named |= lost.any(|lost| lost.counted == *counted && lost.number == *count);
+            is_named |= lost.any(|lost| lost.counted == counted && lost.number == *count);
         }
         is_named
     }
@@ -446,14 +474,6 @@ impl Medium {
             });
         }
         cuts
-    }
-}
-
-impl Counted {
-    fn contains(&self, command: &SentCommand) -> bool {
-        let is_on_the_link = self.from == command.from && self.to == command.to;
-        let mut texts = self.text.iter();
-        is_on_the_link && texts.all(|text| *text == command.text.command)
     }
 }
 

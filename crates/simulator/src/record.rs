@@ -86,6 +86,18 @@ impl Entry {
         commands
     }
 
+    /// What was set by hand before the tick.
+    #[must_use]
+    pub fn changes_by_hand(&self) -> Vec<String> {
+        let mut changes = Vec::new();
+        for event in &self.events {
+            if let Event::Changed { set, by_hand: true } = event {
+                changes.push(set.clone());
+            }
+        }
+        changes
+    }
+
     /// Whether a robot's report of the tick is missing.
     #[must_use]
     pub fn has_missed(&self, name: &RobotName) -> bool {

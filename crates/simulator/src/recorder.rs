@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, BufWriter, Write};
+use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -205,7 +205,12 @@ impl RunFolder {
             std::fs::rename(&file, renamed)
                 .map_err(|error| self.failed("keep files in", &error))?;
         }
-        Ok(())
+
+        // That of an epoch that has ended would say that the new one has.
+        match std::fs::remove_file(self.file(SUMMARY)) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(self.failed("clear", &error)),
+            _ => Ok(()),
+        }
     }
 
     /// The log, the name of which is in the scenario of the run.
@@ -620,7 +625,7 @@ impl Recorder {
     ///
     /// # Errors
     /// [`FileError`] if what remains to be recorded cannot be written.
-    pub fn supersede(mut self) -> Result<(), FileError> {
+    pub fn supersede(&mut self) -> Result<(), FileError> {
         match self.recording.take() {
             Some(recording) => recording.finish().map_err(|error| unrecordable(&error)),
             None => Ok(()),
@@ -631,11 +636,11 @@ impl Recorder {
     ///
     /// # Errors
     /// [`FileError`] if it cannot be written.
-    pub fn finish(mut self, simulation: &Simulation) -> Result<Summary, FileError> {
+    pub fn finish(&mut self, simulation: &Simulation) -> Result<Summary, FileError> {
         self.summary.finish(simulation);
         if !self.drafts.is_empty() {
             // The run was ended before it was resumed: its record is as it was.
-            return Ok(self.summary);
+            return Ok(self.summary.clone());
         }
 
         let text = serde_json::to_string_pretty(&self.summary)
@@ -644,7 +649,7 @@ impl Recorder {
         file.add(&text)?;
         file.flush()?;
         file.sync()?;
-        Ok(self.summary)
+        Ok(self.summary.clone())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Scenarios. A file is read as written (module `raw`), then checked and converted ([`Scenario`]).
 
+mod by_hand;
 pub mod change;
 mod checked;
 pub mod fault;

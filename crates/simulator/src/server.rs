@@ -19,8 +19,9 @@ mod player;
 mod process;
 mod replay;
 mod timers;
+mod viewers;
 mod watchdog;
 
 pub use past::Past;
-pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError};
+pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError, Stay};
 pub use replay::{Replay, ReplayError, ReplayOptions};

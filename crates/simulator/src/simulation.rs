@@ -7,9 +7,9 @@ use lockstep::{Exchange, Membership, Naming, Outcome, Sent};
 use observe::{Observation, RobotState, Watches};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{
-    CommandText, Correction, Cut, Delivery, End, FaultKind, NEWS_FLAGS, News, OnLate, Performative,
-    Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind, SensedRobot, Standing,
-    StateVariables, Welcome,
+    CommandText, Correction, Cut, Delivery, End, FaultKind, HeldProcess, Intervention, NEWS_FLAGS,
+    News, OnLate, Performative, Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind,
+    SensedRobot, Standing, StateVariables, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
@@ -17,7 +17,7 @@ use world::{Body, HallError, Verdict, World};
 
 use crate::digest::{Digest, TickDigest};
 use crate::medium::{Arrival, Medium, SentCommand};
-use crate::scenario::{FaultEnd, Scenario, to_wire, to_world};
+use crate::scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
 
 /// Most bodies in the news of a robot, so that the news fit into a message.
 const MAX_BODIES: usize = 4096;
@@ -88,6 +88,8 @@ pub struct Simulation {
     sent: BTreeMap<RobotName, Seq>,
     /// Events between the last tick and the next.
     between: Vec<Event>,
+    /// The changes of the scenario without what was done by hand, if anything was.
+    planned: Option<Vec<Change>>,
     digest: Digest,
     /// What the scenario expects of the run.
     watches: Watches,
@@ -132,6 +134,7 @@ impl Simulation {
             incarnations: BTreeMap::new(),
             sent: BTreeMap::new(),
             between: Vec::new(),
+            planned: None,
             digest: Digest::default(),
             watches: Watches::new(
                 &scenario.expectations,
@@ -213,7 +216,7 @@ impl Simulation {
         self.now
     }
 
-    /// What the scenario changes takes effect.
+    /// What the scenario or a person changes takes effect.
     fn change_scenario(&mut self) {
         let mut network = None;
         for change in self.scenario.changes_at(self.now) {
@@ -221,12 +224,108 @@ impl Simulation {
             for set in &change.set {
                 self.events.push(Event::Changed {
                     set: set.to_string(),
+                    by_hand: change.is_by_hand,
                 });
             }
         }
         if let Some(network) = network {
             self.medium.set_network(network);
         }
+    }
+
+    /// Has something done to the run from the next tick on that has not begun, as a person wants it.
+    ///
+    /// # Errors
+    /// In words, if it cannot be done; nothing has changed then.
+    pub fn intervene(&mut self, what: &Intervention) -> Result<(), String> {
+        let set = self
+            .scenario
+            .words_of(what, self.now + 1, |counted| self.medium.count(counted))?;
+        self.change_by_hand(&set)
+    }
+
+    /// Sets something in the scenario from the next tick on that has not begun, as a person wants it.
+    ///
+    /// # Errors
+    /// In words, if it is nothing that can change while a run goes on; nothing has changed then.
+    pub fn change_by_hand(&mut self, set: &[Override]) -> Result<(), String> {
+        let changed = self.scenario.with_change_by_hand(self.now + 1, set);
+        let changed = changed.map_err(|error| error.reason().to_owned())?;
+        if !self
+            .medium
+            .has_counted_for(changed.network_at(self.now + 1))
+        {
+            return Err(
+                "commands with a text are counted from the beginning of a run or not at all: leave `text` out"
+                    .to_owned(),
+            );
+        }
+
+        self.planned
+            .get_or_insert_with(|| self.scenario.changes.clone());
+        self.scenario = changed;
+        Ok(())
+    }
+
+    /// Sets by hand what a record says was set by hand before the next tick.
+    ///
+    /// # Errors
+    /// In words, if the record says something that cannot be set.
+    pub fn repeat_changes(&mut self, changes: &[String]) -> Result<(), String> {
+        if changes.is_empty() {
+            return Ok(());
+        }
+        let set: Result<Vec<Override>, String> = changes.iter().map(|set| set.parse()).collect();
+        self.change_by_hand(&set?)
+    }
+
+    /// The scenario without what was done by hand.
+    #[must_use]
+    pub fn planned(&self) -> Scenario {
+        let mut scenario = self.scenario.clone();
+        if let Some(changes) = &self.planned {
+            scenario.changes.clone_from(changes);
+        }
+        scenario
+    }
+
+    /// The rules for late robots that a change makes before the next tick; `None` if there is no change.
+    #[must_use]
+    pub fn lateness_due(&self) -> Option<&Lateness> {
+        let mut due = self.scenario.changes_at(self.tick + 1);
+        due.next()?;
+        Some(self.scenario.lateness_at(self.tick + 1))
+    }
+
+    /// What the scenario says from now on, and from the next tick on, about the process of a robot that is awaited: whether a
+    /// fault stops it until the wall clock ends it.
+    #[must_use]
+    pub fn held_by_wall_clock(&self, robot: &RobotName) -> Option<FaultKind> {
+        if self.now == self.tick {
+            return None;
+        }
+        let mut faults = self.scenario.faults_at(self.now).iter();
+        let fault = faults.find(|fault| {
+            let is_by_wall = matches!(fault.end, FaultEnd::After(_));
+            is_by_wall && fault.robot == *robot && fault.at == self.now
+        })?;
+        Some(fault.kind)
+    }
+
+    /// Robots whose processes a fault holds in the tick in progress, or in the last one.
+    #[must_use]
+    pub fn held_processes(&self) -> Vec<HeldProcess> {
+        let is_complete = self.now == self.tick;
+        let mut held = Vec::new();
+        for fault in self.scenario.faults_at(self.now) {
+            if fault.holds(self.now, is_complete) {
+                held.push(HeldProcess {
+                    robot: fault.robot.clone(),
+                    kind: fault.kind,
+                });
+            }
+        }
+        held
     }
 
     /// The second half of a tick: reports become events and are added to the digest, and expectations are judged by them.
@@ -557,7 +656,7 @@ impl Simulation {
         let tick = self.tick + 1;
         let mut due = Vec::new();
         for fault in self.scenario.faults_at(tick) {
-            if fault.at == tick {
+            if fault.at == tick && !fault.is_restart() {
                 due.push(fault.begin_order());
             }
             if fault.end == FaultEnd::At(tick) {
@@ -567,7 +666,7 @@ impl Simulation {
         due
     }
 
-    /// Robots that start again before the next tick, as further incarnations, because the scenario changes their parameters.
+    /// Robots that start again before the next tick, as further incarnations.
     #[must_use]
     pub fn restarts_due(&self) -> BTreeSet<RobotName> {
         self.scenario.restarts_at(self.tick + 1)
@@ -582,6 +681,16 @@ impl Simulation {
     /// Records orders that are carried out before the next tick, as part of it. A robot whose process they stop, and without
     /// which the clock goes on by its rule for late robots, cannot be queried in that tick.
     pub fn note_faults(&mut self, orders: &[ProcessOrder], on_late: impl Fn(&RobotName) -> OnLate) {
+        let wanted = self.scenario.restarts_wanted_at(self.tick + 1);
+        for robot in wanted.intersection(&self.restarts_due()) {
+            for begins in [true, false] {
+                self.between.push(Event::Fault {
+                    robot: robot.clone(),
+                    kind: FaultKind::Restart,
+                    begins,
+                });
+            }
+        }
         for order in orders {
             let is_stopped = matches!(order.lasting(), Some(FaultKind::Crash | FaultKind::Hang));
             if is_stopped && on_late(&order.robot) == OnLate::Continue {

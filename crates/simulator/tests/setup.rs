@@ -183,6 +183,25 @@ fn a_scenario_from_outside_reads_no_files() {
 }
 
 #[test]
+fn every_shipped_scenario_can_be_loaded_without_its_files() {
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+    let mut read = 0;
+    for entry in std::fs::read_dir(&configs).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let source = Source::read(&path).unwrap();
+        let alone = Scenario::parse_alone(&source)
+            .unwrap_or_else(|error| panic!("{}: {}", path.display(), error.in_words()));
+        let with_files = Scenario::parse(&source, &configs).unwrap();
+        assert_eq!(alone.to_toml().unwrap(), with_files.to_toml().unwrap());
+        read += 1;
+    }
+    assert!(read >= 6, "{read} scenarios");
+}
+
+#[test]
 fn a_robot_whose_name_is_a_number_is_reported_by_its_own_name() {
     let text = "[[robot]]\nname = \"1\"\nat = [\"99 m\", \"5 m\"]\n\
                 [[robot]]\nname = \"Berta\"\nat = [\"7 m\", \"5 m\"]\n";

@@ -256,8 +256,5 @@ fn wrong_expectations_are_shown_with_their_place() {
 
     lab.ok(&["run", SCENARIO, "--run", "parent", "--duration", "20 s"]);
     let (_, shown) = lab.fails(&["fork", "parent@10", "--set", "expect=[]"]);
-    assert!(
-        shown.contains("only the network, faults, and parameters"),
-        "{shown}"
-    );
+    assert!(shown.contains("only the network, faults, rules"), "{shown}");
 }

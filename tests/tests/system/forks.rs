@@ -212,7 +212,8 @@ fn a_fork_that_cannot_be_made_is_refused_and_the_run_is_kept() {
         &["parent@30", "--run", "parent"],
         "would overwrite the run parent",
     );
-    let reason = "only the network, faults, and parameters of robots can change";
+    let reason =
+        "only the network, faults, rules for late robots, and parameters of robots can change";
     refused(&["parent@30", "--set", "seed=5"], reason);
     refused(&["parent@30", "--set", "guests.count=5"], reason);
     refused(&["parent@30", "--set", "robot.Butler.class=Leguin"], reason);

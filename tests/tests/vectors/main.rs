@@ -25,7 +25,7 @@ use protocol::{RobotName, RunName};
 use rand_xoshiro::rand_core::Rng;
 use robot::{Host, HostOptions, Robot};
 use simulator::scenario::Changes;
-use simulator::server::{Options, REPEAT_AFTER, Server};
+use simulator::server::{Options, REPEAT_AFTER, Server, Stay};
 use simulator::{RunFolder, Scenario};
 use stage::Stage;
 use system_tests::{Lab, PATIENCE, eventually, root};
@@ -213,6 +213,7 @@ fn echo_over_zenoh() {
         run: run.clone(),
         speed: None,
         is_paused: true,
+        stay: Stay::Never,
         repeat_after: REPEAT_AFTER,
     };
     let scenario = Scenario::load(&root().join(ECHO), &Changes::default()).unwrap();
@@ -234,6 +235,7 @@ fn echo_over_zenoh() {
     witness.control(&Control::Init {
         seed: Some(8),
         setup: None,
+        epoch: None,
     });
     witness.step(4);
     witness.assert_received("echo.jsonl", 0);

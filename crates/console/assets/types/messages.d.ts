@@ -7,6 +7,10 @@ export type Control =
   | {
       do: "init";
       /**
+       * Only if this is the epoch in progress: another one has another set-up, perhaps. Without it whatever the epoch.
+       */
+      epoch?: number | null;
+      /**
        * Another seed; without it the same.
        */
       seed?: number | null;
@@ -18,7 +22,7 @@ export type Control =
   | {
       do: "load";
       /**
-       * The text of a scenario file that says everything itself (no `params_from`).
+       * The text of a scenario file. Its `params_from` may name parameters that the simulator brings along, and no other file.
        */
       scenario: string;
     }
@@ -71,6 +75,10 @@ export type Control =
       robot?: RobotName | null;
     }
   | {
+      do: "intervene";
+      what: Intervention;
+    }
+  | {
       do: "faults_done";
       /**
        * Epoch of the order.
@@ -95,6 +103,69 @@ export type OnLate = "wait" | "continue" | "abort";
  * Name of a robot of the roster; robots are addressed by it (seed, "Inter-Robot Communication").
  */
 export type RobotName = string;
+/**
+ * What a person does to a run in progress. It is what a scenario can say, too: the record has it in the words of the scenario.
+ */
+export type Intervention =
+  | {
+      /**
+       * One group.
+       */
+      from: RobotName[];
+      intervention: "cut";
+      /**
+       * Whether only messages from the one group to the other are cut.
+       */
+      one_way?: boolean;
+      /**
+       * The other.
+       */
+      to: RobotName[];
+    }
+  | {
+      /**
+       * One group; without names all robots.
+       */
+      from?: RobotName[];
+      intervention: "heal";
+      /**
+       * Whether only messages from the one group to the other pass again.
+       */
+      one_way?: boolean;
+      /**
+       * The other; without names all robots.
+       */
+      to?: RobotName[];
+    }
+  | {
+      from: RobotName;
+      intervention: "lose";
+      to: RobotName;
+    }
+  | {
+      /**
+       * After how long it ends by itself, seconds of wall clock; only where the clock waits for the robot.
+       */
+      for_s?: number | null;
+      intervention: "fault";
+      kind: FaultKind;
+      robot: RobotName;
+    }
+  | {
+      intervention: "recover";
+      robot: RobotName;
+    }
+  | {
+      intervention: "set";
+      /**
+       * Changes as in `robot.Butler.params.policy=rules`.
+       */
+      set: string[];
+    };
+/**
+ * A fault of a process.
+ */
+export type FaultKind = "crash" | "hang" | "slow" | "restart";
 /**
  * The answer to a [`Control`].
  */
@@ -515,6 +586,10 @@ export interface WorldFrame {
    */
   expectations?: Standing[];
   /**
+   * Robots whose processes a fault holds now, because the scenario or a person wants it.
+   */
+  faults?: HeldProcess[];
+  /**
    * Width and height of the field, meters.
    *
    * @minItems 2
@@ -591,6 +666,13 @@ export interface Standing {
    * The verdict; none while it is not decided.
    */
   verdict?: Verdict | null;
+}
+/**
+ * A robot whose process a fault holds.
+ */
+export interface HeldProcess {
+  kind: FaultKind;
+  robot: RobotName;
 }
 /**
  * A command on its way, as observers see it.

@@ -435,7 +435,9 @@ fn run_cells(event: &Event) -> Vec<Cell<'_>> {
             ("protocol", (*protocol).into()),
             ("tick_s", (*tick_s).into()),
         ],
-        Event::Changed { set } => vec![("set", set.as_str().into())],
+        Event::Changed { set, by_hand } => {
+            vec![("set", set.as_str().into()), ("by_hand", (*by_hand).into())]
+        }
         Event::Judged {
             expectation,
             verdict,

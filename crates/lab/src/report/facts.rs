@@ -220,7 +220,7 @@ impl RunFacts {
                 tick,
                 because: because.clone(),
             }),
-            Event::Changed { set } => self.disturb(tick, "change of the scenario", set, true),
+            Event::Changed { set, .. } => self.disturb(tick, "change of the scenario", set, true),
             _ => {}
         }
     }

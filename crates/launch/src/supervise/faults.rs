@@ -48,6 +48,8 @@ impl Supervisor {
                 process.signal(Signal::SIGKILL);
             }
             FaultKind::Hang => process.signal(Signal::SIGSTOP),
+            // The simulator orders it as a crash and its end.
+            FaultKind::Restart => return,
             FaultKind::Slow if process.is_slow => return,
             FaultKind::Slow => {
                 process.is_slow = true;
@@ -76,7 +78,7 @@ impl Supervisor {
                     self.start(index);
                 }
             }
-            FaultKind::Crash => {}
+            FaultKind::Crash | FaultKind::Restart => {}
             FaultKind::Hang => process.signal(Signal::SIGCONT),
             FaultKind::Slow => {
                 process.is_slow = false;

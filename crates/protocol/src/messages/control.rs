@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::limits::{counted, few, finite, short};
+use super::limits::{counted, few, finite, is_false, short};
 use super::log::LogRecord;
 use super::numbers::{Epoch, Generation, Tick};
 use super::point::Point;
@@ -22,10 +22,13 @@ pub enum Control {
         /// Another set-up; without it the same. A refusal names the fields that are wrong, and changes nothing.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         setup: Option<Box<Setup>>,
+        /// Only if this is the epoch in progress: another one has another set-up, perhaps. Without it whatever the epoch.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        epoch: Option<Epoch>,
     },
     /// Start the next epoch with the scenario that this TOML text describes; its roster must be that of the run.
     Load {
-        /// The text of a scenario file that says everything itself (no `params_from`).
+        /// The text of a scenario file. Its `params_from` may name parameters that the simulator brings along, and no other file.
         scenario: String,
     },
     /// What the run is set up with: answered with [`ControlAnswer::Setup`].
@@ -63,6 +66,11 @@ pub enum Control {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         deadline_s: Option<f64>,
     },
+    /// Do something to the run, as an experiment: it takes effect before the next tick, and is an event.
+    Intervene {
+        /// What.
+        what: Intervention,
+    },
     /// The launcher has carried out the faults that it was ordered before this tick.
     FaultsDone {
         /// Epoch of the order.
@@ -90,7 +98,82 @@ impl Message for Control {
             Self::Init {
                 setup: Some(setup), ..
             } => setup.check(),
+            Self::Intervene { what } => what.check(),
             _ => Ok(()),
+        }
+    }
+}
+
+/// What a person does to a run in progress. It is what a scenario can say, too: the record has it in the words of the scenario.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "intervention", rename_all = "snake_case")]
+pub enum Intervention {
+    /// Cuts the links between two groups of robots.
+    Cut {
+        /// One group.
+        from: Vec<RobotName>,
+        /// The other.
+        to: Vec<RobotName>,
+        /// Whether only messages from the one group to the other are cut.
+        #[serde(default, skip_serializing_if = "is_false")]
+        one_way: bool,
+    },
+    /// Heals the links between two groups of robots, whatever has cut them.
+    Heal {
+        /// One group; without names all robots.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        from: Vec<RobotName>,
+        /// The other; without names all robots.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        to: Vec<RobotName>,
+        /// Whether only messages from the one group to the other pass again.
+        #[serde(default, skip_serializing_if = "is_false")]
+        one_way: bool,
+    },
+    /// Loses the next command on a link.
+    Lose {
+        /// Its sender.
+        from: RobotName,
+        /// Its target.
+        to: RobotName,
+    },
+    /// Brings a fault upon the process of a robot.
+    Fault {
+        /// Whose.
+        robot: RobotName,
+        /// Which.
+        kind: FaultKind,
+        /// After how long it ends by itself, seconds of wall clock; only where the clock waits for the robot.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        for_s: Option<f64>,
+    },
+    /// Ends the fault of a robot's process: a stopped one goes on, a killed one is started again.
+    Recover {
+        /// Whose.
+        robot: RobotName,
+    },
+    /// Changes the scenario from the next tick on, as a `[[change]]` does.
+    Set {
+        /// Changes as in `robot.Butler.params.policy=rules`.
+        set: Vec<String>,
+    },
+}
+
+impl Intervention {
+    fn check(&self) -> Result<(), FieldError> {
+        match self {
+            Self::Cut { from, to, .. } | Self::Heal { from, to, .. } => {
+                few(from.len(), "what.from")?;
+                few(to.len(), "what.to")
+            }
+            Self::Fault {
+                for_s: Some(for_s), ..
+            } => finite(*for_s, "what.for_s"),
+            Self::Set { set } => {
+                few(set.len(), "what.set")?;
+                set.iter().try_for_each(|one| short(one, "what.set"))
+            }
+            Self::Lose { .. } | Self::Fault { .. } | Self::Recover { .. } => Ok(()),
         }
     }
 }
@@ -296,6 +379,8 @@ pub enum FaultKind {
     Hang,
     /// The process is stopped for most of the time, and goes on in between.
     Slow,
+    /// The process is killed and started again, between two ticks.
+    Restart,
 }
 
 /// How things stand.

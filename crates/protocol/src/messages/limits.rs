@@ -50,7 +50,7 @@ pub(super) fn few(len: usize, field: &str) -> Result<(), FieldError> {
 }
 
 /// Whether a flag has its default and is left out of a message.
-pub(super) fn is_false(flag: &bool) -> bool {
+pub(crate) fn is_false(flag: &bool) -> bool {
     !*flag
 }
 

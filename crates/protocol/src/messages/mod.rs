@@ -12,15 +12,16 @@ mod step;
 
 pub use crate::codec::FieldError;
 pub use control::{
-    Awaited, Control, ControlAnswer, FaultKind, FaultOrder, LogFile, OnLate, Phase, Presence,
-    ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
+    Awaited, Control, ControlAnswer, FaultKind, FaultOrder, Intervention, LogFile, OnLate, Phase,
+    Presence, ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
+pub(crate) use limits::is_false;
 pub use limits::{MAX_ENTRIES, MAX_TEXT_BYTES};
 pub use log::{LogKind, LogRecord};
 pub use numbers::{Epoch, Generation, Seq, Tick};
 pub use observe::{
-    Cut, Face, Fate, Flight, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame, Standing, Tone, Verdict,
-    Widget, WorldFrame,
+    Cut, Face, Fate, Flight, HeldProcess, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame, Standing,
+    Tone, Verdict, Widget, WorldFrame,
 };
 pub use performative::Performative;
 pub use point::Point;

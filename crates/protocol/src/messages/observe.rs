@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::control::{Awaited, Phase, Presence};
+use super::control::{Awaited, FaultKind, Phase, Presence};
 use super::limits::{few, finite, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
@@ -53,6 +53,9 @@ pub struct WorldFrame {
     /// Pairs of robots between which the medium lets nothing through now.
     #[serde(default)]
     pub cuts: Vec<Cut>,
+    /// Robots whose processes a fault holds now, because the scenario or a person wants it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<HeldProcess>,
     /// How the expectations of the scenario stand, in its order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub expectations: Vec<Standing>,
@@ -102,6 +105,15 @@ pub struct Cut {
     pub commands: bool,
     /// Whether queries are cut.
     pub queries: bool,
+}
+
+/// A robot whose process a fault holds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct HeldProcess {
+    /// Whose.
+    pub robot: RobotName,
+    /// Which fault.
+    pub kind: FaultKind,
 }
 
 /// Whether a run has done what is expected of it. The worse is the greater.

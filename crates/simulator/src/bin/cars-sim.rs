@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use config::Speed;
 use config::units::Time;
 use miette::IntoDiagnostic;
@@ -13,7 +13,7 @@ use protocol::RunName;
 use protocol::messages::End;
 use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
 use simulator::scenario::{Changes, Override, Scenario};
-use simulator::server::{Event, Options, Past, REPEAT_AFTER, Server};
+use simulator::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
 use simulator::{RunFolder, Summary};
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
@@ -60,10 +60,32 @@ struct Args {
     /// and compared with it, and goes on from there.
     #[arg(long, conflicts_with_all = ["seed", "duration", "set"])]
     resume: bool,
+    /// Stay when the run is over and nobody has stopped it, so that `init` begins the next one with the same processes: always,
+    /// or while a browser shows the run in a console.
+    #[arg(long, value_name = "WHEN", num_args = 0..=1, default_missing_value = "always")]
+    stay: Option<StayMode>,
     /// Exit with 0 where the run is over, whatever the verdict on it. Without it a failed expectation is exit status 1, and an
     /// undecided one 2.
     #[arg(long)]
     no_verdict: bool,
+}
+
+/// When the process stays after the end of a run.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StayMode {
+    /// Until it is stopped.
+    Always,
+    /// While a browser shows the run in a console.
+    Viewed,
+}
+
+impl From<StayMode> for Stay {
+    fn from(mode: StayMode) -> Self {
+        match mode {
+            StayMode::Viewed => Self::Viewed,
+            StayMode::Always => Self::Always,
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -111,6 +133,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
         run: args.run.clone(),
         speed: args.speed.0,
         is_paused: args.paused,
+        stay: args.stay.map_or(Stay::Never, Stay::from),
         repeat_after: REPEAT_AFTER,
     };
     let server = Server::open(bus, &scenario, options).into_diagnostic()?;

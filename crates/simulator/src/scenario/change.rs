@@ -6,6 +6,7 @@ use config::Override;
 use protocol::messages::Parameters;
 use protocol::{RobotName, RunName, Tick};
 
+use super::checked::Lateness;
 use super::fault::Fault;
 use super::network::Network;
 
@@ -16,8 +17,12 @@ pub struct Change {
     pub at: Tick,
     /// What it sets.
     pub set: Vec<Override>,
+    /// Whether a person has made it during the run, and not the scenario.
+    pub is_by_hand: bool,
     /// The network from then on.
     pub network: Network,
+    /// The rules for late robots from then on.
+    pub lateness: Lateness,
     /// All faults of the run, as far as they begin from then on.
     pub faults: Vec<Fault>,
     /// The parameters of all robots from then on.

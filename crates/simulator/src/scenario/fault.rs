@@ -9,7 +9,7 @@ use protocol::{RobotName, Tick};
 pub struct Fault {
     /// Robot whose process has the fault.
     pub robot: RobotName,
-    /// Crash, hang or slow.
+    /// Which.
     pub kind: FaultKind,
     /// It begins before the clock of this tick.
     pub at: Tick,
@@ -41,6 +41,34 @@ impl Fault {
             FaultEnd::Never => true,
         };
         is_absence && self.at <= tick && lasts
+    }
+
+    /// What is certain of the fault before a tick: one that has not ended by then may end in any way later.
+    pub(crate) fn before(&self, tick: Tick) -> Self {
+        let end = match self.end {
+            FaultEnd::At(end) if end >= tick => FaultEnd::Never,
+            end => end,
+        };
+        Self {
+            end,
+            ..self.clone()
+        }
+    }
+
+    /// Whether the process is killed and started again at once.
+    pub(crate) fn is_restart(&self) -> bool {
+        self.kind == FaultKind::Restart
+    }
+
+    /// Whether the fault holds the process in a tick, which is complete or not. One that ends by the wall clock lasts until the
+    /// tick is complete for which the clock waits.
+    pub(crate) fn holds(&self, tick: Tick, is_complete: bool) -> bool {
+        let is_over = match self.end {
+            FaultEnd::At(end) => end <= tick,
+            FaultEnd::After(_) => self.at < tick || is_complete,
+            FaultEnd::Never => false,
+        };
+        self.at <= tick && !is_over && !self.is_restart()
     }
 
     fn order(&self, begins: bool, for_s: Option<f64>) -> ProcessOrder {

@@ -6,7 +6,7 @@ use protocol::messages::Parameters;
 use protocol::{RobotName, Tick};
 
 use super::change::Change;
-use super::checked::Scenario;
+use super::checked::{Lateness, Scenario};
 use super::fault::Fault;
 use super::network::Network;
 
@@ -28,6 +28,13 @@ impl Scenario {
         change.map_or(&self.network, |change| &change.network)
     }
 
+    /// The rules for late robots in a tick, as far as the scenario and its changes say.
+    #[must_use]
+    pub fn lateness_at(&self, tick: Tick) -> &Lateness {
+        let change = self.in_effect(tick);
+        change.map_or(&self.lateness, |change| &change.lateness)
+    }
+
     /// The faults of the run, as they are known in a tick.
     #[must_use]
     pub fn faults_at(&self, tick: Tick) -> &[Fault] {
@@ -44,7 +51,7 @@ impl Scenario {
         Some(&self.robots.get(robot)?.parameters)
     }
 
-    /// Robots that start again, with other parameters, before a tick. One whose process is killed or stopped then has the new
+    /// Robots that start again before a tick, because their parameters are others, or because a fault wants it. One whose process is killed or stopped then has the new
     /// parameters when it takes part again.
     #[must_use]
     pub fn restarts_at(&self, tick: Tick) -> BTreeSet<RobotName> {
@@ -52,12 +59,20 @@ impl Scenario {
         for change in self.changes_at(tick) {
             robots.extend(change.restarted.iter().cloned());
         }
+        robots.extend(self.restarts_wanted_at(tick));
         for fault in self.faults_at(tick) {
             if fault.is_absence_at(tick) {
                 robots.remove(&fault.robot);
             }
         }
         robots
+    }
+
+    /// Robots that a fault wants to start again before a tick.
+    pub(crate) fn restarts_wanted_at(&self, tick: Tick) -> BTreeSet<RobotName> {
+        let faults = self.faults_at(tick).iter();
+        let restarts = faults.filter(|fault| fault.is_restart() && fault.at == tick);
+        restarts.map(|fault| fault.robot.clone()).collect()
     }
 
     /// Whether processes have to be killed or stopped for the run.

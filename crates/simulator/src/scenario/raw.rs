@@ -1,11 +1,13 @@
 //! A scenario file as written. Unknown keys are refused; errors show the place in the file.
 
-mod change;
+pub(super) mod change;
 mod expect;
-mod fault;
+pub(super) mod fault;
 mod network;
 mod range;
+mod shipped;
 mod unplaced;
+pub(super) mod words;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -150,6 +152,17 @@ impl Scenario {
         source: &Source,
         folder: Option<&Path>,
     ) -> Result<checked::Scenario, FileError> {
+        self.check_from(source, folder, 0)
+    }
+
+    /// Checks the scenario of a run in which tick `settled` is the next one: what was checked before the run began is not
+    /// checked again.
+    pub(super) fn check_from(
+        self,
+        source: &Source,
+        folder: Option<&Path>,
+        settled: Tick,
+    ) -> Result<checked::Scenario, FileError> {
         let seed = self.seed(source)?;
         let tick_s = self.tick_s(source)?;
         let ticks = self.ticks(source, tick_s)?;
@@ -169,7 +182,7 @@ impl Scenario {
         let robots = robots(self.robots, source, folder)?;
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
-        let faults = fault::check(self.faults, &robots, &lateness, tick_s, source)?;
+        let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;
         let roster: Vec<RobotName> = robots.keys().cloned().collect();
         let expectations = expect::check(self.expectations, &roster, source)?;
         let mut scenario = checked::Scenario {
@@ -193,10 +206,12 @@ impl Scenario {
         };
 
         // A hall that cannot be placed is refused before anything starts.
-        placing::check(&scenario)
-            .map_err(|error| FileError::at(source, guests_span, &error.to_string()))?;
-        scenario.changes = change::check(self.changes, &scenario, source, |changed| {
-            changed.parse::<Self>()?.check(changed, folder)
+        if settled == 0 {
+            placing::check(&scenario)
+                .map_err(|error| FileError::at(source, guests_span, &error.to_string()))?;
+        }
+        scenario.changes = change::check(self.changes, &scenario, source, |changed, at| {
+            changed.parse::<Self>()?.check_from(changed, folder, at)
         })?;
         Ok(scenario)
     }
@@ -358,15 +373,7 @@ fn robots(
 fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpec, FileError> {
     let mut parameters = Parameters::new();
     if let Some(file) = &robot.params_from {
-        let Some(folder) = folder else {
-            let reason = "`params_from` names a file; write its parameters out under `params`";
-            return Err(FileError::at(source, Some(file.span()), reason));
-        };
-        let path = folder.join(file.get_ref());
-        source.check_named(file.span(), &path)?;
-        let read = Source::read(&path).and_then(|file| file.parse());
-        let table = read.map_err(|error| error.named_by(&source.name))?;
-        parameters.extend(to_parameters(&table));
+        parameters.extend(to_parameters(&named_parameters(file, source, folder)?));
     }
     parameters.extend(to_parameters(&robot.params));
 
@@ -376,6 +383,29 @@ fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpe
         at: point(robot.at),
         parameters,
     })
+}
+
+/// The parameters of a file that a robot names. In a text from outside they are those that this program brings along.
+fn named_parameters(
+    file: &Spanned<PathBuf>,
+    source: &Source,
+    folder: Option<&Path>,
+) -> Result<toml::Table, FileError> {
+    let Some(folder) = folder else {
+        let shipped = shipped::parameters(file.get_ref()).ok_or_else(|| {
+            let names = shipped::names().join(" or ");
+            let reason = format!(
+                "`params_from` of a scenario from outside names {names}; write other parameters out under `params`"
+            );
+            FileError::at(source, Some(file.span()), &reason)
+        })?;
+        return shipped.parse();
+    };
+
+    let path = folder.join(file.get_ref());
+    source.check_named(file.span(), &path)?;
+    let read = Source::read(&path).and_then(|file| file.parse());
+    read.map_err(|error| error.named_by(&source.name))
 }
 
 fn point([x, y]: [Length; 2]) -> Point {

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use bus::Query;
 use protocol::messages::{
-    Awaited, Control, ControlAnswer, End, FieldError, Phase, RobotStatus, Setup, SetupAnswer,
-    Status,
+    Awaited, Control, ControlAnswer, End, FieldError, Intervention, Phase, RobotStatus, Setup,
+    SetupAnswer, Status,
 };
-use protocol::{RobotName, decode, encode};
+use protocol::{Epoch, RobotName, decode, encode};
 
-use super::process::{Interrupt, Server};
+use super::process::{Interrupt, Server, Stage};
 use crate::diagnostic::Source;
 use crate::scenario::{OnLate, Scenario};
 use crate::simulation::Simulation;
@@ -17,6 +17,9 @@ use crate::simulation::Simulation;
 /// Why a run in progress does not go to another tick.
 const NOT_SOUGHT: &str = "a run in progress cannot be sought: its ticks take place once, in order; `cars replay RUN` shows a \
                           recorded run, which can";
+
+/// Most requests that wait for the next tick.
+const MAX_DEFERRED: usize = 64;
 
 impl Server {
     /// People ask for something; they are answered at once.
@@ -37,12 +40,18 @@ impl Server {
                 self.on_step(n, query, simulation);
                 return Ok(());
             }
-            Control::Init { seed, setup } => {
-                let next = next_scenario(simulation.scenario(), seed, setup.as_deref());
+            Control::Init { seed, setup, epoch } => {
+                let next = check_epoch(epoch, simulation)
+                    .and_then(|()| next_scenario(&simulation.planned(), seed, setup.as_deref()));
                 self.on_init(next, &query, simulation)?;
             }
             Control::Load { scenario } => {
                 self.on_init(load(&scenario, simulation.scenario()), &query, simulation)?;
+            }
+            // The faults before the next tick are being carried out: it waits for that tick.
+            Control::Intervene { .. } if matches!(self.stage, Stage::Faults(_)) => {
+                self.defer(query);
+                return Ok(());
             }
             Control::Setup => {
                 answer_setup(&query, simulation.scenario());
@@ -56,7 +65,7 @@ impl Server {
                 self.answer_status(&query, simulation);
                 return Err(Interrupt::End(End::Stopped));
             }
-            other => match self.act(&other) {
+            other => match self.act(&other, simulation) {
                 Ok(()) => {
                     if matches!(other, Control::Pause)
                         && let Some(stepping) = self.pace.give_up_stepping()
@@ -74,19 +83,20 @@ impl Server {
         Ok(())
     }
 
-    fn act(&mut self, control: &Control) -> Result<(), String> {
+    fn act(&mut self, control: &Control, simulation: &mut Simulation) -> Result<(), String> {
         match control {
             Control::Start => self.pace.start()?,
             Control::Pause => self.pace.pause()?,
             Control::Speed { factor } => self.pace.set_speed(*factor)?,
             Control::Seek { .. } => return Err(NOT_SOUGHT.to_owned()),
             Control::FaultsDone { epoch, tick } => self.orders.done(*epoch, *tick),
+            Control::Intervene { what } => self.intervene(what, simulation)?,
             Control::Late {
                 robot,
                 on_late,
                 deadline_s,
             } => {
-                self.change_lateness(robot.as_ref(), *on_late, *deadline_s)?;
+                self.change_lateness(robot.as_ref(), *on_late, *deadline_s, simulation)?;
             }
             Control::Status => {}
             Control::Init { .. }
@@ -106,12 +116,19 @@ impl Server {
         robot: Option<&RobotName>,
         on_late: Option<OnLate>,
         deadline_s: Option<f64>,
+        simulation: &mut Simulation,
     ) -> Result<(), String> {
         if let Some(unknown) = robot.filter(|robot| !self.barrier.has(robot)) {
             return Err(format!("no robot of this run is called {unknown}"));
         }
         if deadline_s.is_some_and(|deadline_s| deadline_s <= 0.0) {
             return Err("a deadline is more than zero".to_owned());
+        }
+
+        if let Some(on_late) = on_late {
+            // What it does to the open tick is in the record anyway: who missed it.
+            self.check_interventions(simulation)?;
+            simulation.change_by_hand(&[Scenario::words_of_lateness(robot, on_late)?])?;
         }
 
         let mut lateness = self.barrier.lateness().clone();
@@ -129,6 +146,62 @@ impl Server {
         Ok(())
     }
 
+    /// Keeps a request until the next tick has begun.
+    fn defer(&mut self, query: Query) {
+        if self.deferred.len() < MAX_DEFERRED {
+            self.deferred.push(query);
+        } else {
+            refuse(&query, "too many requests wait for the next tick");
+        }
+    }
+
+    /// Does something to the run, from the next tick on.
+    fn intervene(
+        &mut self,
+        what: &Intervention,
+        simulation: &mut Simulation,
+    ) -> Result<(), String> {
+        self.check_interventions(simulation)?;
+        let concerns_processes = match what {
+            Intervention::Fault { .. } | Intervention::Recover { .. } => true,
+            Intervention::Set { set } => {
+                let mut set = set.iter();
+                set.any(|one| one.starts_with("fault") || one.starts_with("robot"))
+            }
+            Intervention::Cut { .. } | Intervention::Heal { .. } | Intervention::Lose { .. } => {
+                false
+            }
+        };
+        if concerns_processes && !self.orders.publisher.has_subscribers() {
+            return Err(
+                "no launcher is connected that could stop or start processes: start the run by `cars launch`"
+                    .to_owned(),
+            );
+        }
+
+        if let Intervention::Recover { robot } = what
+            && let Some(kind) = simulation.held_by_wall_clock(robot)
+        {
+            let order = self.recover_now(robot, kind, simulation);
+            return order.map_err(|error| error.to_string());
+        }
+        simulation.intervene(what)
+    }
+
+    /// Refuses what is done by hand while the run is executed again, and after its last tick.
+    fn check_interventions(&self, simulation: &Simulation) -> Result<(), String> {
+        if self.is_repeating() {
+            return Err(
+                "the run is executed again up to the end of its record: wait until it goes on from there"
+                    .to_owned(),
+            );
+        }
+        if simulation.tick() >= simulation.scenario().ticks {
+            return Err("the run has no further tick".to_owned());
+        }
+        Ok(())
+    }
+
     fn on_init(
         &mut self,
         next: Result<Scenario, Refusal>,
@@ -143,7 +216,7 @@ impl Server {
             }
         };
         match self.pace.phase {
-            Phase::Gathering | Phase::Ended => {
+            Phase::Gathering => {
                 refuse(query, &format!("the run is {}", self.pace.phase));
                 Ok(())
             }
@@ -256,6 +329,17 @@ impl From<Refusal> for ControlAnswer {
             explanation,
             fields,
         }
+    }
+}
+
+/// Checks that an epoch is the one in progress, if it is named.
+fn check_epoch(epoch: Option<Epoch>, simulation: &Simulation) -> Result<(), Refusal> {
+    let now = simulation.epoch();
+    match epoch {
+        Some(epoch) if epoch != now => Err(Refusal::from(format!(
+            "epoch {now} has begun meanwhile, perhaps with another set-up: look at that first"
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -39,6 +39,26 @@ impl Server {
         Ok((!orders.is_empty()).then(|| self.underway(simulation, orders, then)))
     }
 
+    /// Has the fault of a robot ended for which the open tick waits. Only the wall clock would have ended it, so the record does
+    /// not change.
+    pub(super) fn recover_now(
+        &self,
+        robot: &RobotName,
+        kind: FaultKind,
+        simulation: &Simulation,
+    ) -> Result<(), BusError> {
+        self.orders.publisher.put(encode(&FaultOrder {
+            epoch: simulation.epoch(),
+            tick: simulation.tick() + 1,
+            orders: vec![ProcessOrder {
+                robot: robot.clone(),
+                kind,
+                begins: false,
+                for_s: None,
+            }],
+        }))
+    }
+
     /// Begins to have orders carried out, and then others.
     fn underway(
         &mut self,

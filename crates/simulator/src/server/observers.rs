@@ -234,6 +234,7 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
             .collect(),
         flights: Vec::new(),
         cuts: simulation.cuts(),
+        faults: simulation.held_processes(),
         expectations: simulation.standings(),
     }
 }

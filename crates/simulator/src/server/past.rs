@@ -65,6 +65,12 @@ impl Past {
         sent.map(|sent| (sent.to, sent.command.command)).collect()
     }
 
+    /// What was set by hand before the next tick.
+    pub(super) fn changes_by_hand(&self) -> Vec<String> {
+        let next = self.next.iter();
+        next.flat_map(Entry::changes_by_hand).collect()
+    }
+
     /// Compares a tick that was executed again.
     ///
     /// # Errors

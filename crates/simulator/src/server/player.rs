@@ -160,6 +160,7 @@ impl Player {
             obstacles: header.obstacles.clone(),
             flights: Vec::new(),
             cuts: frame.cuts.clone(),
+            faults: Vec::new(),
             expectations: frame.standings(self.events()),
         }
     }

@@ -8,8 +8,8 @@ use bus::{Bus, BusError, Declared, Publisher, Query};
 use lockstep::{Barrier, Naming, Outcome, Output, Sent, Stamp, Timing};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Awaited, Clock, Command, CommandText, End, LogRecord, MAX_ENTRIES, Panel, Presence, Reason,
-    Report, Waiting,
+    Awaited, Clock, Command, CommandText, End, LogKind, LogRecord, MAX_ENTRIES, Panel, Presence,
+    Reason, Report, Waiting,
 };
 use protocol::{Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 
@@ -26,6 +26,7 @@ use super::orders::{Orders, Underway};
 use super::pace::Pace;
 use super::past::{Past, Repeated};
 use super::timers::Timers;
+use super::viewers::Viewers;
 use super::watchdog::{Doing, Watchdog};
 
 /// While the clock is held it is repeated this often: what was lost on the wire is then sent again.
@@ -46,8 +47,22 @@ pub struct Options {
     pub speed: Option<f64>,
     /// Whether the clock waits for `start` once every robot is connected.
     pub is_paused: bool,
+    /// Whether the process stays when the run is over.
+    pub stay: Stay,
     /// While the clock is held it is repeated this often; [`REPEAT_AFTER`] unless a test is in a hurry.
     pub repeat_after: Duration,
+}
+
+/// Whether a simulator process stays when a run is over that nobody has stopped: then `init` begins another epoch, with the same
+/// processes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stay {
+    /// It ends.
+    Never,
+    /// It stays while a browser shows the run in a console.
+    Viewed,
+    /// It stays until it is stopped.
+    Always,
 }
 
 /// Why a simulator process ended before its time.
@@ -115,6 +130,11 @@ pub enum Event {
         /// Whether it is declared.
         is_present: bool,
     },
+    /// A console declares, or declares no more, that a browser shows the run.
+    Viewer {
+        /// Whether one does.
+        is_present: bool,
+    },
     /// The process is asked to end.
     Terminate,
 }
@@ -163,6 +183,7 @@ pub struct Server {
     clock: Publisher,
     news: BTreeMap<RobotName, Publisher>,
     pub(super) observers: Observers,
+    viewers: Viewers,
     pub(super) orders: Orders,
     pub(super) pace: Pace,
     pub(super) barrier: Barrier<Arc<Report>, CommandText>,
@@ -179,6 +200,8 @@ pub struct Server {
     pub(super) wall: Wall,
     /// Commands from outside the roster that are sent at the next tick boundary.
     operator: Vec<(RobotName, String)>,
+    /// Requests that wait until the next tick has begun.
+    pub(super) deferred: Vec<Query>,
     /// The record of a run that is resumed, until it has been executed again.
     past: Option<Past>,
     /// The subscriber to panels, while they are recorded: robots put them only if there is one.
@@ -261,6 +284,7 @@ impl Server {
             clock: bus.publisher(&keys.clock())?,
             news,
             observers: Observers::new(&bus, &keys)?,
+            viewers: Viewers::default(),
             orders: Orders::new(bus.publisher(&keys.faults())?),
             pace: Pace::new(options.speed, options.is_paused),
             barrier,
@@ -273,6 +297,7 @@ impl Server {
             culprits: Vec::new(),
             wall: Wall::default(),
             operator: Vec::new(),
+            deferred: Vec::new(),
             past: None,
             panel_subscriber: None,
             observing: Observing::default(),
@@ -332,6 +357,16 @@ impl Server {
             })?;
         self.declared.extend([reports, commands, waiting, tokens]);
 
+        if self.options.stay == Stay::Viewed {
+            let inbox = self.inbox.clone();
+            let viewers =
+                self.bus
+                    .liveliness(&self.keys.alive_viewer(), move |_, is_present| {
+                        inbox.send(Event::Viewer { is_present });
+                    })?;
+            self.declared.push(viewers);
+        }
+
         for (key, event) in [
             (self.keys.join(), Event::Join as fn(Query) -> Event),
             (self.keys.joins(), Event::Join),
@@ -369,7 +404,7 @@ impl Server {
             let running = Running {
                 server: self,
                 simulation,
-                recorder,
+                recorder: Recording::On(Box::new(recorder)),
             };
             let (running, interrupt) = inbox.run(running);
             let Running {
@@ -380,11 +415,22 @@ impl Server {
             self = server;
             match interrupt {
                 Interrupt::Init(next) => {
-                    recorder.supersede()?;
+                    if let Recording::On(mut recorder) = recorder {
+                        recorder.supersede()?;
+                    }
                     scenario = *next;
                     epoch += 1;
                 }
-                Interrupt::End(end) => return self.end(end, &mut simulation, recorder),
+                Interrupt::End(end) => {
+                    let summary = match recorder {
+                        Recording::On(mut recorder) => {
+                            self.end(end, &mut simulation, &mut recorder)
+                        }
+                        Recording::Over(summary) => Ok(*summary),
+                    };
+                    self.leave(end, &mut simulation)?;
+                    return Ok(summary?);
+                }
                 Interrupt::Failed(error) => {
                     self.abandon(&mut simulation);
                     return Err(error);
@@ -480,6 +526,8 @@ impl Server {
                 {
                     return Ok(Next::Wait(self.show_owed(simulation, patience)));
                 }
+                self.repeat_changes(simulation);
+                self.follow_lateness(simulation);
                 if let Some(underway) = self.order_faults(simulation)? {
                     self.stage = Stage::Faults(underway);
                     return Ok(Next::Opened);
@@ -504,7 +552,35 @@ impl Server {
         self.waiting_since = Instant::now();
         self.barrier
             .open(tick, simulation.robots_with_news(), &mut self.outputs);
+        for query in std::mem::take(&mut self.deferred) {
+            self.on_control(query, simulation)?;
+        }
         Ok(Next::Opened)
+    }
+
+    /// While a run is executed again, what was done by hand is done again.
+    fn repeat_changes(&self, simulation: &mut Simulation) {
+        let Some(past) = &self.past else { return };
+        if let Err(reason) = simulation.repeat_changes(&past.changes_by_hand()) {
+            // The tick differs from its record then, which ends the repetition.
+            tracing::error!("what was done by hand cannot be done again: {reason}");
+        }
+    }
+
+    /// What a change says about late robots holds from its tick on.
+    fn follow_lateness(&mut self, simulation: &Simulation) {
+        let Some(due) = simulation.lateness_due() else {
+            return;
+        };
+        let mut lateness = self.barrier.lateness().clone();
+        lateness.on_late = due.on_late;
+        lateness.own.clone_from(&due.own);
+        self.barrier.set_lateness(lateness, &mut self.outputs);
+    }
+
+    /// Whether the run is executed again up to the end of its record.
+    pub(super) fn is_repeating(&self) -> bool {
+        self.past.is_some()
     }
 
     /// Carries out what the barrier wants done.
@@ -690,34 +766,74 @@ impl Server {
         }
     }
 
-    /// Puts the end of the run, and writes what came of it.
+    /// The run is over: writes what came of it.
     fn end(
-        mut self,
+        &mut self,
         end: End,
         simulation: &mut Simulation,
-        recorder: Recorder,
-    ) -> Result<Summary, ServerError> {
+        recorder: &mut Recorder,
+    ) -> Result<Summary, FileError> {
         self.pace.end();
         if let Some(query) = self.pace.give_up_stepping() {
             self.answer_status(&query, simulation);
         }
-        let recorded = self.record_end(end, simulation, recorder);
+        self.record_end(end, simulation, recorder)
+    }
 
-        // Also if the record could not be written.
+    /// Puts the end of the run, also if its record could not be written, and ends this side of the contract.
+    fn leave(mut self, end: End, simulation: &mut Simulation) -> Result<(), BusError> {
         let clock = self.barrier.end(end);
         self.clock.put(encode(&clock))?;
         self.say_goodbye(&clock, simulation);
         self.declared.clear();
         self.panel_subscriber = None;
         self.bus.close();
-        Ok(recorded?)
+        Ok(())
+    }
+
+    /// Whether the process stays now that the run is over.
+    fn stays(&self) -> bool {
+        match self.options.stay {
+            Stay::Never => false,
+            Stay::Viewed => self.viewers.rest().is_none_or(|rest| !rest.is_zero()),
+            Stay::Always => true,
+        }
+    }
+
+    fn say_that_it_stays(&mut self, simulation: &Simulation) {
+        let tick = simulation.tick();
+        self.observers.log(&[LogRecord {
+            epoch: simulation.epoch(),
+            tick,
+            time_s: simulation.time_s(tick),
+            source: "simulator".to_owned(),
+            kind: LogKind::Run,
+            text:
+                "the run is over, and its processes stay: Init begins the next one, Stop ends them"
+                    .to_owned(),
+        }]);
+    }
+
+    /// The run is over, and the process stays: answers requests until one begins another epoch, or nobody is there any more.
+    fn linger(&mut self, simulation: &mut Simulation) -> Result<Option<Duration>, Interrupt> {
+        while let Some(event) = self.events.try_next() {
+            self.handle(event, simulation)?;
+        }
+        // Nothing of the run is granted any more.
+        self.outputs.clear();
+
+        if !self.stays() {
+            return Err(Interrupt::End(End::Stopped));
+        }
+        let rest = self.viewers.rest();
+        Ok(rest.filter(|_| self.options.stay == Stay::Viewed))
     }
 
     fn record_end(
         &mut self,
         end: End,
         simulation: &mut Simulation,
-        mut recorder: Recorder,
+        recorder: &mut Recorder,
     ) -> Result<Summary, FileError> {
         let record = simulation.end(end);
         let lines = recorder.write(simulation, &record)?;
@@ -806,6 +922,7 @@ impl Server {
             Event::Join(query) => self.on_join(&query, simulation),
             Event::Token { robot, is_present } => self.on_token(&robot, is_present),
             Event::Control(query) => self.on_control(query, simulation)?,
+            Event::Viewer { is_present } => self.viewers.note(is_present),
             Event::Terminate => return Err(Interrupt::End(End::Stopped)),
         }
 
@@ -908,11 +1025,19 @@ impl Server {
     }
 }
 
-/// An epoch that a server runs.
+/// An epoch that a server runs, or that is over while the server stays.
 struct Running {
     server: Server,
     simulation: Simulation,
-    recorder: Recorder,
+    recorder: Recording,
+}
+
+/// The record of an epoch.
+enum Recording {
+    /// It is written.
+    On(Box<Recorder>),
+    /// The run is over, and this came of it.
+    Over(Box<Summary>),
 }
 
 impl Work for Running {
@@ -921,9 +1046,32 @@ impl Work for Running {
 
     fn work(&mut self) -> Result<Option<Duration>, Interrupt> {
         self.server.watchdog.note(Some(Doing::Work));
-        let outcome = self.server.work(&mut self.simulation, &mut self.recorder);
+        let outcome = match &mut self.recorder {
+            Recording::On(recorder) => self.server.work(&mut self.simulation, recorder),
+            Recording::Over(_) => self.server.linger(&mut self.simulation),
+        };
         self.server.watchdog.note(None);
-        outcome
+
+        match outcome {
+            // Who stops a run wants its processes to end.
+            Err(Interrupt::End(end)) if end != End::Stopped && self.server.stays() => {
+                self.finish(end)?;
+                Ok(Some(Duration::ZERO))
+            }
+            outcome => outcome,
+        }
+    }
+}
+
+impl Running {
+    /// The run is over, and the server stays.
+    fn finish(&mut self, end: End) -> Result<(), Interrupt> {
+        if let Recording::On(recorder) = &mut self.recorder {
+            let summary = self.server.end(end, &mut self.simulation, recorder)?;
+            self.recorder = Recording::Over(Box::new(summary));
+            self.server.say_that_it_stays(&self.simulation);
+        }
+        Ok(())
     }
 }
 

@@ -392,6 +392,7 @@ impl Replay {
             Control::Init {
                 seed: None,
                 setup: None,
+                ..
             } => {
                 self.seek(0)?;
                 self.pace.phase = Phase::Ready;
@@ -400,6 +401,7 @@ impl Replay {
             Control::Init { .. }
             | Control::Load { .. }
             | Control::Late { .. }
+            | Control::Intervene { .. }
             | Control::FaultsDone { .. } => {
                 return Err(format!("{}: it cannot be changed", self.what_it_is()));
             }

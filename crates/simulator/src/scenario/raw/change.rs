@@ -15,7 +15,7 @@ use super::super::network::ticks;
 use super::unplaced::unplaced;
 
 /// Most changes of a scenario.
-const MAX_CHANGES: usize = 100;
+pub(in super::super) const MAX_CHANGES: usize = 1000;
 /// Tables that a change cannot set.
 const NOT_CHANGED: [&str; 2] = ["change", "parent"];
 
@@ -40,14 +40,14 @@ pub(super) fn check(
     raw: Vec<Spanned<ChangeTable>>,
     scenario: &checked::Scenario,
     source: &Source,
-    resolve: impl Fn(&Source) -> Result<checked::Scenario, FileError>,
+    resolve: impl Fn(&Source, Tick) -> Result<checked::Scenario, FileError>,
 ) -> Result<Vec<Change>, FileError> {
     if raw.is_empty() {
         return Ok(Vec::new());
     }
     if let Some(extra) = raw.get(MAX_CHANGES) {
         let span = Some(extra.span());
-        return Err(FileError::at(source, span, "more than 100 changes"));
+        return Err(FileError::at(source, span, "more than 1000 changes"));
     }
 
     let mut tables = raw;
@@ -77,7 +77,7 @@ pub(super) fn check(
                 .map_err(|reason| FileError::at(source, Some(text.span()), &reason))?;
             set.push(change);
         }
-        let after = resolve(&changed(&content, source, at)?)?;
+        let after = resolve(&changed(&content, source, at)?, at)?;
         check_difference(&before, &after, at)
             .map_err(|reason| FileError::at(source, span, &reason))?;
         changes.push(change(at, set, &before, &after));
@@ -115,6 +115,8 @@ fn check_difference(
 ) -> Result<(), String> {
     let mut same = after.clone();
     same.network.clone_from(&before.network);
+    same.lateness.on_late = before.lateness.on_late;
+    same.lateness.own.clone_from(&before.lateness.own);
     same.faults.clone_from(&before.faults);
     same.parent.clone_from(&before.parent);
     for (name, robot) in &mut same.robots {
@@ -125,18 +127,18 @@ fn check_difference(
     let is_same = same.to_toml().ok() == before.to_toml().ok();
     if !is_same {
         return Err(
-            "only the network, faults, and parameters of robots can change while a run goes on"
+            "only the network, faults, rules for late robots, and parameters of robots can change while a run goes on"
                 .to_owned(),
         );
     }
 
     let begun = |faults: &[Fault]| -> Vec<Fault> {
         let begun = faults.iter().filter(|fault| fault.at < at);
-        begun.cloned().collect()
+        begun.map(|fault| fault.before(at)).collect()
     };
     if begun(&before.faults) != begun(&after.faults) {
         return Err(format!(
-            "a fault that begins before the change, at tick {at}, cannot change"
+            "what a fault did before the change, at tick {at}, cannot change"
         ));
     }
     Ok(())
@@ -161,7 +163,9 @@ fn change(
     Change {
         at,
         set,
+        is_by_hand: false,
         network: after.network.clone(),
+        lateness: after.lateness.clone(),
         faults: after.faults.clone(),
         parameters,
         restarted,

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use config::units::Time;
 use config::{FileError, Source};
-use protocol::RobotName;
 use protocol::messages::{FaultKind, OnLate};
+use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
@@ -16,7 +16,7 @@ use super::super::network::ticks;
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 10_000;
 /// Longest fault that ends by the wall clock, seconds.
-const MAX_WALL_S: f64 = 3600.0;
+pub(in super::super) const MAX_WALL_S: f64 = 3600.0;
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -30,12 +30,14 @@ pub(super) struct FaultTable {
     lasting: Option<Time>,
 }
 
-/// Checks the faults; returns them in the order of their begins.
+/// Checks the faults; returns them in the order of their begins. Those that begin before tick `settled` were checked when other
+/// rules for late robots held.
 pub(super) fn check(
     raw: Vec<Spanned<FaultTable>>,
     robots: &BTreeMap<RobotName, RobotSpec>,
     lateness: &Lateness,
     tick_s: f64,
+    settled: Tick,
     source: &Source,
 ) -> Result<Vec<Fault>, FileError> {
     if let Some(extra) = raw.get(MAX_FAULTS) {
@@ -46,7 +48,7 @@ pub(super) fn check(
     let mut faults = Vec::new();
     for entry in raw {
         let span = Some(entry.span());
-        let fault = check_fault(entry.into_inner(), robots, lateness, tick_s);
+        let fault = check_fault(entry.into_inner(), robots, lateness, tick_s, settled);
         faults.push(fault.map_err(|reason| FileError::at(source, span, &reason))?);
     }
 
@@ -60,6 +62,7 @@ fn check_fault(
     robots: &BTreeMap<RobotName, RobotSpec>,
     lateness: &Lateness,
     tick_s: f64,
+    settled: Tick,
 ) -> Result<Fault, String> {
     let robot = raw.robot.into_inner();
     if !robots.contains_key(&robot) {
@@ -77,7 +80,9 @@ fn check_fault(
     {
         return Err("it ends before it begins: `until` comes after `at`".to_owned());
     }
-    check_end(&robot, raw.kind, end, lateness.of(&robot))?;
+    if at >= settled {
+        check_end(&robot, raw.kind, end, lateness.of(&robot))?;
+    }
 
     Ok(Fault {
         robot,
@@ -109,6 +114,12 @@ fn check_end(
     end: FaultEnd,
     on_late: OnLate,
 ) -> Result<(), String> {
+    if kind == FaultKind::Restart {
+        return match end {
+            FaultEnd::Never => Ok(()),
+            _ => Err("a restart is over at once: it has no `until` and no `for`".to_owned()),
+        };
+    }
     let is_by_wall = matches!(end, FaultEnd::After(_));
 
     // While the clock waits for a robot, simulated time does not advance.

@@ -1,0 +1,100 @@
+//! What a console leaves for the one that is started after it, in a file that only its owner can read.
+
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::net::SocketAddr;
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::guard::Guard;
+
+/// Others may not read the file: it has the token.
+const OWN: u32 = 0o600;
+
+/// Address and secrets of a console.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Kept {
+    pub(crate) address: SocketAddr,
+    pub(crate) token: String,
+    pub(crate) path: String,
+}
+
+impl Kept {
+    /// What a console leaves.
+    pub(crate) fn of(guard: &Guard) -> Self {
+        Self {
+            address: guard.address(),
+            token: guard.token().to_owned(),
+            path: guard.path().to_owned(),
+        }
+    }
+
+    /// What the console before has left; `None` if there was none, or others could have read or written it.
+    pub(crate) fn read(file: &Path) -> Option<Self> {
+        let mode = fs::metadata(file).ok()?.permissions().mode();
+        if mode & 0o077 != 0 {
+            return None;
+        }
+        let kept: Self = serde_json::from_slice(&fs::read(file).ok()?).ok()?;
+        kept.is_sound().then_some(kept)
+    }
+
+    /// Whether token and path are such as a console draws: a path with something else would be another route.
+    fn is_sound(&self) -> bool {
+        let is_hex = |text: &str| text.len() >= 16 && text.bytes().all(|b| b.is_ascii_hexdigit());
+        let path = self.path.strip_prefix('/');
+        let path = path.and_then(|path| path.strip_suffix('/'));
+        is_hex(&self.token) && path.is_some_and(is_hex)
+    }
+
+    /// Leaves it for the console after this one.
+    pub(crate) fn write(&self, file: &Path) -> std::io::Result<()> {
+        let text = serde_json::to_vec(self)?;
+        let unfinished = file.with_extension("new");
+        let _is_new = fs::remove_file(&unfinished);
+        let mut options = OpenOptions::new();
+        let mut to = options
+            .write(true)
+            .create_new(true)
+            .mode(OWN)
+            .open(&unfinished)?;
+        to.write_all(&text)?;
+        fs::rename(&unfinished, file)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_is_read_again_only_where_nobody_else_could_read_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("console.kept");
+        let guard = Guard::new("127.0.0.1:7007".parse().unwrap()).unwrap();
+        let kept = Kept::of(&guard);
+        kept.write(&file).unwrap();
+        assert_eq!(Kept::read(&file), Some(kept));
+
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();
+        assert_eq!(Kept::read(&file), None);
+        assert_eq!(Kept::read(&folder.path().join("none")), None);
+    }
+
+    #[test]
+    fn a_path_that_no_console_draws_is_not_served() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("console.kept");
+        for path in ["/", "//", "/{*x}/", "/assets/", "0123456789abcdef"] {
+            let kept = Kept {
+                address: "127.0.0.1:7007".parse().unwrap(),
+                token: "0123456789abcdef".to_owned(),
+                path: path.to_owned(),
+            };
+            kept.write(&file).unwrap();
+            assert_eq!(Kept::read(&file), None, "{path}");
+        }
+    }
+}

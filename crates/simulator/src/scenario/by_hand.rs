@@ -1,0 +1,360 @@
+//! What a person does to a run in progress: put into the words of the scenario, checked, and added as a change of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use config::{FileError, Override, Source};
+use protocol::messages::{FaultKind, Intervention, OnLate};
+use protocol::{RobotName, Tick};
+
+use super::change::Change;
+use super::checked::Scenario;
+use super::fault::{Fault, FaultEnd};
+use super::network::{Counted, LostCommand, Network, Partition};
+use super::raw;
+use super::raw::change::MAX_CHANGES;
+use super::raw::words;
+
+/// A link, in the direction of its messages.
+type Link = (RobotName, RobotName);
+
+impl Scenario {
+    /// An intervention in the words of the scenario: what it sets from a tick on. `sent` is how many commands the network has
+    /// decided on so far, of a set.
+    ///
+    /// # Errors
+    /// In words, if there is nothing to do, or a robot is unknown.
+    pub fn words_of(
+        &self,
+        what: &Intervention,
+        at: Tick,
+        sent: impl Fn(&Counted) -> u64,
+    ) -> Result<Vec<Override>, String> {
+        let words = match what {
+            Intervention::Cut { from, to, one_way } => {
+                words::partitions(&self.with_cut(from, to, *one_way, at)?, self.tick_s)?
+            }
+            Intervention::Heal { from, to, one_way } => {
+                words::partitions(&self.with_healed(from, to, *one_way, at)?, self.tick_s)?
+            }
+            Intervention::Lose { from, to } => {
+                words::lost(&self.with_lost(from, to, at, sent), self.tick_s)?
+            }
+            Intervention::Fault { robot, kind, for_s } => {
+                let faults = self.with_fault(robot, *kind, *for_s, at)?;
+                words::faults(&faults, self.tick_s)?
+            }
+            Intervention::Recover { robot } => {
+                words::faults(&self.with_recovery(robot, at)?, self.tick_s)?
+            }
+            Intervention::Set { set } => {
+                let set: Result<Vec<Override>, String> =
+                    set.iter().map(|one| one.parse()).collect();
+                return set.and_then(|set| {
+                    if set.is_empty() {
+                        Err("nothing is to be set".to_owned())
+                    } else {
+                        Ok(set)
+                    }
+                });
+            }
+        };
+        Ok(vec![words])
+    }
+
+    /// A rule for late robots, or for one of them, in the words of the scenario.
+    ///
+    /// # Errors
+    /// In words, if it cannot be written.
+    pub fn words_of_lateness(
+        robot: Option<&RobotName>,
+        on_late: OnLate,
+    ) -> Result<Override, String> {
+        match robot {
+            Some(robot) => words::on_late(&["robot", robot.as_str(), "on_late"], on_late),
+            None => words::on_late(&["on_late"], on_late),
+        }
+    }
+
+    fn with_cut(
+        &self,
+        from: &[RobotName],
+        to: &[RobotName],
+        one_way: bool,
+        at: Tick,
+    ) -> Result<Network, String> {
+        let mut cut = BTreeSet::new();
+        for partition in &self.network_at(at).partitions {
+            if partition.lasts_at(at) && partition.commands && partition.queries {
+                cut.extend(Self::links_cut_by(partition));
+            }
+        }
+        if self.links_between(from, to, one_way)?.is_subset(&cut) {
+            return Err("all links between these robots are cut already".to_owned());
+        }
+
+        let mut network = self.network_from(at);
+        network.partitions.push(Partition {
+            groups: vec![from.to_vec(), to.to_vec()],
+            from: at,
+            until: None,
+            one_way,
+            commands: true,
+            queries: true,
+        });
+        Ok(network)
+    }
+
+    /// The network without the cuts between two groups. What else a partition cuts stays cut, link by link.
+    fn with_healed(
+        &self,
+        from: &[RobotName],
+        to: &[RobotName],
+        one_way: bool,
+        at: Tick,
+    ) -> Result<Network, String> {
+        let healed = self.links_between(from, to, one_way)?;
+        let mut network = self.network_from(at);
+        let mut partitions = Vec::new();
+        let mut has_healed = false;
+        for partition in std::mem::take(&mut network.partitions) {
+            let cut = Self::links_cut_by(&partition);
+            if !partition.lasts_at(at) || cut.is_disjoint(&healed) {
+                partitions.push(partition);
+                continue;
+            }
+
+            has_healed = true;
+            partitions.extend(cut.difference(&healed).map(|(from, to)| Partition {
+                groups: vec![vec![from.clone()], vec![to.clone()]],
+                from: at,
+                one_way: true,
+                ..partition.clone()
+            }));
+            if partition.from < at {
+                partitions.push(Partition {
+                    until: Some(at),
+                    ..partition
+                });
+            }
+        }
+
+        if !has_healed {
+            return Err("no link between these robots is cut".to_owned());
+        }
+        network.partitions = partitions;
+        Ok(network)
+    }
+
+    /// The links between the robots of two groups; without names a group is all robots.
+    fn links_between(
+        &self,
+        from: &[RobotName],
+        to: &[RobotName],
+        one_way: bool,
+    ) -> Result<BTreeSet<Link>, String> {
+        let all = self.roster();
+        let group = |named: &[RobotName]| -> Result<Vec<RobotName>, String> {
+            if let Some(unknown) = named.iter().find(|name| !self.robots.contains_key(*name)) {
+                return Err(format!("no robot of this run is called {unknown}"));
+            }
+            Ok(if named.is_empty() {
+                all.clone()
+            } else {
+                named.to_vec()
+            })
+        };
+
+        let to = group(to)?;
+        let mut links = BTreeSet::new();
+        for from in group(from)? {
+            for to in to.iter().filter(|to| **to != from) {
+                links.insert((from.clone(), to.clone()));
+                if !one_way {
+                    links.insert((to.clone(), from.clone()));
+                }
+            }
+        }
+        Ok(links)
+    }
+
+    fn links_cut_by(partition: &Partition) -> BTreeSet<Link> {
+        let members = || partition.groups.iter().flatten();
+        let mut links = BTreeSet::new();
+        for from in members() {
+            let cut_off = members().filter(|to| partition.separates(from, to));
+            links.extend(cut_off.map(|to| (from.clone(), to.clone())));
+        }
+        links
+    }
+
+    fn with_lost(
+        &self,
+        from: &RobotName,
+        to: &RobotName,
+        at: Tick,
+        sent: impl Fn(&Counted) -> u64,
+    ) -> Network {
+        let mut network = self.network_from(at);
+        network
+            .lost
+            .retain(|lost| lost.number > sent(&lost.counted));
+
+        let counted = Counted {
+            from: from.clone(),
+            to: to.clone(),
+            text: None,
+        };
+        let mut number = sent(&counted) + 1;
+        while network
+            .lost
+            .iter()
+            .any(|lost| lost.counted == counted && lost.number == number)
+        {
+            number += 1;
+        }
+        network.lost.push(LostCommand { counted, number });
+        network
+    }
+
+    /// The network of a tick, without partitions that are over by then.
+    fn network_from(&self, at: Tick) -> Network {
+        let mut network = self.network_at(at).clone();
+        network
+            .partitions
+            .retain(|partition| partition.until.is_none_or(|until| until >= at));
+        network
+    }
+
+    fn with_fault(
+        &self,
+        robot: &RobotName,
+        kind: FaultKind,
+        for_s: Option<f64>,
+        at: Tick,
+    ) -> Result<Vec<Fault>, String> {
+        let mut faults = self.faults_at(at).to_vec();
+        let holding = faults
+            .iter()
+            .find(|fault| fault.robot == *robot && fault.holds(at, false));
+        if let Some(Fault { kind, .. }) = holding {
+            let kind = kind_in_words(*kind);
+            return Err(format!("{robot} {kind} already: let it go on first"));
+        }
+
+        // While the clock waits for a robot, only the wall clock can end its fault.
+        let is_awaited = self.lateness_at(at).of(robot) == OnLate::Wait;
+        let end = match for_s {
+            Some(for_s) => FaultEnd::After(for_s),
+            None if is_awaited && matches!(kind, FaultKind::Crash | FaultKind::Hang) => {
+                FaultEnd::After(raw::fault::MAX_WALL_S)
+            }
+            None => FaultEnd::Never,
+        };
+        faults.push(Fault {
+            robot: robot.clone(),
+            kind,
+            at,
+            end,
+        });
+        Ok(faults)
+    }
+
+    fn with_recovery(&self, robot: &RobotName, at: Tick) -> Result<Vec<Fault>, String> {
+        let mut faults = self.faults_at(at).to_vec();
+        let found = faults
+            .iter()
+            .position(|fault| fault.robot == *robot && fault.holds(at, false));
+        let Some(index) = found else {
+            return Err(format!("no fault holds {robot}"));
+        };
+
+        if faults[index].at == at {
+            faults.remove(index); // It has not begun.
+        } else {
+            faults[index].end = FaultEnd::At(at);
+        }
+        Ok(faults)
+    }
+
+    /// The scenario with something more set from a tick on, by hand; nothing after that tick has been done by hand yet. The
+    /// changes of the scenario from that tick on apply to what is set.
+    ///
+    /// # Errors
+    /// [`FileError`] if it is not a change that can be made while a run goes on.
+    pub fn with_change_by_hand(&self, at: Tick, set: &[Override]) -> Result<Self, FileError> {
+        let mut kept = self.changes.clone();
+        let mut later = kept.split_off(kept.partition_point(|change| change.at < at));
+        let mut all = Vec::new();
+        later.retain_mut(|change| {
+            if change.is_by_hand {
+                all = std::mem::take(&mut change.set);
+            }
+            !change.is_by_hand
+        });
+        if kept.len() + later.len() >= MAX_CHANGES {
+            return Err(FileError::new(format!("more than {MAX_CHANGES} changes")));
+        }
+        for one in set {
+            all.retain(|earlier| !earlier.has_path_of(one));
+            all.push(one.clone());
+        }
+
+        // The words of later changes are applied once more, to what is set now.
+        let mut now = self.as_of(at - 1);
+        let own = later.partition_point(|change| change.at == at);
+        later.insert(own, now.change_to(at, all));
+        now.changes = later;
+        let source = Source {
+            name: "the scenario".to_owned(),
+            text: now.to_toml()?,
+        };
+        let raw: raw::Scenario = source.parse()?;
+        let mut resolved = raw.check_from(&source, None, at)?.changes;
+        if let Some(own) = resolved.get_mut(own) {
+            own.is_by_hand = true;
+        }
+        kept.append(&mut resolved);
+        Ok(Self {
+            changes: kept,
+            ..self.clone()
+        })
+    }
+
+    /// The scenario as it is in a tick, without changes.
+    fn as_of(&self, tick: Tick) -> Self {
+        let mut scenario = self.clone();
+        scenario.network.clone_from(self.network_at(tick));
+        scenario.lateness.clone_from(self.lateness_at(tick));
+        scenario.faults = self.faults_at(tick).to_vec();
+        for (name, robot) in &mut scenario.robots {
+            if let Some(parameters) = self.parameters_at(name, tick) {
+                robot.parameters.clone_from(parameters);
+            }
+        }
+        scenario.changes.clear();
+        scenario
+    }
+
+    /// A change of the scenario of which only the words are known.
+    fn change_to(&self, at: Tick, set: Vec<Override>) -> Change {
+        Change {
+            at,
+            set,
+            is_by_hand: false,
+            network: self.network.clone(),
+            lateness: self.lateness.clone(),
+            faults: Vec::new(),
+            parameters: BTreeMap::new(),
+            restarted: Vec::new(),
+        }
+    }
+}
+
+fn kind_in_words(kind: FaultKind) -> &'static str {
+    match kind {
+        FaultKind::Crash => "is killed",
+        FaultKind::Hang => "is stopped",
+        FaultKind::Slow => "is slowed down",
+        FaultKind::Restart => "starts again",
+    }
+}
