@@ -154,3 +154,33 @@ def test_what_nobody_would_see_is_not_painted(page):
     assert 2 <= slow <= 10, due
     assert fast >= 30, due
     assert at_rest is False
+
+
+def test_a_crowd_that_is_written_looks_like_one_that_is_drawn(page):
+    found = page.evaluate(
+        """async () => {
+            const [{Crowd}, draw] = await Promise.all([import('./assets/crowd.js'), import('./assets/draw.js')]);
+            const theme = {guest: '#7a9684', guestFill: '#d3e2d8'}, results = [];
+            for (const [radius, ratio] of [[0.75, 1], [3.2, 1], [4.9, 1.5], [3, 2]]) {
+                const [one, other] = [0, 1].map(() => new OffscreenCanvas(300, 200).getContext('2d', {willReadFrequently: true}));
+                for (const context of [one, other]) {
+                    context.fillStyle = '#ffffff';
+                    context.fillRect(0, 0, 300, 200);
+                    context.fillStyle = '#16150f';
+                    context.fillRect(100, 50, 40, 40);
+                }
+                const at = [];
+                for (let i = 0; i < 400; i += 1) at.push((i * 37.77) % (300 / ratio), (i * 23.31) % (200 / ratio));
+                new Crowd().draw(one, one.getImageData(0, 0, 300, 200), theme, at, radius, ratio);
+                other.scale(ratio, ratio);
+                draw.guestCircles({context: other, theme}, at, radius);
+                const [a, b] = [one, other].map((context) => context.getImageData(0, 0, 300, 200).data);
+                const sum = a.reduce((all, value, i) => all + Math.abs(value - b[i]), 0);
+                results.push([sum / a.length, b.filter((value, i) => i % 4 === 0 && value === 0x7a).length, a.filter((value, i) => i % 4 === 0 && value === 0x7a).length]);
+            }
+            return results;
+        }"""
+    )
+    for mean, drawn, written in found:
+        assert mean < 3, found
+        assert abs(drawn - written) <= 0.25 * drawn + 20, found

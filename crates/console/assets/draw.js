@@ -21,13 +21,10 @@ const FULL_TURN = 2 * Math.PI;
 const SMALLEST_ROBOT_PX = 9;
 /** Width of the ring in the color of the emotion, with its edge. */
 const RING_PX = 4.5;
-/** Guests with a smaller radius are drawn as squares, which are faster than circles. */
-const SMALLEST_ROUND_PX = 1.7;
+/** Smaller guests would not be seen. */
+const SMALLEST_GUEST_PX = 0.75;
 /** Guests with a larger radius are pale, with an edge, so that robots stand out among them. */
 const SMALLEST_PALE_PX = 5;
-/** More small guests than this are drawn as two crossed bars: twice as fast as circles, and hardly different. */
-const MANY_GUESTS = 2000;
-const LARGEST_CROSS_PX = 5;
 /** Circles per path: one path for all is slow, and so is one for each. */
 const CIRCLES_IN_PATH = 60;
 
@@ -85,13 +82,23 @@ export function obstacles({ context, camera, theme }, centers, body_m) {
   }
 }
 
+/** Radius of a guest. @param {Camera} camera @param {number} body_m */
+export function guestRadius(camera, body_m) {
+  return Math.max(SMALLEST_GUEST_PX, (body_m * camera.scale) / 2);
+}
+
+/** Whether guests of a radius have one color. @param {number} radius */
+export function isPlain(radius) {
+  return radius < SMALLEST_PALE_PX;
+}
+
 /**
- * @param {Pen} pen
+ * Where the guests are that can be seen, x and y in turn.
+ * @param {Camera} camera
  * @param {Float64Array} places_m x and y in turn
- * @param {number} body_m
+ * @param {number} radius
  */
-export function guests({ context, camera, theme }, places_m, body_m) {
-  const radius = (body_m * camera.scale) / 2;
+export function guestsAt(camera, places_m, radius) {
   const { scale, width_px, height_px } = camera;
   const left = camera.x(0);
   const bottom = camera.y(0);
@@ -103,41 +110,25 @@ export function guests({ context, camera, theme }, places_m, body_m) {
     if (x > -radius && y > -radius && x < width_px + radius && y < height_px + radius) seen.push(x, y);
   }
 
-  context.fillStyle = theme.guest;
-  if (radius < SMALLEST_ROUND_PX) squares(context, seen, Math.max(0.75, radius));
-  else if (seen.length / 2 > MANY_GUESTS && radius < LARGEST_CROSS_PX) crosses(context, seen, radius);
-  else if (radius < SMALLEST_PALE_PX) circles(context, seen, radius, () => context.fill());
-  else guestCircles({ context, theme }, seen, radius);
+  return seen;
 }
 
 /**
- * Pale circles with an edge, which has the contrast.
+ * Guests: pale circles with an edge, which has the contrast; small ones have the color of the edge.
  * @param {Omit<Pen, "camera">} pen
  * @param {number[]} at x and y in turn
  * @param {number} radius
  */
 export function guestCircles({ context, theme }, at, radius) {
-  context.fillStyle = theme.guestFill;
+  context.fillStyle = isPlain(radius) ? theme.guest : theme.guestFill;
+  if (isPlain(radius)) return circles(context, at, radius, () => context.fill());
+
   context.strokeStyle = theme.guest;
   context.lineWidth = 1.5;
   circles(context, at, radius - 0.75, () => {
     context.fill();
     context.stroke();
   });
-}
-
-/** @type {(context: Paper, at: number[], radius: number) => void} */
-function squares(context, at, radius) {
-  for (let i = 0; i < at.length; i += 2) context.fillRect(at[i] - radius, at[i + 1] - radius, 2 * radius, 2 * radius);
-}
-
-/** @type {(context: Paper, at: number[], radius: number) => void} */
-function crosses(context, at, radius) {
-  const narrow = 0.55 * radius;
-  for (let i = 0; i < at.length; i += 2) {
-    context.fillRect(at[i] - radius, at[i + 1] - narrow, 2 * radius, 2 * narrow);
-    context.fillRect(at[i] - narrow, at[i + 1] - radius, 2 * narrow, 2 * radius);
-  }
 }
 
 /** @type {(context: Paper, at: number[], radius: number, paint: () => void) => void} */

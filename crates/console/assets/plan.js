@@ -2,6 +2,7 @@
 // The plan view: the field from above, at the display's frame rate.
 
 import { Camera } from "./camera.js";
+import { Crowd } from "./crowd.js";
 import * as draw from "./draw.js";
 import { Flights } from "./flights.js";
 import { Gestures } from "./gestures.js";
@@ -43,6 +44,7 @@ export class Plan {
     this.width_px = 1;
     this.height_px = 1;
     this.ground = new Ground();
+    this.crowd = new Crowd();
     this.sprites = new Sprites();
     this.store = store;
     this.units = units;
@@ -154,19 +156,38 @@ export class Plan {
   paintRun(frame, now_ms) {
     this.flights.advance(Math.min(100, now_ms - this.lastDraw_ms), CALM.matches);
     this.lastDraw_ms = now_ms;
-    this.ground.draw(this.pen, this.canvas, frame.obstacles, frame.body_m, this.step_m());
+    this.paintGround(frame.obstacles, frame.body_m, true);
     this.paintMoving(this.pen, frame, this.drawRobot);
   }
 
   /**
-   * All that moves, on the canvas or in a picture.
+   * The field with its obstacles, and the guests on it.
+   * @param {[number, number][]} obstacles
+   * @param {number} body_m
+   * @param {boolean} hasGuests
+   */
+  paintGround(obstacles, body_m, hasGuests) {
+    const { camera, theme } = this.pen;
+    const radius = draw.guestRadius(camera, body_m);
+    const guests = hasGuests ? draw.guestsAt(camera, this.motion.now_m, radius) : [];
+    this.ground.renew(this.pen, this.canvas, obstacles, body_m, this.step_m());
+    if (this.crowd.takes(guests.length / 2, radius)) {
+      this.crowd.draw(this.context, this.ground.pixels(), theme, guests, radius, this.sprites.ratio);
+      return;
+    }
+
+    this.context.drawImage(this.ground.canvas, 0, 0, camera.width_px, camera.height_px);
+    draw.guestCircles(this.pen, guests, radius);
+  }
+
+  /**
+   * All that moves but the guests, on the canvas or in a picture.
    * @param {draw.Pen} pen
    * @param {WorldFrame} frame
    * @param {(pen: draw.Pen, robot: draw.Drawn, look: draw.Look, place: Place) => void} drawRobot
    */
   paintMoving(pen, frame, drawRobot) {
     const { motion } = this;
-    draw.guests(pen, motion.now_m, frame.body_m);
     if (this.hasTrails) this.paintTrails(pen, frame);
 
     for (const { from, to, label } of cutPairs(frame.cuts ?? [])) {
@@ -221,9 +242,8 @@ export class Plan {
   paintDraft(draft) {
     const body_m = this.motion.to?.body_m ?? 0.6096;
     const obstacles = draft.obstacles.map(({ x, y }) => /** @type {[number, number]} */ ([x, y]));
-    this.ground.draw(this.pen, this.canvas, obstacles, body_m, this.step_m());
     // The simulator places the guests: those of a changed set-up have no places yet.
-    if (this.editor.isAsApplied && this.motion.to?.tick === 0) draw.guests(this.pen, this.motion.now_m, body_m);
+    this.paintGround(obstacles, body_m, this.editor.isAsApplied && this.motion.to?.tick === 0);
 
     for (const [name, place] of Object.entries(draft.robots)) {
       const robot = { name, emotion_state: "", blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
@@ -272,6 +292,8 @@ export class Plan {
 
     draw.field(pen, this.step_m());
     draw.obstacles(pen, frame.obstacles, frame.body_m);
+    const radius = draw.guestRadius(this.camera, frame.body_m);
+    draw.guestCircles(pen, draw.guestsAt(this.camera, this.motion.now_m, radius), radius);
     this.paintMoving(pen, frame, (_, robot, look, place) => {
       const x = this.camera.x(place.x);
       const y = this.camera.y(place.y);

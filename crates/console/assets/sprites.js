@@ -19,22 +19,25 @@ export class Ground {
     this.key = "";
     /** @type {[number, number][]} */
     this.obstacles = [];
+    /** Its pixels, if they were asked for. @type {ImageData | null} */
+    this.read = null;
   }
 
   /**
-   * Copies it onto the plan, and draws it anew if anything of it is different.
+   * Draws it anew if anything of it is different.
    * @param {draw.Pen} pen
    * @param {HTMLCanvasElement} plan
    * @param {[number, number][]} obstacles
    * @param {number} body_m
    * @param {number} step_m between lines
    */
-  draw({ context, camera, theme }, plan, obstacles, body_m, step_m) {
+  renew({ camera, theme }, plan, obstacles, body_m, step_m) {
     const { width_px, height_px, field_m, scale, center } = camera;
     const key = [plan.width, plan.height, width_px, height_px, ...field_m, scale, center.x, center.y, body_m, step_m, theme.field].join();
     if (key !== this.key || !areSame(obstacles, this.obstacles)) {
       this.key = key;
       this.obstacles = obstacles;
+      this.read = null;
       this.canvas.width = plan.width;
       this.canvas.height = plan.height;
       this.context.setTransform(plan.width / width_px, 0, 0, plan.height / height_px, 0, 0);
@@ -43,8 +46,12 @@ export class Ground {
       draw.field(pen, step_m);
       draw.obstacles(pen, obstacles, body_m);
     }
+  }
 
-    /** @type {CanvasRenderingContext2D} */ (context).drawImage(this.canvas, 0, 0, width_px, height_px);
+  /** Its pixels, to write on a copy of them. */
+  pixels() {
+    this.read ??= this.context.getImageData(0, 0, this.canvas.width, this.canvas.height);
+    return this.read;
   }
 }
 

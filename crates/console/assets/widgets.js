@@ -85,7 +85,7 @@ function bar({ label, value, min, max }) {
 
   return html`
     <div class="widget gauge">
-      <div class="row"><span class="label">${label}</span><span class="number">${short(value)}${of}</span></div>
+      <div class="row"><span class="label" title=${label}>${label}</span><span class="number">${short(value)}${of}</span></div>
       <svg viewBox="0 0 100 1" preserveAspectRatio="none" role="meter" aria-label=${label} aria-valuemin=${min}
         aria-valuemax=${max} aria-valuenow=${value}><rect class="rail" width="100" height="1"></rect>
         <rect class="level" width=${width} height="1"></rect></svg>
