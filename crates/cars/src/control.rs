@@ -162,10 +162,10 @@ enum Request {
     },
     /// Cut the links between two robots, or two groups of robots.
     Cut(BetweenArgs),
-    /// Heal links that are cut; without robots all of them.
+    /// Heal links that are cut: between two robots or groups, all of one, or without robots all.
     Heal {
         /// A robot, or several, separated by commas.
-        #[arg(value_delimiter = ',', num_args = 0..=1, requires = "to")]
+        #[arg(value_delimiter = ',', num_args = 0..=1)]
         from: Vec<RobotName>,
         /// Another one, or several.
         #[arg(value_delimiter = ',', num_args = 0..=1)]

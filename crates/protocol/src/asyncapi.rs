@@ -168,6 +168,13 @@ fn channels() -> Vec<Channel> {
             &[],
             &[],
         ),
+        channel(
+            "alive_viewer",
+            keys.alive_viewer(),
+            "Liveliness token of a console, while a browser shows the run there.",
+            &[],
+            &[],
+        ),
     ];
     let query = |name| {
         let what = "One field of what a robot lets others know. Parameters tick and epoch.";

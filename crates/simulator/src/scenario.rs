@@ -4,6 +4,7 @@ mod by_hand;
 pub mod change;
 mod checked;
 pub mod fault;
+mod lateness;
 pub mod network;
 mod over_time;
 mod placing;
@@ -19,9 +20,10 @@ use protocol::RobotName;
 pub use protocol::messages::OnLate;
 
 pub use change::{Change, Parent};
-pub use checked::{DEFAULT_SEED, Lateness, MAX_GUESTS, Record, RobotSpec, Scenario, SyncPoint};
+pub use checked::{DEFAULT_SEED, MAX_GUESTS, Record, RobotSpec, Scenario, SyncPoint};
 pub(crate) use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
+pub use lateness::Lateness;
 pub use network::Network;
 
 /// Reads the expectations of a file, for a run with these robots. Other tables of the file are of no concern.

@@ -297,24 +297,20 @@ impl Simulation {
         Some(self.scenario.lateness_at(self.tick + 1))
     }
 
-    /// What the scenario says from now on, and from the next tick on, about the process of a robot that is awaited: whether a
-    /// fault stops it until the wall clock ends it.
+    /// The fault that may hold the process of a robot for which the open tick waits, until the wall clock ends it. A process
+    /// that is told to stop may do another tick or two before it does.
     #[must_use]
     pub fn held_by_wall_clock(&self, robot: &RobotName) -> Option<FaultKind> {
-        if self.now == self.tick {
-            return None;
-        }
-        let mut faults = self.scenario.faults_at(self.now).iter();
-        let fault = faults.find(|fault| {
-            let is_by_wall = matches!(fault.end, FaultEnd::After(_));
-            is_by_wall && fault.robot == *robot && fault.at == self.now
-        })?;
-        Some(fault.kind)
+        let faults = self.scenario.faults_at(self.now).iter();
+        let mut begun = faults.filter(|fault| fault.robot == *robot && fault.at <= self.now);
+        let last = begun.next_back()?;
+        matches!(last.end, FaultEnd::After(_)).then_some(last.kind)
     }
 
-    /// Robots whose processes a fault holds in the tick in progress, or in the last one.
+    /// Robots whose processes a fault holds in the tick in progress, or in the last one; `late` are those for which the clock
+    /// is held.
     #[must_use]
-    pub fn held_processes(&self) -> Vec<HeldProcess> {
+    pub fn held_processes(&self, late: &[RobotName]) -> Vec<HeldProcess> {
         let is_complete = self.now == self.tick;
         let mut held = Vec::new();
         for fault in self.scenario.faults_at(self.now) {
@@ -322,6 +318,15 @@ impl Simulation {
                 held.push(HeldProcess {
                     robot: fault.robot.clone(),
                     kind: fault.kind,
+                });
+            }
+        }
+        for robot in late {
+            let is_told = held.iter().any(|held| held.robot == *robot);
+            if let Some(kind) = self.held_by_wall_clock(robot).filter(|_| !is_told) {
+                held.push(HeldProcess {
+                    robot: robot.clone(),
+                    kind,
                 });
             }
         }

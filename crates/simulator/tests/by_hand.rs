@@ -315,7 +315,7 @@ fn faults_are_ordered_for_the_next_tick_and_end_when_a_person_says_so() {
     assert_eq!(due.len(), 1);
     assert!(due[0].begins && due[0].for_s.is_none());
     simulation.step(&mut robots).unwrap();
-    assert_eq!(simulation.held_processes().len(), 1);
+    assert_eq!(simulation.held_processes(&[]).len(), 1);
     let again = simulation.intervene(&fault(FaultKind::Crash, None));
     assert!(again.unwrap_err().contains("B is stopped already"));
 
@@ -330,15 +330,24 @@ fn faults_are_ordered_for_the_next_tick_and_end_when_a_person_says_so() {
     assert_eq!(due.len(), 1);
     assert!(!due[0].begins);
     simulation.step(&mut robots).unwrap();
-    assert!(simulation.held_processes().is_empty());
+    assert!(simulation.held_processes(&[]).is_empty());
     let again = simulation.intervene(&Intervention::Recover { robot: name("B") });
     assert_eq!(again.unwrap_err(), "no fault holds B");
 
     // Where the clock waits for the robot, only the wall clock can end its fault.
+    assert_eq!(simulation.held_by_wall_clock(&name("B")), None);
     simulation
         .intervene(&fault(FaultKind::Crash, None))
         .unwrap();
     assert_eq!(simulation.faults_due()[0].for_s, Some(3600.0));
+
+    // It may report once more before it is killed: it is held in whatever tick waits for it.
+    simulation.step(&mut robots).unwrap();
+    simulation.step(&mut robots).unwrap();
+    assert!(simulation.held_processes(&[]).is_empty());
+    let held = simulation.held_processes(&[name("B"), name("C")]);
+    assert_eq!(held.len(), 1);
+    assert_eq!(held[0].kind, FaultKind::Crash);
 }
 
 #[test]
@@ -356,7 +365,7 @@ fn a_restart_is_over_at_once() {
     );
     simulation.step(&mut robots).unwrap();
     assert!(simulation.restarts_due().is_empty());
-    assert!(simulation.held_processes().is_empty());
+    assert!(simulation.held_processes(&[]).is_empty());
     let with_end = simulation.intervene(&fault(FaultKind::Restart, Some(1.0)));
     assert!(with_end.unwrap_err().contains("a restart is over at once"));
 }

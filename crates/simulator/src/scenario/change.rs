@@ -6,8 +6,8 @@ use config::Override;
 use protocol::messages::Parameters;
 use protocol::{RobotName, RunName, Tick};
 
-use super::checked::Lateness;
 use super::fault::Fault;
+use super::lateness::Lateness;
 use super::network::Network;
 
 /// A change of the network, the faults or the robots' parameters during a run.

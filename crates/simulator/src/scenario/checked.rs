@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use observe::Expectation;
-use protocol::messages::{OnLate, Parameters, Point};
+use protocol::messages::{Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use world::{Field, Guests, Hall};
 
 use super::change::{Change, Parent};
 use super::fault::Fault;
+use super::lateness::Lateness;
 use super::network::Network;
 
 /// Seed if neither the file nor the command line gives one. It is fixed, so runs are reproducible by default.
@@ -127,40 +128,6 @@ pub struct RobotSpec {
     pub at: Point,
     /// Parameters of the robot; lengths, speeds and times are SI numbers.
     pub parameters: Parameters,
-}
-
-/// Rules for late robots.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Lateness {
-    /// Rule for robots without one of their own.
-    pub on_late: OnLate,
-    /// Rules of single robots.
-    pub own: BTreeMap<RobotName, OnLate>,
-    /// Time without a report after which a robot is late, seconds of wall clock.
-    pub deadline_s: f64,
-    /// Number of consecutive missed ticks after which a robot is lost, if the clock continues without it.
-    pub lose_after: u32,
-}
-
-impl Lateness {
-    /// The rule for a robot.
-    #[must_use]
-    pub fn of(&self, robot: &RobotName) -> OnLate {
-        self.own.get(robot).copied().unwrap_or(self.on_late)
-    }
-
-    /// The rules as the lock-step takes them.
-    #[must_use]
-    pub fn to_lockstep(&self) -> lockstep::Lateness {
-        let deadline = std::time::Duration::try_from_secs_f64(self.deadline_s);
-
-        lockstep::Lateness {
-            on_late: self.on_late,
-            own: self.own.clone(),
-            deadline: deadline.unwrap_or(std::time::Duration::MAX),
-            lose_after: self.lose_after,
-        }
-    }
 }
 
 impl Scenario {

@@ -6,8 +6,9 @@ use protocol::messages::Parameters;
 use protocol::{RobotName, Tick};
 
 use super::change::Change;
-use super::checked::{Lateness, Scenario};
+use super::checked::Scenario;
 use super::fault::Fault;
+use super::lateness::Lateness;
 use super::network::Network;
 
 impl Scenario {

@@ -30,7 +30,8 @@ use unplaced::unplaced;
 pub(super) use expect::Expectations;
 
 use super::change::Parent;
-use super::checked::{self, DEFAULT_SEED, Lateness, Record, RobotSpec};
+use super::checked::{self, DEFAULT_SEED, Record, RobotSpec};
+use super::lateness::Lateness;
 use super::placing;
 
 /// Most ticks of a scenario.

@@ -180,6 +180,7 @@ impl Server {
         }
 
         if let Intervention::Recover { robot } = what
+            && self.barrier.awaited().iter().any(|(name, _)| name == robot)
             && let Some(kind) = simulation.held_by_wall_clock(robot)
         {
             let order = self.recover_now(robot, kind, simulation);

@@ -17,6 +17,9 @@ use crate::simulation::Simulation;
 /// Pictures are for eyes: no more often than this.
 pub(super) const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 
+/// In every tick the clock waits a short time for each robot.
+const LATE_S: f64 = 0.5;
+
 /// Most bytes of texts among the lines of the log that are kept: with escapes and the other fields, all of them fit into one
 /// message.
 const MAX_PAST_BYTES: usize = 128 << 10;
@@ -206,6 +209,9 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
             presence: process.map_or(Presence::Gone, |process| process.presence),
         }
     };
+    let late = status.awaiting.iter();
+    let late = late.filter(|awaited| awaited.since_s > LATE_S);
+    let late: Vec<RobotName> = late.map(|awaited| awaited.name.clone()).collect();
     WorldFrame {
         run: status.run.clone(),
         epoch: status.epoch,
@@ -234,7 +240,7 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
             .collect(),
         flights: Vec::new(),
         cuts: simulation.cuts(),
-        faults: simulation.held_processes(),
+        faults: simulation.held_processes(&late),
         expectations: simulation.standings(),
     }
 }

@@ -15,7 +15,7 @@ use super::super::network::ticks;
 use super::unplaced::unplaced;
 
 /// Most changes of a scenario.
-pub(in super::super) const MAX_CHANGES: usize = 1000;
+pub(crate) const MAX_CHANGES: usize = 1000;
 /// Tables that a change cannot set.
 const NOT_CHANGED: [&str; 2] = ["change", "parent"];
 

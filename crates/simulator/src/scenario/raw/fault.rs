@@ -9,14 +9,15 @@ use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::super::checked::{Lateness, RobotSpec};
+use super::super::checked::RobotSpec;
 use super::super::fault::{Fault, FaultEnd};
+use super::super::lateness::Lateness;
 use super::super::network::ticks;
 
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 10_000;
 /// Longest fault that ends by the wall clock, seconds.
-pub(in super::super) const MAX_WALL_S: f64 = 3600.0;
+pub(crate) const MAX_WALL_S: f64 = 3600.0;
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

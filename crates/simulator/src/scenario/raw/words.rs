@@ -9,12 +9,12 @@ use super::fault::FaultTable;
 use super::network::NetworkTable;
 
 /// Sets all partitions of a network.
-pub(in super::super) fn partitions(network: &Network, tick_s: f64) -> Result<Override, String> {
+pub(crate) fn partitions(network: &Network, tick_s: f64) -> Result<Override, String> {
     list_of_network(network, tick_s, "partition")
 }
 
 /// Sets all commands that a network loses by their numbers.
-pub(in super::super) fn lost(network: &Network, tick_s: f64) -> Result<Override, String> {
+pub(crate) fn lost(network: &Network, tick_s: f64) -> Result<Override, String> {
     list_of_network(network, tick_s, "lose")
 }
 
@@ -28,7 +28,7 @@ fn list_of_network(network: &Network, tick_s: f64, name: &str) -> Result<Overrid
 }
 
 /// Sets all faults of a run.
-pub(in super::super) fn faults(faults: &[Fault], tick_s: f64) -> Result<Override, String> {
+pub(crate) fn faults(faults: &[Fault], tick_s: f64) -> Result<Override, String> {
     let mut tables = Vec::new();
     for fault in faults {
         tables.push(to_value(FaultTable::of(fault, tick_s))?);
@@ -37,7 +37,7 @@ pub(in super::super) fn faults(faults: &[Fault], tick_s: f64) -> Result<Override
 }
 
 /// Sets what the clock does about late robots.
-pub(in super::super) fn on_late(path: &[&str], rule: impl Serialize) -> Result<Override, String> {
+pub(crate) fn on_late(path: &[&str], rule: impl Serialize) -> Result<Override, String> {
     Ok(Override::new(path, to_value(rule)?))
 }
 
