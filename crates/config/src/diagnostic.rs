@@ -100,13 +100,6 @@ impl FileError {
         label.unwrap_or(&self.message)
     }
 
-    /// The reason alone, for a text that its reader has not written line by line.
-    #[must_use]
-    pub fn reason(&self) -> &str {
-        let label = self.place.as_ref().and_then(|place| place.label.label());
-        label.unwrap_or(&self.message)
-    }
-
     /// The error of a file that another file names.
     #[must_use]
     pub fn named_by(mut self, name: &str) -> Self {
