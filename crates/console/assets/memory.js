@@ -6,7 +6,8 @@ import { spread } from "./history.js";
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./types/messages.js").Panel} Panel */
-/** A frame, and the panels at that time. @typedef {{frame: WorldFrame, panels: Map<string, Panel>}} Seen */
+/** A frame without its guests, whose places are packed, and the panels at that time.
+ * @typedef {{frame: WorldFrame, guests_m: Float64Array, panels: Map<string, Panel>}} Seen */
 
 /** Most frames; beyond, older ones are dropped where they are close together, so that the whole time stays in reach. */
 const MOST_FRAMES = 3000;
@@ -37,8 +38,10 @@ export class Memory {
 
     // Most frames bring no panel, or not of many robots: those that are alike are kept once.
     const isAlike = last && last.panels.size === panels.size && [...panels].every(([robot, panel]) => last.panels.get(robot) === panel);
-    this.seen.push({ frame, panels: isAlike ? last.panels : new Map(panels) });
-    this.bodies += weight(frame);
+    const guests_m = new Float64Array(frame.guests.flat());
+    const seen = { frame: { ...frame, guests: [] }, guests_m, panels: isAlike ? last.panels : new Map(panels) };
+    this.seen.push(seen);
+    this.bodies += weight(seen);
     if (this.seen.length > MOST_FRAMES || this.bodies > MOST_BODIES) this.thin();
   }
 
@@ -56,7 +59,7 @@ export class Memory {
   /** @param {(seen: Seen, index: number) => boolean} isKept */
   keep(isKept) {
     this.seen = this.seen.filter(isKept);
-    this.bodies = this.seen.reduce((sum, { frame }) => sum + weight(frame), 0);
+    this.bodies = this.seen.reduce((sum, seen) => sum + weight(seen), 0);
   }
 
   /** The oldest tick; infinite if there is none. */
@@ -67,20 +70,27 @@ export class Memory {
   /**
    * The newest frame of a tick or before; the oldest one if all are later.
    * @param {number} tick
-   * @returns {Seen | undefined}
+   * @returns {{frame: WorldFrame, panels: Map<string, Panel>} | null}
    */
   at(tick) {
     const later = this.seen.findIndex(({ frame }) => frame.tick > tick);
-    return this.seen[later < 0 ? this.seen.length - 1 : Math.max(0, later - 1)];
+    const seen = this.seen[later < 0 ? this.seen.length - 1 : Math.max(0, later - 1)];
+    if (!seen) return null;
+
+    const { frame, guests_m, panels } = seen;
+    /** @type {[number, number][]} */
+    const guests = [];
+    for (let i = 0; i < guests_m.length; i += 2) guests.push([guests_m[i], guests_m[i + 1]]);
+    return { frame: { ...frame, guests }, panels };
   }
 
-  /** The frames after a tick. @param {number} tick */
+  /** The frames after a tick, without guests. @param {number} tick */
   after(tick) {
     return this.seen.filter(({ frame }) => frame.tick > tick).map(({ frame }) => frame);
   }
 }
 
-/** @param {WorldFrame} frame */
-function weight(frame) {
-  return frame.guests.length + ROBOT_WEIGHT * frame.robots.length;
+/** @param {Seen} seen */
+function weight({ frame, guests_m }) {
+  return guests_m.length / 2 + ROBOT_WEIGHT * frame.robots.length;
 }

@@ -40,6 +40,8 @@ const SAMPLES = 3000;
 const ENOUGH_LINES = 10_000;
 /** How often it is asked what has been recorded since; after a request that takes long, later. */
 const FOLLOW_MS = 1000;
+/** In this time a run that has begun has recorded something. */
+const BEGINNING_MS = 5000;
 /** Least time between two frames. */
 const FRAME_MS = 33;
 /** How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states. */
@@ -61,6 +63,8 @@ export class Player {
     this.header = null;
     /** Why nothing is recorded. */
     this.missing = "";
+    /** Since when. */
+    this.missingAt_ms = 0;
     /** The last tick of the newest epoch that charts and log have from its recording. */
     this.readTo = -1;
     /** The recording of which the log has the epochs before. */
@@ -95,6 +99,11 @@ export class Player {
   get isOfLive() {
     const { live } = this.store;
     return live !== null && (this.isLive || this.epoch === live.epoch);
+  }
+
+  /** Whether something of the past is not there. A run that has just begun has recorded nothing yet. */
+  get isWanting() {
+    return this.missing !== "" && (this.first > 0 || performance.now() - this.missingAt_ms > BEGINNING_MS);
   }
 
   /** Whether it is known what is recorded. */
@@ -158,6 +167,7 @@ export class Player {
     const missing = "missing" in answer ? answer.missing : "";
     const isOther = "seed" in answer && answer.epoch === live?.epoch && answer.seed !== live.seed;
     if ("missing" in answer || isOther) {
+      if (!this.missing) this.missingAt_ms = performance.now();
       this.missing = missing || "the folder has the recording of another run";
       this.newest = null;
       if (this.isLive) this.header = null;
@@ -208,6 +218,10 @@ export class Player {
     await this.learn();
     const { newest, store } = this;
     store.emit("live");
+
+    // What was asked for may have been between what was recorded and what the page saw.
+    const wanted = Math.floor(this.position);
+    if (store.isBack && !this.isPlaying && this.chosen !== wanted && wanted <= this.recorded) await this.show(wanted, false);
     if (!newest || newest.epoch !== store.live?.epoch) return;
 
     if (before && before.number !== newest.number && before.epoch >= newest.epoch) {

@@ -98,7 +98,7 @@ function note(player) {
   const say = (/** @type {string} */ text, /** @type {string} */ why) =>
     html`<p class="past-note muted" data-testid="past-note" role="status" title=${why}>${text}</p>`;
 
-  if (missing) return say(`Only what this page has seen, from ${(first * tick_s).toFixed(1)} s on: ${missing}.`, missing);
+  if (player.isWanting) return say(`Only what this page has seen, from ${(first * tick_s).toFixed(1)} s on: ${missing}.`, missing);
   const share = newest && newest.ticks > 0 ? player.readTo / newest.ticks : 1;
   if (share < 0.9 && newest && newest.epoch === store.live?.epoch) return say(`Reading what is recorded: ${Math.max(0, Math.floor(100 * share))} %`, "");
   return nothing;

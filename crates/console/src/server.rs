@@ -260,11 +260,19 @@ async fn read(app: Arc<App>, answer: impl FnOnce(&App) -> Response + Send + 'sta
     read.await.unwrap_or_else(|error| internal_error(&error))
 }
 
-/// The recording of an epoch, or the answer that there is none.
-fn find(app: &App, epoch: Option<Epoch>) -> Result<Arc<Recording>, Response> {
-    let past = app.past.as_ref().ok_or_else(not_found)?;
-    past.epoch(epoch)
-        .map_err(|error| (StatusCode::NOT_FOUND, format!("{error}\n")).into_response())
+/// Answers from the recording of an epoch, or that there is none.
+fn with_epoch(
+    app: &App,
+    epoch: Option<Epoch>,
+    answer: impl FnOnce(&Recording) -> Response,
+) -> Response {
+    let Some(past) = &app.past else {
+        return not_found();
+    };
+    match past.epoch(epoch) {
+        Ok(recording) => answer(&recording),
+        Err(error) => (StatusCode::NOT_FOUND, format!("{error}\n")).into_response(),
+    }
 }
 
 /// A range of ticks, as the query string of a request states it.
@@ -293,15 +301,15 @@ async fn ticks(
     if !wanted.is_valid() {
         return bad_range();
     }
-    read(app, move |app| read_ticks(app, epoch, wanted)).await
+    let answer = move |app: &App| with_epoch(app, epoch, |recording| read_ticks(recording, wanted));
+    read(app, answer).await
 }
 
 /// Reads from the recording's files; blocks.
-fn read_ticks(app: &App, epoch: Option<Epoch>, wanted: Wanted) -> Response {
-    match find(app, epoch).map(|recording| recording.range(wanted)) {
-        Ok(Ok(range)) => json_text(range),
-        Ok(Err(error)) => internal_error(&error),
-        Err(answer) => answer,
+fn read_ticks(recording: &Recording, wanted: Wanted) -> Response {
+    match recording.range(wanted) {
+        Ok(range) => json_text(range),
+        Err(error) => internal_error(&error),
     }
 }
 
@@ -321,16 +329,16 @@ async fn diagram(
         Ok(Query(window)) if window.is_valid() => window,
         _ => return bad_window(),
     };
-    read(app, move |app| draw_diagram(app, window)).await
+    let answer = move |app: &App| {
+        with_epoch(app, window.epoch, |recording| {
+            draw_diagram(recording, window)
+        })
+    };
+    read(app, answer).await
 }
 
 /// Reads from the recording's files; blocks.
-fn draw_diagram(app: &App, window: Window) -> Response {
-    let recording = match find(app, window.epoch) {
-        Ok(recording) => recording,
-        Err(answer) => return answer,
-    };
-
+fn draw_diagram(recording: &Recording, window: Window) -> Response {
     match recording.diagram(window) {
         Ok(svg) => ([(CONTENT_TYPE, content_type("diagram.svg"))], svg).into_response(),
         Err(error @ DiagramError::TooMuch(_)) => {
