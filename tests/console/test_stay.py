@@ -37,6 +37,14 @@ def test_the_run_ends_and_init_starts_the_next_one(launched, open_page, screensh
     expect(page.locator("#panel-log")).to_contain_text("its processes stay")
     page.screenshot(path=screenshots / "ended.png")
 
+    # It is watched again, and the page returns to its end.
+    page.get_by_test_id("watch-again").click()
+    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "false")
+    eventually("an earlier tick", lambda: int(page.get_by_test_id("tick").text_content()) < 10)
+    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "true", timeout=30_000)
+    expect(page.get_by_test_id("tick")).to_have_text("10")
+    expect(page.get_by_test_id("watch-again")).to_be_visible()
+
     # The page is loaded again, which the simulator outlives.
     page.reload()
     expect(page.get_by_test_id("phase")).to_have_text("ended", ignore_case=True)

@@ -461,6 +461,17 @@ export class Player {
     this.play();
   }
 
+  /** Whether a run that is over is shown at its end, and can be seen again. */
+  get isOver() {
+    return this.isLive && this.store.live?.phase === "ended" && this.first < this.last;
+  }
+
+  /** Plays a run that is over from its beginning. */
+  async watchAgain() {
+    await this.seek(this.first);
+    if (!this.isPlaying) this.toggle();
+  }
+
   pause() {
     this.isPlaying = false;
     this.seek(this.tick);

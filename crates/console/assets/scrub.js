@@ -34,6 +34,7 @@ export function renderScrub(place, player, shown) {
 
   render(
     html`
+      ${player.isOver ? again(player) : nothing}
       ${player.isLive ? nothing : buttons}
       ${epochs(player)}
       <div class="track">
@@ -47,6 +48,12 @@ export function renderScrub(place, player, shown) {
       ${note(player)}`,
     place,
   );
+}
+
+/** @param {Player} player */
+function again(player) {
+  return html`<button type="button" class="primary" data-testid="watch-again" title="from its beginning, as it is recorded"
+    @click=${() => player.watchAgain()}>${ICONS.start}<span>Watch again</span></button>`;
 }
 
 /** @param {Player} player */
