@@ -89,7 +89,8 @@ export class Interventions {
 
   /** What is in effect now. @returns {Effect[]} */
   inEffect() {
-    const { frame, status } = this.store;
+    // Also while a past tick is shown.
+    const { now: frame, status } = this.store;
     /** @type {Effect[]} */
     const effects = [];
 
