@@ -2,6 +2,7 @@
 //! ([`Experiment::load`]), of which some ship with the project. It is planned ([`Plan`]) into units, which are played on one
 //! machine or on many ([`engine`]) and kept in a folder ([`Store`]), whose results are read from there ([`Results`]).
 
+mod case;
 mod condition;
 mod contrast;
 pub mod engine;

@@ -13,10 +13,11 @@ use serde::{Deserialize, Serialize};
 use simulator::Scenario;
 use xxhash_rust::xxh3::Xxh3;
 
+use super::case::Case;
 use super::condition::{Condition, OWN_OPTIONS};
 use super::file::{Arm, Experiment};
 use super::script;
-use super::setting::{Case, Setting};
+use super::setting::Setting;
 use crate::export::draft::{Draft, unwritable};
 
 /// The plan in the folder of an experiment.
