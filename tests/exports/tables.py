@@ -51,7 +51,8 @@ def files_of(run: Path, name: str) -> dict[int, Path]:
 def cells_of(event: dict) -> dict:
     """The cells of an event of events.jsonl."""
     names = RENAMED.get(event["event"], MESSAGE)
-    cells = {}
+    # A record leaves out what is false.
+    cells = {"by_hand": False} if event["event"] == "changed" else {}
     for field, value in event.items():
         if field == "seal":
             continue

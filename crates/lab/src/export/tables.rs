@@ -45,6 +45,7 @@ const EVENTS: [(&str, Type); 30] = [
     ("fault", Type::Text),
     ("begins", Type::Flag),
     ("set", Type::Text),
+    ("by_hand", Type::Flag),
     ("expectation", Type::Text),
     ("verdict", Type::Text),
     ("text", Type::Text),
