@@ -40,9 +40,12 @@ def test_a_link_leads_to_a_tick_and_a_robot(recorded, open_page):
     page.goto(f"{home}#run=other&tick=20")
     expect(page.get_by_test_id("message")).to_contain_text("other")
     expect(page.get_by_test_id("tick")).to_have_text("151")
-    for odd in ("tick=-1", "tick=9999999", "tick=x&robot=Nobody", "%"):
-        page.goto(f"{home}#{odd}")
+    page.goto(f"{home}#tick=9999999")
     expect(page.get_by_test_id("tick")).to_have_text("200")
+    for odd in ("tick=-1", "tick=x&robot=Nobody", "%"):
+        page.goto(f"{home}#{odd}")
+    page.goto(f"{home}#tick=150")
+    expect(page.get_by_test_id("tick")).to_have_text("150")
 
 
 def test_the_plan_is_saved_as_a_picture_and_fills_the_screen(launch, open_page, tmp_path):

@@ -50,7 +50,13 @@ export class Ground {
 
   /** Its pixels, to write on a copy of them. */
   pixels() {
-    this.read ??= this.context.getImageData(0, 0, this.canvas.width, this.canvas.height);
+    if (this.read) return this.read;
+    const { width, height } = this.canvas;
+    // A canvas that is read again and again would be slow to draw from.
+    const copy = new OffscreenCanvas(width, height).getContext("2d", { alpha: false, willReadFrequently: true });
+    if (!copy) throw new Error("this browser draws no canvas");
+    copy.drawImage(this.canvas, 0, 0);
+    this.read = copy.getImageData(0, 0, width, height);
     return this.read;
   }
 }
