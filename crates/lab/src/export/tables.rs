@@ -23,7 +23,7 @@ const WHEN: [(&str, Type); 3] = [
 ];
 
 /// A row for each event.
-const EVENTS: [(&str, Type); 30] = [
+const EVENTS: [(&str, Type); 31] = [
     ("event", Type::Text),
     ("robot", Type::Text),
     ("generation", Type::Integer),
