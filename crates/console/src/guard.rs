@@ -42,6 +42,8 @@ pub(crate) const ENTRANCE: &str = "/";
 const TOKEN_BYTES: usize = 24;
 /// Random bytes in the path of the page.
 const PATH_BYTES: usize = 8;
+/// Longest name of a host with its port, bytes.
+const MAX_HOST_BYTES: usize = 260;
 
 /// Decides which requests are answered.
 #[derive(Debug)]
@@ -53,6 +55,27 @@ pub(crate) struct Guard {
     path: String,
     /// Cookies with this name contain the token. Consoles on one host have different ports and share the browser's cookies.
     cookie_name: String,
+    /// Further hosts that requests may name.
+    hosts: Vec<AllowedHost>,
+}
+
+/// A host under which a proxy serves the console: a name or an address, with a port unless it is the usual one of HTTP or HTTPS.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct AllowedHost(String);
+
+impl std::str::FromStr for AllowedHost {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let is_part = |c: char| c.is_ascii_alphanumeric() || "-.:[]".contains(c);
+        let is_host = !Host::parse(text).name.is_empty() && text.chars().all(is_part);
+        if !is_host || text.len() > MAX_HOST_BYTES {
+            return Err(format!(
+                "{text:?} is not a host such as cars.example.org or cars.example.org:8443, without http:// and path"
+            ));
+        }
+        Ok(Self(text.to_owned()))
+    }
 }
 
 /// Why a request is refused.
@@ -75,6 +98,7 @@ impl Guard {
             token,
             path: format!("/{path}/"),
             cookie_name: format!("cars-console-{}", address.port()),
+            hosts: Vec::new(),
         })
     }
 
@@ -85,7 +109,14 @@ impl Guard {
             token,
             path: path.to_owned(),
             cookie_name: format!("cars-console-{}", address.port()),
+            hosts: Vec::new(),
         }
+    }
+
+    /// The guard, which also admits requests that name these hosts.
+    pub(crate) fn allowing(mut self, hosts: Vec<AllowedHost>) -> Self {
+        self.hosts = hosts;
+        self
     }
 
     /// What is served.
@@ -128,13 +159,22 @@ impl Guard {
         path: &str,
         query: Option<&str>,
     ) -> Option<Refusal> {
-        let Some(host) = single(headers, &HOST).filter(|host| self.is_own(host)) else {
+        let named = single(headers, &HOST);
+        let is_allowed = named.is_some_and(|host| self.is_allowed(host));
+        let Some(host) = named.filter(|host| is_allowed || self.is_own(host)) else {
             return Some(Refusal::Foreign(format!(
-                "This console is at {}: a request must name that address, or localhost, with its port.\n",
+                "This console is at {}: a request must name that address, or localhost, with its port. \
+                 The option --allow-host admits other names.\n",
                 self.address
             )));
         };
-        if is_from_other_page(headers, host) {
+        // A proxy that serves an allowed host may do so over TLS.
+        let schemes: &[&str] = if is_allowed {
+            &["http", "https"]
+        } else {
+            &["http"]
+        };
+        if is_from_other_page(headers, host, schemes) {
             return Some(Refusal::Foreign(
                 "A page from elsewhere may not use this console.\n".to_owned(),
             ));
@@ -145,6 +185,11 @@ impl Guard {
             None => path == ENTRANCE && self.has_token(query),
         };
         (!is_admitted).then_some(Refusal::NoToken)
+    }
+
+    fn is_allowed(&self, host: &str) -> bool {
+        let mut hosts = self.hosts.iter();
+        hosts.any(|AllowedHost(allowed)| allowed.eq_ignore_ascii_case(host))
     }
 
     fn is_own(&self, host: &str) -> bool {
@@ -232,14 +277,16 @@ fn without_brackets(name: &str) -> &str {
         .unwrap_or(name)
 }
 
-/// Whether a browser sent the request for a page that `host` did not serve. Other programs send no `Origin`.
-fn is_from_other_page(headers: &HeaderMap, host: &str) -> bool {
+/// Whether a browser sent the request for a page that `host` did not serve over one of the schemes. Other programs send no
+/// `Origin`.
+fn is_from_other_page(headers: &HeaderMap, host: &str, schemes: &[&str]) -> bool {
     if !headers.contains_key(ORIGIN) {
         return false;
     }
 
-    let own_origin = format!("http://{host}");
-    single(headers, &ORIGIN).is_none_or(|origin| !origin.eq_ignore_ascii_case(&own_origin))
+    let origin = single(headers, &ORIGIN).unwrap_or_default();
+    let mut own_origins = schemes.iter().map(|scheme| format!("{scheme}://{host}"));
+    !own_origins.any(|own| origin.eq_ignore_ascii_case(&own))
 }
 
 /// The loopback address of the same IP version.
@@ -338,6 +385,73 @@ mod tests {
             ":7007",
         ] {
             assert!(!admits(&guard, foreign), "{foreign} was served");
+        }
+    }
+
+    #[test]
+    fn hosts_are_allowed_by_name() {
+        let allowed = ["cars.example.org", "lab.example:8443"].map(|host| host.parse().unwrap());
+        let guard = guard("127.0.0.1:7007").allowing(allowed.to_vec());
+
+        for own in [
+            "cars.example.org",
+            "CARS.example.org",
+            "lab.example:8443",
+            "localhost:7007",
+        ] {
+            assert!(admits(&guard, own), "{own} was refused");
+        }
+        for foreign in [
+            "cars.example.org:7007",
+            "cars.example.org.",
+            "x.cars.example.org",
+            "example.org",
+            "lab.example",
+            "lab.example:7007",
+        ] {
+            assert!(!admits(&guard, foreign), "{foreign} was served");
+        }
+
+        let query = format!("token={}", guard.token);
+        let admits = |origin| {
+            let headers = headers("cars.example.org", Some(origin));
+            guard.refuse(&headers, ENTRANCE, Some(&query)).is_none()
+        };
+        assert!(admits("https://cars.example.org") && admits("http://cars.example.org"));
+        for foreign in [
+            "https://lab.example:8443",
+            "https://cars.example.org:8443",
+            "null",
+            "",
+        ] {
+            assert!(!admits(foreign), "{foreign} was served");
+        }
+        // The own address is not served over TLS.
+        assert!(!admits_origin(&guard, "https://localhost:7007"));
+    }
+
+    #[test]
+    fn what_is_no_host_cannot_be_allowed() {
+        for host in [
+            "cars.example.org",
+            "10.0.0.1:80",
+            "[::1]:8443",
+            &"a".repeat(MAX_HOST_BYTES),
+        ] {
+            assert!(host.parse::<AllowedHost>().is_ok(), "{host}");
+        }
+        let long = "a".repeat(MAX_HOST_BYTES + 1);
+        for wrong in [
+            "",
+            ":80",
+            "https://cars.example.org",
+            "cars.example.org/",
+            "a b",
+            "*",
+            "a,b",
+            &long,
+        ] {
+            assert!(wrong.parse::<AllowedHost>().is_err(), "{wrong}");
         }
     }
 

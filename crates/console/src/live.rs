@@ -198,8 +198,12 @@ impl Live {
     /// Sends a request to the simulator and waits for its answer.
     ///
     /// # Errors
-    /// The request is malformed, or there is no answer.
+    /// The request is malformed or no person's, or there is no answer.
     pub(crate) fn control(&self, control: &Control) -> Result<ControlAnswer, String> {
+        if matches!(control, Control::FaultsDone { .. }) {
+            return Err("only the launcher says that faults are done".to_owned());
+        }
+
         let timeout = if matches!(control, Control::Step { .. }) {
             STEP_TIMEOUT
         } else {

@@ -31,7 +31,7 @@ use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use app::{App, Mode};
-use guard::Guard;
+use guard::{AllowedHost, Guard};
 use kept::Kept;
 use live::Live;
 use past::Past;
@@ -76,6 +76,24 @@ struct Args {
     /// was killed is started again.
     #[arg(long, env = "CARS_CONSOLE_KEEP", value_name = "FILE")]
     keep: Option<PathBuf>,
+    /// Admit requests that name this host, too, with its port unless it is the usual one: that of a proxy, which also brings TLS.
+    /// Can be given several times.
+    #[arg(
+        long,
+        env = "CARS_CONSOLE_ALLOW_HOST",
+        value_name = "HOST[:PORT]",
+        value_delimiter = ','
+    )]
+    allow_host: Vec<AllowedHost>,
+}
+
+/// How the page is served.
+struct Serving {
+    bind: Option<SocketAddr>,
+    /// Whether a browser is started.
+    opens: bool,
+    keep: Option<PathBuf>,
+    allowed: Vec<AllowedHost>,
 }
 
 fn main() -> ExitCode {
@@ -105,9 +123,15 @@ fn run(args: Args) -> Result<(), String> {
             (Mode::Live(live), past)
         }
     };
+    let serving = Serving {
+        bind: args.bind,
+        opens: args.open,
+        keep: args.keep,
+        allowed: args.allow_host,
+    };
     let runtime = build_runtime()?;
 
-    let outcome = runtime.block_on(serve(args.bind, mode, past, args.open, args.keep));
+    let outcome = runtime.block_on(serve(mode, past, serving));
 
     // Requests that still wait for the simulator get no answer any more.
     runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
@@ -130,17 +154,11 @@ fn build_runtime() -> Result<Runtime, String> {
 }
 
 /// Serves until the process receives SIGTERM or SIGINT.
-async fn serve(
-    bind: Option<SocketAddr>,
-    mode: Mode,
-    past: Option<Past>,
-    opens: bool,
-    keep: Option<PathBuf>,
-) -> Result<(), String> {
-    let kept = keep.as_deref().and_then(Kept::read);
+async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<(), String> {
+    let kept = how.keep.as_deref().and_then(Kept::read);
     let listener = match &kept {
-        Some(kept) => listen_again(kept.address, bind).await?,
-        None => listen(bind).await?,
+        Some(kept) => listen_again(kept.address, how.bind).await?,
+        None => listen(how.bind).await?,
     };
     let address = listener
         .local_addr()
@@ -150,7 +168,8 @@ async fn serve(
         Some(kept) => Guard::again(address, kept.token, &kept.path),
         None => Guard::new(address).map_err(|error| format!("cannot create a token: {error}"))?,
     };
-    if let Some(file) = &keep
+    let guard = guard.allowing(how.allowed);
+    if let Some(file) = &how.keep
         && let Err(error) = Kept::of(&guard).write(file)
     {
         tracing::warn!("{}: {error}", file.display());
@@ -161,7 +180,7 @@ async fn serve(
     let mut interrupt = handle(SignalKind::interrupt())?;
 
     announce(address, &url);
-    if opens && !was_open {
+    if how.opens && !was_open {
         opening::open(&url, app.clone());
     }
 

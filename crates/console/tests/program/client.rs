@@ -28,6 +28,8 @@ pub(crate) fn program(args: &[&str]) -> Command {
         "CARS_CONNECT",
         "CARS_ZENOH_CONFIG",
         "CARS_CONSOLE_BIND",
+        "CARS_CONSOLE_ALLOW_HOST",
+        "CARS_CONSOLE_KEEP",
     ] {
         command.env_remove(variable);
     }

@@ -3,7 +3,7 @@
 use std::io::{Read, Write};
 use std::net::TcpListener;
 
-use crate::client::{Console, fails};
+use crate::client::{Console, fails, program};
 
 #[test]
 fn a_request_for_another_host_is_refused() {
@@ -46,6 +46,50 @@ fn a_request_for_the_own_address_is_served() {
         let answer = console.get_with(&console.path_of("nothing"), &headers);
         assert_eq!(answer.status, 404, "{host}");
     }
+}
+
+/// As behind a proxy that brings TLS.
+#[test]
+fn a_host_that_is_allowed_is_served_and_no_other() {
+    let console = Console::start(&[
+        "--bind",
+        "127.0.0.1:0",
+        "--connect",
+        "tcp/127.0.0.1:1",
+        "--allow-host",
+        "cars.example.org,lab.example:8443",
+    ]);
+
+    for (host, status) in [
+        ("cars.example.org", 303),
+        ("lab.example:8443", 303),
+        ("lab.example", 403),
+        ("evil.example", 403),
+    ] {
+        let answer = console.get_with(&console.entrance(), &[("Host", host)]);
+        assert_eq!(answer.status, status, "{host}");
+    }
+    let path = console.path_of("nothing");
+    let admitted = [("Host", "cars.example.org"), ("Cookie", &console.cookie)];
+    assert_eq!(console.get_with(&path, &admitted).status, 404);
+    for (origin, status) in [
+        ("https://cars.example.org", 404),
+        ("https://evil.example", 403),
+    ] {
+        let headers = [&admitted[..], &[("Origin", origin)]].concat();
+        assert_eq!(console.get_with(&path, &headers).status, status, "{origin}");
+    }
+    assert_eq!(
+        console.get_with(&path, &admitted[..1]).status,
+        403,
+        "without the cookie"
+    );
+
+    let output = program(&["--allow-host", "https://cars.example.org"]).output();
+    let output = output.expect("the program is there");
+    assert_eq!(output.status.code(), Some(2));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(errors.contains("without http://"), "{errors}");
 }
 
 #[test]

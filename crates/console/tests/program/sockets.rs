@@ -46,6 +46,18 @@ fn without_a_simulator_requests_are_answered_with_an_error() {
 }
 
 #[test]
+fn what_only_programs_say_to_each_other_is_refused() {
+    let console = Console::live();
+    let mut page = console.page();
+
+    page.send_text(&control(7, r#"{"do":"faults_done","epoch":1,"tick":3}"#));
+
+    let answer = page.until("answer");
+    assert_eq!(answer["id"], 7);
+    assert!(error(&answer).contains("only the launcher"), "{answer}");
+}
+
+#[test]
 fn malformed_requests_are_answered_with_the_reason() {
     let console = Console::live();
     let mut page = console.page();
