@@ -42,6 +42,8 @@ const ENOUGH_LINES = 10_000;
 const FOLLOW_MS = 1000;
 /** In this time a run that has begun has recorded something. */
 const BEGINNING_MS = 5000;
+/** How fast a run that went as fast as it could is watched again. */
+const SEEN = 5;
 /** Least time between two frames. */
 const FRAME_MS = 33;
 /** How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states. */
@@ -483,9 +485,11 @@ export class Player {
     this.seek(Math.min(this.last, Math.max(this.first, this.tick + ticks)));
   }
 
-  /** How fast it is played: a run in progress as fast as it goes. */
+  /** How fast it is played: a run in progress as fast as it goes, one that is over so that it can be seen. */
   get pace() {
-    return (this.store.live ? this.store.live.speed : this.factor) ?? FASTEST;
+    const { live } = this.store;
+    if (live?.phase === "ended") return live.speed ?? SEEN;
+    return (live ? live.speed : this.factor) ?? FASTEST;
   }
 
   async play() {

@@ -238,7 +238,7 @@ export class Store {
   /** @param {LogRecord[]} lines */
   addLines(lines) {
     const last = this.recordedLine;
-    if (last && lines.some((line) => compare(line, last) <= 0)) return this.mergeLines(lines);
+    if (last && lines.some((line) => compare(line, last) <= 0)) return this.mergeLines(lines, false);
     this.append(lines);
   }
 
@@ -249,7 +249,7 @@ export class Store {
   addRecorded(lines) {
     const last = lines.at(-1);
     if (last && compare(last, this.recordedLine) > 0) this.recordedLine = last;
-    this.mergeLines(lines);
+    this.mergeLines(lines, true);
   }
 
   /** Forgets the log: another run has taken the name of this one. */
@@ -262,8 +262,12 @@ export class Store {
     this.emit("log");
   }
 
-  /** Adds those of the lines that are not known, each where it belongs. @param {LogRecord[]} lines in order */
-  mergeLines(lines) {
+  /**
+   * Adds those of the lines that are not known, each where it belongs.
+   * @param {LogRecord[]} lines in order
+   * @param {boolean} areRecorded whether they come before others of their tick: the order within a tick is that of the record
+   */
+  mergeLines(lines, areRecorded) {
     const [first] = lines;
     if (!first) return;
     const begin = this.log.findIndex((line) => compare(line, first) >= 0);
@@ -278,8 +282,7 @@ export class Store {
     });
     if (later.length === 0 || fresh.length === 0) return this.append(fresh);
 
-    // The order within a tick is that of the record.
-    const all = [...fresh, ...later].sort(compare);
+    const all = (areRecorded ? [...fresh, ...later] : [...later, ...fresh]).sort(compare);
     this.log.splice(begin, later.length, ...all);
     this.logEdits += 1;
     this.counted(fresh);
