@@ -21,8 +21,8 @@ use system_tests::Lab;
 const OPEN: Duration = Duration::from_secs(1);
 /// How long a client that connects may take.
 const ACCEPT: Duration = Duration::from_secs(2);
-/// A link that is silent for so long is given up.
-const LEASE: Duration = Duration::from_secs(2);
+/// How long an attempt takes at least if nothing limits it (the middleware's own limit).
+const WITHOUT_LIMIT: Duration = Duration::from_secs(10);
 /// Longest wait for a session: much longer than any attempt, because one that is lost never comes back.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Handshakes of a sweep. With 200 in this one process and much other load, no attempt may end within its limit, because all
@@ -211,7 +211,12 @@ fn connect(client: TcpStream, router: TcpStream, framing: Framing, held: Option<
         std::thread::spawn(move || {
             // A connection that ends is not the relay's affair.
             let _is_over = relay(sender, &from, &to, framing, held, accepted);
-            let _is_closed = to.shutdown(Shutdown::Both);
+            // Of a handshake that is held for ever, the client does not learn either that the router ended it (the router does,
+            // if it has not yet seen the end of the connection before).
+            let is_silent = held.is_some_and(|held| held.lasting.is_none());
+            if !(is_silent && sender == Sender::Router) {
+                let _is_closed = to.shutdown(Shutdown::Both);
+            }
         });
     }
 }
@@ -370,7 +375,7 @@ fn an_attempt_that_stalls_is_given_up_in_time() {
                 let took = Client::new(&router, held, "").returns().unwrap();
                 println!("{framing:?}, {held:?}: {took:.2?}");
                 assert!(took >= OPEN, "{held:?}: it took only {took:?}");
-                assert!(took < OPEN + LEASE, "{held:?}: it took {took:?}");
+                assert!(took < WITHOUT_LIMIT, "{held:?}: it took {took:?}");
             }
         }
     }
