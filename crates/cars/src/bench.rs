@@ -24,6 +24,7 @@ use programs::Programs;
 use results::Results;
 use subject::{CROWD, HallPlace, Subject};
 use workload::Workload;
+use crate::named;
 
 /// `cars bench`.
 #[derive(Debug, Args)]
@@ -40,11 +41,7 @@ pub(crate) struct BenchArgs {
     )]
     robots: Vec<u64>,
     /// Scenario of the hall.
-    #[arg(
-        long,
-        default_value = "configs/hors_doeuvres.toml",
-        value_name = "FILE"
-    )]
+    #[arg(long, default_value = "hors_doeuvres", value_name = "FILE", value_parser = named::scenario())]
     scenario: PathBuf,
     /// Ticks of a measurement with two processes; more processes do fewer.
     #[arg(long, default_value_t = 20_000, value_name = "N")]

@@ -12,6 +12,7 @@ mod again;
 mod bench;
 mod boundaries;
 mod browser;
+mod built_in;
 mod by_hand;
 mod conform;
 mod control;

@@ -5,7 +5,6 @@ mod expect;
 pub(super) mod fault;
 mod network;
 mod range;
-mod shipped;
 mod unplaced;
 pub(super) mod words;
 
@@ -13,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use config::units::{Length, Speed, Time, quantity};
-use config::{FileError, Source, seed};
+use config::{FileError, Source, seed, shipped};
 use observe::Expectation;
 use protocol::messages::{OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
@@ -386,173 +385,24 @@ fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpe
     })
 }
 
-/// The parameters of a file that a robot names. In a text from outside they are those that this program brings along.
+/// The parameters of a file that a robot names. In a text from outside they are those of the files that come with the programs.
 fn named_parameters(
     file: &Spanned<PathBuf>,
     source: &Source,
     folder: Option<&Path>,
 ) -> Result<toml::Table, FileError> {
-    let Some(folder) = folder else {
-        let shipped = shipped::parameters(file.get_ref()).ok_or_else(|| {
-            let names = shipped::names().join(" or ");
-            let reason = format!(
-                "`params_from` of a scenario from outside names {names}; write other parameters out under `params`"
-            );
-            FileError::at(source, Some(file.span()), &reason)
-        })?;
-        return shipped.parse();
-    };
+    let shipped = shipped::path(shipped::SCENARIOS);
+    let path = folder.unwrap_or(&shipped).join(file.get_ref());
+    if folder.is_none() && !shipped::contains(&path) {
+        let names: Vec<_> = shipped::names(shipped::PARAMETERS).collect();
+        let reason = format!(
+            "`params_from` of a scenario from outside names robots/{}.toml; write other parameters out under `params`",
+            names.join(".toml or robots/")
+        );
+        return Err(FileError::at(source, Some(file.span()), &reason));
+    }
 
-    let path = folder.join(file.get_ref());
     source.check_named(file.span(), &path)?;
     let read = Source::read(&path).and_then(|file| file.parse());
     read.map_err(|error| error.named_by(&source.name))
-}
-
-fn point([x, y]: [Length; 2]) -> Point {
-    Point::new(x.0, y.0)
-}
-
-/// A value that must be positive and finite, or its default.
-fn positive<T: Quantity>(
-    source: &Source,
-    value: Option<&Spanned<T>>,
-    default: T,
-    what: &str,
-) -> Result<T, FileError> {
-    let Some(spanned) = value else {
-        return Ok(default);
-    };
-
-    let value = *spanned.get_ref();
-    let number = value.number();
-    if number > 0.0 && number.is_finite() {
-        return Ok(value);
-    }
-    let text = format!("{what} must be more than zero");
-    Err(FileError::at(source, Some(spanned.span()), &text))
-}
-
-/// Parameters as JSON for the welcome of a robot. Texts that are quantities become SI numbers.
-fn to_parameters(table: &toml::Table) -> Parameters {
-    let entries = table.iter();
-    entries
-        .map(|(key, value)| (key.clone(), to_json(value)))
-        .collect()
-}
-
-fn to_json(value: &toml::Value) -> serde_json::Value {
-    match value {
-        toml::Value::String(text) => match quantity(text) {
-            Some((number, _)) => number.into(),
-            None => text.clone().into(),
-        },
-        toml::Value::Integer(number) => (*number).into(),
-        toml::Value::Float(number) => (*number).into(),
-        toml::Value::Boolean(flag) => (*flag).into(),
-        toml::Value::Datetime(date) => date.to_string().into(),
-        toml::Value::Array(values) => values.iter().map(to_json).collect(),
-        toml::Value::Table(table) => table
-            .iter()
-            .map(|(key, value)| (key.clone(), to_json(value)))
-            .collect(),
-    }
-}
-
-impl From<&checked::Scenario> for Scenario {
-    fn from(scenario: &checked::Scenario) -> Self {
-        let tick_s = scenario.tick_s;
-        let lateness = &scenario.lateness;
-        let field = FieldTable {
-            size: scenario.field_m.map(Length),
-            body: Some(Length(scenario.body_m)),
-            max_speed: Some(Speed(scenario.max_speed_mps)),
-        };
-        let record = RecordTable {
-            log: Some(scenario.record.log),
-            log_name: Some(unplaced(scenario.record.log_name.clone())),
-            frames: Some(scenario.record.frames),
-            panels: Some(scenario.record.panels),
-            sync: Some(scenario.record.sync),
-        };
-
-        let faults = scenario.faults.iter();
-        let faults = faults.map(|fault| unplaced(FaultTable::of(fault, tick_s)));
-        let changes = scenario.changes.iter();
-        let changes = changes.map(|change| unplaced(ChangeTable::of(change, tick_s)));
-        let expectations = scenario.expectations.iter().cloned().map(unplaced);
-        let obstacles = scenario.obstacles.iter();
-        let obstacles = obstacles.map(|at| Obstacle { at: lengths(*at) });
-        let robots = scenario.robots.iter();
-        let robots = robots.map(|(name, spec)| unplaced(Robot::of(name, spec, lateness)));
-
-        Self {
-            seed: Some(unplaced(scenario.seed)),
-            tick: Some(unplaced(Time(tick_s))),
-            duration: Some(unplaced(Time(scenario.duration_s()))),
-            on_late: Some(lateness.on_late),
-            deadline: Some(unplaced(Time(lateness.deadline_s))),
-            lose_after: Some(unplaced(lateness.lose_after)),
-            field: Some(unplaced(field)),
-            sensing: Some(SensingTable {
-                range: unplaced(Length(scenario.sensing_range_m)),
-            }),
-            guests: Some(unplaced(GuestsTable::from(&scenario.guests))),
-            network: NetworkTable::of(&scenario.network, tick_s),
-            record: Some(record),
-            faults: faults.collect(),
-            changes: changes.collect(),
-            expectations: expectations.collect(),
-            parent: scenario.parent.as_ref().map(ParentTable::from),
-            obstacles: obstacles.collect(),
-            robots: robots.collect(),
-        }
-    }
-}
-
-impl From<&world::Guests> for GuestsTable {
-    fn from(guests: &world::Guests) -> Self {
-        let speed = &guests.speed_mps;
-        let speed = Range {
-            min: Speed(speed.min()),
-            mode: Speed(speed.mode()),
-            max: Speed(speed.max()),
-        };
-        let duration = &guests.duration_s;
-        let duration = Range {
-            min: Time(duration.min()),
-            mode: Time(duration.mode()),
-            max: Time(duration.max()),
-        };
-
-        Self {
-            count: unplaced(guests.count),
-            speed: Some(unplaced(speed)),
-            duration: Some(unplaced(duration)),
-        }
-    }
-}
-
-impl Robot {
-    fn of(name: &RobotName, spec: &RobotSpec, lateness: &Lateness) -> Self {
-        let parameters = spec.parameters.iter();
-        let params = parameters.filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
-        Self {
-            name: name.clone(),
-            class: Some(spec.class.clone()),
-            at: lengths(spec.at),
-            on_late: lateness.own.get(name).copied(),
-            params_from: None,
-            params: params.collect(),
-        }
-    }
-}
-
-fn lengths(at: Point) -> [Length; 2] {
-    [Length(at.x), Length(at.y)]
-}
-
-/// The inverse of [`to_json`]; parameters come from TOML, which has no `null`.
-fn to_toml(value: &serde_json::Value) -> Option<toml::Value> {
-    toml::Value::try_from(value).ok()
 }
