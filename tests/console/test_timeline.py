@@ -119,6 +119,47 @@ def test_clicks_seek(launch, open_page):
         expect(page.locator("#bands .cursor")).to_have_count(0)
 
 
+def test_the_log_seeks_by_keyboard(launch, open_page):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 40)
+
+    def picked_time_s():
+        """The time of the marked lines, which is the time that is shown."""
+        time_s = float(re.match(r"\s*([\d.]+) s", page.locator(".line.picked").first.inner_text())[1])
+        until(page, f"window.carsConsole.frame().time_s === {time_s}")
+        return time_s
+
+    log = page.get_by_test_id("log")
+    log.focus()
+    page.keyboard.press("Enter")
+    expect(page.locator(".line.picked").first).to_be_visible()
+    last_s = picked_time_s()
+    page.keyboard.press("ArrowUp")
+    until(page, f"window.carsConsole.frame().time_s < {last_s}")
+    expect(page.locator(".line.picked").first).to_be_visible()
+    before_s = picked_time_s()
+    assert before_s < last_s
+    page.keyboard.press("ArrowDown")
+    until(page, f"window.carsConsole.frame().time_s === {last_s}")
+    assert picked_time_s() == last_s
+    page.keyboard.press("l")
+    expect(page.locator(".line.picked")).to_have_count(0)
+    expect(page.get_by_test_id("tick")).to_have_text("40")
+
+
+def test_the_tools_of_a_run_in_progress_need_one_row(launch, open_page, screenshots):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    step_to(page, 4)
+    expect(page.get_by_test_id("experiment")).to_be_visible()
+    heights = page.locator(".tools button:visible").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
+    assert len(heights) == 6
+    assert max(heights) - min(heights) < 4, heights
+    page.screenshot(path=screenshots / "tools-1280.png")
+
+
 def window(page):
     return [round(value, 2) for value in page.evaluate("window.carsConsole.window()")]
 
@@ -133,9 +174,13 @@ def test_charts_and_bands_zoom_together(launch, open_page, screenshots):
     assert window(page) == [0, 20]
 
     def settled(place):
-        """Charts and bands move when the button beside them goes."""
         expect(page.get_by_test_id("window-all")).to_be_hidden()
         page.locator(place).scroll_into_view_if_needed()
+
+    def height_of_bar():
+        return page.locator("#chart").bounding_box()["y"] - page.locator("#chart-select").bounding_box()["y"]
+
+    height = height_of_bar()
 
     def drag(place, begin, end):
         settled(place)
@@ -158,6 +203,7 @@ def test_charts_and_bands_zoom_together(launch, open_page, screenshots):
         eventually("the chart", lambda: drawn() == window(page))
         expect(page.get_by_test_id("span")).to_have_count(1)
         expect(page.get_by_test_id("tick")).to_have_text("40")
+        assert height_of_bar() == height, "the button that comes with a shorter window moves nothing"
         page.screenshot(path=screenshots / f"timeline-zoom-{place[1:]}.png")
         page.locator(place).dblclick(position={"x": 300, "y": 20})
         eventually("the whole run", lambda: window(page) == [0, 20] and drawn() == [0, 20])
