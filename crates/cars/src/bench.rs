@@ -20,11 +20,11 @@ use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use simulator::scenario::{Changes, Scenario};
 
+use crate::named;
 use programs::Programs;
 use results::Results;
 use subject::{CROWD, HallPlace, Subject};
 use workload::Workload;
-use crate::named;
 
 /// `cars bench`.
 #[derive(Debug, Args)]

@@ -7,6 +7,13 @@ use clap::{Args, Command, CommandFactory};
 use miette::miette;
 use robot::RobotArgs;
 
+/// The programs of the robots.
+const ROBOTS: [(&str, &str); 3] = [
+    ("cars-butler", "Runs Butler, the waiter"),
+    ("cars-leguin", "Runs Leguin, who refills"),
+    ("cars-vonda", "Runs Vonda, who refills as Leguin does"),
+];
+
 /// `cars man`.
 #[derive(Debug, Args)]
 pub(crate) struct ManArgs {
@@ -28,14 +35,8 @@ pub(crate) fn man(args: &ManArgs, cars: Command) -> miette::Result<ExitCode> {
 
 /// The command lines of all programs.
 fn programs(cars: Command) -> Vec<Command> {
-    let mut programs = vec![
-        cars,
-        simulator::program::command(),
-        console::command(),
-    ];
-    for class in robots::CLASSES {
-        let name = format!("cars-{}", class.to_lowercase());
-        let about = format!("Runs the robot {class} of the Cooperative Affective Robot Simulator");
+    let mut programs = vec![cars, simulator::program::command(), console::command()];
+    for (name, about) in ROBOTS {
         programs.push(RobotArgs::command().name(name).about(about));
     }
     programs

@@ -69,7 +69,8 @@ pub fn find(given: &Path, folders: &[&str]) -> PathBuf {
 pub fn names(folder: &str) -> impl Iterator<Item = &'static str> {
     files().filter_map(move |(path, _)| {
         let name = path.strip_prefix(folder)?.strip_prefix('/')?;
-        name.strip_suffix(".toml").filter(|name| !name.contains('/'))
+        name.strip_suffix(".toml")
+            .filter(|name| !name.contains('/'))
     })
 }
 

@@ -3,6 +3,10 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
+use crate::scenario::{Changes, Override, Scenario};
+use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
+use crate::{RunFolder, Summary};
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
 use clap::{Command, CommandFactory, Parser, ValueEnum};
@@ -11,10 +15,6 @@ use config::{Speed, shipped};
 use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::messages::End;
-use crate::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
-use crate::scenario::{Changes, Override, Scenario};
-use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
-use crate::{RunFolder, Summary};
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
 #[derive(Debug, Parser)]

@@ -58,7 +58,11 @@ fn a_launch_of_a_name_is_that_of_its_file() {
     let file = root().join("configs/three_robots.toml");
     let of_file = play(&lab, &["run", file.to_str().unwrap()], "file");
     let in_process = play(&lab, &["run", "three_robots"], "in-process");
-    let launched = play(&lab, &["launch", "three_robots", "--no-console"], "launched");
+    let launched = play(
+        &lab,
+        &["launch", "three_robots", "--no-console"],
+        "launched",
+    );
     assert_same(("file", &of_file), ("name, in one process", &in_process));
     assert_same(("file", &of_file), ("name, as processes", &launched));
 }
@@ -86,8 +90,22 @@ fn a_launch_of_a_name_is_resumed_in_another_folder() {
 
     let resumed = lab.out().join("stopped");
     let resumed = resumed.to_str().unwrap();
-    lab.ok(&["launch", "--resume", resumed, "--no-console", "--speed", "max"]);
-    lab.ok(&["run", "hors_doeuvres", "--duration", "20 s", "--run", "whole"]);
+    lab.ok(&[
+        "launch",
+        "--resume",
+        resumed,
+        "--no-console",
+        "--speed",
+        "max",
+    ]);
+    lab.ok(&[
+        "run",
+        "hors_doeuvres",
+        "--duration",
+        "20 s",
+        "--run",
+        "whole",
+    ]);
     assert_same(
         ("resumed", &lab.bytes("stopped")),
         ("never stopped", &lab.bytes("whole")),
@@ -108,9 +126,10 @@ fn init_writes_all_files_and_replaces_none() {
     }
 
     // Everything that was written can be used where it is.
-    for name in written.iter().filter(|name| {
-        !name.starts_with("configs/robots") && !name.starts_with("configs/links")
-    }) {
+    for name in written
+        .iter()
+        .filter(|name| !name.starts_with("configs/robots") && !name.starts_with("configs/links"))
+    {
         let file = mine.join(name);
         let (code, text) = elsewhere_without_out(&lab, &["check", file.to_str().unwrap()]);
         assert_eq!(code, 0, "{name}: {text}");
@@ -122,13 +141,20 @@ fn init_writes_all_files_and_replaces_none() {
     std::fs::remove_file(&lost).unwrap();
     let (code, text) = elsewhere_without_out(&lab, &["init", "mine"]);
     assert_eq!(code, 1, "{text}");
-    assert!(text.contains("mine/configs/museum.toml has been changed"), "{text}");
+    assert!(
+        text.contains("mine/configs/museum.toml has been changed"),
+        "{text}"
+    );
     assert!(!lost.exists(), "something was written");
 
     // Without the file that was changed, what is missing comes back.
     std::fs::remove_file(&changed).unwrap();
     let (code, text) = elsewhere_without_out(&lab, &["init", "mine"]);
-    assert_eq!((code, text.contains("2 files written")), (0, true), "{text}");
+    assert_eq!(
+        (code, text.contains("2 files written")),
+        (0, true),
+        "{text}"
+    );
     assert_eq!(files_of(&mine), written);
 }
 
@@ -144,7 +170,10 @@ fn every_name_can_be_checked_and_an_unknown_one_shows_them() {
         let (code, text) = elsewhere(&lab, &[command, "musem"]);
         assert_eq!(code, 1, "{text}");
         assert!(text.contains("cannot read musem"), "{text}");
-        assert!(text.contains("museum") && text.contains("three_robots"), "{text}");
+        assert!(
+            text.contains("museum") && text.contains("three_robots"),
+            "{text}"
+        );
     }
     // A file comes before a name, and a path is no name.
     std::fs::write(lab.out().join("museum"), "seed = \"none\"\n").unwrap();
@@ -167,7 +196,10 @@ fn an_experiment_of_a_name_is_played_anywhere() {
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stderr);
-    assert!(folder.join("report.md").exists() || files_of(&folder).len() > 2, "{text}");
+    assert!(
+        folder.join("report.md").exists() || files_of(&folder).len() > 2,
+        "{text}"
+    );
     assert_ne!(output.status.code(), Some(101), "{text}");
     assert!(!text.contains("cannot read"), "{text}");
 }

@@ -406,3 +406,151 @@ fn named_parameters(
     let read = Source::read(&path).and_then(|file| file.parse());
     read.map_err(|error| error.named_by(&source.name))
 }
+
+fn point([x, y]: [Length; 2]) -> Point {
+    Point::new(x.0, y.0)
+}
+
+/// A value that must be positive and finite, or its default.
+fn positive<T: Quantity>(
+    source: &Source,
+    value: Option<&Spanned<T>>,
+    default: T,
+    what: &str,
+) -> Result<T, FileError> {
+    let Some(spanned) = value else {
+        return Ok(default);
+    };
+
+    let value = *spanned.get_ref();
+    let number = value.number();
+    if number > 0.0 && number.is_finite() {
+        return Ok(value);
+    }
+    let text = format!("{what} must be more than zero");
+    Err(FileError::at(source, Some(spanned.span()), &text))
+}
+
+/// Parameters as JSON for the welcome of a robot. Texts that are quantities become SI numbers.
+fn to_parameters(table: &toml::Table) -> Parameters {
+    let entries = table.iter();
+    entries
+        .map(|(key, value)| (key.clone(), to_json(value)))
+        .collect()
+}
+
+fn to_json(value: &toml::Value) -> serde_json::Value {
+    match value {
+        toml::Value::String(text) => match quantity(text) {
+            Some((number, _)) => number.into(),
+            None => text.clone().into(),
+        },
+        toml::Value::Integer(number) => (*number).into(),
+        toml::Value::Float(number) => (*number).into(),
+        toml::Value::Boolean(flag) => (*flag).into(),
+        toml::Value::Datetime(date) => date.to_string().into(),
+        toml::Value::Array(values) => values.iter().map(to_json).collect(),
+        toml::Value::Table(table) => table
+            .iter()
+            .map(|(key, value)| (key.clone(), to_json(value)))
+            .collect(),
+    }
+}
+
+impl From<&checked::Scenario> for Scenario {
+    fn from(scenario: &checked::Scenario) -> Self {
+        let tick_s = scenario.tick_s;
+        let lateness = &scenario.lateness;
+        let field = FieldTable {
+            size: scenario.field_m.map(Length),
+            body: Some(Length(scenario.body_m)),
+            max_speed: Some(Speed(scenario.max_speed_mps)),
+        };
+        let record = RecordTable {
+            log: Some(scenario.record.log),
+            log_name: Some(unplaced(scenario.record.log_name.clone())),
+            frames: Some(scenario.record.frames),
+            panels: Some(scenario.record.panels),
+            sync: Some(scenario.record.sync),
+        };
+
+        let faults = scenario.faults.iter();
+        let faults = faults.map(|fault| unplaced(FaultTable::of(fault, tick_s)));
+        let changes = scenario.changes.iter();
+        let changes = changes.map(|change| unplaced(ChangeTable::of(change, tick_s)));
+        let expectations = scenario.expectations.iter().cloned().map(unplaced);
+        let obstacles = scenario.obstacles.iter();
+        let obstacles = obstacles.map(|at| Obstacle { at: lengths(*at) });
+        let robots = scenario.robots.iter();
+        let robots = robots.map(|(name, spec)| unplaced(Robot::of(name, spec, lateness)));
+
+        Self {
+            seed: Some(unplaced(scenario.seed)),
+            tick: Some(unplaced(Time(tick_s))),
+            duration: Some(unplaced(Time(scenario.duration_s()))),
+            on_late: Some(lateness.on_late),
+            deadline: Some(unplaced(Time(lateness.deadline_s))),
+            lose_after: Some(unplaced(lateness.lose_after)),
+            field: Some(unplaced(field)),
+            sensing: Some(SensingTable {
+                range: unplaced(Length(scenario.sensing_range_m)),
+            }),
+            guests: Some(unplaced(GuestsTable::from(&scenario.guests))),
+            network: NetworkTable::of(&scenario.network, tick_s),
+            record: Some(record),
+            faults: faults.collect(),
+            changes: changes.collect(),
+            expectations: expectations.collect(),
+            parent: scenario.parent.as_ref().map(ParentTable::from),
+            obstacles: obstacles.collect(),
+            robots: robots.collect(),
+        }
+    }
+}
+
+impl From<&world::Guests> for GuestsTable {
+    fn from(guests: &world::Guests) -> Self {
+        let speed = &guests.speed_mps;
+        let speed = Range {
+            min: Speed(speed.min()),
+            mode: Speed(speed.mode()),
+            max: Speed(speed.max()),
+        };
+        let duration = &guests.duration_s;
+        let duration = Range {
+            min: Time(duration.min()),
+            mode: Time(duration.mode()),
+            max: Time(duration.max()),
+        };
+
+        Self {
+            count: unplaced(guests.count),
+            speed: Some(unplaced(speed)),
+            duration: Some(unplaced(duration)),
+        }
+    }
+}
+
+impl Robot {
+    fn of(name: &RobotName, spec: &RobotSpec, lateness: &Lateness) -> Self {
+        let parameters = spec.parameters.iter();
+        let params = parameters.filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
+        Self {
+            name: name.clone(),
+            class: Some(spec.class.clone()),
+            at: lengths(spec.at),
+            on_late: lateness.own.get(name).copied(),
+            params_from: None,
+            params: params.collect(),
+        }
+    }
+}
+
+fn lengths(at: Point) -> [Length; 2] {
+    [Length(at.x), Length(at.y)]
+}
+
+/// The inverse of [`to_json`]; parameters come from TOML, which has no `null`.
+fn to_toml(value: &serde_json::Value) -> Option<toml::Value> {
+    toml::Value::try_from(value).ok()
+}
