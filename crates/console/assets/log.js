@@ -35,6 +35,8 @@ export class LogView {
     this.until = null;
     /** The moment of the line that was clicked: the lines after it stay. @type {Moment | null} */
     this.picked = null;
+    /** The row that was reached by keys: that of the newest tick is not marked. @type {Element | null} */
+    this.reached = null;
     /** The lines of the rows. @type {WeakMap<Element, LogRecord>} */
     this.lines = new WeakMap();
     this.edits = 0;
@@ -87,6 +89,7 @@ export class LogView {
   rebuild() {
     this.edits = this.store.logEdits;
     this.rows.replaceChildren();
+    this.reached = null;
     this.epoch = null;
     this.seen = this.store.logCount - this.store.log.length;
     this.waiting = 0;
@@ -139,26 +142,27 @@ export class LogView {
     /** @type {Element | null | undefined} */
     let row;
     if (event.key === "Enter") row = this.lastInView();
-    else if (event.key === "ArrowUp") row = this.neighbor(marked.at(0), "previousElementSibling");
-    else if (event.key === "ArrowDown") row = this.neighbor(marked.at(-1), "nextElementSibling");
+    else if (event.key === "ArrowUp") row = this.neighbor(marked.at(0) ?? this.reached, "previousElementSibling");
+    else if (event.key === "ArrowDown") row = this.neighbor(marked.at(-1) ?? this.reached, "nextElementSibling");
     const line = row && this.lines.get(row);
     if (!row || !line) return;
 
     event.preventDefault();
     row.scrollIntoView({ block: "nearest" });
+    this.reached = row;
     this.pick(line);
   }
 
   /** The last line that is seen as a whole. */
   lastInView() {
     const { bottom } = this.rows.getBoundingClientRect();
-    const rows = [...this.rows.children].filter((row) => this.lines.has(row));
-    return rows.findLast((row) => row.getBoundingClientRect().bottom <= bottom + 1);
+    const isWhole = (/** @type {Element} */ row) => this.lines.has(row) && row.getBoundingClientRect().bottom <= bottom + 1;
+    return [...this.rows.children].filter(isWhole).at(-1);
   }
 
   /**
    * The next line in a direction, over divisions.
-   * @param {Element | undefined} row
+   * @param {Element | null} row
    * @param {"previousElementSibling" | "nextElementSibling"} way
    */
   neighbor(row, way) {
