@@ -463,6 +463,34 @@ def test_epochs_are_chosen(launch, open_page, screenshots):
         expect(other.get_by_test_id("log")).to_contain_text("initialized")
 
 
+def test_an_epoch_that_comes_late_is_still_the_one_that_was_chosen(launch, open_page):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 12)
+    page.get_by_test_id("btn-init").click()
+    until(page, "window.carsConsole.frame().epoch === 2")
+    step_to(page, 3)
+
+    # What is recorded of the epoch in progress is asked for all the time. Whole ticks are, where one is to be shown.
+    asked, held = [], []
+    whole_ticks = re.compile(r"/recording/ticks\?from=0&count=32&epoch=1$")
+    page.on("request", lambda request: asked.append(request.url) if request.url.endswith("/recording") else None)
+    page.route(whole_ticks, lambda route: held.append(route))
+    page.get_by_test_id("epoch").select_option("1")
+    eventually("a request for the ticks", lambda: page.evaluate("1") and held)
+    before = len(asked)
+    eventually("what is recorded now", lambda: page.evaluate("1") and len(asked) > before + 2)
+    for route in held:
+        route.continue_()
+    page.unroute(whole_ticks)
+
+    until(page, "window.carsConsole.frame().epoch === 1")
+    scrub(page, 12)
+    expect(page.get_by_test_id("tick")).to_have_text("12")
+    assert page.evaluate("window.carsConsole.frame().epoch") == 1
+
+
 def test_the_diagram_of_a_run_in_progress(launch, open_page, screenshots):
     run = launch(options=("--speed", "10", "--set", "network.commands.loss=0.4"))
     page = open_page(run.address, 1280, 720)

@@ -63,6 +63,8 @@ export class Player {
     this.newest = null;
     /** The epoch that is shown, if it is recorded. @type {Recorded | null} */
     this.header = null;
+    /** The epoch that was chosen and is not shown yet. @type {number | null} */
+    this.choosing = null;
     /** Why nothing is recorded. */
     this.missing = "";
     /** Since when. */
@@ -124,6 +126,13 @@ export class Player {
     return [...new Set([...(this.newest?.epochs ?? []), ...(live === undefined ? [] : [live])])];
   }
 
+  /** The epoch that is shown, or that was chosen last and is being fetched. */
+  get wantedEpoch() {
+    if (this.choosing !== null) return this.choosing;
+    if (this.isRecording) return this.newest?.epoch;
+    return this.isLive ? this.store.live?.epoch : this.epoch;
+  }
+
   get tick_s() {
     return this.store.frame?.tick_s ?? this.header?.tick_s ?? 0;
   }
@@ -178,8 +187,7 @@ export class Player {
 
     this.missing = "";
     this.newest = answer;
-    const shown = this.isRecording ? answer.epoch : this.isLive ? live?.epoch : this.epoch;
-    if (answer.epoch === shown) this.header = answer;
+    if (answer.epoch === this.wantedEpoch) this.header = answer;
   }
 
   /** A new epoch of a run in progress has begun: what is recorded is of the one before, and is not read on. */
@@ -287,14 +295,18 @@ export class Player {
     try {
       this.isPlaying = false;
       if (epoch === this.store.live?.epoch) return this.live();
+      this.choosing = epoch;
       const header = await get("recording", new URLSearchParams({ epoch: String(epoch) }));
+      if (this.choosing !== epoch) return;
       if ("missing" in header) throw new Error(header.missing);
       this.forgetChunks();
       this.header = header;
       this.store.history = new History();
       await this.seek(0);
+      if (this.choosing === epoch) this.choosing = null;
       await this.read(header, this.store.history, () => this.header?.epoch === epoch);
     } catch (error) {
+      if (this.choosing === epoch) this.choosing = null;
       this.client.failed(reasonOf(error));
     }
   }
@@ -303,6 +315,7 @@ export class Player {
   live() {
     if (this.store.mode !== "live") return;
     this.seeks += 1;
+    this.choosing = null;
     this.isPlaying = false;
     const { newest, store } = this;
     if (this.header !== newest) this.forgetChunks();

@@ -139,18 +139,22 @@ impl Past {
         Ok(earlier)
     }
 
-    /// The epochs that have a recording, in order: the newest [`MAX_EPOCHS`].
-    pub(crate) fn epochs(&self, last: Epoch) -> Vec<Epoch> {
-        let mut epochs = Vec::new();
-        for epoch in (1..last).rev().take(MAX_EPOCHS) {
-            let file = self.folder().map(|folder| folder.join(earlier_name(epoch)));
-            if file.is_some_and(|file| file.exists()) {
-                epochs.push(epoch);
-            }
-        }
+    /// The epochs that have a recording, in order: the newest [`MAX_EPOCHS`]. One that has just begun may have none yet.
+    pub(crate) fn epochs(&self) -> Vec<Epoch> {
+        let last = self.last().ok().map(|last| last.epoch());
+        let next = last.or_else(|| (1..).find(|epoch| !self.has_earlier(*epoch)));
+
+        let earlier = (1..next.unwrap_or(1)).rev().take(MAX_EPOCHS);
+        let mut epochs: Vec<Epoch> = earlier.filter(|epoch| self.has_earlier(*epoch)).collect();
         epochs.reverse();
-        epochs.push(last);
+        epochs.extend(last);
         epochs
+    }
+
+    /// Whether there is a recording of an epoch that `init` has ended.
+    fn has_earlier(&self, epoch: Epoch) -> bool {
+        let file = self.folder().map(|folder| folder.join(earlier_name(epoch)));
+        file.is_some_and(|file| file.exists())
     }
 
     fn folder(&self) -> Option<&Path> {

@@ -236,13 +236,8 @@ fn summarize(app: &App, epoch: Option<Epoch>) -> Response {
             missing: NO_FOLDER.to_owned(),
         });
     };
-    let found = past.epoch(epoch).and_then(|found| {
-        let last = past.last()?;
-        Ok(found.summary(&past.epochs(last.epoch())))
-    });
-
-    match found {
-        Ok(summary) => json_text(summary),
+    match past.epoch(epoch) {
+        Ok(found) => json_text(found.summary(&past.epochs())),
         Err(error) => json(&Missing {
             missing: error.to_string(),
         }),
