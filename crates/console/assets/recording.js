@@ -181,13 +181,24 @@ export class Player {
       if (!this.missing) this.missingAt_ms = performance.now();
       this.missing = missing || "the folder has the recording of another run";
       this.newest = null;
-      if (this.isLive) this.header = null;
+      if (this.isLive && this.choosing === null) this.header = null;
       return;
     }
 
     this.missing = "";
     this.newest = answer;
     if (answer.epoch === this.wantedEpoch) this.header = answer;
+    await this.complete(answer);
+  }
+
+  /** Takes in the end of an epoch that was chosen before it was written. @param {Recorded} newest */
+  async complete(newest) {
+    const { header } = this;
+    if (!header || header.epoch === newest.epoch || header.epochs.at(-1) !== header.epoch) return;
+    const whole = await get("recording", new URLSearchParams({ epoch: String(header.epoch) }));
+    if ("missing" in whole || this.header !== header) return;
+    this.header = whole;
+    this.forgetChunks();
   }
 
   /** A new epoch of a run in progress has begun: what is recorded is of the one before, and is not read on. */
