@@ -57,12 +57,14 @@ fn prose(page: &str) -> Vec<&str> {
 /// Where the links and pictures of a page lead.
 fn links(page: &str) -> Vec<String> {
     let text = prose(page).join("\n");
-    let rests = text.split("](").skip(1);
+    let mut found = Vec::new();
+    for (begin, end) in [("](", ')'), ("src=\"", '"'), ("srcset=\"", '"')] {
+        let rests = text.split(begin).skip(1);
+        let links = rests.filter_map(|rest| rest.split_once(end));
+        found.extend(links.map(|(to, _)| to.to_owned()));
+    }
 
-    rests
-        .filter_map(|rest| rest.split_once(')'))
-        .map(|(to, _)| to.to_owned())
-        .collect()
+    found
 }
 
 /// A heading as GitHub and mdBook name it in links.
