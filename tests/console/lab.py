@@ -31,7 +31,10 @@ def eventually(what, ready, patience_s=PATIENCE_S):
 
 def until(page, expression):
     """Waits until an expression is true in the page, whose policy forbids Playwright's own `wait_for_function`."""
-    return eventually(expression, lambda: page.evaluate(expression))
+    try:
+        return eventually(expression, lambda: page.evaluate(expression))
+    except AssertionError as error:
+        raise AssertionError(f"{error}; the page says: {page.locator('#notice').inner_text()!r}") from None
 
 
 # Not the ports that the kernel gives to connections: another process would take one before it is used.

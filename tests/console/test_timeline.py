@@ -119,6 +119,46 @@ def test_clicks_seek(launch, open_page):
         expect(page.locator("#bands .cursor")).to_have_count(0)
 
 
+def test_the_log_seeks_by_keyboard(launch, open_page):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 64)
+
+    times_s = page.locator("[data-testid=log] .line").evaluate_all("(all) => all.map((line) => parseFloat(line.textContent))")
+    *_, before_s, last_s = sorted(set(times_s))
+
+    def is_shown(time_s):
+        until(page, f"window.carsConsole.frame().time_s === {time_s}")
+        expect(page.locator(".line.picked").first).to_have_text(re.compile(rf"^\s*{time_s:.1f} s"))
+
+    page.get_by_test_id("log").focus()
+    page.keyboard.press("Enter")
+    page.keyboard.press("ArrowUp")
+    until(page, "window.carsConsole.frame().tick < 64")
+    while page.evaluate("window.carsConsole.frame().time_s") > before_s:
+        is_shown(last_s)
+        page.keyboard.press("ArrowUp")
+    is_shown(before_s)
+    page.keyboard.press("ArrowDown")
+    until(page, f"window.carsConsole.frame().time_s === {last_s}")
+    page.keyboard.press("l")
+    expect(page.locator(".line.picked")).to_have_count(0)
+    expect(page.get_by_test_id("tick")).to_have_text("64")
+
+
+def test_the_tools_of_a_run_in_progress_need_one_row(launch, open_page, screenshots):
+    run = launch()
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    step_to(page, 4)
+    expect(page.get_by_test_id("experiment")).to_be_visible()
+    heights = page.locator(".tools button:visible").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
+    assert len(heights) == 6
+    assert max(heights) - min(heights) < 4, heights
+    page.screenshot(path=screenshots / "tools-1280.png")
+
+
 def window(page):
     return [round(value, 2) for value in page.evaluate("window.carsConsole.window()")]
 
@@ -133,9 +173,13 @@ def test_charts_and_bands_zoom_together(launch, open_page, screenshots):
     assert window(page) == [0, 20]
 
     def settled(place):
-        """Charts and bands move when the button beside them goes."""
         expect(page.get_by_test_id("window-all")).to_be_hidden()
         page.locator(place).scroll_into_view_if_needed()
+
+    def height_of_bar():
+        return page.locator("#chart").bounding_box()["y"] - page.locator("#chart-select").bounding_box()["y"]
+
+    height = height_of_bar()
 
     def drag(place, begin, end):
         settled(place)
@@ -158,6 +202,7 @@ def test_charts_and_bands_zoom_together(launch, open_page, screenshots):
         eventually("the chart", lambda: drawn() == window(page))
         expect(page.get_by_test_id("span")).to_have_count(1)
         expect(page.get_by_test_id("tick")).to_have_text("40")
+        assert height_of_bar() == height, "the button that comes with a shorter window moves nothing"
         page.screenshot(path=screenshots / f"timeline-zoom-{place[1:]}.png")
         page.locator(place).dblclick(position={"x": 300, "y": 20})
         eventually("the whole run", lambda: window(page) == [0, 20] and drawn() == [0, 20])

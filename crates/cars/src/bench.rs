@@ -20,6 +20,7 @@ use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use simulator::scenario::{Changes, Scenario};
 
+use crate::named;
 use programs::Programs;
 use results::Results;
 use subject::{CROWD, HallPlace, Subject};
@@ -40,11 +41,7 @@ pub(crate) struct BenchArgs {
     )]
     robots: Vec<u64>,
     /// Scenario of the hall.
-    #[arg(
-        long,
-        default_value = "configs/hors_doeuvres.toml",
-        value_name = "FILE"
-    )]
+    #[arg(long, default_value = "hors_doeuvres", value_name = "FILE", value_parser = named::scenario())]
     scenario: PathBuf,
     /// Ticks of a measurement with two processes; more processes do fewer.
     #[arg(long, default_value_t = 20_000, value_name = "N")]

@@ -13,11 +13,13 @@ use simulator::seal::{self, Checked};
 use simulator::{RunFolder, Scenario};
 use terminal::OutputError;
 
+use crate::named;
+
 /// `cars check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
     /// Scenario files, launch files, experiment files, and folders of runs.
-    #[arg(required = true)]
+    #[arg(required = true, value_parser = named::any())]
     files: Vec<PathBuf>,
 }
 

@@ -11,6 +11,8 @@ use protocol::{RobotName, Tick};
 use simulator::Scenario;
 use terminal::OutputError;
 
+use crate::named;
+
 /// `cars conform`.
 ///
 /// Starts the robot COMMAND several times, acts as its simulator, and checks the rules of docs/protocol.md one by one.
@@ -22,7 +24,7 @@ pub(crate) struct ConformArgs {
     name: Option<RobotName>,
     /// A scenario, or a launch file with one, for parameters, field and roster. The other robots behave as in a run of this
     /// scenario.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = named::run())]
     scenario: Option<PathBuf>,
     /// Report in the Test Anything Protocol (the default).
     #[arg(long, conflicts_with = "json")]

@@ -23,6 +23,7 @@ use protocol::messages::Verdict;
 use protocol::random::MAX_SEED;
 
 use self::launcher::launcher;
+use crate::named;
 use crate::submit::EngineArgs;
 
 /// Where the folders of experiments are made.
@@ -64,13 +65,13 @@ enum What {
 /// What is planned.
 #[derive(Debug, Args)]
 struct PlanArgs {
-    /// An experiment file, or the name of an experiment that ships with the project, such as `deadlock`.
+    /// An experiment file, or the name of one that comes with the programs, such as `deadlock`.
     file: PathBuf,
     /// Folder of the results; without it `runs/experiments/NAME`.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Scenario or launch file; without it, that of the experiment's file.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = named::run())]
     scenario: Option<PathBuf>,
     /// Number of runs of each arm and condition, with the seeds 1, 2, 3 and so on, or a range of seeds such as `65..=128`;
     /// without it, the seeds of the experiment's file.
@@ -303,7 +304,7 @@ impl PlanArgs {
     }
 
     fn request(&self) -> miette::Result<Request> {
-        let mut experiment = load(&self.file)?;
+        let mut experiment = Experiment::find(&self.file)?;
         if let Some(duration) = self.duration {
             experiment.duration_s = duration.0;
             experiment.duration_span = None;
@@ -331,17 +332,6 @@ impl PlanArgs {
             robots,
         })
     }
-}
-
-/// The experiment in a file, or that of this name that ships with the project.
-fn load(file: &Path) -> miette::Result<Experiment> {
-    let name = file.to_str().filter(|_| !file.exists());
-    if let Some(name) = name
-        && let Some(experiment) = Experiment::shipped(name)?
-    {
-        return Ok(experiment);
-    }
-    Ok(Experiment::load(file)?)
 }
 
 /// Plays those of these units that have not been played.

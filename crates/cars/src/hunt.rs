@@ -18,6 +18,8 @@ use miette::IntoDiagnostic;
 use protocol::random::MAX_SEED;
 use terminal::OutputError;
 
+use crate::named;
+
 /// Time for which a hunt draws plans if neither a time nor a number of plans is given, seconds.
 const DEFAULT_S: f64 = 60.0;
 /// Set by Ctrl-C: the hunt ends with what it has found.
@@ -27,6 +29,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 #[derive(Debug, Args)]
 pub(crate) struct HuntArgs {
     /// A scenario file, or a launch file, whose scenario is hunted in. It needs `[[expect]]`.
+    #[arg(value_parser = named::run())]
     file: PathBuf,
     /// Draw plans for this time of wall clock, for example "60 s", which is the default.
     #[arg(long = "for", value_name = "TIME", conflicts_with = "plans")]

@@ -15,14 +15,15 @@ use simulator::RunFolder;
 use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
+use crate::named;
 use crate::replay_robot::open;
 use crate::table;
 
 /// `cars launch`.
 #[derive(Debug, Args)]
 pub(crate) struct LaunchArgs {
-    /// The launch file.
-    #[arg(required_unless_present_any = ["roster", "resume"])]
+    /// The launch file, or the name of one that comes with the programs, such as `hors_doeuvres`.
+    #[arg(required_unless_present_any = ["roster", "resume"], value_parser = named::launch())]
     file: Option<PathBuf>,
     /// A run, or its folder, to go on with where its simulator was killed. It is executed again up to the last tick of its
     /// record, and compared with it.

@@ -13,7 +13,10 @@ mod experiment;
 mod export;
 mod fork;
 mod hunt;
+mod init;
 mod launch;
+mod man;
+mod named;
 mod net;
 mod new;
 mod output;
@@ -34,7 +37,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 /// The Cooperative Affective Robot Simulator.
 ///
-/// `cars launch launch/hors_doeuvres.toml` plays the experiment of the paper as separate processes.
+/// `cars launch hors_doeuvres` plays the experiment of the paper as separate processes.
 #[derive(Debug, Parser)]
 #[command(name = "cars", version, propagate_version = true)]
 struct Cli {
@@ -48,6 +51,8 @@ enum Subcommands {
     Exec(exec::ExecArgs),
     /// Make a skeleton of a robot of your own: `cars new robot Rosie --lang python`.
     New(new::NewArgs),
+    /// Write the files that come with the programs to a folder, to edit them: launch files, scenarios, experiments.
+    Init(init::InitArgs),
     /// Start the processes of a launch file and run them to the end.
     Launch(launch::LaunchArgs),
     /// Run a scenario, or that of a launch file, in this process.
@@ -104,6 +109,8 @@ enum Subcommands {
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Write the manual pages of all programs to a folder.
+    Man(man::ManArgs),
     #[command(hide = true)]
     Child(exec::ChildArgs),
     #[command(hide = true)]
@@ -134,6 +141,7 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Launch(args) => launch::launch(args),
         Subcommands::Exec(args) => exec::exec(&args),
         Subcommands::New(args) => new::new(&args),
+        Subcommands::Init(args) => init::init(&args),
         Subcommands::Run(args) => run::run(args),
         Subcommands::Experiment(args) => experiment::experiment(args),
         Subcommands::Hunt(args) => Ok(hunt::hunt(&args)),
@@ -158,6 +166,7 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Secure(args) => secure::secure(args),
         Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::Completions { shell } => print_completions(shell),
+        Subcommands::Man(args) => man::man(&args, Cli::command()),
 
         Subcommands::Child(args) => Ok(exec::child(&args)),
         Subcommands::ReplayRobot(args) => replay_robot::take_part(&args),

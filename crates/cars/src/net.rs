@@ -15,6 +15,7 @@ use protocol::RobotName;
 use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
+use crate::named;
 
 /// Subcommands of `cars net`.
 #[derive(Debug, Subcommand)]
@@ -36,7 +37,7 @@ pub(crate) struct ProxyArgs {
     #[arg(long, value_name = "ENDPOINT", value_parser = address)]
     to: SocketAddr,
     /// Plan of faults; its times begin with the first connection.
-    #[arg(long, value_name = "FILE", requires = "robot")]
+    #[arg(long, value_name = "FILE", requires = "robot", value_parser = named::links())]
     plan: Option<PathBuf>,
     /// Robot of the plan whose faults are played.
     #[arg(long, value_name = "NAME")]
@@ -49,11 +50,12 @@ pub(crate) struct ProxyArgs {
 /// `cars net play`.
 #[derive(Debug, Args)]
 pub(crate) struct PlayArgs {
-    /// The launch file.
+    /// The launch file, or the name of one that comes with the programs.
+    #[arg(value_parser = named::launch())]
     file: PathBuf,
     /// Plan of faults; its times are wall clock, from the first tick of the run. Without one, the partitions of the
     /// scenario are played on the links instead of being simulated.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = named::links())]
     plan: Option<PathBuf>,
     /// Kind of link.
     #[arg(long)]

@@ -9,6 +9,7 @@ use miette::IntoDiagnostic;
 use simulator::Scenario;
 
 use crate::execution::ExecutionArgs;
+use crate::named;
 use crate::table;
 
 pub(crate) use lab::run::execute;
@@ -16,7 +17,8 @@ pub(crate) use lab::run::execute;
 /// `cars run`.
 #[derive(Debug, Args)]
 pub(crate) struct RunArgs {
-    /// A scenario file, or a launch file, whose scenario is run.
+    /// A scenario file, or a launch file, whose scenario is run, or the name of one that comes with the programs.
+    #[arg(value_parser = named::run())]
     file: PathBuf,
     #[command(flatten)]
     execution: ExecutionArgs,

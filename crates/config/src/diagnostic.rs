@@ -1,12 +1,14 @@
 //! Errors in configuration files: file, line, caret, and help.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::Path;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 use protocol::plain::{escape_line, escape_text};
+
+use crate::shipped;
 
 /// Longest file, bytes, so that an endless one cannot exhaust the memory.
 const MAX_FILE_BYTES: u64 = 16 << 20;
@@ -60,7 +62,12 @@ impl FileError {
     /// A file that cannot be read.
     #[must_use]
     pub fn unreadable(path: &Path, error: &std::io::Error) -> Self {
-        Self::new(format!("cannot read {}: {error}", path.display()))
+        let message = format!("cannot read {}: {error}", path.display());
+        if error.kind() == ErrorKind::NotFound && path.extension().is_none() {
+            Self::new(message).with_help(known_names())
+        } else {
+            Self::new(message)
+        }
     }
 
     /// An error at a place in a text. Control characters of the text are shown escaped.
@@ -116,6 +123,17 @@ impl FileError {
     }
 }
 
+/// What can be named without a file.
+fn known_names() -> String {
+    let list = |folder| shipped::names(folder).collect::<Vec<_>>().join(", ");
+    format!(
+        "without a file there are the launches {}, the scenarios {}, and the experiments {}; `cars init DIR` writes them to files",
+        list(shipped::LAUNCHES),
+        list(shipped::SCENARIOS),
+        list(shipped::EXPERIMENTS)
+    )
+}
+
 /// A text with its control characters escaped, and the place in it that a span of the text becomes.
 fn escaped_with_span(text: &str, span: Range<usize>) -> (String, Range<usize>) {
     let text = text.replace("\r\n", " \n"); // As long, so that the span stays.
@@ -147,13 +165,18 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a file.
+    /// Reads a file, from the disk or of those that come with the programs.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read, or is longer than 16 MiB.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = read_limited(path).map_err(|error| FileError::unreadable(path, &error))?;
         let name = path.display().to_string();
+        if let Some(text) = shipped::text(path) {
+            let text = text.to_owned();
+            return Ok(Self { name, text });
+        }
+
+        let text = read_limited(path).map_err(|error| FileError::unreadable(path, &error))?;
         if text.len() as u64 > MAX_FILE_BYTES {
             let reason = format!("it is longer than {MAX_FILE_BYTES} bytes");
             return Err(FileError::new(format!("cannot read {name}: {reason}")));
@@ -168,6 +191,10 @@ impl Source {
     /// # Errors
     /// [`FileError`] at `span`.
     pub fn check_named(&self, span: Range<usize>, path: &Path) -> Result<(), FileError> {
+        if shipped::contains(path) {
+            return Ok(());
+        }
+
         let name = path.display();
         let reason = match path.metadata() {
             Ok(metadata) if metadata.is_file() => return Ok(()),

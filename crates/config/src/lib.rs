@@ -1,9 +1,10 @@
 //! Shared parts of scenario, launch and experiment files: quantities with units, errors with file, line and caret, seeds,
-//! speeds, and overrides of single values.
+//! speeds, overrides of single values, and the files that come with the programs.
 
 pub mod diagnostic;
 pub mod overrides;
 pub mod seed;
+pub mod shipped;
 pub mod speed;
 pub mod units;
 

@@ -194,7 +194,7 @@ export class Charts {
           </select></label>
         ${this.chooser()}
         <span class="muted" ?hidden=${names.length > 0}>No robot has published a number yet.</span>
-        <button type="button" data-testid="window-all" title="show the whole run (double click)" ?hidden=${this.shown.isWhole}
+        <button type="button" data-testid="window-all" title="show the whole run (double click)" .style=${`visibility:${this.shown.isWhole ? "hidden" : "visible"}`}
           @click=${() => this.shown.reset()}>Whole run</button>
         <span class="muted" ?hidden=${history.dropped === 0}>${history.dropped} variables more are not kept.</span>
         <ul class="key">${this.key()}</ul>`,

@@ -35,6 +35,8 @@ export class LogView {
     this.until = null;
     /** The moment of the line that was clicked: the lines after it stay. @type {Moment | null} */
     this.picked = null;
+    /** The row that was reached by keys: that of the newest tick is not marked. @type {Element | null} */
+    this.reached = null;
     /** The lines of the rows. @type {WeakMap<Element, LogRecord>} */
     this.lines = new WeakMap();
     this.edits = 0;
@@ -53,6 +55,7 @@ export class LogView {
     this.rows.setAttribute("role", "log");
     this.rows.setAttribute("aria-label", "Log");
     this.rows.addEventListener("click", (event) => this.click(event));
+    this.rows.addEventListener("keydown", (event) => this.key(event));
     this.rows.addEventListener("scroll", () => this.scrolled(), { passive: true });
     place.append(this.bar, this.rows);
   }
@@ -86,6 +89,7 @@ export class LogView {
   rebuild() {
     this.edits = this.store.logEdits;
     this.rows.replaceChildren();
+    this.reached = null;
     this.epoch = null;
     this.seen = this.store.logCount - this.store.log.length;
     this.waiting = 0;
@@ -128,6 +132,47 @@ export class LogView {
     const line = this.lines.get(/** @type {Element} */ (event.target).closest(".line") ?? this.rows);
     const marked = getSelection();
     if (!line || (marked?.isCollapsed === false && this.rows.contains(marked.anchorNode))) return;
+    this.pick(line);
+  }
+
+  /** Enter shows the tick of the last line in view; then the arrows show those of the lines around it. @param {KeyboardEvent} event */
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.shiftKey) return;
+    const marked = [...this.rows.querySelectorAll(".line.picked")];
+    /** @type {Element | null | undefined} */
+    let row;
+    if (event.key === "Enter") row = this.lastInView();
+    else if (event.key === "ArrowUp") row = this.neighbor(marked.at(0) ?? this.reached, "previousElementSibling");
+    else if (event.key === "ArrowDown") row = this.neighbor(marked.at(-1) ?? this.reached, "nextElementSibling");
+    const line = row && this.lines.get(row);
+    if (!row || !line) return;
+
+    event.preventDefault();
+    row.scrollIntoView({ block: "nearest" });
+    this.reached = row;
+    this.pick(line);
+  }
+
+  /** The last line that is seen as a whole. */
+  lastInView() {
+    const { bottom } = this.rows.getBoundingClientRect();
+    const isWhole = (/** @type {Element} */ row) => this.lines.has(row) && row.getBoundingClientRect().bottom <= bottom + 1;
+    return [...this.rows.children].filter(isWhole).at(-1);
+  }
+
+  /**
+   * The next line in a direction, over divisions.
+   * @param {Element | null} row
+   * @param {"previousElementSibling" | "nextElementSibling"} way
+   */
+  neighbor(row, way) {
+    let next = row?.[way];
+    while (next && !this.lines.has(next)) next = next[way];
+    return next;
+  }
+
+  /** Shows the tick of a line; the lines after it stay. @param {LogRecord} line */
+  pick(line) {
     this.picked = { epoch: line.epoch, tick: line.tick };
     this.isFollowing = false;
     this.seek(line);

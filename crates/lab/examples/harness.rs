@@ -5,6 +5,8 @@
 
 #![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
 
+use std::path::Path;
+
 use config::Changes;
 use lab::experiment::engine::{self, Options, Queue};
 use lab::experiment::{Experiment, Plan, Request, Robots, Store};
@@ -24,7 +26,7 @@ fn main() -> miette::Result<()> {
         .nth(1)
         .map_or(Ok(ROUNDS), |text| text.parse());
     let rounds: usize = rounds.into_diagnostic()?;
-    let mut experiment = Experiment::shipped("deadlock")?.ok_or_else(|| miette!("not there"))?;
+    let mut experiment = Experiment::find(Path::new("deadlock"))?;
     experiment.seeds = (1..=RUNS).collect();
     let scenario = experiment.scenario.clone();
     let plan = Plan::new(&Request {

@@ -7,6 +7,7 @@ pub mod difference;
 pub mod digest;
 mod files;
 pub mod medium;
+pub mod program;
 pub mod record;
 pub mod recorder;
 pub mod roster;

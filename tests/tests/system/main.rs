@@ -13,6 +13,7 @@ mod bench;
 mod book;
 mod boundaries;
 mod browser;
+mod built_in;
 mod by_hand;
 mod conform;
 mod control;

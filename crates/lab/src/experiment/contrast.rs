@@ -179,6 +179,8 @@ fn correct(family: &mut [Contrast]) {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use observe::Measured;
 
     use super::super::estimate::Estimated;
@@ -231,7 +233,7 @@ mod tests {
 
     #[test]
     fn numbers_are_compared_in_pairs_and_corrected_in_families() {
-        let experiment = Experiment::shipped("deadlock").unwrap().unwrap();
+        let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let better = BTreeMap::from([("rules", 2.0), ("timer", -1.0)]);
         let contrasts = experiment.contrast(&outcomes(&experiment, &better));
 
@@ -271,7 +273,7 @@ mod tests {
 
     #[test]
     fn times_are_compared_by_their_curves() {
-        let experiment = Experiment::shipped("deadlock").unwrap().unwrap();
+        let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let outcomes = outcomes(&experiment, &BTreeMap::new());
         let contrasts = experiment.contrast(&outcomes);
         let rules = find(&contrasts, "deadlock", "rules");
@@ -304,7 +306,7 @@ mod tests {
 
     #[test]
     fn only_seeds_of_both_arms_count() {
-        let experiment = Experiment::shipped("deadlock").unwrap().unwrap();
+        let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let mut outcomes = outcomes(&experiment, &BTreeMap::new());
         outcomes.retain(|run| run.arm != "timer" && (run.arm != "rules" || run.seed < 3));
         let contrasts = experiment.contrast(&outcomes);
@@ -320,7 +322,7 @@ mod tests {
 
     #[test]
     fn the_json_of_a_contrast_is_flat() {
-        let experiment = Experiment::shipped("deadlock").unwrap().unwrap();
+        let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let better = BTreeMap::from([("rules", 2.0)]);
         let contrasts = experiment.contrast(&outcomes(&experiment, &better));
         let json = serde_json::to_value(find(&contrasts, "served", "rules")).unwrap();

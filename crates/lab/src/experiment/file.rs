@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use config::units::Time;
-use config::{FileError, Source};
+use config::{FileError, Source, shipped};
 use observe::expect::check_all;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
@@ -42,26 +42,6 @@ const RESERVED: [&str; 8] = [
     "times",
     "times_s",
     "yoked_to_seed",
-];
-
-/// Experiments that ship with the project, by path.
-const SHIPPED: [(&str, &str); 4] = [
-    (
-        "configs/experiments/affect.toml",
-        include_str!("../../../../configs/experiments/affect.toml"),
-    ),
-    (
-        "configs/experiments/crowd.toml",
-        include_str!("../../../../configs/experiments/crowd.toml"),
-    ),
-    (
-        "configs/experiments/deadlock.toml",
-        include_str!("../../../../configs/experiments/deadlock.toml"),
-    ),
-    (
-        "configs/experiments/partition.toml",
-        include_str!("../../../../configs/experiments/partition.toml"),
-    ),
 ];
 
 /// An experiment, checked.
@@ -216,28 +196,12 @@ impl Experiment {
         raw.check(source, folder)
     }
 
-    /// An experiment that ships with the project; `None` if there is none of this name. Its scenario is relative to the
-    /// folder of the project.
+    /// The experiment at a path, or of this name among those that come with the programs.
     ///
     /// # Errors
-    /// [`FileError`] if the program was built from a file that cannot be used.
-    pub fn shipped(name: &str) -> Result<Option<Self>, FileError> {
-        for (path, text) in SHIPPED {
-            let path = Path::new(path);
-            if path.file_stem().is_some_and(|stem| stem == name) {
-                let source = Source {
-                    name: path.display().to_string(),
-                    text: text.to_owned(),
-                };
-                let folder = path.parent().unwrap_or(Path::new(""));
-                let mut experiment = Self::parse(&source, folder)?;
-                // The project has no symbolic links between these folders.
-                experiment.scenario = without_dots(&experiment.scenario);
-                return Ok(Some(experiment));
-            }
-        }
-
-        Ok(None)
+    /// [`FileError`] with line and caret.
+    pub fn find(given: &Path) -> Result<Self, FileError> {
+        Self::load(&shipped::find(given, &[shipped::EXPERIMENTS]))
     }
 
     /// Reads the text of an experiment file; `folder` is where its relative paths begin.
@@ -336,17 +300,6 @@ impl Experiment {
             None => self.procedure.clone(),
         }
     }
-}
-
-/// A path in which `..` follows no other part.
-fn without_dots(path: &Path) -> PathBuf {
-    let mut short = PathBuf::new();
-    for part in path {
-        if part != ".." || !short.pop() {
-            short.push(part);
-        }
-    }
-    short
 }
 
 /// The error of a part of the file.

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 
+use config::shipped;
 use miette::IntoDiagnostic;
 use protocol::name::MAX_NAME_LEN;
 use protocol::plain::escape_line;
@@ -126,7 +127,12 @@ fn rename_parameter_files(content: &mut toml::Table, from: &Path, to: &Path) -> 
         let Some(name) = file.as_str() else {
             continue;
         };
-        let path = from.join(name).canonicalize().into_diagnostic()?;
+        let path = from.join(name);
+        if shipped::contains(&path) {
+            *file = path.display().to_string().into();
+            continue;
+        }
+        let path = path.canonicalize().into_diagnostic()?;
         let folder = to.canonicalize().into_diagnostic()?;
         *file = relative(&path, &folder).display().to_string().into();
     }

@@ -5,7 +5,6 @@ mod expect;
 pub(super) mod fault;
 mod network;
 mod range;
-mod shipped;
 mod unplaced;
 pub(super) mod words;
 
@@ -13,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use config::units::{Length, Speed, Time, quantity};
-use config::{FileError, Source, seed};
+use config::{FileError, Source, seed, shipped};
 use observe::Expectation;
 use protocol::messages::{OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
@@ -386,24 +385,23 @@ fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpe
     })
 }
 
-/// The parameters of a file that a robot names. In a text from outside they are those that this program brings along.
+/// The parameters of a file that a robot names. In a text from outside they are those of the files that come with the programs.
 fn named_parameters(
     file: &Spanned<PathBuf>,
     source: &Source,
     folder: Option<&Path>,
 ) -> Result<toml::Table, FileError> {
-    let Some(folder) = folder else {
-        let shipped = shipped::parameters(file.get_ref()).ok_or_else(|| {
-            let names = shipped::names().join(" or ");
-            let reason = format!(
-                "`params_from` of a scenario from outside names {names}; write other parameters out under `params`"
-            );
-            FileError::at(source, Some(file.span()), &reason)
-        })?;
-        return shipped.parse();
-    };
+    let shipped = shipped::path(shipped::SCENARIOS);
+    let path = folder.unwrap_or(&shipped).join(file.get_ref());
+    if folder.is_none() && !shipped::contains(&path) {
+        let names: Vec<_> = shipped::names(shipped::PARAMETERS).collect();
+        let reason = format!(
+            "`params_from` of a scenario from outside names robots/{}.toml; write other parameters out under `params`",
+            names.join(".toml or robots/")
+        );
+        return Err(FileError::at(source, Some(file.span()), &reason));
+    }
 
-    let path = folder.join(file.get_ref());
     source.check_named(file.span(), &path)?;
     let read = Source::read(&path).and_then(|file| file.parse());
     read.map_err(|error| error.named_by(&source.name))

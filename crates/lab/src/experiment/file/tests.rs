@@ -1,5 +1,7 @@
 //! Tests of experiment files: what is read, and what is refused, where and why.
 
+use config::Changes;
+
 use super::super::presentation::{Example, Shown};
 use super::*;
 
@@ -11,14 +13,13 @@ fn the_shipped_experiments_can_be_played() {
         ("deadlock", 5, 5),
         ("partition", 4, 5),
     ] {
-        let experiment = Experiment::shipped(name).unwrap().unwrap();
+        let experiment = Experiment::find(Path::new(name)).unwrap();
         let found = experiment.list_conditions().unwrap().len();
         assert_eq!(found, conditions, "{name}");
         assert_eq!(experiment.arms.len(), arms, "{name}");
-        let scenario = Path::new("configs/hors_doeuvres.toml");
-        assert_eq!(experiment.scenario, scenario, "{name}");
+        Scenario::load(&experiment.scenario, &Changes::default()).unwrap();
     }
-    assert!(Experiment::shipped("none").unwrap().is_none());
+    assert!(Experiment::find(Path::new("none")).is_err());
 }
 
 /// An experiment with everything that can be wrong.

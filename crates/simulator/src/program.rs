@@ -1,26 +1,26 @@
-//! `cars-sim`: the simulator process of one run.
+//! The program `cars-sim`: the simulator process of one run.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
+use crate::scenario::{Changes, Override, Scenario};
+use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
+use crate::{RunFolder, Summary};
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
-use clap::{Parser, ValueEnum};
-use config::Speed;
+use clap::{Command, CommandFactory, Parser, ValueEnum};
 use config::units::Time;
+use config::{Speed, shipped};
 use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::messages::End;
-use simulator::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
-use simulator::scenario::{Changes, Override, Scenario};
-use simulator::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
-use simulator::{RunFolder, Summary};
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
 #[derive(Debug, Parser)]
-#[command(version)]
+#[command(name = "cars-sim", version)]
 struct Args {
-    /// The scenario file.
+    /// The scenario file, or the name of one that comes with the programs.
     scenario: PathBuf,
     /// Name of the run; its robots must name it, too.
     #[arg(long, env = "CARS_RUN", default_value = "default")]
@@ -88,7 +88,15 @@ impl From<StayMode> for Stay {
     }
 }
 
-fn main() -> ExitCode {
+/// The command line, for manual pages.
+#[must_use]
+pub fn command() -> Command {
+    Args::command()
+}
+
+/// The program: reads its arguments, and owns the clock of one run to its end.
+#[must_use]
+pub fn main() -> ExitCode {
     let args: Args = match terminal::arguments() {
         Ok(args) => args,
         Err(code) => return code,
@@ -112,7 +120,7 @@ fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
 fn run(args: &Args) -> miette::Result<Summary> {
     let duration_s = args.duration.map(|duration| duration.0);
     let scenario = Scenario::load(
-        &args.scenario,
+        &shipped::find(&args.scenario, &[shipped::SCENARIOS]),
         &Changes {
             seed: args.seed,
             duration_s,

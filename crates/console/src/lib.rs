@@ -1,4 +1,5 @@
-//! `cars-console`: shows a run, or a recording of one, in a browser, and sends the simulator what people request there.
+//! The program `cars-console`: shows a run, or a recording of one, in a browser, and sends the simulator what people request
+//! there.
 //!
 //! The console is an observer. It forwards what the run publishes to browsers and forwards requests to the simulator,
 //! which decides. A run is the same with or without it.
@@ -24,7 +25,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bus::DEFAULT_ENDPOINT;
-use clap::Parser;
+use clap::{Command, CommandFactory, Parser};
 use protocol::RunName;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
@@ -47,7 +48,7 @@ const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// The web console of the Cooperative Affective Robot Simulator.
 #[derive(Debug, Parser)]
-#[command(version)]
+#[command(name = "cars-console", version)]
 struct Args {
     /// The run to watch.
     #[arg(long, env = "CARS_RUN", default_value = "default")]
@@ -96,7 +97,15 @@ struct Serving {
     allowed: Vec<AllowedHost>,
 }
 
-fn main() -> ExitCode {
+/// The command line, for manual pages.
+#[must_use]
+pub fn command() -> Command {
+    Args::command()
+}
+
+/// The program: reads its arguments, and serves the page until it is told to end.
+#[must_use]
+pub fn main() -> ExitCode {
     bus::runtime::use_one_thread();
     let args: Args = match terminal::arguments() {
         Ok(args) => args,

@@ -1,0 +1,5 @@
+//! The console.
+
+fn main() -> std::process::ExitCode {
+    console::main()
+}

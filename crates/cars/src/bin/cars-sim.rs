@@ -1,0 +1,5 @@
+//! The simulator.
+
+fn main() -> std::process::ExitCode {
+    simulator::program::main()
+}

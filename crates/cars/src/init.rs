@@ -1,0 +1,61 @@
+//! `cars init`: writes the files that come with the programs to a folder, to be edited.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use config::{FileError, shipped};
+use lab::shell;
+use miette::miette;
+use terminal::OutputError;
+
+/// `cars init`.
+#[derive(Debug, Args)]
+pub(crate) struct InitArgs {
+    /// The folder; it is made if it is not there. No file in it is replaced.
+    folder: PathBuf,
+}
+
+/// Writes all files, or none if one is there with another text.
+pub(crate) fn init(args: &InitArgs) -> miette::Result<ExitCode> {
+    let folder = &args.folder;
+    let mut missing = Vec::new();
+    for (name, text) in shipped::files() {
+        let path = folder.join(name);
+        match fs::read(&path) {
+            Ok(found) if found == text.as_bytes() => {}
+            Ok(_) => {
+                return Err(miette!(
+                    help = "give another folder, or remove the file",
+                    "{} has been changed; nothing was written",
+                    path.display()
+                ));
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => missing.push((path, text)),
+            Err(error) => return Err(FileError::unreadable(&path, &error).into()),
+        }
+    }
+
+    for (path, text) in &missing {
+        write_new(path, text)
+            .map_err(|error| miette!("cannot write {}: {error}", path.display()))?;
+    }
+
+    let count = missing.len();
+    let launch = folder.join("launch/hors_doeuvres.toml");
+    let line = format!(
+        "{count} files written; edit them, and type `cars launch {}`",
+        shell::path(&launch)
+    );
+    OutputError::unless_closed(terminal::print_line(line))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write_new(path: &Path, text: &str) -> std::io::Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    File::create_new(path)?.write_all(text.as_bytes())
+}
