@@ -40,6 +40,7 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/robots/leguin.toml",
     "configs/three_robots.toml",
     "launch/hors_doeuvres.toml",
+    "launch/museum.toml",
     "launch/partition.toml",
     "launch/three_robots.toml",
 ];

@@ -14,7 +14,7 @@ const MESSAGES = [
   "world_frame",
 ];
 const OUTPUT = new URL("../assets/types/messages.d.ts", import.meta.url);
-const BANNER = "// Generated from crates/protocol/schemas by `npm run generate` in crates/console/check. Do not edit.\n";
+const BANNER = "// Generated from docs/schemas by `npm run generate` in crates/console/check. Do not edit.\n";
 
 /** Every schema and every definition under its own name; two of one name must be the same. */
 function collect() {
@@ -27,7 +27,7 @@ function collect() {
     definitions[name] = schema;
   };
   for (const message of MESSAGES) {
-    const file = new URL(`../../protocol/schemas/${message}.json`, import.meta.url);
+    const file = new URL(`../../../docs/schemas/${message}.json`, import.meta.url);
     const { $schema, $defs, title, ...schema } = JSON.parse(readFileSync(file, "utf8"));
     define(title, schema);
     Object.entries($defs ?? {}).forEach(([name, definition]) => define(name, definition));

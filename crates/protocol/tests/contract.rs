@@ -365,7 +365,7 @@ fn a_name_that_breaks_keys_cannot_be_a_run() {
 /// Set `CARS_UPDATE=1` to write the files anew.
 #[test]
 fn the_schemas_on_file_are_those_of_the_types() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas");
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schemas");
     for (name, schema) in schema::all() {
         let file = folder.join(format!("{name}.json"));
         let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";

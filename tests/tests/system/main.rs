@@ -10,6 +10,7 @@
 mod affect;
 mod again;
 mod bench;
+mod book;
 mod boundaries;
 mod browser;
 mod built_in;

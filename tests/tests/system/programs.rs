@@ -467,7 +467,7 @@ fn the_page_makes_a_robot_from_nothing() {
         return;
     }
 
-    let page = std::fs::read_to_string(root().join("sdk/stdio/README.md")).unwrap();
+    let page = std::fs::read_to_string(root().join("docs/any-language.md")).unwrap();
     let mut blocks = page.split("\n```").skip(1).step_by(2);
     let [program, scenario, launch] = ["python\n", "toml\n", "toml\n"].map(|language| {
         let block = blocks.next().and_then(|block| block.strip_prefix(language));

@@ -1,4 +1,4 @@
-// Generated from crates/protocol/schemas by `npm run generate` in crates/console/check. Do not edit.
+// Generated from docs/schemas by `npm run generate` in crates/console/check. Do not edit.
 
 /**
  * A request to the simulator. It never goes through the barrier: it is answered at once, also while the clock is held.

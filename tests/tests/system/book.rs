@@ -1,0 +1,162 @@
+//! The pages of the project: every link leads somewhere, on a repository page and in the book that `mdbook build` makes of
+//! docs/, and the book has every page.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use system_tests::{programs, root};
+
+/// Pages that are not in the book.
+const OTHERS: [&str; 5] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "sdk/python/README.md",
+    "sdk/stdio/README.md",
+];
+
+fn docs() -> PathBuf {
+    root().join("docs")
+}
+
+fn read(page: &Path) -> String {
+    std::fs::read_to_string(page).unwrap_or_else(|error| panic!("{}: {error}", page.display()))
+}
+
+/// All pages in a folder.
+fn pages(folder: &Path) -> BTreeSet<PathBuf> {
+    let mut found = BTreeSet::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(pages(&path));
+        } else if path.extension().is_some_and(|extension| extension == "md") {
+            found.insert(path);
+        }
+    }
+
+    found
+}
+
+/// A page without its blocks of code, line by line.
+fn prose(page: &str) -> Vec<&str> {
+    let mut lines = Vec::new();
+    let mut is_code = false;
+    for line in page.lines() {
+        if line.trim_start().starts_with("```") {
+            is_code = !is_code;
+        } else if !is_code {
+            lines.push(line);
+        }
+    }
+
+    lines
+}
+
+/// Where the links and pictures of a page lead.
+fn links(page: &str) -> Vec<String> {
+    let text = prose(page).join("\n");
+    let mut found = Vec::new();
+    for (begin, end) in [("](", ')'), ("src=\"", '"'), ("srcset=\"", '"')] {
+        let rests = text.split(begin).skip(1);
+        let links = rests.filter_map(|rest| rest.split_once(end));
+        found.extend(links.map(|(to, _)| to.to_owned()));
+    }
+
+    found
+}
+
+/// A heading as GitHub and mdBook name it in links.
+pub(crate) fn anchor(heading: &str) -> String {
+    let kept = heading
+        .chars()
+        .filter(|c| c.is_alphanumeric() || *c == ' ' || *c == '-' || *c == '_');
+    kept.collect::<String>().to_lowercase().replace(' ', "-")
+}
+
+fn anchors(page: &str) -> BTreeSet<String> {
+    let lines = prose(page).into_iter();
+
+    lines
+        .filter(|line| line.starts_with('#'))
+        .map(|line| anchor(line.trim_start_matches('#').trim()))
+        .collect()
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let mut all = pages(&docs());
+    all.extend(OTHERS.map(|page| root().join(page)));
+    let mut count = 0;
+
+    for path in all {
+        for link in links(&read(&path)) {
+            let place = format!("{}: {link}", path.display());
+            count += 1;
+            if link.starts_with("https://") {
+                continue;
+            }
+
+            let (file, section) = link.split_once('#').unwrap_or((&link, ""));
+            let target = match file {
+                "" => path.clone(),
+                file => path.parent().unwrap().join(file),
+            };
+            assert!(target.exists(), "{place}");
+            if !section.is_empty() {
+                assert!(anchors(&read(&target)).contains(section), "{place}");
+            }
+
+            // A site has the files of docs/ and nothing else of the project.
+            if path.starts_with(docs()) {
+                assert!(
+                    !file.contains(".."),
+                    "{place} is not in the book: name it as code"
+                );
+                assert!(
+                    target.is_file(),
+                    "{place} is no file, so the book does not have it"
+                );
+            }
+        }
+    }
+
+    assert!(count > 200, "{count}");
+}
+
+#[test]
+fn the_book_has_every_page() {
+    let summary = docs().join("SUMMARY.md");
+    let links = links(&read(&summary));
+    let listed: BTreeSet<PathBuf> = links.iter().map(|link| docs().join(link)).collect();
+    assert_eq!(listed.len(), links.len(), "a page is in SUMMARY.md twice");
+
+    let mut expected = pages(&docs());
+    expected.remove(&summary);
+    assert_eq!(listed, expected);
+}
+
+#[test]
+fn the_page_of_commands_names_them_all() {
+    let mut cars = Command::new(programs().join("cars"));
+    let help = cars.arg("--help").output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let (_, commands) = help.split_once("Commands:\n").unwrap();
+    let (commands, _) = commands.split_once("\n\n").unwrap();
+
+    // A line that is indented more goes on with the text of the one before.
+    let names = commands
+        .lines()
+        .filter_map(|line| line.strip_prefix("  "))
+        .filter(|line| !line.starts_with(' '))
+        .filter_map(|line| line.split(' ').next());
+    let page = read(&docs().join("commands.md"));
+    let mut count = 0;
+    for name in names {
+        assert!(page.contains(&format!("`cars {name}")), "{name}");
+        count += 1;
+    }
+
+    assert!(count > 20, "{count}");
+}
