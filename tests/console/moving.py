@@ -6,7 +6,7 @@ there. The places of robots and guests change smoothly, everything else at once.
 
 import difflib
 import re
-import xml.etree.ElementTree as ElementTree
+from xml.etree import ElementTree
 
 SVG = "http://www.w3.org/2000/svg"
 TICK_S = 0.4  # of the picture, for one tick
