@@ -14,7 +14,7 @@ use clap::{Args, Subcommand};
 use config::Override;
 use config::units::Time;
 use indicatif::{ProgressBar, ProgressStyle};
-use lab::experiment::engine::{self, Options, Queue, WORKER};
+use lab::experiment::engine::{self, OUT, Options, Queue, WORKER};
 use lab::experiment::{Experiment, LaunchText, Plan, Provenance, Request, Results, Robots, Store};
 use lab::shell;
 use launch::{is_launch_file, scenario_file};
@@ -25,8 +25,6 @@ use protocol::random::MAX_SEED;
 use self::launcher::launcher;
 use crate::submit::EngineArgs;
 
-/// Where the folders of experiments are made.
-const OUT: &str = "runs/experiments";
 /// Most runs at the same time.
 const MAX_JOBS: u64 = 1024;
 /// Fewest seeds of an option; an interval needs two.
@@ -303,7 +301,7 @@ impl PlanArgs {
     }
 
     fn request(&self) -> miette::Result<Request> {
-        let mut experiment = load(&self.file)?;
+        let mut experiment = Experiment::find(&self.file)?;
         if let Some(duration) = self.duration {
             experiment.duration_s = duration.0;
             experiment.duration_span = None;
@@ -331,17 +329,6 @@ impl PlanArgs {
             robots,
         })
     }
-}
-
-/// The experiment in a file, or that of this name that ships with the project.
-fn load(file: &Path) -> miette::Result<Experiment> {
-    let name = file.to_str().filter(|_| !file.exists());
-    if let Some(name) = name
-        && let Some(experiment) = Experiment::shipped(name)?
-    {
-        return Ok(experiment);
-    }
-    Ok(Experiment::load(file)?)
 }
 
 /// Plays those of these units that have not been played.

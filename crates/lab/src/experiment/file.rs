@@ -216,6 +216,20 @@ impl Experiment {
         raw.check(source, folder)
     }
 
+    /// The experiment in a file, or, where there is no such file, that of this name that ships with the project.
+    ///
+    /// # Errors
+    /// [`FileError`] if there is neither, or the file cannot be used.
+    pub fn find(file: &Path) -> Result<Self, FileError> {
+        let name = file.to_str().filter(|_| !file.exists());
+        if let Some(name) = name
+            && let Some(experiment) = Self::shipped(name)?
+        {
+            return Ok(experiment);
+        }
+        Self::load(file)
+    }
+
     /// An experiment that ships with the project; `None` if there is none of this name. Its scenario is relative to the
     /// folder of the project.
     ///
