@@ -1,11 +1,11 @@
 //! The pages of the project: every link leads somewhere, on a repository page and in the book that `mdbook build` makes of
-//! docs/, and the book has every page.
+//! docs/, the book has every page, and what pages show of files and commands is right.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use system_tests::{programs, root};
+use system_tests::{Lab, programs, root};
 
 /// Pages that are not in the book.
 const OTHERS: [&str; 5] = [
@@ -159,4 +159,52 @@ fn the_page_of_commands_names_them_all() {
     }
 
     assert!(count > 20, "{count}");
+}
+
+/// The blocks of TOML of a page, with the project's files where they are.
+fn examples(page: &str) -> Vec<String> {
+    let page = read(&docs().join(page));
+    let rests = page.split("\n```toml\n").skip(1);
+    let blocks = rests.filter_map(|rest| rest.split_once("\n```"));
+    let configs = format!("\"{}/", root().join("configs").display());
+
+    blocks
+        .map(|(block, _)| {
+            block
+                .replace("\"../configs/", &configs)
+                .replace("\"configs/", &configs)
+                .replace("\"robots/", &format!("{configs}robots/"))
+        })
+        .collect()
+}
+
+/// The first example of scenario files is complete, and the others are parts of it.
+#[test]
+fn the_examples_of_files_are_right() {
+    const WAIT: &str = "on_late = \"wait\"";
+    const CONTINUE: &str = "on_late = \"continue\"";
+
+    let mut parts = examples("scenario-files.md");
+    let complete = parts.remove(0);
+    parts.extend(examples("faults.md"));
+    let mut files = vec![complete.clone()];
+    for part in parts {
+        // A key before the tables replaces the one of the complete example.
+        if part.contains(CONTINUE) {
+            let rest = part.replace(CONTINUE, "");
+            files.push(complete.replace(WAIT, CONTINUE) + "\n" + &rest);
+        } else {
+            files.push(format!("{complete}\n{part}"));
+        }
+    }
+    files.extend(examples("launch-files.md"));
+    files.extend(examples("first-experiment.md"));
+    assert_eq!(files.len(), 9);
+
+    let lab = Lab::new();
+    for file in files {
+        let path = lab.write("example.toml", &file);
+        let (status, text) = lab.cars_without_out(&["check", path.to_str().unwrap()]);
+        assert_eq!(status, 0, "{text}\n{file}");
+    }
 }
