@@ -20,8 +20,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cars_robot.bus import ONE_THREAD, RUNTIME_VARIABLE
-
 IDLE = Path(__file__).parent / "examples" / "idle.py"
 
 
@@ -49,7 +47,6 @@ def rate(robots: int, commands: list[list[str]], ticks: int, scratch: Path) -> f
     environment = os.environ | {
         "CARS_RUN": "bench",
         "CARS_CONNECT": endpoint,
-        RUNTIME_VARIABLE: ONE_THREAD,
         "RUST_LOG": "error",
     }
     processes = [subprocess.Popen(command, env=environment) for command in [simulator, *commands]]

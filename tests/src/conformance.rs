@@ -39,7 +39,7 @@ pub fn assert_conforms(launch_file: &Path, robot: &str) {
         .args(["conform", "--name", robot])
         .args(["--scenario", &file.scenario, "--"])
         .args(&words)
-        .env("PYTHONPATH", crate::root().join("sdk/python/src"))
+        .env("PYTHONPATH", crate::python::package())
         .output()
         .expect("cars");
     let printed = [&output.stdout, &output.stderr]

@@ -13,6 +13,7 @@ pub mod network;
 pub mod planted;
 pub mod processes;
 pub mod pytest;
+pub mod python;
 pub mod stalls;
 pub mod tools;
 
@@ -70,9 +71,14 @@ pub fn programs() -> &'static Path {
         let mut build = cargo();
         // All packages and examples, so that dependencies have the same features as in `cargo test --workspace` and are
         // not compiled again.
-        build
-            .current_dir(root())
-            .args(["build", "--workspace", "--bins", "--examples", "--quiet"]);
+        build.current_dir(root()).args([
+            "build",
+            "--workspace",
+            "--lib",
+            "--bins",
+            "--examples",
+            "--quiet",
+        ]);
         if folder.ends_with("release") {
             build.arg("--release");
         }

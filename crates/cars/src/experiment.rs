@@ -14,7 +14,7 @@ use clap::{Args, Subcommand};
 use config::Override;
 use config::units::Time;
 use indicatif::{ProgressBar, ProgressStyle};
-use lab::experiment::engine::{self, Options, Queue, WORKER};
+use lab::experiment::engine::{self, OUT, Options, Queue, WORKER};
 use lab::experiment::{Experiment, LaunchText, Plan, Provenance, Request, Results, Robots, Store};
 use lab::shell;
 use launch::{is_launch_file, scenario_file};
@@ -26,8 +26,6 @@ use self::launcher::launcher;
 use crate::named;
 use crate::submit::EngineArgs;
 
-/// Where the folders of experiments are made.
-const OUT: &str = "runs/experiments";
 /// Most runs at the same time.
 const MAX_JOBS: u64 = 1024;
 /// Fewest seeds of an option; an interval needs two.

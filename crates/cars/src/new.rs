@@ -32,7 +32,7 @@ struct RobotArgs {
     /// Where the folder is made.
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// The folder of the CARS project, for robots that use its SDK (Rust, Python); without it the one around this program or
+    /// The folder of the CARS project, for a robot in Rust, which uses its SDK; without it the one around this program or
     /// around the current folder.
     #[arg(long, value_name = "DIR")]
     cars: Option<PathBuf>,
@@ -42,7 +42,7 @@ struct RobotArgs {
 enum Language {
     /// With the Rust SDK.
     Rust,
-    /// With the Python SDK.
+    /// With the module `cars`, which the wheel of CARS brings.
     Python,
     /// Over standard input and output (`cars exec`).
     C,
@@ -118,8 +118,10 @@ impl Language {
                 more: &[],
                 command: r#"["./robot.py"]"#,
                 typed: "@FOLDER@/robot.py",
-                build: "pip install @CARS@/sdk/python",
-                hint: "`sdk/python/README.md` of the CARS project documents what a robot can do in a tick.",
+                build: "",
+                hint: "The robot imports the module `cars`. The wheel of CARS brings it, together with the command `cars`; with the checkout\n\
+                       of the project alone, `pip install CHECKOUT/sdk/python` builds and installs it. `sdk/python/README.md` of the\n\
+                       project documents what a robot can do in a tick, and so does `help(cars.Robot)` in Python.",
             },
             Self::C => Skeleton {
                 // A fused multiply-add rounds once instead of twice, so results would differ between machines.
@@ -146,7 +148,7 @@ impl Language {
     }
 
     fn needs_sdk(self) -> bool {
-        matches!(self, Self::Rust | Self::Python)
+        matches!(self, Self::Rust)
     }
 }
 

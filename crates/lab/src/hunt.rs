@@ -30,7 +30,7 @@ pub use coverage::{Coverage, Fate, Feature};
 pub use draw::Ground;
 pub use fault::{Effect, Kind, Link, Messages, PlannedFault, Span};
 pub use shrink::{Bounds, Shrunk, World, shrink};
-pub use trial::{Failure, Played, RUNS, SentMessage, Subject, Trial};
+pub use trial::{Failure, Maker, Played, RUNS, SentMessage, Subject, Trial};
 
 use file::Heading;
 

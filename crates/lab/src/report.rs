@@ -13,5 +13,5 @@ mod study;
 mod transitions;
 mod words;
 
-pub use experiment::of_experiment;
-pub use runs::{MOST_RUNS, of_runs};
+pub use experiment::{of_experiment, page_of_experiment};
+pub use runs::{MOST_RUNS, of_runs, page_of_runs};

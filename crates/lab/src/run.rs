@@ -12,6 +12,9 @@ use simulator::recorder::Observed;
 use simulator::scenario::FaultEnd;
 use simulator::{Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
 
+/// Longest sleep of a run that is not as fast as possible, before it looks whether it is to go on.
+const NAP: Duration = Duration::from_millis(50);
+
 /// Runs a scenario to its end and records it in a folder that [`RunFolder::create`] made. `speed` is in simulated seconds
 /// per second; `None` is as fast as possible.
 ///
@@ -23,9 +26,25 @@ pub fn execute(
     folder: &RunFolder,
     speed: Option<f64>,
 ) -> miette::Result<Summary> {
+    execute_with(scenario, run, folder, speed, &of_class, || Ok(()))
+}
+
+/// Runs a scenario as [`execute`] does. `make` makes the robots; `goes_on` is called in every tick and while the run sleeps, and
+/// ends the run by an error.
+///
+/// # Errors
+/// As [`execute`], and the first error of `goes_on`.
+pub fn execute_with(
+    scenario: Scenario,
+    run: &RunName,
+    folder: &RunFolder,
+    speed: Option<f64>,
+    make: Make<'_>,
+    mut goes_on: impl FnMut() -> miette::Result<()>,
+) -> miette::Result<Summary> {
     let mut recorder = None;
     let begun = Instant::now();
-    let simulation = play_with_robots(scenario, run, |local, record, opened| {
+    let simulation = play_with_robots(scenario, run, make, |local, record, opened| {
         let simulation = &local.simulation;
         let recorder = match &mut recorder {
             Some(recorder) => recorder,
@@ -35,8 +54,10 @@ pub fn execute(
             recorder.observe(observed(local, opened));
         }
         recorder.write(simulation, record)?;
+        goes_on()?;
         if let Some(speed) = speed {
-            wait_until(begun, simulation.time_s(simulation.tick()) / speed);
+            let due_s = simulation.time_s(simulation.tick()) / speed;
+            wait_until(begun, due_s, &mut goes_on)?;
         }
         Ok(())
     })?;
@@ -65,9 +86,20 @@ pub(crate) fn observed(local: &Local, opened: Instant) -> Observed {
 }
 
 /// Sleeps until this many seconds after `begun`.
-fn wait_until(begun: Instant, due_s: f64) {
+fn wait_until(
+    begun: Instant,
+    due_s: f64,
+    goes_on: &mut impl FnMut() -> miette::Result<()>,
+) -> miette::Result<()> {
     let due = Duration::try_from_secs_f64(due_s).unwrap_or(Duration::MAX);
-    std::thread::sleep(due.saturating_sub(begun.elapsed()));
+    loop {
+        let left = due.saturating_sub(begun.elapsed());
+        if left.is_zero() {
+            return Ok(());
+        }
+        std::thread::sleep(left.min(NAP));
+        goes_on()?;
+    }
 }
 
 /// Plays a scenario to its end in this process and calls `each` after every tick and after the end of the run. Crashes and hangs
@@ -80,7 +112,7 @@ pub fn play(
     run: &RunName,
     mut each: impl FnMut(&Simulation, &TickRecord) -> miette::Result<()>,
 ) -> miette::Result<Simulation> {
-    play_with_robots(scenario, run, |local, record, _| {
+    play_with_robots(scenario, run, &of_class, |local, record, _| {
         each(&local.simulation, record)
     })
 }
@@ -89,15 +121,17 @@ pub fn play(
 fn play_with_robots(
     scenario: Scenario,
     run: &RunName,
+    make: Make<'_>,
     mut each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
 ) -> miette::Result<Simulation> {
     check_faults(&scenario, 0)?;
-    let mut local = Local::new(scenario, run)?;
+    let robots = make_robots_with(&scenario, Path::new("the scenario"), make)?;
+    let mut local = Local::with_robots(scenario, 1, run, robots)?;
     let opened = Instant::now();
     let record = local.simulation.init(&mut local.robots).into_diagnostic()?;
     each(&local, &record, opened)?;
 
-    go_on(&mut local, run, each)?;
+    go_on_with(&mut local, run, make, each)?;
     Ok(local.simulation)
 }
 
@@ -108,11 +142,20 @@ fn play_with_robots(
 pub(crate) fn go_on(
     local: &mut Local,
     run: &RunName,
+    each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
+) -> miette::Result<()> {
+    go_on_with(local, run, &of_class, each)
+}
+
+fn go_on_with(
+    local: &mut Local,
+    run: &RunName,
+    make: Make<'_>,
     mut each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
 ) -> miette::Result<()> {
     while local.simulation.tick() < local.simulation.scenario().ticks {
         let opened = Instant::now();
-        local.carry_out_faults(run)?;
+        local.carry_out_faults_with(run, make)?;
         let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
         each(local, &record, opened)?;
     }
@@ -168,14 +211,14 @@ impl Local {
     /// # Errors
     /// If a robot that comes back is of a class that cannot run in this process.
     pub fn carry_out_faults(&mut self, run: &RunName) -> miette::Result<()> {
-        self.carry_out_faults_by(run, robots::make)
+        self.carry_out_faults_with(run, &of_class)
     }
 
-    /// Carries out faults as [`Self::carry_out_faults`] does; `maker` makes the robots that come back.
+    /// Carries out faults as [`Self::carry_out_faults`] does; `make` makes the robots that come back.
     ///
     /// # Errors
     /// As [`Self::carry_out_faults`].
-    pub fn carry_out_faults_by(&mut self, run: &RunName, maker: Maker) -> miette::Result<()> {
+    pub fn carry_out_faults_with(&mut self, run: &RunName, make: Make<'_>) -> miette::Result<()> {
         let orders = self.simulation.faults_due();
         let next = self.simulation.tick() + 1;
         let lateness = self.simulation.scenario().lateness_at(next).clone();
@@ -186,20 +229,20 @@ impl Local {
             match (order.begins, order.kind) {
                 (true, FaultKind::Hang) => self.robots.hang(&order.robot, lateness.lose_after),
                 (true, _) => self.robots.crash(&order.robot),
-                (false, _) => self.start(&order.robot, run, maker)?,
+                (false, _) => self.start(&order.robot, run, make)?,
             }
         }
         for robot in self.simulation.restarts_due() {
             self.robots.crash(&robot);
-            self.start(&robot, run, maker)?;
+            self.start(&robot, run, make)?;
         }
         Ok(())
     }
 
     /// Starts a robot that is stopped, as a further incarnation.
-    fn start(&mut self, name: &RobotName, run: &RunName, maker: Maker) -> miette::Result<()> {
+    fn start(&mut self, name: &RobotName, run: &RunName, make: Make<'_>) -> miette::Result<()> {
         let scenario = self.simulation.scenario();
-        let mut robots = make_robots_by(scenario, Path::new("the scenario"), maker)?;
+        let mut robots = make_robots_with(scenario, Path::new("the scenario"), make)?;
         if let Some(robot) = robots.remove(name) {
             let simulation = &self.simulation;
             self.robots.bring_back(name, robot, |generation| {
@@ -238,8 +281,13 @@ pub fn check_faults(scenario: &Scenario, after: Tick) -> miette::Result<()> {
     Ok(())
 }
 
-/// Makes a robot of a class; `None` if it makes no robots of that class.
-pub type Maker = fn(&str) -> Option<Box<dyn Robot>>;
+/// Makes the robot of a name and a class; `None` if it makes no such robots.
+pub type Make<'a> = &'a dyn Fn(&RobotName, &str) -> Option<Box<dyn Robot>>;
+
+/// Makes the robots of the project.
+fn of_class(_: &RobotName, class: &str) -> Option<Box<dyn Robot>> {
+    robots::make(class)
+}
 
 /// Creates the robots of a scenario by their classes; `file` is named in the error.
 ///
@@ -249,21 +297,21 @@ pub fn make_robots(
     scenario: &Scenario,
     file: &Path,
 ) -> miette::Result<BTreeMap<RobotName, Box<dyn Robot>>> {
-    make_robots_by(scenario, file, robots::make)
+    make_robots_with(scenario, file, &of_class)
 }
 
-/// Creates the robots of a scenario as [`make_robots`] does; `maker` makes them.
+/// Creates the robots of a scenario as [`make_robots`] does; `make` makes them.
 ///
 /// # Errors
 /// As [`make_robots`].
-pub fn make_robots_by(
+pub fn make_robots_with(
     scenario: &Scenario,
     file: &Path,
-    maker: Maker,
+    make: Make<'_>,
 ) -> miette::Result<BTreeMap<RobotName, Box<dyn Robot>>> {
     let mut robots = BTreeMap::new();
     for (name, spec) in &scenario.robots {
-        let robot = maker(&spec.class).ok_or_else(|| {
+        let robot = make(name, &spec.class).ok_or_else(|| {
             miette!(
                 help = "a robot of another kind runs as a process of its own: name it in a launch file and use `cars launch`",
                 "{}: robot {name} is of class {:?}, and only {} can run in this process",

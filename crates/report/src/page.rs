@@ -1,5 +1,7 @@
 //! The page: one HTML file that needs nothing else.
 
+use std::ops::Range;
+
 use diagram::markup::Markup;
 
 use crate::style::sheet;
@@ -71,7 +73,8 @@ pub struct Page {
     body: Markup,
     /// Headings of the sections with their ids.
     sections: Vec<(String, String)>,
-    figures: usize,
+    /// Where the figures are in the body.
+    figures: Vec<Range<usize>>,
     tables: usize,
 }
 
@@ -87,7 +90,7 @@ impl Page {
             head,
             body: Markup::default(),
             sections: Vec::new(),
-            figures: 0,
+            figures: Vec::new(),
             tables: 0,
         }
     }
@@ -142,8 +145,8 @@ impl Page {
 
     /// Adds a figure and returns its number.
     pub fn figure(&mut self, figure: &Figure) -> usize {
-        self.figures += 1;
-        let number = self.figures;
+        let number = self.figures.len() + 1;
+        let begin = self.body.size();
         let body = &mut self.body;
         body.tag("figure")
             .with("id", &format!("figure-{number}"))
@@ -175,6 +178,7 @@ impl Page {
             body.close("details");
         }
         body.close("figure");
+        self.figures.push(begin..self.body.size());
         number
     }
 
@@ -229,7 +233,7 @@ impl Page {
     /// Number of figures so far.
     #[must_use]
     pub fn figures(&self) -> usize {
-        self.figures
+        self.figures.len()
     }
 
     /// Number of bytes so far.
@@ -245,39 +249,63 @@ impl Page {
             self.body.close("section");
         }
 
-        let mut page = Markup::default();
-        page.add("<!DOCTYPE html>\n");
-        page.tag("html").with("lang", "en").open();
-        page.tag("head").open();
-        page.tag("meta").with("charset", "utf-8").empty();
-        page.tag("meta")
-            .with("http-equiv", "Content-Security-Policy")
-            .with("content", POLICY)
-            .empty();
-        page.tag("meta")
-            .with("name", "viewport")
-            .with("content", "width=device-width, initial-scale=1")
-            .empty();
-        page.tag("meta")
-            .with("name", "color-scheme")
-            .with("content", "light dark")
-            .empty();
-        page.tag("title").content(&self.title);
-        page.style(&sheet());
-        page.close("head");
-
-        page.tag("body").open();
-        page.tag("main").open();
+        let mut page = begin(&self.title);
         page.tag("header").open();
         page.add(&self.head.finish());
         write_contents(&mut page, &self.sections);
         page.close("header");
         page.add(&self.body.finish());
-        page.close("main");
-        page.close("body");
-        page.close("html");
-        page.finish()
+        end(page)
     }
+
+    /// The figures of the page, each as a page of its own.
+    #[must_use]
+    pub fn into_figures(self) -> Vec<String> {
+        let body = self.body.finish();
+        let mut pages = Vec::new();
+        for place in self.figures {
+            let mut page = begin(&self.title);
+            page.add(&body[place]);
+            pages.push(end(page));
+        }
+        pages
+    }
+}
+
+/// Begins the text of a page, up to what it shows.
+fn begin(title: &str) -> Markup {
+    let mut page = Markup::default();
+    page.add("<!DOCTYPE html>\n");
+    page.tag("html").with("lang", "en").open();
+    page.tag("head").open();
+    page.tag("meta").with("charset", "utf-8").empty();
+    page.tag("meta")
+        .with("http-equiv", "Content-Security-Policy")
+        .with("content", POLICY)
+        .empty();
+    page.tag("meta")
+        .with("name", "viewport")
+        .with("content", "width=device-width, initial-scale=1")
+        .empty();
+    page.tag("meta")
+        .with("name", "color-scheme")
+        .with("content", "light dark")
+        .empty();
+    page.tag("title").content(title);
+    page.style(&sheet());
+    page.close("head");
+
+    page.tag("body").open();
+    page.tag("main").open();
+    page
+}
+
+/// Ends the text of a page.
+fn end(mut page: Markup) -> String {
+    page.close("main");
+    page.close("body");
+    page.close("html");
+    page.finish()
 }
 
 fn write_contents(page: &mut Markup, sections: &[(String, String)]) {

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from cars_robot import Stream
+from cars import Stream
 
 
 class Chance:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from chance import Chance
 
-from cars_robot import Cars, Percept, Point
+from cars import Cars, Point, SensedBody
 
 Heading = tuple[float, float]
 
@@ -101,16 +101,16 @@ class Legs:
         return stepped(at, heading, step_m)
 
     def _free_step(self, cars: Cars, at: Point, straight: Heading, step_m: float) -> tuple[Heading | None, float]:
-        percept = cars.percept()
+        bodies = cars.bodies
         # A narrow gap may take a short step where a long one does not fit.
         for share in SHARES:
-            heading = self._free_heading(cars, percept, at, straight, step_m * share)
+            heading = self._free_heading(cars, bodies, at, straight, step_m * share)
             if heading is not None:
                 return heading, step_m * share
         return None, 0.0
 
     def _free_heading(
-        self, cars: Cars, percept: Percept, at: Point, straight: Heading, step_m: float
+        self, cars: Cars, bodies: tuple[SensedBody, ...], at: Point, straight: Heading, step_m: float
     ) -> Heading | None:
         """The heading nearest to the straight one whose step is free, on the side that worked last before the other."""
         apart_m = cars.welcome.body_m - TOUCH_M
@@ -118,7 +118,7 @@ class Legs:
         def is_free(heading: Heading) -> bool:
             there = stepped(at, heading, step_m)
             return is_on_field(cars, there) and not any(
-                abs(body.x - there.x) < apart_m and abs(body.y - there.y) < apart_m for _, body in percept.bodies
+                abs(body.x - there.x) < apart_m and abs(body.y - there.y) < apart_m for _, body in bodies
             )
 
         if is_free(straight):

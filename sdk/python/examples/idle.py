@@ -3,14 +3,11 @@
 
 import sys
 
-import cars_robot
-from cars_robot import Cars, Point, StateVariables
+from cars import Cars, CarsRobotInterface, Point, StateVariables, main
 
 
-class Idle(cars_robot.Robot):
+class Idle(CarsRobotInterface):
     """Stands where it stands."""
-
-    senses_bodies = False
 
     def init_robot(self, cars: Cars) -> None:
         self.at = cars.welcome.location
@@ -49,4 +46,4 @@ class Idle(cars_robot.Robot):
 
 
 if __name__ == "__main__":
-    sys.exit(cars_robot.main("Idle", lambda name: Idle()))
+    sys.exit(main("Idle", lambda name: Idle()))

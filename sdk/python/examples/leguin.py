@@ -31,9 +31,8 @@ from closing import Closing
 from drive import Course, Legs
 from peer import Peer
 
-import cars_robot
-from cars_robot import BadParameters, Cars, Panel, Point, StateVariables
-from cars_robot.panel import Badge, Bar, Button, Face, FaceName, Table, Text, Tone, Widget
+from cars import BadParameters, Cars, CarsRobotInterface, Panel, Point, StateVariables, main
+from cars.panel import Badge, Bar, Button, Face, FaceName, Table, Text, Tone, Widget
 
 FT_M = 0.3048
 REFILL, HURRY, GO_HOME = "refill", "hurry", "go home"
@@ -239,8 +238,10 @@ def urgency(measures: Measures) -> float:
     return max(measures.hurry, measures.blocked, measures.waiting)
 
 
-class Leguin(cars_robot.Robot):
+class Leguin(CarsRobotInterface):
     """The refiller."""
+
+    senses_bodies = True
 
     def init_robot(self, cars: Cars) -> None:
         self.parameters = cars.parameters(Parameters)
@@ -552,4 +553,4 @@ class Leguin(cars_robot.Robot):
 
 
 if __name__ == "__main__":
-    sys.exit(cars_robot.main("Leguin", lambda name: Leguin()))
+    sys.exit(main("Leguin", lambda name: Leguin()))

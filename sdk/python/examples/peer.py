@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cars_robot import CallError, Cars, Point, PublicState
+from cars import CallError, Cars, Point, PublicState
 
 
 class Peer:

@@ -3,11 +3,10 @@
 
 import sys
 
-import cars_robot
-from cars_robot import Cars, Point, StateVariables
+from cars import Cars, CarsRobotInterface, Point, StateVariables, main
 
 
-class Walker(cars_robot.Robot):
+class Walker(CarsRobotInterface):
     def init_robot(self, cars: Cars) -> None:
         self.at = cars.welcome.location
         self.way_mps = 0.5
@@ -53,4 +52,4 @@ class Walker(cars_robot.Robot):
 
 
 if __name__ == "__main__":
-    sys.exit(cars_robot.main("Walker", lambda name: Walker()))
+    sys.exit(main("Walker", lambda name: Walker()))

@@ -1,4 +1,4 @@
-"""What the tests stand on: the programs of the project, a folder for runs, and a stage for a single robot."""
+"""What the tests stand on: the programs of the project, and a folder for runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import NoReturn
 
 import pytest
 from lab import Lab
-from stage import Stage
 
 
 @pytest.fixture
@@ -21,13 +20,6 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
     if cars is None:
         missing("the program cars is not there: `cargo build --release`, and name its folder by CARS_BIN_DIR")
     with Lab(Path(cars).resolve().parent, tmp_path) as made:
-        yield made
-
-
-@pytest.fixture
-def stage() -> Iterator[Stage]:
-    """A stage for robots, with nobody on it yet."""
-    with Stage() as made:
         yield made
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import sys
 
-import cars_robot
-from cars_robot import CallError, Cars, Interrupted, Point, StateVariables, UnknownRobot, Variable
+from cars import CallError, Cars, CarsRobotInterface, Interrupted, Point, StateVariables, UnknownRobot, Variable, main
 
 
-class Echo(cars_robot.Robot):
+class Echo(CarsRobotInterface):
     """Sends back what it hears, and looks around now and then."""
+
+    senses_bodies = True
 
     def init_robot(self, cars: Cars) -> None:
         self.tick_s = cars.tick_s
@@ -34,7 +35,7 @@ class Echo(cars_robot.Robot):
     def update_state_variables(self, cars: Cars) -> None:
         if cars.tick % 4:
             return
-        self.seen["near"] = len(cars.percept().bodies)
+        self.seen["near"] = len(cars.bodies)
         for other in cars.welcome.roster:
             if other != cars.name:
                 self.seen[f"saw_{other}"] = self.behavior_of(other, cars)
@@ -79,4 +80,4 @@ class Echo(cars_robot.Robot):
 
 
 if __name__ == "__main__":
-    sys.exit(cars_robot.main("Echo", lambda name: Echo()))
+    sys.exit(main("Echo", lambda name: Echo()))

@@ -39,8 +39,6 @@ def eventually(what: str, ready: Callable[[], T | None], patience_s: float = PAT
 def environment(**more: str) -> dict[str, str]:
     """The environment of a process that knows no run but what ``more`` says."""
     own = {name: value for name, value in os.environ.items() if not name.startswith("CARS_")}
-    source = str(ROOT / "sdk" / "python" / "src")
-    own["PYTHONPATH"] = os.pathsep.join(filter(None, [source, own.get("PYTHONPATH")]))
     # Scripts find the interpreter of these tests.
     own["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), own.get("PATH", "")])
     return own | more

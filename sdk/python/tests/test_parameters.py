@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import pytest
 
-from cars_robot.parameters import build
+from cars._parameters import build
 
 
 class Mood(enum.Enum):

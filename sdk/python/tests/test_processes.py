@@ -152,18 +152,18 @@ def test_an_encrypted_endpoint_wants_a_certificate(lab: Lab) -> None:
     assert robot.returncode == 1 and "wants a certificate: name a file zenoh.json5" in said
 
 
-def test_an_encrypted_endpoint_wants_one_thread(lab: Lab) -> None:
-    arguments = ["--name", "A", "--connect", "tls/127.0.0.1:1", "--zenoh-config", "zenoh.json5"]
-    robot = lab.robot("walker.py", *arguments, ZENOH_RUNTIME="(app:(worker_threads:3))")
-    _, said = robot.communicate(timeout=PATIENCE_S)
-    assert robot.returncode == 1 and "unsafe with the threads of ZENOH_RUNTIME" in said
-
-
 def test_the_kit_finds_no_fault(lab: Lab) -> None:
     """Every rule of docs/protocol.md, as `cars conform` checks it."""
     echo = Path(__file__).with_name("echo.py")
     found = lab.cars("conform", "--say", "hello", "--say", "world", "--", sys.executable, str(echo))
     assert "not ok" not in found and "# SKIP" not in found and found.count("\nok ") >= 28, found
+
+
+def test_the_kit_finds_no_fault_in_plain_zenoh(lab: Lab) -> None:
+    """The example of the page, over zenoh's own bindings. It asks nobody and commands nobody."""
+    example = [sys.executable, str(EXAMPLES / "plain_zenoh.py")]
+    found = lab.cars("conform", "--name", "Walker", "--say", "turn", "--", *example)
+    assert "not ok" not in found and found.count("\nok ") >= 28, found
 
 
 def test_the_benchmark_measures(lab: Lab) -> None:

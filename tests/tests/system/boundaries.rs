@@ -81,6 +81,21 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "terminal",
         ],
     ),
+    (
+        "python-module",
+        &[
+            "lab",
+            "launch",
+            "simulator",
+            "robots",
+            "robot",
+            "bus",
+            "config",
+            "protocol",
+            "report",
+            "terminal",
+        ],
+    ),
     ("zenoh-link-tcp", &[]),
     ("zenoh-link-tls", &["zenoh-link-tcp"]),
     (

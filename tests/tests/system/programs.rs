@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 
 use protocol::random::{Stream, stream, unit};
 use system_tests::conformance::assert_conforms;
+use system_tests::python::{package, python};
 use system_tests::tools::lacks_tool;
 use system_tests::{Lab, assert_same, eventually, root};
 
@@ -694,11 +695,8 @@ fn every_program_ends_at_the_line_end_and_at_the_end_of_its_input() {
 
 #[test]
 fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
-    let python = Command::new("python3")
-        .args(["-c", "import zenoh"])
-        .output();
-    let has_zenoh = python.is_ok_and(|output| output.status.success());
-    if lacks_compiler() || lacks("Python with zenoh", has_zenoh, "`pip install ./sdk/python`") {
+    let has_python = succeeds(python().args(["-c", "import cars"]));
+    if lacks_compiler() || lacks("Python", has_python, "`apt-get install python3`") {
         return;
     }
 
@@ -735,7 +733,7 @@ fn robots_in_rust_python_and_c_in_one_run_are_the_robots_in_rust() {
         let mut launch = lab.cars(&launch.iter().chain(more).copied().collect::<Vec<_>>());
         // As it is here, installed or not.
         launch
-            .env("PYTHONPATH", root().join("sdk/python/src"))
+            .env("PYTHONPATH", package())
             .env("PYTHONDONTWRITEBYTECODE", "1");
         ok(&mut launch);
 

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use config::FileError;
@@ -20,6 +20,8 @@ use crate::export::draft::unwritable;
 
 /// Name of the threads that play units.
 pub const WORKER: &str = "units";
+/// Where the folders of experiments are made.
+pub const OUT: &str = "runs/experiments";
 /// How often other processes' units are read.
 const REFRESH: Duration = Duration::from_secs(2);
 /// File that the first of several processes on a folder locks.
@@ -41,6 +43,7 @@ pub struct Options {
 pub struct Queue {
     units: Vec<usize>,
     next: AtomicUsize,
+    is_stopped: Arc<AtomicBool>,
 }
 
 /// What the workers share.
@@ -74,6 +77,7 @@ impl Queue {
         Self {
             units,
             next: AtomicUsize::new(0),
+            is_stopped: Arc::default(),
         }
     }
 
@@ -83,7 +87,17 @@ impl Queue {
         &self.units
     }
 
+    /// What stops the playing of the queue from another thread: set to true, it lets no further unit begin. Those that are being
+    /// played come to their end.
+    #[must_use]
+    pub fn stopper(&self) -> Arc<AtomicBool> {
+        self.is_stopped.clone()
+    }
+
     fn next(&self) -> Option<usize> {
+        if self.is_stopped.load(Ordering::Relaxed) {
+            return None;
+        }
         let place = self.next.fetch_add(1, Ordering::Relaxed);
         self.units.get(place).copied()
     }

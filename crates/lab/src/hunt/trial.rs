@@ -8,12 +8,13 @@ use config::{Changes, Source};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Seq, Tick};
+use robot::Robot;
 use simulator::{Scenario, TickRecord};
 
 use super::case::Case;
 use super::coverage::{Fate, Feature};
 use super::fault::Link;
-use crate::run::{Local, Maker, check_faults, make_robots_by};
+use crate::run::{Local, check_faults, make_robots_with};
 
 /// What is expected of every run beside the expectations of its scenario.
 pub const RUNS: &str = "the run goes to its end";
@@ -66,6 +67,9 @@ pub trait Trial: Sync {
     fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> miette::Result<Played>;
 }
 
+/// Makes a robot of a class; `None` if it makes no robots of that class.
+pub type Maker = fn(&str) -> Option<Box<dyn Robot>>;
+
 /// A scenario in whose robots a hunt looks for defects.
 #[derive(Debug)]
 pub struct Subject {
@@ -100,7 +104,7 @@ impl Subject {
         let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
         let scenario = Scenario::parse(&source, &folder)?;
         check_faults(&scenario, 0)?;
-        make_robots_by(&scenario, file, maker)?;
+        make_robots_with(&scenario, file, &|_, class| maker(class))?;
         Ok(Self {
             file: file.to_owned(),
             content: source.parse()?,
@@ -158,7 +162,7 @@ impl Subject {
             if notes.has_failed(wanted) {
                 return Ok(());
             }
-            local.carry_out_faults_by(run, self.maker)?;
+            local.carry_out_faults_with(run, &|_, class| (self.maker)(class))?;
             let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
             notes.note(&record);
         }
@@ -172,7 +176,7 @@ impl Trial for Subject {
     fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> miette::Result<Played> {
         let scenario = self.scenario_of(case)?;
         let run = RunName::new("hunt").into_diagnostic()?;
-        let robots = make_robots_by(&scenario, &self.file, self.maker)?;
+        let robots = make_robots_with(&scenario, &self.file, &|_, class| (self.maker)(class))?;
         let mut notes = Notes::default();
         notes.played.expectations.insert(RUNS.to_owned());
         for expectation in &scenario.expectations {

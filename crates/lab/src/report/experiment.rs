@@ -38,6 +38,14 @@ const EXAMPLE_PARTS: [Shown; 3] = [Shown::Runs, Shown::Transitions, Shown::Floor
 /// # Errors
 /// If it is not the folder of an experiment, none of its units has been played, or a file cannot be read.
 pub fn of_experiment(folder: &Path) -> miette::Result<String> {
+    Ok(page_of_experiment(folder)?.finish())
+}
+
+/// The page of that report.
+///
+/// # Errors
+/// As [`of_experiment`].
+pub fn page_of_experiment(folder: &Path) -> miette::Result<Page> {
     let results = Results::load(folder)?;
     if let (true, Some(first)) = (results.outcomes.is_empty(), results.failures.first()) {
         return Err(miette!(
@@ -70,7 +78,7 @@ pub fn of_experiment(folder: &Path) -> miette::Result<String> {
     }
     write_examples(&mut page, &study, folder);
     write_reproduction(&mut page, &study, folder, provenance.as_ref());
-    Ok(page.finish())
+    Ok(page)
 }
 
 fn write_answer(page: &mut Page, study: &Study<'_>) {

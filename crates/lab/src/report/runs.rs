@@ -45,6 +45,14 @@ struct Run {
 /// # Errors
 /// If there is no run or there are too many, or one cannot be read.
 pub fn of_runs(folders: &[RunFolder]) -> miette::Result<String> {
+    Ok(page_of_runs(folders)?.finish())
+}
+
+/// The page of that report.
+///
+/// # Errors
+/// As [`of_runs`].
+pub fn page_of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
     if folders.len() > MOST_RUNS {
         return Err(miette!(
             help = "compare many runs by an experiment: `cars experiment run FILE`, then `cars report` with its folder",
@@ -86,7 +94,7 @@ pub fn of_runs(folders: &[RunFolder]) -> miette::Result<String> {
     write_disturbances(&mut page, &runs);
     write_expectations(&mut page, &runs);
     write_reproduction(&mut page, &runs);
-    Ok(page.finish())
+    Ok(page)
 }
 
 impl Run {

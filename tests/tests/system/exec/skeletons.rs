@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use system_tests::processes::{Running, nobody_is_left};
+use system_tests::python::package;
 use system_tests::tools::lacks_tool;
 use system_tests::{Lab, assert_same, cargo, programs, root};
 
@@ -169,8 +170,8 @@ impl Robot {
 
 /// Where Python finds the SDK: that of the project first.
 fn python_path() -> OsString {
-    let own = root().join("sdk/python/src");
     let others = std::env::var_os("PYTHONPATH").unwrap_or_default();
+    let own = package().to_owned();
     std::env::join_paths([own].into_iter().chain(std::env::split_paths(&others))).unwrap()
 }
 
@@ -365,14 +366,10 @@ fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
 
     let mut python = Command::new("python3");
     python
-        .args(["-c", "import cars_robot"])
+        .args(["-c", "import cars"])
         .env("PYTHONPATH", python_path());
 
-    if has(
-        "Python",
-        &mut python,
-        "install what sdk/python needs: pip install ./sdk/python",
-    ) {
+    if has("Python", &mut python, "install Python 3.9 or later") {
         assert_same(
             ("Rust", &rust),
             ("Python", &Robot::new("python").plays("python")),

@@ -10,9 +10,8 @@ import math
 import sys
 from dataclasses import dataclass
 
-import cars_robot
-from cars_robot import Cars, Panel, Point, StateVariables
-from cars_robot.panel import Button
+from cars import Cars, CarsRobotInterface, Panel, Point, StateVariables, main
+from cars.panel import Button
 
 
 @dataclass
@@ -24,7 +23,7 @@ class Parameters:
     patience_s: float
 
 
-class Stroller(cars_robot.Robot):
+class Stroller(CarsRobotInterface):
     def init_robot(self, cars: Cars) -> None:
         """Before tick 0, and whenever the run starts again: back to the initial state."""
         self.parameters = cars.parameters(Parameters)
@@ -54,8 +53,8 @@ class Stroller(cars_robot.Robot):
         cars.log(f"obeys {sender}: {command}")
 
     def update_state_variables(self, cars: Cars) -> None:
-        """Its progress. To look around: ``cars.percept()``; to query another robot:
-        ``cars.get_robot_state("Butler")``."""
+        """Its progress. To look around: ``cars.bodies``, with ``senses_bodies = True`` in the class; to query another
+        robot: ``cars.get_robot_state("Butler")``."""
         if cars.was_blocked:
             self.held_up_s += cars.tick_s
         else:
@@ -108,4 +107,4 @@ class Stroller(cars_robot.Robot):
 
 
 if __name__ == "__main__":
-    sys.exit(cars_robot.main("@NAME@", lambda name: Stroller()))
+    sys.exit(main("@NAME@", lambda name: Stroller()))

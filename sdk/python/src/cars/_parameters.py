@@ -8,15 +8,20 @@ import typing
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from ._errors import BadParameters
+
 P = TypeVar("P")
 
 
-class BadParameters(Exception):
-    """Parameters that a robot cannot work with; the text says which and why."""
+def parameters(robot: str, kind: type[P], given: Mapping[str, Any]) -> P:
+    """The parameters of a robot as an instance of the dataclass ``kind``.
 
-    def __init__(self, robot: str, reason: str) -> None:
-        super().__init__(f"parameters of {robot}: {reason}; mend them in the scenario, under the robot's params")
-        self.reason = reason
+    :raises BadParameters: which parameter is wrong, missing or unknown.
+    """
+    try:
+        return build(kind, given)
+    except ValueError as error:
+        raise BadParameters(robot, str(error)) from None
 
 
 def build(kind: type[P], values: Mapping[str, Any], path: str = "") -> P:
@@ -52,7 +57,7 @@ def _convert(kind: Any, value: Any, path: str) -> Any:
     if origin is tuple and isinstance(value, list):
         kinds = arguments[:1] * len(value) if arguments[1:] == (...,) else arguments
         if len(kinds) == len(value):
-            return tuple(_convert(one, part, path) for one, part in zip(kinds, value, strict=True))
+            return tuple(_convert(one, part, path) for one, part in zip(kinds, value))
     if origin is typing.Literal:
         return _choose({one: one for one in arguments}, value, path)
     if isinstance(kind, type) and issubclass(kind, enum.Enum):

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Union
 
-from .messages import MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Json, shortened
+MAX_TEXT_BYTES = 4096
+"""Longest text of a message, UTF-8."""
+MAX_ENTRIES = 1024
+"""Most entries of a list in a message."""
+MAX_WIDGETS = 64
+"""Most widgets of a panel."""
 
 Tone = Literal["good", "neutral", "warning", "bad"]
 """How a badge is meant."""
@@ -15,7 +21,7 @@ FaceName = Literal["happy", "sad", "surprised", "disgusted", "angry", "fearful",
 """The facial expressions of the paper."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Text:
     """A labeled line of text."""
 
@@ -24,7 +30,7 @@ class Text:
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Badge:
     """A state, set off from the rest."""
 
@@ -34,7 +40,7 @@ class Badge:
     tone: Tone = "neutral"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Bar:
     """A quantity within bounds."""
 
@@ -45,7 +51,7 @@ class Bar:
     max: float = 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Face:
     """A facial expression, and how strong it is, 0 to 1."""
 
@@ -54,7 +60,7 @@ class Face:
     intensity: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Sparkline:
     """A small curve of recent values, oldest first."""
 
@@ -63,7 +69,7 @@ class Sparkline:
     values: Sequence[float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Table:
     """Rows of text."""
 
@@ -71,7 +77,7 @@ class Table:
     rows: Sequence[Sequence[str]]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Svg:
     """A picture; shown as an image, so that nothing in it runs. ``label`` says what it shows."""
 
@@ -80,7 +86,7 @@ class Svg:
     svg: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Button:
     """Sends the robot a command."""
 
@@ -89,29 +95,29 @@ class Button:
     command: str
 
 
-Widget = Text | Badge | Bar | Face | Sparkline | Table | Svg | Button
+Widget = Union[Text, Badge, Bar, Face, Sparkline, Table, Svg, Button]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Panel:
     """Widgets from top to bottom."""
 
     widgets: Sequence[Widget] = field(default_factory=tuple)
 
 
-def panel_json(panel: Panel) -> Json:
+def to_json(panel: Panel) -> str:
     """A panel as JSON, within the limits of a message: what cannot be shown is left out or cut."""
     shown = []
     for widget in panel.widgets[:MAX_WIDGETS]:
         fields = {name: _showable(value, name) for name, value in asdict(widget).items()}
         shown.append({"widget": widget.widget, **fields})
-    return {"widgets": shown}
+    return json.dumps({"widgets": shown})
 
 
 def _showable(value: object, name: str) -> object:
     if isinstance(value, str):
         # The size of a picture is bounded by that of a message.
-        return value if name == "svg" else shortened(value, MAX_TEXT_BYTES)
+        return value if name == "svg" else value.encode(errors="replace")[:MAX_TEXT_BYTES].decode(errors="ignore")
     if isinstance(value, float) and not math.isfinite(value):
         return 0.0
     if isinstance(value, (list, tuple)):

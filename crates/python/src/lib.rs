@@ -1,0 +1,39 @@
+//! The Python module `cars._cars`: what the package `cars` in `sdk/python` calls. It translates between Python and the
+//! libraries: robots of Python for the crate `robot`, and runs and experiments of the crate `lab` for Python. Rules are theirs.
+
+mod cars;
+mod error;
+mod experiment;
+mod host;
+mod interrupt;
+mod lent;
+mod make;
+mod pictures;
+mod run;
+mod seat;
+mod stream;
+mod values;
+
+use pyo3::prelude::*;
+
+/// What the package `cars` is made of.
+#[pymodule]
+fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    error::print_without_colors();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<cars::Cars>()?;
+    module.add_class::<stream::Stream>()?;
+    module.add_function(wrap_pyfunction!(stream::stream, module)?)?;
+    module.add_function(wrap_pyfunction!(stream::published_angle, module)?)?;
+    module.add_function(wrap_pyfunction!(host::main, module)?)?;
+    module.add_function(wrap_pyfunction!(host::take_part, module)?)?;
+    module.add_function(wrap_pyfunction!(run::run, module)?)?;
+    module.add_function(wrap_pyfunction!(run::find, module)?)?;
+    module.add_function(wrap_pyfunction!(run::export, module)?)?;
+    module.add_function(wrap_pyfunction!(experiment::experiment, module)?)?;
+    module.add_function(wrap_pyfunction!(experiment::verdicts, module)?)?;
+    module.add_function(wrap_pyfunction!(pictures::report, module)?)?;
+    module.add_function(wrap_pyfunction!(pictures::figures, module)?)?;
+    module.add_function(wrap_pyfunction!(pictures::diagram, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,71 @@
+//! Pictures: as `cars report` and `cars diagram` draw them.
+
+use std::path::PathBuf;
+
+use ::report::Page;
+use lab::diagram::{Options, Window, draw};
+use lab::experiment::PLAN;
+use lab::folder::{recorded_epoch, recorded_epochs};
+use lab::moment::Moment;
+use lab::report::{page_of_experiment, page_of_runs};
+use pyo3::prelude::*;
+use simulator::RunFolder;
+
+use crate::error::{plain, reported};
+
+/// The report about runs, or about one experiment, by their folders: HTML.
+#[pyfunction]
+pub(crate) fn report(py: Python<'_>, folders: Vec<PathBuf>) -> PyResult<String> {
+    py.detach(|| page(folders).map(Page::finish))
+        .map_err(reported)
+}
+
+/// The figures of that report, each as a page of its own.
+#[pyfunction]
+pub(crate) fn figures(py: Python<'_>, folders: Vec<PathBuf>) -> PyResult<Vec<String>> {
+    py.detach(|| page(folders).map(Page::into_figures))
+        .map_err(reported)
+}
+
+fn page(folders: Vec<PathBuf>) -> miette::Result<Page> {
+    if let [folder] = &folders[..]
+        && folder.join(PLAN).exists()
+    {
+        return page_of_experiment(folder);
+    }
+    let runs: Vec<RunFolder> = folders.into_iter().map(RunFolder::at).collect();
+    page_of_runs(&runs)
+}
+
+/// The space-time diagram of the last epoch of a run: SVG, and what it lacks, a sentence each.
+#[pyfunction]
+pub(crate) fn diagram(
+    py: Python<'_>,
+    run: PathBuf,
+    from: Option<&str>,
+    to: Option<&str>,
+    queries: bool,
+    whole: bool,
+) -> PyResult<(String, Vec<String>)> {
+    let window = Window {
+        from: from.map(str::parse::<Moment>).transpose().map_err(plain)?,
+        to: to.map(str::parse::<Moment>).transpose().map_err(plain)?,
+    };
+    let drawn = py.detach(|| -> miette::Result<_> {
+        let folder = RunFolder::at(run);
+        let files = recorded_epoch(&folder, None)?;
+        let mut title = folder.name()?.to_string();
+        if recorded_epochs(&folder)?.len() > 1 {
+            title += &format!(", epoch {}", files.epoch);
+        }
+        let options = Options {
+            title,
+            queries,
+            is_whole: whole,
+            ..Options::default()
+        };
+        draw(&files, window, options)
+    });
+    let drawn = drawn.map_err(reported)?;
+    Ok((drawn.svg, drawn.notes))
+}

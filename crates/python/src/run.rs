@@ -1,0 +1,118 @@
+//! Runs: as `cars run` and `cars export` do them.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use config::units::Time;
+use config::{Override, Speed, seed};
+use lab::export::sheet::Format;
+use lab::export::{Wanted, export as export_epochs};
+use lab::folder::{find as find_folder, read_summary, recorded_epochs};
+use lab::run::{check_faults, execute_with};
+use launch::{RunOptions, scenario_file};
+use miette::{IntoDiagnostic, miette};
+use pyo3::prelude::*;
+use simulator::{RunFolder, Scenario};
+
+use crate::error::{plain, reported};
+use crate::interrupt::Watch;
+use crate::make::Makers;
+use crate::seat::Failure;
+
+/// Changes of a scenario, each as after `--set`.
+pub(crate) fn overrides(set: &[String]) -> PyResult<Vec<Override>> {
+    let mut changes = Vec::new();
+    for change in set {
+        changes.push(change.parse().map_err(plain)?);
+    }
+    Ok(changes)
+}
+
+/// Runs a scenario in this process. Returns the folder of the run and its summary as JSON.
+#[pyfunction]
+#[pyo3(signature = (file, *, seed, set, duration, speed, name, out, robots))]
+#[expect(clippy::too_many_arguments, reason = "they are named in Python")]
+pub(crate) fn run(
+    py: Python<'_>,
+    file: PathBuf,
+    seed: Option<u64>,
+    set: Vec<String>,
+    duration: Option<&str>,
+    speed: Option<&str>,
+    name: Option<&str>,
+    out: PathBuf,
+    robots: BTreeMap<String, Py<PyAny>>,
+) -> PyResult<(PathBuf, String)> {
+    let options = RunOptions {
+        run: name.map(str::parse).transpose().map_err(plain)?,
+        seed: seed.map(seed::check).transpose().map_err(plain)?,
+        duration: duration
+            .map(str::parse::<Time>)
+            .transpose()
+            .map_err(plain)?,
+        speed: speed.map(str::parse::<Speed>).transpose().map_err(plain)?,
+        out,
+        set: overrides(&set)?,
+    };
+    let failure = Failure::default();
+    let makers = Makers::new(robots, &failure);
+    py.detach(|| play(&file, &options, &makers, &failure))
+}
+
+fn play(
+    file: &Path,
+    options: &RunOptions,
+    makers: &Makers,
+    failure: &Failure,
+) -> PyResult<(PathBuf, String)> {
+    let scenario = scenario_file(file).map_err(reported)?;
+    let scenario = Scenario::load(&scenario, &options.changes()).map_err(reported)?;
+    makers.check(&scenario)?;
+    check_faults(&scenario, 0).map_err(reported)?;
+    let run = options.run_name(file).map_err(plain)?;
+    let (folder, _lock) = options.folder(&run, &scenario).map_err(reported)?;
+    let speed = options.speed.and_then(|speed| speed.0);
+
+    let watch = RefCell::new(Watch::begin());
+    let goes_on = || {
+        watch.borrow_mut().look().map_err(|error| {
+            failure.set(error);
+            miette!("interrupted")
+        })
+    };
+    let make = |name: &_, class: &_| makers.make(name, class);
+    let played = execute_with(scenario, &run, &folder, speed, &make, goes_on);
+    // What Python raised is the reason, whatever became of it on its way.
+    if let Some(error) = failure.take() {
+        return Err(error);
+    }
+    let summary = played.map_err(reported)?;
+    let summary = serde_json::to_string(&summary).map_err(plain)?;
+    Ok((folder.path().to_owned(), summary))
+}
+
+/// Finds the folder of a run by its name under `out`, or by its path. Returns it, and its summary as JSON if it has one.
+#[pyfunction]
+pub(crate) fn find(out: PathBuf, run: PathBuf) -> PyResult<(PathBuf, Option<String>)> {
+    let folder = find_folder(&out, &run).map_err(reported)?;
+    recorded_epochs(&folder).map_err(reported)?;
+    let summary = read_summary(&folder).map_err(reported)?;
+    let summary = summary.map(|summary| serde_json::to_string(&summary));
+    let summary = summary.transpose().map_err(plain)?;
+    Ok((folder.path().to_owned(), summary))
+}
+
+/// Writes the tables of a run to a folder, as Parquet. Returns what they leave out, a sentence each.
+#[pyfunction]
+pub(crate) fn export(py: Python<'_>, run: PathBuf, into: PathBuf) -> PyResult<Vec<String>> {
+    let wanted = Wanted {
+        tables: vec![Format::Parquet],
+        has_shiviz: false,
+    };
+    let exported = py.detach(|| -> miette::Result<_> {
+        let epochs = recorded_epochs(&RunFolder::at(run)).into_diagnostic()?;
+        Ok(export_epochs(&epochs, &into, &wanted)?)
+    });
+    Ok(exported.map_err(reported)?.notes)
+}

@@ -1,0 +1,156 @@
+//! Values of the SDK in Rust as values of the package in Python, and back. Their classes are in `cars/_data.py`.
+
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBool, PyDict, PyString, PyTuple, PyType};
+use robot::{Action, Point, PublicState, SensedBody, SensedKind, StateVariables, Variable};
+
+/// Module of the classes.
+const DATA: &str = "cars._data";
+
+/// A point.
+pub(crate) fn point(py: Python<'_>, point: Point) -> PyResult<Bound<'_, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, DATA, "Point")?.call1((point.x, point.y))
+}
+
+/// A point from two numbers.
+pub(crate) fn read_point(value: &Bound<'_, PyAny>) -> PyResult<Point> {
+    let [x, y] = value.extract()?;
+    Ok(Point::new(x, y))
+}
+
+/// A command that arrived.
+pub(crate) fn command<'py>(
+    py: Python<'py>,
+    sender: &str,
+    text: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, DATA, "Command")?.call1((sender, text))
+}
+
+/// A robot within sensing range.
+pub(crate) fn sensed_robot<'py>(
+    py: Python<'py>,
+    name: &str,
+    location: Point,
+) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let location = point(py, location)?;
+    CLASS
+        .import(py, DATA, "SensedRobot")?
+        .call1((name, location))
+}
+
+/// A body within sensing range.
+pub(crate) fn sensed_body<'py>(py: Python<'py>, body: &SensedBody) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let kind = match body.kind {
+        SensedKind::Obstacle => "obstacle",
+        SensedKind::Guest => "guest",
+        SensedKind::Robot => "robot",
+    };
+    let location = point(py, body.location)?;
+    CLASS
+        .import(py, DATA, "SensedBody")?
+        .call1((kind, location))
+}
+
+/// What a robot published of itself.
+pub(crate) fn state<'py>(py: Python<'py>, state: &PublicState) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let fields = (
+        state.epoch,
+        state.tick,
+        point(py, state.location)?,
+        state.speed_mps,
+        state.direction_rad,
+        variables(py, &state.state_variables)?,
+        &state.emotion_state,
+        &state.behavior_state,
+    );
+    CLASS.import(py, DATA, "PublicState")?.call1(fields)
+}
+
+/// State variables as a dictionary.
+pub(crate) fn variables<'py>(
+    py: Python<'py>,
+    variables: &StateVariables,
+) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    for (name, value) in variables {
+        match value {
+            Variable::Flag(flag) => all.set_item(name, flag)?,
+            Variable::Number(number) => all.set_item(name, number)?,
+            Variable::Text(text) => all.set_item(name, text)?,
+        }
+    }
+    Ok(all)
+}
+
+/// State variables from a dictionary.
+fn read_variables(value: &Bound<'_, PyAny>) -> PyResult<StateVariables> {
+    let mut variables = StateVariables::new();
+    for item in value.call_method0("items")?.try_iter()? {
+        let (name, value): (String, Bound<'_, PyAny>) = item?.extract()?;
+        let value = read_variable(&name, &value)?;
+        variables.insert(name, value);
+    }
+    Ok(variables)
+}
+
+/// A flag, a number or a text, also of NumPy.
+fn read_variable(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Variable> {
+    if value.is_instance_of::<PyBool>() {
+        return Ok(Variable::Flag(value.is_truthy()?));
+    }
+    if let Ok(text) = value.cast::<PyString>() {
+        return Ok(Variable::Text(text.to_string()));
+    }
+    match value.extract() {
+        Ok(number) => Ok(Variable::Number(number)),
+        // Not finite, which the seat leaves out and logs.
+        Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
+            Ok(Variable::Number(f64::INFINITY))
+        }
+        // A flag of NumPy is no number.
+        Err(_) => match value.extract() {
+            Ok(flag) => Ok(Variable::Flag(flag)),
+            Err(_) => Err(PyTypeError::new_err(format!(
+                "the state variable {name:?} must be a number, a text, True or False, not a {}",
+                value.get_type().name()?
+            ))),
+        },
+    }
+}
+
+/// An action of Python.
+pub(crate) fn read_action(value: &Bound<'_, PyAny>) -> PyResult<Action> {
+    let proposal = value.getattr("proposal").map_err(|_| {
+        let class = value.get_type();
+        PyTypeError::new_err(format!("a tick returns a cars.Action, not a {class}"))
+    })?;
+    Ok(Action {
+        proposal: read_point(&proposal)?,
+        speed_mps: value.getattr("speed_mps")?.extract()?,
+        direction_rad: value.getattr("direction_rad")?.extract()?,
+        emotion_state: value.getattr("emotion_state")?.extract()?,
+        behavior_state: value.getattr("behavior_state")?.extract()?,
+        state_variables: read_variables(&value.getattr("state_variables")?)?,
+    })
+}
+
+/// A tuple of values.
+pub(crate) fn tuple<'py, T>(
+    py: Python<'py>,
+    items: &[T],
+    convert: impl Fn(&T) -> PyResult<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let mut converted = Vec::with_capacity(items.len());
+    for item in items {
+        converted.push(convert(item)?);
+    }
+    PyTuple::new(py, converted)
+}

@@ -1,0 +1,69 @@
+"""CARS, the Cooperative Affective Robot Simulator, for Python: runs, experiments, and robots.
+
+>>> run = cars.run("configs/hors_doeuvres.toml", seed=7)
+>>> run.states.groupby("robot").emotion.value_counts()
+
+A robot is a class derived from :class:`Robot`, for a run in this process (``cars.run(scenario, robots={"Walker": Walker})``) or,
+by :func:`main`, as a program of its own.
+"""
+
+from . import panel
+from ._cars import Cars, Stream, __version__, published_angle, stream
+from ._data import (
+    Command,
+    Point,
+    PublicState,
+    SensedBody,
+    SensedRobot,
+    StateVariables,
+    Variable,
+    Welcome,
+)
+from ._entry import main, take_part
+from ._errors import BadParameters, CallError, Error, HostError, Interrupted, TooEarly, UnknownRobot, Unreachable
+from ._experiment import Experiment, Verdict, experiment
+from ._frames import Frames
+from ._pictures import Page, Picture
+from ._robot import Action, CarsRobotInterface, Robot
+from ._run import Run, load, run
+from .panel import Panel
+
+__all__ = [
+    "Action",
+    "BadParameters",
+    "CallError",
+    "Cars",
+    "CarsRobotInterface",
+    "Command",
+    "Error",
+    "Experiment",
+    "Frames",
+    "HostError",
+    "Interrupted",
+    "Page",
+    "Panel",
+    "Picture",
+    "Point",
+    "PublicState",
+    "Robot",
+    "Run",
+    "SensedBody",
+    "SensedRobot",
+    "StateVariables",
+    "Stream",
+    "TooEarly",
+    "UnknownRobot",
+    "Unreachable",
+    "Variable",
+    "Verdict",
+    "Welcome",
+    "__version__",
+    "experiment",
+    "load",
+    "main",
+    "panel",
+    "published_angle",
+    "run",
+    "stream",
+    "take_part",
+]

@@ -1,0 +1,102 @@
+"""What robots are told, as types. Lengths are meters, times seconds, speeds meters per second, angles radians counter-clockwise
+from +x."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple, Optional, Union
+
+Variable = Union[bool, float, str]
+"""A value that a robot publishes about itself. 7 and 7.0 are the same number."""
+StateVariables = Mapping[str, Variable]
+"""All that a robot chooses to publish about its inner workings: the hashtable of the paper."""
+
+
+class Point(NamedTuple):
+    """A place on the field: meters from its lower left corner."""
+
+    x: float
+    y: float
+
+    def distance_m(self, other: Point) -> float:
+        """Straight distance, meters."""
+        dx, dy = other.x - self.x, other.y - self.y
+        # Not hypot: multiplication and square root are the same on every machine.
+        return math.sqrt(dx * dx + dy * dy)
+
+
+class Command(NamedTuple):
+    """A command that arrived."""
+
+    sender: str
+    text: str
+
+
+class SensedRobot(NamedTuple):
+    """Another robot within sensing range."""
+
+    name: str
+    location: Point
+
+
+class SensedBody(NamedTuple):
+    """One sensed body: ``obstacle``, ``guest`` or ``robot``, and its center."""
+
+    kind: str
+    location: Point
+
+
+class PublicState(NamedTuple):
+    """A robot as it reported itself for ``tick``: the answer to all six queries of the common robot interface."""
+
+    epoch: int
+    tick: int
+    location: Point
+    speed_mps: float
+    direction_rad: float
+    state_variables: StateVariables
+    emotion_state: str
+    behavior_state: str
+
+
+@dataclass(frozen=True)
+class Welcome:
+    """What a robot needs to know to take part in an epoch."""
+
+    run: str
+    name: str
+    generation: int
+    """Its incarnation, from 1; a robot that comes back has a higher one."""
+    epoch: int
+    tick: int
+    """Last tick that was granted."""
+    seed: int
+    tick_s: float
+    """Length of a tick, simulated seconds."""
+    field_m: tuple[float, float]
+    """Width and height of the field, meters."""
+    body_m: float
+    """Side of every body, meters."""
+    sensing_range_m: float
+    """Distance within which it senses other bodies, meters."""
+    location: Point
+    """Where it stands, meters."""
+    roster: tuple[str, ...]
+    """Names of all robots of the scenario, itself included."""
+    parameters: Mapping[str, Any]
+    """Its parameters, as the scenario says, lengths and times in SI units."""
+    last_state: Optional[Mapping[str, Any]] = None
+    """What its previous incarnation reported last in this epoch."""
+
+
+def read_welcome(text: str) -> Welcome:
+    """A welcome from the message of the protocol."""
+    given = json.loads(text)
+    known = {field.name: given[field.name] for field in fields(Welcome) if field.name in given}
+    known["field_m"] = tuple(given["field_m"])
+    known["location"] = Point(**given["location"])
+    known["roster"] = tuple(given["roster"])
+    return Welcome(**known)

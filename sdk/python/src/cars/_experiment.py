@@ -1,0 +1,127 @@
+"""Experiments: playing a scenario in several arms under several conditions over many seeds."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, Optional, Union
+
+from . import _cars, _settings
+from ._frames import Frame, of_rows, read
+from ._pictures import Page
+from ._run import Name
+
+
+class Verdict(NamedTuple):
+    """How the runs of an experiment have met an expectation of its file."""
+
+    expectation: str
+    verdict: str
+    """``pass``, ``fail`` or ``undecided``: that of the worst run."""
+    failed: list[int]
+    """Numbers of the units that fail it."""
+    undecided: list[int]
+    """Numbers of the units that ended before it was certain."""
+
+
+class Experiment:
+    """The results of an experiment. Its folder has them as files, too."""
+
+    def __init__(self, folder: Path) -> None:
+        """Use :func:`cars.experiment`."""
+        self.folder = folder
+        """Its folder, from which it is resumed, and which every program of CARS reads."""
+        self._written = json.loads(Path(folder, "results.json").read_text(encoding="utf-8"))
+
+    def __repr__(self) -> str:
+        facts = self._written
+        return f"<Experiment {facts['name']}: {facts['units']} units, {len(self.failures)} failed>"
+
+    @property
+    def question(self) -> str:
+        """The question that it answers."""
+        return str(self._written["question"])
+
+    @property
+    def results(self) -> Frame:
+        """A row for each unit: condition, arm, seed, measures, verdicts."""
+        return self.frame()
+
+    def frame(self, kind: Optional[str] = None) -> Frame:
+        """The results as a frame of this library: ``"pandas"`` or ``"polars"``.
+
+        :raises Error: if it is not installed.
+        """
+        return read(Path(self.folder, "runs.parquet"), kind)
+
+    @property
+    def estimates(self) -> Frame:
+        """A row for each measure of each arm under each condition: the mean or the times, with intervals."""
+        return of_rows(self._written["estimates"])
+
+    @property
+    def contrasts(self) -> Frame:
+        """A row for each difference to the baseline, with its interval and p value."""
+        return of_rows(self._written["contrasts"])
+
+    @property
+    def failures(self) -> list[dict[str, Any]]:
+        """The units that could not be played to their end, with the reasons."""
+        return list(self._written["failures"])
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """How the runs have met each expectation of the experiment file."""
+        return [Verdict(*judged) for judged in _cars.verdicts(self.folder)]
+
+    def report(self) -> Page:
+        """The report about it: the answer, the design, estimates with intervals, differences, example runs."""
+        return Page(_cars.report([self.folder]))
+
+    @property
+    def figures(self) -> list[Page]:
+        """The figures of its report, each by itself."""
+        return [Page(figure) for figure in _cars.figures([self.folder])]
+
+
+def experiment(
+    file: Name,
+    *,
+    out: Optional[Name] = None,
+    scenario: Optional[Name] = None,
+    seeds: Union[int, Iterable[int], None] = None,
+    duration: Union[float, str, None] = None,
+    set: Optional[Mapping[str, Any]] = None,  # noqa: A002
+    jobs: Optional[int] = None,
+    retry_failed: bool = False,
+) -> Experiment:
+    """Plays an experiment, or goes on with it where it was interrupted, as ``cars experiment run`` does.
+
+    :param file: an experiment file, or the name of one that ships with the project, such as ``"deadlock"``.
+    :param out: its folder; without it ``runs/experiments/NAME``.
+    :param scenario: scenario or launch file, instead of that of the file.
+    :param seeds: instead of those of the file: a number of seeds, or the seeds.
+    :param duration: simulated time of each run, instead of that of the file: seconds, or a text such as ``"600 s"``.
+    :param set: changes of the scenario in every arm: see :func:`cars.run`.
+    :param jobs: number of runs at the same time; without it the number of processors. The results do not depend on it.
+    :param retry_failed: play units that failed once more.
+    :raises Error: with the text of the command line, if a file cannot be used.
+    """
+    folder = _cars.experiment(
+        Path(file),
+        out=None if out is None else Path(out),
+        scenario=None if scenario is None else Path(scenario),
+        seeds=None if seeds is None else list(range(1, seeds + 1) if isinstance(seeds, int) else seeds),
+        duration=_settings.time(duration),
+        set=_settings.changes(set),
+        jobs=jobs,
+        retry_failed=retry_failed,
+    )
+    played = Experiment(folder)
+    if played.failures:
+        first = played.failures[0]
+        reason = f"the first, {first['unit']}: {first['reason']}"
+        warnings.warn(f"{len(played.failures)} units failed; {reason}", stacklevel=2)
+    return played

@@ -1,0 +1,178 @@
+"""Runs: playing a scenario in this process, and reading what was recorded."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Optional, Union
+
+from . import _cars, _settings
+from ._errors import Error
+from ._frames import Frame, Frames, read, with_value
+from ._pictures import Page, Picture
+from ._robot import Robot, checked
+
+Name = Union[str, os.PathLike[str]]
+
+
+class Run:
+    """A run that was recorded."""
+
+    def __init__(self, folder: Path, summary: Optional[Mapping[str, Any]], keeper: object = None) -> None:
+        """Use :func:`cars.run` or :func:`cars.load`."""
+        self.folder = folder
+        """Its folder, as every program of CARS reads it."""
+        self.summary: Mapping[str, Any] = summary or {}
+        """What ``summary.json`` has: seed, time, verdicts, and for each robot how long it felt and did what. Empty if the
+        simulator was killed before it wrote one."""
+        self._keeper = keeper
+        self._frames: dict[Optional[str], Frames] = {}
+
+    def __repr__(self) -> str:
+        facts = self.summary
+        if not facts:
+            return f"<Run in {self.folder}, without an end>"
+        return f"<Run {facts['run']}, seed {facts['seed']}: {facts['ticks']} ticks, {facts['end']}, {self.verdict}>"
+
+    @property
+    def verdict(self) -> str:
+        """``pass``, ``fail`` or ``undecided``: the worst about what the scenario expects."""
+        verdicts = {judged["verdict"] for judged in self.summary.get("expectations", {}).values()}
+        return next((verdict for verdict in ("fail", "undecided") if verdict in verdicts), "pass")
+
+    def frames(self, kind: Optional[str] = None) -> Frames:
+        """Its tables as frames, which are those of ``cars export``.
+
+        :param kind: ``"pandas"`` or ``"polars"``; without it pandas where it is installed, else polars.
+        :raises Error: if that is not installed.
+        """
+        if kind not in self._frames:
+            self._check()
+            with tempfile.TemporaryDirectory() as folder:
+                for note in _cars.export(self.folder, Path(folder)):
+                    warnings.warn(note, stacklevel=2)
+                names = ("events", "states", "variables")
+                self._frames[kind] = Frames(*(read(Path(folder, f"{name}.parquet"), kind) for name in names))
+        return self._frames[kind]
+
+    @property
+    def events(self) -> Frame:
+        """A row for each event: moves that were blocked, emotions, behaviors, commands and their fate, faults, verdicts."""
+        return self.frames().events
+
+    @property
+    def states(self) -> Frame:
+        """A row for each robot in each tick: place, speed, emotion, behavior."""
+        return self.frames().states
+
+    @property
+    def variables(self) -> Frame:
+        """A row for each state variable of each robot in each tick."""
+        return self.frames().variables
+
+    @property
+    def commands(self) -> Frame:
+        """The events of commands: sent, delivered, lost."""
+        return with_value(self.events, "command")
+
+    def report(self) -> Page:
+        """The report about it: emotions and behaviors over time, transitions, occupancy, the network."""
+        self._check()
+        return Page(_cars.report([self.folder]))
+
+    @property
+    def figures(self) -> list[Page]:
+        """The figures of its report, each by itself."""
+        self._check()
+        return [Page(figure) for figure in _cars.figures([self.folder])]
+
+    def diagram(
+        self,
+        start: Union[int, str, None] = None,
+        end: Union[int, str, None] = None,
+        *,
+        queries: bool = False,
+        whole: bool = False,
+    ) -> Picture:
+        """Its space-time diagram: who commanded whom, what was lost, what the robots felt.
+
+        :param start: first moment: a tick, or a time such as ``"120 s"``.
+        :param end: last moment.
+        :param queries: draw lost queries, too.
+        :param whole: draw time in which nothing happens to scale, too.
+        """
+        self._check()
+        first, last = (None if moment is None else str(moment) for moment in (start, end))
+        svg, notes = _cars.diagram(self.folder, first, last, queries, whole)
+        for note in notes:
+            warnings.warn(note, stacklevel=2)
+        return Picture(svg)
+
+    def _check(self) -> None:
+        """Checks that no later run has taken its folder."""
+        if self.summary:
+            _, now = _cars.find(Path(), self.folder)
+            if now is None or json.loads(now)["digest"] != self.summary["digest"]:
+                raise Error(f"{self.folder} holds another run now; give each run a name or a folder of its own")
+
+
+def run(
+    scenario: Name,
+    *,
+    seed: Optional[int] = None,
+    set: Optional[Mapping[str, Any]] = None,  # noqa: A002
+    duration: Union[float, str, None] = None,
+    speed: Union[float, str, None] = None,
+    name: Optional[str] = None,
+    out: Optional[Name] = None,
+    robots: Optional[Mapping[str, Callable[[], Robot]]] = None,
+) -> Run:
+    """Runs a scenario in this process to its end, as ``cars run`` does, and returns its record.
+
+    :param scenario: a scenario file, or a launch file, whose scenario is run.
+    :param seed: instead of the scenario's.
+    :param set: changes of the scenario: ``{"guests.count": 50, "robot.Butler.params.refiller": "Vonda"}``. A text is read as after
+        ``--set`` on the command line.
+    :param duration: simulated time, instead of the scenario's: seconds, or a text such as ``"600 s"``.
+    :param speed: simulated seconds per second; without it as fast as possible.
+    :param name: name of the run and of its folder; without it the file's name.
+    :param out: where its folder is made, such as ``"runs"``. Without it in a temporary folder, which goes with the returned object.
+    :param robots: classes of robots of Python, or functions that make one, by the names of the scenario's robots. All others are
+        made by their classes in the scenario. A robot of Python computes under Python's lock; with those of Rust
+        alone other threads of Python go on meanwhile.
+    :raises Error: with the text of the command line, if a file cannot be used, or a robot cannot run in this process.
+    """
+
+    def maker(make: Callable[[], Robot]) -> Callable[[], Robot]:
+        return lambda: checked(make())
+
+    keeper = None
+    if out is None:
+        keeper = tempfile.TemporaryDirectory(prefix="cars-")
+        out = keeper.name
+    folder, summary = _cars.run(
+        Path(scenario),
+        seed=seed,
+        set=_settings.changes(set),
+        duration=_settings.time(duration),
+        speed=None if speed is None else str(speed),
+        name=name,
+        out=Path(out),
+        robots={of: maker(make) for of, make in (robots or {}).items()},
+    )
+    return Run(folder, json.loads(summary), keeper)
+
+
+def load(run: Name = "latest", *, out: Name = "runs") -> Run:
+    """A run that was recorded before, by any program.
+
+    :param run: its name, or its folder.
+    :param out: where run folders are made.
+    :raises Error: if there is none.
+    """
+    folder, summary = _cars.find(Path(out), Path(run))
+    return Run(folder, None if summary is None else json.loads(summary))

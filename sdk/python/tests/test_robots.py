@@ -1,0 +1,379 @@
+"""Robots in Python, one behavior at a time: in this process, and as programs."""
+
+from __future__ import annotations
+
+import math
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lab import PATIENCE_S, Lab, environment
+
+import cars
+from cars import Action, Cars, CarsRobotInterface, Panel, Point, Robot, StateVariables, TooEarly, UnknownRobot
+from cars.panel import Bar, Button, Text
+
+HALL = """
+seed = 1
+tick = "0.5 s"
+duration = "10 s"
+[field]
+size = ["20 m", "20 m"]
+[sensing]
+range = "4 m"
+"""
+
+
+def hall(*names: str, more: str = "") -> str:
+    """A scenario with nothing in it but robots, two meters apart."""
+    places = (f'[[robot]]\nname = "{name}"\nat = ["10 m", "{3 + 2 * i} m"]\n' for i, name in enumerate(names))
+    return HALL + "".join(places) + more
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    """A hall with robots A and B."""
+    file = tmp_path / "hall.toml"
+    file.write_text(hall("A", "B"))
+    return file
+
+
+class Still(Robot):
+    """Stands where it stands."""
+
+    def tick(self, cars: Cars) -> Action:
+        return Action.stay(cars, emotion_state="CALM", behavior_state="STAND")
+
+
+class Caller(Robot):
+    """Walks to the right, and does what robots can do."""
+
+    senses_bodies = True
+
+    def init(self, cars: Cars) -> None:
+        cars.log(f"init of {cars.name} at {cars.location.x}")
+        self.notes: list[str] = []
+
+    def tick(self, cars: Cars) -> Action:
+        if cars.tick == 0:
+            with pytest.raises(TooEarly):
+                cars.get_robot_state("B")
+        if cars.tick == 1:
+            cars.set_robot_command("B", "hello")
+            with pytest.raises(UnknownRobot, match='no robot is called "C"'):
+                cars.set_robot_command("C", "hello")
+            state = cars.get_robot_state("B")
+            self.notes.append(f"{state.emotion_state} {state.location.y} {cars.get_robot_behavior_state('B')}")
+            self.notes.append(f"{cars.sensed_robots[0].name} {cars.bodies[0].kind}")
+            self.notes.append(f"{cars.random.unit()} {cars.time_s} {cars.tick_s} {cars.welcome.roster}")
+        goal = Point(12.0, cars.location.y)
+        return Action.go(cars, goal, 1.0, emotion_state="CALM", state_variables={"notes": "; ".join(self.notes), "n": 3})
+
+
+class Listener(Still):
+    """Logs its commands."""
+
+    def tick(self, cars: Cars) -> Action:
+        for sender, text in cars.commands:
+            cars.log(f"{sender} says {text}")
+        return super().tick(cars)
+
+
+def test_a_robot_perceives_and_acts(scenario: Path) -> None:
+    run = cars.run(scenario, robots={"A": Caller, "B": Listener})
+    said = run.events[run.events.event == "say"].text.tolist()
+    assert said == ["init of A at 10.0", "A says hello"]
+    published = run.summary["robots"]["A"]["state_variables"]
+    draw = cars.stream(1, "robot/A").unit()
+    assert published == {"notes": f"CALM 5.0 STAND; B robot; {draw} 0.5 0.5 ('A', 'B')", "n": 3.0}
+    ways = run.states[run.states.robot == "A"]
+    assert ways.x_m.tolist()[:6] == [10.0, 10.5, 11.0, 11.5, 12.0, 12.0]
+    assert ways.speed_mps.tolist()[:6] == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]
+
+
+class Order(CarsRobotInterface):
+    """Notes in what order its methods are called."""
+
+    def init_robot(self, cars: Cars) -> None:
+        self.calls = ["init"]
+
+    def set_current_location(self, cars: Cars, location: Point) -> None:
+        self.at = location
+        self.calls.append("location")
+
+    def set_command(self, cars: Cars, sender: str, command: str) -> None:
+        self.calls.append(f"command {sender} {command}")
+
+    def update_state_variables(self, cars: Cars) -> None:
+        self.calls.append("variables")
+
+    def update_emotion_state(self, cars: Cars) -> None:
+        self.calls.append("emotion")
+
+    def update_behavior_state(self, cars: Cars) -> None:
+        self.calls.append("behavior")
+
+    def project_location(self, cars: Cars) -> Point:
+        cars.log(" ".join([*self.calls, "project"]))
+        self.calls = []
+        return self.at
+
+    def current_location(self) -> Point:
+        return self.at
+
+    def speed(self) -> float:
+        return 0.0
+
+    def direction(self) -> float:
+        return 0.1234567891
+
+    def state_variables(self) -> StateVariables:
+        return {"whole": 7, "part": 0.1, "flag": True, "text": "caf\u00e9", "huge": 10**400, "none": math.nan}
+
+    def emotion_state(self) -> str:
+        return "CALM"
+
+    def behavior_state(self) -> str:
+        return "NOTE"
+
+
+class Orders(Still):
+    """Sends a command at tick 1."""
+
+    def tick(self, cars: Cars) -> Action:
+        if cars.tick == 1:
+            cars.set_robot_command("A", "go")
+        return super().tick(cars)
+
+
+def test_figure_7_is_called_in_the_order_of_figure_5(scenario: Path) -> None:
+    run = cars.run(scenario, robots={"A": Order, "B": Orders}, duration="1.5 s")
+    said = run.events[run.events.event == "say"]
+    calls = [text for text in said.text if not text.startswith("error")]
+    assert calls == [
+        "init location project",
+        "location variables emotion behavior project",
+        "location command B go variables emotion behavior project",
+        "location variables emotion behavior project",
+    ]
+    assert sum("huge" in text or "none" in text for text in said.text) == 8, "what is not finite is left out and logged"
+    published = run.summary["robots"]["A"]["state_variables"]
+    assert published == {"whole": 7.0, "part": 0.1, "flag": True, "text": "caf\u00e9"}
+    assert run.states[run.states.robot == "A"].direction_rad.tolist()[0] == 0.123457
+
+
+def raising(method: str, error: str) -> type[Robot]:
+    """A class of robots one of whose methods raises something."""
+
+    def fail(self: Any, *_: Any) -> Any:
+        raise eval(error)
+
+    return type("Raising", (Still,), {method: fail})
+
+
+@pytest.mark.parametrize("method", ["init", "tick", "panel"])
+def test_what_a_robot_raises_is_raised_by_the_run(scenario: Path, method: str) -> None:
+    with pytest.raises(ZeroDivisionError, match="as it was told") as raised:
+        cars.run(scenario, robots={"A": raising(method, "ZeroDivisionError('as it was told')"), "B": Still})
+    assert "fail" in [entry.name for entry in raised.traceback], "the traceback shows the robot's own code"
+
+
+def answering(**fields: Any) -> type[Robot]:
+    """A class of robots that does and publishes this."""
+
+    class Answering(Robot):
+        def tick(self, cars: Cars) -> Action:
+            return Action.stay(cars, **fields) if fields else None  # type: ignore[return-value]
+
+    return Answering
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({}, "a tick returns a cars.Action"),
+        ({"state_variables": {"list": []}}, "the state variable \"list\" must be a number, a text, True or False"),
+        ({"speed_mps": "fast"}, "str"),
+    ],
+)
+def test_an_answer_of_the_wrong_kind_is_named(scenario: Path, fields: dict[str, Any], reason: str) -> None:
+    with pytest.raises(TypeError, match=reason):
+        cars.run(scenario, robots={"A": answering(**fields), "B": Still})
+
+
+def test_numbers_of_numpy_are_numbers(scenario: Path) -> None:
+    numpy = pytest.importorskip("numpy")
+    values = {"a": numpy.float32(0.5), "b": numpy.int64(7), "c": numpy.bool_(True)}
+    run = cars.run(scenario, robots={"A": answering(state_variables=values), "B": Still})
+    assert run.summary["robots"]["A"]["state_variables"] == {"a": 0.5, "b": 7.0, "c": True}
+
+
+class Hoarder(Still):
+    """Keeps what it is lent."""
+
+    kept: list[Cars] = []
+
+    def tick(self, cars: Cars) -> Action:
+        self.kept.append(cars)
+        with pytest.raises(RuntimeError, match="A uses cars.bodies and its senses_bodies is False"):
+            _ = cars.bodies
+        return super().tick(cars)
+
+
+def test_cars_is_lent_for_a_tick(scenario: Path) -> None:
+    cars.run(scenario, robots={"A": Hoarder, "B": Still})
+    with pytest.raises(RuntimeError, match="lent to a robot for a tick"):
+        _ = Hoarder.kept[0].tick
+
+
+def test_who_is_no_robot_is_refused(scenario: Path) -> None:
+    with pytest.raises(cars.UnknownRobot, match='no robot is called "C"; the roster is A, B'):
+        cars.run(scenario, robots={"C": Still})
+    with pytest.raises(TypeError, match="derived from cars.Robot"):
+        cars.run(scenario, robots={"A": dict, "B": Still})  # type: ignore[dict-item]
+
+
+def test_a_robot_that_comes_back_is_made_anew_and_resumes(tmp_path: Path) -> None:
+    class Counter(Still):
+        """Counts its ticks, also those before it was lost."""
+
+        count = 0.0
+
+        def tick(self, cars: Cars) -> Action:
+            self.count += 1
+            return Action.stay(cars, state_variables={"count": self.count})
+
+        def resume(self, cars: Cars, last: StateVariables) -> None:
+            assert cars.welcome.last_state is not None
+            self.count = float(last["count"])
+
+    fault = '[[fault]]\nrobot = "A"\ndo = "crash"\nat = "2 s"\nuntil = "4 s"\n'
+    file = tmp_path / "fault.toml"
+    file.write_text('on_late = "continue"\n' + hall("A", "B", more=fault))
+    run = cars.run(file, robots={"A": Counter, "B": Still})
+    missed = run.summary["robots"]["A"]["missed"]
+    assert missed > 0
+    assert run.summary["robots"]["A"]["state_variables"]["count"] == 21 - missed
+
+
+def test_the_same_seed_gives_the_same_run(scenario: Path) -> None:
+    runs = [cars.run(scenario, seed=seed, robots={"A": Caller, "B": Listener}) for seed in (5, 5, 6)]
+    digests = [run.summary["digest"] for run in runs]
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_panels_stay_within_the_limits_of_a_message() -> None:
+    shown = cars.panel.to_json(Panel([Bar("b", math.nan), Text("t", "\u00e9" * 4096), *[Button("x", "y")] * 100]))
+    assert '"value": 0.0' in shown and shown.count('"widget"') == 64 and len(shown) < 20_000
+
+
+# As programs.
+
+PROGRAM = """
+import sys
+import cars
+from cars import Action, Cars, Point, Robot
+
+
+class Own(Robot):
+    def tick(self, cars: Cars) -> Action:
+        %s
+        return Action.stay(cars, emotion_state="CALM")
+
+
+sys.exit(cars.main("A", lambda name: Own()))
+"""
+
+
+def program(folder: Path, body: str) -> list[str]:
+    """The command of a robot's program with these lines in its tick."""
+    file = folder / "own.py"
+    file.write_text(PROGRAM % textwrap.indent(body, "        ").strip())
+    return [sys.executable, str(file)]
+
+
+def test_a_program_whose_robot_fails_ends_with_its_traceback(lab: Lab) -> None:
+    robot = lab.start(program(lab.folder, "1 / 0"), **lab.simulator("fails", hall("A")))
+    _, said = robot.communicate(timeout=PATIENCE_S)
+    assert robot.returncode == 1
+    assert "1 / 0" in said and said.rstrip().endswith("ZeroDivisionError: division by zero"), said
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("body", ["pass", "print('busy', flush=True)\nwhile True: pass"])
+def test_a_signal_ends_a_program_at_once(lab: Lab, number: signal.Signals, body: str) -> None:
+    at = lab.simulator("signal", hall("A"), "--paused")
+    robot = lab.start(program(lab.folder, body), **at)
+    ctl = ["--run", "signal", "--connect", at["CARS_CONNECT"]]
+    if "busy" in body:
+        assert robot.stdout is not None and robot.stdout.readline() == "busy\n"
+    else:
+        lab.until_ready(*ctl)
+    robot.send_signal(number)
+    assert robot.wait(PATIENCE_S) == -number
+
+
+TAKES_PART = """
+import sys
+import cars
+
+
+class Still(cars.Robot):
+    def tick(self, cars):
+        print("tick", flush=True)
+        return {action}
+
+
+try:
+    print(cars.take_part({{"A": Still()}}))
+except KeyboardInterrupt:
+    print("interrupted")
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+
+
+def takes_part(lab: Lab, action: str, **more: str) -> subprocess.Popen[str]:
+    """A program that takes part without a command line."""
+    file = lab.folder / "takes_part.py"
+    file.write_text(TAKES_PART.format(action=action))
+    return lab.start([sys.executable, str(file)], **more)
+
+
+STAY = "__import__('cars').Action.stay(cars)"
+
+
+def test_taking_part_returns_how_the_run_ended(lab: Lab) -> None:
+    robot = takes_part(lab, STAY, **lab.simulator("ends", hall("A")))
+    printed, _ = robot.communicate(timeout=PATIENCE_S)
+    assert printed == "tick\n" * 21 + "finished\n"
+
+
+def test_taking_part_raises_what_the_robot_raised(lab: Lab) -> None:
+    robot = takes_part(lab, "1 / 0", **lab.simulator("raises", hall("A")))
+    printed, _ = robot.communicate(timeout=PATIENCE_S)
+    assert printed == "tick\nZeroDivisionError division by zero\n"
+
+
+def test_taking_part_is_interrupted(lab: Lab) -> None:
+    robot = takes_part(lab, STAY, **lab.simulator("interrupted", hall("A"), "--paused"))
+    assert robot.stdout is not None and robot.stdout.readline() == "tick\n"
+    robot.send_signal(signal.SIGINT)
+    printed, _ = robot.communicate(timeout=PATIENCE_S)
+    assert (printed, robot.returncode) == ("interrupted\n", 0)
+
+
+def test_where_nobody_is_it_says_what_to_do(lab: Lab) -> None:
+    robot = takes_part(lab, STAY, CARS_CONNECT="tcp/127.0.0.1:1", CARS_PATIENCE_S="0.3")
+    printed, _ = robot.communicate(timeout=PATIENCE_S)
+    assert printed.startswith("HostError ") and "127.0.0.1:1" in printed
+
+
+def test_a_robot_without_the_module_of_the_lab_costs_little() -> None:
+    """Neither pandas nor polars is imported by a robot's program."""
+    script = "import sys, cars; sys.exit(bool({'pandas', 'polars', 'numpy'} & set(sys.modules)))"
+    subprocess.run([sys.executable, "-c", script], env=environment(), check=True)
