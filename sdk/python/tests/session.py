@@ -52,6 +52,8 @@ duration = "60 s"
 size = ["10 m", "10 m"]
 [guests]
 count = 20
+[[obstacle]]
+at = ["7 m", "5 m"]
 [[robot]]
 name = "Walker"
 at = ["5 m", "5 m"]
