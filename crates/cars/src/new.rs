@@ -119,9 +119,8 @@ impl Language {
                 command: r#"["./robot.py"]"#,
                 typed: "@FOLDER@/robot.py",
                 build: "",
-                hint: "The robot imports the module `cars`. The wheel of CARS brings it, together with the command `cars`; with the checkout\n\
-                       of the project alone, `pip install CHECKOUT/sdk/python` builds and installs it. `sdk/python/README.md` of the\n\
-                       project documents what a robot can do in a tick, and so does `help(cars.Robot)` in Python.",
+                hint: "The robot imports the module `cars`. The wheel of CARS brings it, together with the command `cars`; `docs/notebooks.md`\n\
+                       of the project says how to make one. `sdk/python/README.md` of the project documents what a robot can do in a tick, and so does `help(cars.Robot)` in Python.",
             },
             Self::C => Skeleton {
                 // A fused multiply-add rounds once instead of twice, so results would differ between machines.

@@ -8,14 +8,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use config::units::Time;
 use lab::experiment::engine::{self, Options, Queue};
 use lab::experiment::{Experiment, Plan, Provenance, Request, Results, Robots, Store};
-use launch::scenario_file;
 use miette::miette;
 use protocol::random::MAX_SEED;
 use pyo3::prelude::*;
 
 use crate::error::{plain, reported};
 use crate::interrupt::interruptible;
-use crate::run::overrides;
+use crate::run::{overrides, scenario_of};
 
 /// Plays what has not been played of an experiment, and writes its results into its folder, which is returned with the names of
 /// units that cannot be trusted.
@@ -49,7 +48,7 @@ pub(crate) fn experiment(
     if let Some(scenario) = scenario {
         experiment.scenario = scenario;
     }
-    experiment.scenario = scenario_file(&experiment.scenario).map_err(reported)?;
+    experiment.scenario = scenario_of(&experiment.scenario)?;
 
     let name = file
         .file_stem()

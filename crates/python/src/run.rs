@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use config::units::Time;
+use config::shipped::{self, LAUNCHES, SCENARIOS};
 use config::{Override, Speed, seed};
 use lab::export::sheet::Format;
 use lab::export::{Wanted, export as export_epochs};
@@ -66,7 +67,7 @@ fn play(
     makers: &Makers,
     failure: &Failure,
 ) -> PyResult<(PathBuf, String)> {
-    let scenario = scenario_file(file).map_err(reported)?;
+    let scenario = scenario_of(file)?;
     let scenario = Scenario::load(&scenario, &options.changes()).map_err(reported)?;
     makers.check(&scenario)?;
     check_faults(&scenario, 0).map_err(reported)?;
@@ -90,6 +91,13 @@ fn play(
     let summary = played.map_err(reported)?;
     let summary = serde_json::to_string(&summary).map_err(plain)?;
     Ok((folder.path().to_owned(), summary))
+}
+
+/// The scenario file that a person means by the path of a scenario or launch file, or by the name of one that comes with the
+/// programs.
+pub(crate) fn scenario_of(given: &Path) -> PyResult<PathBuf> {
+    let file = shipped::find(given, &[LAUNCHES, SCENARIOS]);
+    scenario_file(&file).map_err(reported)
 }
 
 /// Finds the folder of a run by its name under `out`, or by its path. Returns it, and its summary as JSON if it has one.

@@ -1,11 +1,10 @@
 """The session of a researcher in a notebook: every cell is executed as IPython does it, in the folder where it is started.
 
-    python session.py CHECKOUT
+    python session.py
 """
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ CELLS = [
     # Run, frame.
     """
 import cars
-run = cars.run(CHECKOUT / "configs/hors_doeuvres.toml", seed=7, set={"guests.count": 60})
+run = cars.run("hors_doeuvres", seed=7, set={"guests.count": 60})
 assert run.verdict == "pass", run
 run
 """,
@@ -80,7 +79,7 @@ own
 """,
     # An experiment.
     """
-experiment = cars.experiment("deadlock", out="deadlock", scenario=CHECKOUT / "configs/hors_doeuvres.toml", seeds=2, duration=60)
+experiment = cars.experiment("deadlock", out="deadlock", seeds=2, duration=60)
 assert len(experiment.results) == 2 * 5 * 5 and not experiment.failures
 experiment.estimates.head()
 """,
@@ -101,7 +100,6 @@ def main() -> None:
     """Executes the cells; fails with the first one that fails."""
     kind: Any = InteractiveShell
     shell = kind.instance()
-    shell.user_ns["CHECKOUT"] = Path(sys.argv[1])
     for cell in CELLS:
         done = shell.run_cell(cell)
         done.raise_error()

@@ -1,6 +1,6 @@
 """CARS, the Cooperative Affective Robot Simulator, for Python: runs, experiments, and robots.
 
->>> run = cars.run("configs/hors_doeuvres.toml", seed=7)
+>>> run = cars.run("hors_doeuvres", seed=7)
 >>> run.states.groupby("robot").emotion.value_counts()
 
 A robot is a class derived from :class:`Robot`, for a run in this process (``cars.run(scenario, robots={"Walker": Walker})``) or,

@@ -99,9 +99,9 @@ def experiment(
 ) -> Experiment:
     """Plays an experiment, or goes on with it where it was interrupted, as ``cars experiment run`` does.
 
-    :param file: an experiment file, or the name of one that ships with the project, such as ``"deadlock"``.
+    :param file: an experiment file, or the name of one that comes with the programs, such as ``"deadlock"``.
     :param out: its folder; without it ``runs/experiments/NAME``.
-    :param scenario: scenario or launch file, instead of that of the file.
+    :param scenario: scenario or launch file, or the name of one, instead of that of the file.
     :param seeds: instead of those of the file: a number of seeds, or the seeds.
     :param duration: simulated time of each run, instead of that of the file: seconds, or a text such as ``"600 s"``.
     :param set: changes of the scenario in every arm: see :func:`cars.run`.

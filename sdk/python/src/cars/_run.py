@@ -133,7 +133,8 @@ def run(
 ) -> Run:
     """Runs a scenario in this process to its end, as ``cars run`` does, and returns its record.
 
-    :param scenario: a scenario file, or a launch file, whose scenario is run.
+    :param scenario: a scenario file, a launch file, whose scenario is run, or the name of one that comes with the programs, such as
+        ``"hors_doeuvres"``.
     :param seed: instead of the scenario's.
     :param set: changes of the scenario: ``{"guests.count": 50, "robot.Butler.params.refiller": "Vonda"}``. A text is read as after
         ``--set`` on the command line.
