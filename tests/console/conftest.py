@@ -8,7 +8,9 @@ from playwright.sync_api import expect, sync_playwright
 
 from lab import ROOT, Launch, Launched
 
-CHROMIUM = "/usr/bin/chromium"
+# The shell is the same engine without windows, and needs a third less processor time.
+SHELL = "/usr/bin/chromium-headless-shell"
+CHROMIUM = SHELL if os.path.exists(SHELL) else "/usr/bin/chromium"
 SCREENSHOTS = pathlib.Path(os.environ.get("CARS_SCREENSHOTS", ROOT / "target" / "console-screenshots"))
 
 expect.set_options(timeout=30_000)

@@ -24,7 +24,7 @@ def axe():
 
 def violations(page, axe):
     # Colors are judged when they have arrived.
-    page.evaluate("Promise.all(document.getAnimations().map((one) => one.finished))")
+    page.evaluate("Promise.allSettled(document.getAnimations().map((one) => one.finished))")
     page.evaluate(f"() => {{ {axe} }}")
     return page.evaluate(RUN)
 

@@ -40,6 +40,37 @@ def test_the_plan_says_draft_while_the_set_up_is_not_that_of_the_run(launch, ope
     expect(draft).to_be_hidden()
 
 
+def test_an_edit_while_the_set_up_is_read_is_kept(open_page, launch):
+    """The set-up of a new epoch is requested; what is edited before the answer comes is not replaced by it."""
+    run = launch()
+    held = []
+    is_slow = []
+
+    def relay(socket):
+        def pass_on(text):
+            if is_slow and '"answer":"setup"' in text:
+                held.append(lambda: socket.send(text))
+            else:
+                socket.send(text)
+
+        socket.connect_to_server().on_message(pass_on)
+
+    page = open_page("about:blank")
+    page.route_web_socket("**/ws", relay)
+    page.goto(run.address)
+    set_up(page)
+    is_slow.append(True)
+    page.get_by_test_id("btn-init").click()
+    eventually("the answer", lambda: page.wait_for_timeout(10) or held)
+    guests(page).fill("9")
+    is_slow.clear()
+    held[0]()
+    page.get_by_test_id("btn-start").click()
+    page.get_by_test_id("draft-apply").click()
+    eventually("the run", lambda: run.status()["epoch"] == 3)
+    expect(guests(page)).to_have_value("9")
+
+
 def test_start_and_init_ask_about_a_draft(launch, open_page):
     run = launch()
     page = open_page(run.address)

@@ -145,10 +145,20 @@ export class SetupView {
     await this.refresh();
   }
 
-  /** Replaces the draft with the set-up of the run. */
+  /** Replaces the draft with the set-up of the run, unless the draft is edited before the answer comes. */
   async refresh() {
+    const asked = JSON.stringify(this.draft);
     const applied = await this.ask();
-    if (applied) this.take(applied.setup, applied.epoch);
+    if (!applied) return;
+    if (JSON.stringify(this.draft) === asked) return this.take(applied.setup, applied.epoch);
+
+    // The edit changes what is applied now, if that is what it was made of. If not, the set-up was overtaken.
+    const setup = JSON.stringify(applied.setup);
+    if (setup === asked || setup === JSON.stringify(this.applied)) {
+      this.applied = applied.setup;
+      this.epoch = applied.epoch;
+    }
+    this.changed();
   }
 
   /**

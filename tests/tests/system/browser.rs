@@ -34,8 +34,10 @@ fn the_page_works_in_a_browser() {
 
 /// What the tests in a browser lack, and how to install it.
 fn missing_tools() -> Option<String> {
-    if !Path::new("/usr/bin/chromium").exists() {
-        return Some("there is no /usr/bin/chromium; `apt-get install chromium`".to_owned());
+    let browsers = ["/usr/bin/chromium-headless-shell", "/usr/bin/chromium"];
+    if !browsers.iter().any(|browser| Path::new(browser).exists()) {
+        let install = "`apt-get install chromium-headless-shell`";
+        return Some(format!("there is none of {}; {install}", browsers.join(", ")));
     }
 
     let python = Command::new("python3")
