@@ -4,8 +4,8 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use config::units::Time;
 use config::shipped::{self, LAUNCHES, SCENARIOS};
+use config::units::Time;
 use config::{Override, Speed, seed};
 use lab::export::sheet::Format;
 use lab::export::{Wanted, export as export_epochs};

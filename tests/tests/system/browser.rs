@@ -37,7 +37,10 @@ fn missing_tools() -> Option<String> {
     let browsers = ["/usr/bin/chromium-headless-shell", "/usr/bin/chromium"];
     if !browsers.iter().any(|browser| Path::new(browser).exists()) {
         let install = "`apt-get install chromium-headless-shell`";
-        return Some(format!("there is none of {}; {install}", browsers.join(", ")));
+        return Some(format!(
+            "there is none of {}; {install}",
+            browsers.join(", ")
+        ));
     }
 
     let python = Command::new("python3")
