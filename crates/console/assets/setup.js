@@ -139,10 +139,15 @@ export class SetupView {
     return null;
   }
 
-  /** Requests the set-up of the run, unless there are unapplied changes. */
+  /** Shows the set-up of the run. Changes of it are kept, and are changes of the new epoch if that has the same set-up. */
   async fetch() {
-    if (!this.isOpen || !this.store.isLive || this.isChanged) return this.changed();
-    await this.refresh();
+    if (!this.isOpen || !this.store.isLive) return this.changed();
+    const applied = await this.ask();
+    if (!applied) return;
+    if (!this.isChanged) return this.take(applied.setup, applied.epoch);
+
+    if (JSON.stringify(applied.setup) === JSON.stringify(this.applied)) this.epoch = applied.epoch;
+    this.changed();
   }
 
   /** Replaces the draft with the set-up of the run, unless the draft is edited before the answer comes. */
@@ -152,9 +157,8 @@ export class SetupView {
     if (!applied) return;
     if (JSON.stringify(this.draft) === asked) return this.take(applied.setup, applied.epoch);
 
-    // The edit changes what is applied now, if that is what it was made of. If not, the set-up was overtaken.
-    const setup = JSON.stringify(applied.setup);
-    if (setup === asked || setup === JSON.stringify(this.applied)) {
+    // The edit changes what has just been applied. If not, the set-up was overtaken.
+    if (JSON.stringify(applied.setup) === asked) {
       this.applied = applied.setup;
       this.epoch = applied.epoch;
     }
