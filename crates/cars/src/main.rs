@@ -1,4 +1,4 @@
-//! `cars`: the command line of the Cooperative Affective Robot Simulator.
+//! `cars`: the command line of the Cooperative Affective Robot Simulator, and what the programs beside it do.
 
 mod bench;
 mod check;
@@ -20,6 +20,7 @@ mod named;
 mod net;
 mod new;
 mod output;
+mod programs;
 mod replay;
 mod replay_robot;
 mod report;
@@ -126,6 +127,10 @@ enum Subcommands {
 }
 
 fn main() -> ExitCode {
+    if let Some(main) = programs::begun_as() {
+        return main();
+    }
+
     let cli: Cli = match terminal::arguments() {
         Ok(cli) => cli,
         Err(code) => return code,

@@ -39,3 +39,48 @@ fn errors_of_the_middleware_name_no_sources() {
     assert!(text.contains("cannot listen at"), "{text}");
     assert!(!text.contains(".rs:"), "{text}");
 }
+
+#[test]
+fn the_programs_beside_cars_are_that_program_under_their_names() {
+    let lab = Lab::new();
+    let run = "doors";
+    let args = ["launch", "launch/hors_doeuvres.toml", "--paused"];
+    let launch = lab.start(run, &args);
+    for program in ["cars-sim", "cars-console", "cars-butler", "cars-leguin"] {
+        let pid = launch.process(program);
+        // As killall and pgrep find it.
+        let name = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap();
+        assert_eq!(name.trim_end(), program);
+    }
+
+    let size = |program: &str| std::fs::metadata(programs().join(program)).unwrap().len();
+    for program in [
+        "cars-sim",
+        "cars-console",
+        "cars-butler",
+        "cars-leguin",
+        "cars-vonda",
+    ] {
+        assert!(size(program) * 10 < size("cars"), "{program}");
+    }
+}
+
+#[test]
+fn a_program_that_has_no_cars_beside_it_says_so() {
+    let lab = Lab::new();
+    let alone = lab.out().join("cars-sim");
+    std::fs::copy(programs().join("cars-sim"), &alone).unwrap();
+
+    let output = Command::new(&alone).arg("--version").output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr);
+    let missing = lab.out().join("cars");
+    assert!(
+        said.contains(&format!("cars-sim needs the program {}", missing.display())),
+        "{said}"
+    );
+    assert!(
+        said.contains("install all programs of CARS in one folder"),
+        "{said}"
+    );
+}

@@ -1,5 +1,8 @@
 //! Butler, the waiter.
 
+#[path = "../door.rs"]
+mod door;
+
 fn main() -> std::process::ExitCode {
-    robot::main("Butler", |_| Box::new(robots::Butler::default()))
+    door::open("cars-butler")
 }

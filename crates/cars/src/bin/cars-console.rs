@@ -1,5 +1,8 @@
 //! The console.
 
+#[path = "../door.rs"]
+mod door;
+
 fn main() -> std::process::ExitCode {
-    console::main()
+    door::open("cars-console")
 }

@@ -1,5 +1,8 @@
 //! Leguin, the refiller.
 
+#[path = "../door.rs"]
+mod door;
+
 fn main() -> std::process::ExitCode {
-    robot::main("Leguin", |_| Box::new(robots::Leguin::default()))
+    door::open("cars-leguin")
 }

@@ -1,5 +1,8 @@
 //! The simulator.
 
+#[path = "../door.rs"]
+mod door;
+
 fn main() -> std::process::ExitCode {
-    simulator::program::main()
+    door::open("cars-sim")
 }

@@ -1,5 +1,8 @@
 //! Vonda, a clone of Leguin under another name.
 
+#[path = "../door.rs"]
+mod door;
+
 fn main() -> std::process::ExitCode {
-    robot::main("Vonda", |_| Box::new(robots::Leguin::default()))
+    door::open("cars-vonda")
 }
