@@ -1,7 +1,5 @@
 //! Recording mode.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +9,7 @@ use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, RecordedTick, Wall, Writer};
 use serde_json::{Value, json};
 
-use crate::client::{Console, fails};
+use super::client::{Console, fails};
 
 fn robot(name: &str) -> RobotName {
     RobotName::new(name).unwrap()

@@ -1,10 +1,5 @@
 //! Starts a console and connects to it as a browser does.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a test that cannot set up its subject fails"
-)]
-
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -13,6 +8,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
+use system_tests::programs;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
@@ -22,7 +18,7 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The program under test.
 pub(crate) fn program(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_cars-console"));
+    let mut command = Command::new(programs().join("cars-console"));
     for variable in [
         "CARS_RUN",
         "CARS_CONNECT",
