@@ -41,7 +41,7 @@ impl Watch {
 pub(crate) fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
-    stop: impl Fn(),
+    stop: impl Fn() + Sync,
 ) -> PyResult<T> {
     let (done, mut is_done) = channel();
     let worker = thread::Builder::new().spawn(move || {
@@ -67,7 +67,8 @@ pub(crate) fn interruptible<T: Send + 'static>(
             if interruption.is_some() {
                 return Err(error);
             }
-            stop();
+            // Whoever it waits for may wait for the lock of Python.
+            py.detach(&stop);
             interruption = Some(error);
         }
     }
