@@ -140,6 +140,9 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("{} printed:\n{}", self.run, self.printed());
+        }
         for (pid, _) in find(&self.run) {
             let _ = kill(pid_of(pid), Signal::SIGKILL);
         }

@@ -3,6 +3,12 @@
 //! Set `CARS_UPDATE=1` to write the files again. They are transcripts of the real state machines of simulator and robots, joined
 //! by function calls; a run over zenoh puts the same bytes.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot set up its subject fails"
+)]
+
 mod caller;
 mod echo;
 mod process;

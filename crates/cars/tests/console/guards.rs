@@ -3,7 +3,7 @@
 use std::io::{Read, Write};
 use std::net::TcpListener;
 
-use super::client::{Console, fails, program};
+use crate::client::{Console, fails, program};
 
 #[test]
 fn a_request_for_another_host_is_refused() {

@@ -1,5 +1,10 @@
 //! Without the token there is nothing to see and nothing to do, on loopback as elsewhere.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot set up its subject fails"
+)]
+
 use std::io::{Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -7,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use tungstenite::Message;
 
-use super::client::{Console, PATIENCE, Response, program};
+use crate::client::{Console, PATIENCE, Response, program};
 
 /// Addresses to serve at: loopback, and all interfaces.
 const BINDS: [&str; 2] = ["127.0.0.1:0", "0.0.0.0:0"];

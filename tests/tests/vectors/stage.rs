@@ -21,8 +21,8 @@ use simulator::scenario::Changes;
 use simulator::{Scenario, Simulation};
 use system_tests::root;
 
-use super::process::{Machine, MachineAction, Others, Process};
-use super::transcript::{Query, Transcript};
+use crate::process::{Machine, MachineAction, Others, Process};
+use crate::transcript::{Query, Transcript};
 
 fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap()

@@ -10,7 +10,7 @@ use proptest::test_runner::TestRunner;
 use serde_json::Value;
 use tungstenite::Message;
 
-use super::client::{Console, PATIENCE, Page, Received};
+use crate::client::{Console, PATIENCE, Page, Received};
 
 fn control(id: u64, control: &str) -> String {
     format!(r#"{{"type":"control","id":{id},"control":{control}}}"#)

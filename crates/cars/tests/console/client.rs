@@ -1,5 +1,10 @@
 //! Starts a console and connects to it as a browser does.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot set up its subject fails"
+)]
+
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -8,7 +13,6 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
-use system_tests::programs;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
@@ -18,7 +22,7 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The program under test.
 pub(crate) fn program(args: &[&str]) -> Command {
-    let mut command = Command::new(programs().join("cars-console"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cars-console"));
     for variable in [
         "CARS_RUN",
         "CARS_CONNECT",

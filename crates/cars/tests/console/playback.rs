@@ -1,5 +1,7 @@
 //! Recording mode.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +11,7 @@ use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, RecordedTick, Wall, Writer};
 use serde_json::{Value, json};
 
-use super::client::{Console, fails};
+use crate::client::{Console, fails};
 
 fn robot(name: &str) -> RobotName {
     RobotName::new(name).unwrap()

@@ -1,5 +1,7 @@
 //! Experiments played by clusters: their results are those of this machine, byte for byte.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 mod kubernetes;
 mod parallel;
 mod slurm;
