@@ -139,6 +139,7 @@ impl Running {
 }
 
 impl Drop for Running {
+    #[expect(clippy::print_stdout, reason = "shown if the test fails")]
     fn drop(&mut self) {
         if std::thread::panicking() {
             println!("{} printed:\n{}", self.run, self.printed());
