@@ -1,5 +1,7 @@
 //! Errors of the bus.
 
+use std::io::{Error, ErrorKind};
+
 /// A failure of the bus itself.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
@@ -41,4 +43,22 @@ pub enum BusError {
         /// The reason, from the middleware.
         reason: String,
     },
+}
+
+impl BusError {
+    /// Whether nothing could listen at the address, because another socket of this machine has it.
+    #[must_use]
+    pub fn is_address_taken(&self) -> bool {
+        let Self::Open { reason, .. } = self else {
+            return false;
+        };
+        os_errors(reason).any(|kind| kind == ErrorKind::AddrInUse)
+    }
+}
+
+/// The errors of the operating system that a text of the middleware names, which has its reasons as texts only.
+fn os_errors(text: &str) -> impl Iterator<Item = ErrorKind> {
+    let after = text.split("(os error ").skip(1);
+    let numbers = after.filter_map(|rest| rest.split_once(')')?.0.parse().ok());
+    numbers.map(|number| Error::from_raw_os_error(number).kind())
 }

@@ -60,6 +60,8 @@ impl std::fmt::Display for Ended {
 /// A failure that ended a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failure {
+    /// Name of the process.
+    pub process: String,
     /// Name of the process and how it ended.
     pub text: String,
     /// Exit status of the launch.

@@ -306,7 +306,7 @@ impl Launch {
     /// If the run's folder cannot be made, or the processes cannot be supervised. The failure of a process is part of the
     /// outcome.
     pub fn play(&self, mut notice: impl FnMut(&str)) -> miette::Result<(Outcome, RunFolder)> {
-        // A free port may be taken before the simulator binds it.
+        // A free port may be taken before the simulator binds it, if only by a connection that has ended since.
         let may_choose = self.options.listen.is_none() && self.options.connect_port.is_none();
         let mut ports_left = if may_choose { PORTS } else { 1 };
         loop {
@@ -319,12 +319,10 @@ impl Launch {
 
             let outcome = self.supervise(planned, &endpoint, &folder)?;
             ports_left -= 1;
-            if ports_left == 0 || outcome.failure.is_none() || !endpoint::is_taken(&endpoint) {
+            if ports_left == 0 || !is_port_taken(&outcome) {
                 return Ok((outcome, folder));
             }
-            notice(&format!(
-                "another process listens at {endpoint}: trying another port"
-            ));
+            notice(&format!("{endpoint} is taken: trying another port"));
         }
     }
 
@@ -398,6 +396,14 @@ impl Launch {
         screen.finish();
         Ok(outcome)
     }
+}
+
+/// Whether the run failed because the simulator could not listen where another process does.
+fn is_port_taken(outcome: &Outcome) -> bool {
+    let failure = outcome.failure.as_ref();
+    failure.is_some_and(|failure| {
+        failure.process == file::SIMULATOR && failure.code == simulator::program::ADDRESS_TAKEN
+    })
 }
 
 /// A path that holds in any folder: the run may be resumed from another one.

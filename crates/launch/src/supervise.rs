@@ -373,6 +373,7 @@ impl Supervisor {
         self.notice(format!("{name} {ended}: ending the run"));
 
         let failure = Failure {
+            process: name.to_owned(),
             text: format!("{name} {ended}"),
             code: ended.code(),
             tail: self.processes[index].tail.lines(),

@@ -16,6 +16,9 @@ use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::messages::End;
 
+/// Exit status where another process has the address at which the simulator is to listen.
+pub const ADDRESS_TAKEN: u8 = 3;
+
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
 #[derive(Debug, Parser)]
 #[command(name = "cars-sim", version)]
@@ -104,7 +107,7 @@ pub fn main() -> ExitCode {
     bus::runtime::use_router_threads();
     terminal::print_diagnostics("warn,zenoh=error");
 
-    terminal::conclude(run(&args).map(|summary| exit_code(&summary, args.no_verdict)))
+    terminal::conclude(run(&args))
 }
 
 fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
@@ -117,7 +120,7 @@ fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
     }
 }
 
-fn run(args: &Args) -> miette::Result<Summary> {
+fn run(args: &Args) -> miette::Result<ExitCode> {
     let duration_s = args.duration.map(|duration| duration.0);
     let scenario = Scenario::load(
         &shipped::find(&args.scenario, &[shipped::SCENARIOS]),
@@ -136,7 +139,13 @@ fn run(args: &Args) -> miette::Result<Summary> {
         listen: args.listen.clone(),
         trusts_network: args.insecure,
     };
-    let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
+    let bus = match Bus::open(&role, args.zenoh_config.as_ref()) {
+        Err(error) if error.is_address_taken() => {
+            terminal::note(format_args!("Error: {error}"));
+            return Ok(ExitCode::from(ADDRESS_TAKEN));
+        }
+        bus => bus.into_diagnostic()?,
+    };
     let options = Options {
         run: args.run.clone(),
         speed: args.speed.0,
@@ -154,7 +163,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
     }
 
     folder.write_line(ENDPOINT, &connectable(&args.listen))?;
-    let outcome = server.run(scenario, &folder, past).into_diagnostic();
+    let summary = server.run(scenario, &folder, past).into_diagnostic();
 
     for name in [ENDPOINT, OPERATOR_CONFIG]
         .map(|name| folder.file(name))
@@ -166,7 +175,7 @@ fn run(args: &Args) -> miette::Result<Summary> {
         }
     }
 
-    outcome
+    Ok(exit_code(&summary?, args.no_verdict))
 }
 
 /// Makes the folder of a new run, or opens that of a run to resume, with its record.

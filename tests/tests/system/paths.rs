@@ -1,6 +1,8 @@
 //! Programs that were built on one machine and run on another one do not show folders of the first.
 
+use std::fs::Permissions;
 use std::net::TcpListener;
+use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
 
 use system_tests::{Lab, programs, root};
@@ -35,7 +37,7 @@ fn errors_of_the_middleware_name_no_sources() {
         .unwrap();
 
     let text = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("cannot listen at"), "{text}");
     assert!(!text.contains(".rs:"), "{text}");
 }
@@ -83,4 +85,58 @@ fn a_program_that_has_no_cars_beside_it_says_so() {
         said.contains("install all programs of CARS in one folder"),
         "{said}"
     );
+}
+
+/// A simulator that finds the port of its launch taken, the first time it is started, and is the real one otherwise.
+const TAKEN_ONCE: &str = r#"#!/bin/sh
+if mkdir "$ONCE"; then
+    for argument in "$@"; do
+        case $argument in --listen=*) argument=--listen=$TAKEN;; esac
+        shift
+        set -- "$@" "$argument"
+    done
+fi
+exec "$SIMULATOR" "$@"
+"#;
+
+#[test]
+fn a_launch_whose_port_was_taken_tries_another() {
+    let lab = Lab::new();
+    let folder = lab.out().join("programs");
+    std::fs::create_dir(&folder).unwrap();
+    for program in ["cars", "cars-butler", "cars-leguin", "cars-vonda"] {
+        std::fs::copy(programs().join(program), folder.join(program)).unwrap();
+    }
+    let simulator = folder.join("cars-sim");
+    std::fs::write(&simulator, TAKEN_ONCE).unwrap();
+    std::fs::set_permissions(&simulator, Permissions::from_mode(0o755)).unwrap();
+
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let output = Command::new(folder.join("cars"))
+        .current_dir(root())
+        .args([
+            "launch",
+            "launch/three_robots.toml",
+            "--run",
+            "taken",
+            "--no-console",
+            "--duration",
+            "5 s",
+            "--out",
+        ])
+        .arg(lab.out())
+        .env("ONCE", lab.out().join("once"))
+        .env("TAKEN", format!("tcp/{}", taken.local_addr().unwrap()))
+        .env("SIMULATOR", programs().join("cars-sim"))
+        .output()
+        .unwrap();
+
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert_eq!(
+        said.matches("is taken: trying another port").count(),
+        1,
+        "{said}"
+    );
+    assert!(!lab.recorded("taken").is_empty());
 }
