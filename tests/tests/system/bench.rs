@@ -43,6 +43,17 @@ fn a_build_is_compared_with_its_floor_and_with_another_build() {
 }
 
 #[test]
+fn a_part_of_the_hall_is_measured_whatever_a_whole_run_is_to_show() {
+    let args = ["--rounds", "1", "--robots", "2", "--ticks", "6000"];
+    let (code, text) =
+        Lab::new().cars_without_out(&[&["bench", "--only", "the hall"], &args[..]].concat());
+    assert_eq!(code, 0, "{text}");
+    for subject in ["the hall, as processes", "the hall, in one process"] {
+        assert!(text.contains(subject), "{text}");
+    }
+}
+
+#[test]
 fn a_folder_without_programs_is_refused() {
     let lab = Lab::new();
     let folder = lab.out().to_str().unwrap();

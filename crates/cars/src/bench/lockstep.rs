@@ -232,6 +232,8 @@ fn execute(
 ) -> miette::Result<f64> {
     simulation
         .args(["--run", RUN, "--duration", &format!("{duration_s} s")])
+        // A run of any length is measured; what a scenario expects of a whole one is no failure of a part.
+        .args(["--set", "expect=[]"])
         .arg("--out")
         .arg(workload.scratch);
     let mut processes = Processes::default();
