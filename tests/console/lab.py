@@ -37,6 +37,13 @@ def until(page, expression):
         raise AssertionError(f"{error}; the page says: {page.locator('#notice').inner_text()!r}") from None
 
 
+# The plan is drawn anew in the frame after the page was laid out; until then its places are where they were.
+FITS = """(() => {
+    const plan = document.getElementById("plan"), ratio = Math.min(2, devicePixelRatio);
+    return plan.width === Math.round(plan.clientWidth * ratio) && plan.height === Math.round(plan.clientHeight * ratio);
+})()"""
+
+
 # Not the ports that the kernel gives to connections: another process would take one before it is used.
 PORTS = itertools.cycle(range(11_000, 31_000))
 for _ in range(os.getpid() % 20_000):

@@ -2,7 +2,7 @@
 
 from playwright.sync_api import expect
 
-from lab import eventually
+from lab import FITS, eventually, until
 
 
 def open_menu(page):
@@ -130,6 +130,7 @@ def test_a_robots_menu_opens_on_the_plan_and_by_a_key(launch, open_page, screens
         for width, height in ((1280, 720), (390, 844)):
             page = open_page(run.address, width=width, height=height, scheme=scheme)
             expect(page.get_by_test_id("tick")).not_to_have_text("–")
+            until(page, FITS)
             menu = page.get_by_test_id("experiment-menu")
             at = page.evaluate(
                 "(() => { const at = window.carsConsole.frame().robots.find(r => r.name === 'Leguin').location;"

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from lab import ROOT, eventually, until
+from lab import FITS, ROOT, eventually, until
 
 PIXEL = """([x, y]) => {
     const canvas = document.querySelector('[data-testid=plan]'), box = canvas.getBoundingClientRect();
@@ -73,6 +73,7 @@ def test_initials_are_unique_and_the_name_is_shown_on_hover(launch, open_page):
     found = labels(*many)
     assert len({label.lower() for label in found.values()}) == len(many)
 
+    until(page, FITS)
     at = page.evaluate(
         "(() => { const {location} = window.carsConsole.frame().robots[0];"
         " return window.carsConsole.toClient(location.x, location.y); })()"

@@ -5,7 +5,7 @@ import json
 import pytest
 from playwright.sync_api import expect
 
-from lab import eventually, until
+from lab import FITS, eventually, until
 
 BODY_M = 0.6096
 
@@ -17,6 +17,7 @@ def set_up(page):
 
 
 def at(page, x_m, y_m):
+    until(page, FITS)
     place = page.evaluate("([x, y]) => window.carsConsole.toClient(x, y)", [x_m, y_m])
     return place["x"], place["y"]
 
@@ -39,7 +40,6 @@ def test_obstacles_that_are_clicked_block_a_robot(launch, open_page):
     walls = [(1, 0), (1, 1), (0, 1), (1, -1), (-1, 1)]
     for right, up in walls:
         page.mouse.click(*at(page, corner + right * BODY_M, corner + up * BODY_M))
-    page.wait_for_timeout(100)
     apply(page, run)
     assert len(page.evaluate("window.carsConsole.frame().obstacles")) == 1 + len(walls)
 
