@@ -31,8 +31,11 @@ def build(profile: str, out: Path) -> Path:
     subprocess.run([*cargo, "--quiet"], cwd=ROOT, check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"), profile)
     made = out.resolve()
-    # A copy, so that programs never lie among the sources; within the project, whose toolchain and settings cargo finds from there.
-    with tempfile.TemporaryDirectory(dir=target) as folder:
+    # A copy, so that programs never lie among the sources; within the project, whose toolchain and settings cargo finds from there,
+    # wherever it builds.
+    within = ROOT / "target"
+    within.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=within) as folder:
         copy = Path(folder, "python")
         shutil.copytree(HERE, copy, ignore=shutil.ignore_patterns("__pycache__", "tests"))
         project = copy / "pyproject.toml"
