@@ -526,6 +526,13 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             .is_some_and(|member| member.is_present)
     }
 
+    /// Whether this incarnation of a robot has missed the last ticks.
+    #[must_use]
+    pub fn is_behind(&self, robot: &RobotName, generation: Generation) -> bool {
+        let member = self.members.get(robot);
+        member.is_some_and(|member| member.missed > 0 && member.generation == generation)
+    }
+
     /// Whether a robot can take part in the next tick.
     #[must_use]
     pub fn is_back(&self, robot: &RobotName) -> bool {

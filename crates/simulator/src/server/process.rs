@@ -891,7 +891,7 @@ impl Server {
             Event::Report {
                 robot,
                 report: Ok(report),
-            } => self.on_report(&robot, report),
+            } => self.on_report(&robot, report, simulation),
             Event::Command {
                 from,
                 to,
@@ -950,12 +950,16 @@ impl Server {
         name
     }
 
-    fn on_report(&mut self, robot: &str, report: Report) {
+    fn on_report(&mut self, robot: &str, report: Report, simulation: &mut Simulation) {
         let Some(name) = self.known(robot) else {
             return;
         };
         self.observing.report(&name, report.tick);
         let stamp = Stamp::from(&report);
+        let is_of_epoch = stamp.epoch == simulation.epoch();
+        if is_of_epoch && self.barrier.is_behind(&name, stamp.generation) {
+            simulation.done_late(&name, stamp.tick);
+        }
         let commands = report.commands;
         self.barrier
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
