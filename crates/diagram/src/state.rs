@@ -117,6 +117,7 @@ impl State {
                 set: set.clone(),
             }),
             Event::Init { .. }
+            | Event::DoneLate { .. }
             | Event::Blocked { .. }
             | Event::Say { .. }
             | Event::Judged { .. }

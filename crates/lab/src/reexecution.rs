@@ -119,8 +119,8 @@ impl Reexecution {
         })
     }
 
-    /// What the simulation was given between this tick and the one before: what was changed by hand, faults that were due, and
-    /// the operator's commands.
+    /// What the simulation was given between this tick and the one before: what was changed by hand, faults that were due, the
+    /// operator's commands, and answers that came too late.
     fn repeat_inputs(&mut self, recorded: &Entry) -> miette::Result<()> {
         let simulation = &mut self.local.simulation;
         let changes = recorded.changes_by_hand();
@@ -136,6 +136,11 @@ impl Reexecution {
 
         for sent in recorded.commands_of(&RobotName::operator()) {
             simulation.command(&sent.to, &sent.command.command);
+        }
+        for (robot, ticks) in recorded.done_late() {
+            for tick in ticks {
+                simulation.done_late(robot, *tick);
+            }
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Re
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::{Membership, Outcome, Sent};
-use crate::member::{Admission, Lateness, Member, Naming, Turn};
+use crate::member::{Admission, Attendance, Lateness, Member, Naming, Turn};
 use crate::rules::{Rule, Rules};
 
 /// How long the barrier waits for what.
@@ -149,6 +149,8 @@ pub struct Barrier<R, C> {
     /// Robots for which the simulation has news of the open tick.
     news: BTreeSet<RobotName>,
     membership: Vec<Membership>,
+    /// Who takes part in the tick, where it is executed again: then neither tokens nor time decide.
+    attendance: Option<Attendance>,
     is_announced: bool,
     pub(crate) rules: Rules,
 }
@@ -175,6 +177,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             tick: 0,
             news: BTreeSet::new(),
             membership: Vec::new(),
+            attendance: None,
             is_announced: false,
             rules: Rules::default(),
         }
@@ -190,6 +193,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         self.is_announced = false;
         self.news.clear();
         self.membership.clear();
+        self.attendance = None;
         for member in self.members.values_mut() {
             member.turn = Turn::default();
             member.fault = None;
@@ -198,6 +202,18 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
         out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
         self.look_whether_gathered(out);
+    }
+
+    /// Says who takes part in the tick that is opened next, because it is executed again. `None` if that is open, as usual.
+    pub fn recall(&mut self, attendance: Option<Attendance>) {
+        self.attendance = attendance;
+    }
+
+    /// Asks the process of a robot to join again, so that it takes part as a further incarnation from the next tick on.
+    pub fn ask_to_rejoin(&mut self, robot: &RobotName) {
+        if let Some(member) = self.members.get_mut(robot) {
+            member.must_rejoin |= !member.is_coming;
+        }
     }
 
     /// Grants a tick. `news` are the robots for which the simulation has something new.
@@ -215,7 +231,12 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             member.turn = Turn::default();
             if tick == 0 {
                 member.begin_epoch();
-            } else if let Some(generation) = member.take_in() {
+                continue;
+            }
+            // Where the tick is executed again, a successor waits until its predecessor's absence is over.
+            let attendance = self.attendance.as_ref();
+            let is_admitted = attendance.is_none_or(|recorded| recorded.joined.contains(name));
+            if is_admitted && let Some(generation) = member.take_in() {
                 self.membership
                     .push(Membership::Joined(name.clone(), generation));
             }
@@ -307,7 +328,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             }
             self.repeat(out);
         }
-        if !is_present && is_awaited && policy == OnLate::Continue {
+        let is_decided = self.attendance.is_some();
+        if !is_present && is_awaited && policy == OnLate::Continue && !is_decided {
             // It will not report in time.
             self.give_up(name);
             self.stand_in(name, out);
@@ -429,7 +451,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
                 }
                 out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
             }
-            Timer::Deadline if self.phase == Phase::Open => self.judge_late(out),
+            Timer::Deadline if self.phase == Phase::Open && self.attendance.is_none() => {
+                self.judge_late(out);
+            }
             Timer::Token(name) => {
                 if let Some(member) = self.members.get_mut(name) {
                     member.is_reserved = false;
@@ -524,6 +548,19 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         self.members
             .get(robot)
             .is_some_and(|member| member.is_present)
+    }
+
+    /// Whether this incarnation of a robot has missed the last ticks.
+    #[must_use]
+    pub fn is_behind(&self, robot: &RobotName, generation: Generation) -> bool {
+        let member = self.members.get(robot);
+        member.is_some_and(|member| member.missed > 0 && member.generation == generation)
+    }
+
+    /// Whether the scenario keeps the process of a robot from running.
+    #[must_use]
+    pub fn is_stopped(&self, robot: &RobotName) -> bool {
+        self.members.get(robot).is_some_and(Member::is_stopped)
     }
 
     /// Whether a robot can take part in the next tick.
@@ -626,15 +663,26 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             }
         }
 
+        // A robot does not run a tick whose clock says that it has news, and they do not come.
+        let mut withheld = BTreeSet::new();
+        for name in self.attendance.iter().flat_map(|recorded| &recorded.absent) {
+            let naming = named.get(name).copied().unwrap_or_default();
+            if naming.rejoin.is_none() {
+                withheld.insert(name.clone());
+            }
+        }
+
         let mut flags = 0;
         for (index, name) in self.members.keys().enumerate() {
-            if self.news.contains(name) || named.contains_key(name) {
+            let has_own = self.news.contains(name) || named.contains_key(name);
+            if has_own || withheld.contains(name) {
                 flags |= 1_u32 << (index % NEWS_FLAGS);
             }
         }
         let mut news = Vec::new();
         for (index, name) in self.members.keys().enumerate() {
-            if has_news && flags & (1 << (index % NEWS_FLAGS)) != 0 {
+            let is_flagged = flags & (1 << (index % NEWS_FLAGS)) != 0;
+            if has_news && is_flagged && !withheld.contains(name) {
                 news.push((name.clone(), named.get(name).copied().unwrap_or_default()));
             }
         }
@@ -682,13 +730,16 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     }
 
     /// Where the clock goes on without late robots, it does not wait for those that cannot report. It never waits for a report
-    /// that would not count.
+    /// that would not count. Where the tick is executed again, its record says which robots those are.
     fn give_up_those_that_are_out(&mut self) {
         let goes_on = self.rules.hold(Rule::GoesOnWithoutAbsent);
         let mut out = Vec::new();
         for (name, member) in &self.members {
             let policy = self.lateness.of(name);
-            let is_out = member.is_out(self.tick) && policy == OnLate::Continue && goes_on;
+            let is_out = match &self.attendance {
+                Some(recorded) => recorded.absent.contains(name),
+                None => member.is_out(self.tick) && policy == OnLate::Continue && goes_on,
+            };
             if !member.is_lost && (is_out || member.must_rejoin) {
                 out.push(name.clone());
             }
@@ -724,10 +775,12 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// The clock goes on without a robot in the open tick, and from then on if it is lost.
     fn give_up(&mut self, name: &RobotName) {
         let lose_after = self.lateness.lose_after;
+        let attendance = self.attendance.as_ref();
+        let recorded = attendance.map(|recorded| recorded.lost.contains(name));
         let Some(member) = self.members.get_mut(name) else {
             return;
         };
-        if member.miss(lose_after, self.rules) {
+        if member.miss(lose_after, recorded, self.rules) {
             self.membership.push(Membership::Lost(name.clone()));
         }
     }

@@ -1,6 +1,6 @@
 //! A robot of the roster as the barrier knows it: its process, whether it takes part, and its turn in the open tick.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -49,6 +49,17 @@ pub struct Naming {
     pub joined: Option<Generation>,
     /// The incarnation that takes part no more, and whose process is to join again.
     pub rejoin: Option<Generation>,
+}
+
+/// Who takes part in a tick that is executed again, as its record has it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Attendance {
+    /// Robots of which a further incarnation takes part from this tick on.
+    pub joined: BTreeSet<RobotName>,
+    /// Robots that do not run this tick.
+    pub absent: BTreeSet<RobotName>,
+    /// Those of them that are lost in it.
+    pub lost: BTreeSet<RobotName>,
 }
 
 /// A robot of the roster.
@@ -173,8 +184,8 @@ impl<R, C> Member<R, C> {
         Some(self.generation)
     }
 
-    /// Misses the open tick. Returns whether it is lost now.
-    pub(crate) fn miss(&mut self, lose_after: u32, rules: Rules) -> bool {
+    /// Misses the open tick. Returns whether it is lost now; `recorded` is whether it was, where the tick is executed again.
+    pub(crate) fn miss(&mut self, lose_after: u32, recorded: Option<bool>, rules: Rules) -> bool {
         self.turn = Turn {
             is_given_up: true,
             ..Turn::default()
@@ -185,7 +196,7 @@ impl<R, C> Member<R, C> {
         // nothing.
         let is_hung = self.fault == Some(FaultKind::Hang) && rules.hold(Rule::HangDecides);
         let is_gone = !self.is_present && !is_hung;
-        self.is_lost = self.missed >= lose_after || is_gone;
+        self.is_lost = recorded.unwrap_or(self.missed >= lose_after || is_gone);
 
         // How many old clocks a stopped process answers when it goes on is wall clock: its state must not matter any more.
         let was_stopped = self.fault == Some(FaultKind::Hang) && rules.hold(Rule::RejoinsAfterHang);
@@ -203,9 +214,12 @@ impl<R, C> Member<R, C> {
 
     /// Whether it cannot report for this tick: the scenario keeps its process from running, or it is not connected.
     pub(crate) fn is_out(&self, tick: Tick) -> bool {
-        let is_stopped = matches!(self.fault, Some(FaultKind::Hang | FaultKind::Crash));
+        tick > 0 && (self.is_stopped() || !self.is_present)
+    }
 
-        tick > 0 && (is_stopped || !self.is_present)
+    /// Whether the scenario keeps its process from running.
+    pub(crate) fn is_stopped(&self) -> bool {
+        matches!(self.fault, Some(FaultKind::Hang | FaultKind::Crash))
     }
 
     /// The incarnation whose process is asked to join again, if it is connected.

@@ -8,9 +8,9 @@ use protocol::messages::{Clock, FaultKind, OnLate, Refusal};
 
 use crate::states::States;
 use crate::{
-    Action, Admission, Barrier, Begin, Ignored, Lateness, Leave, Membership, Naming, NoState,
-    Outcome, Output, Participant, Patience, Refused, RobotTimer, Sent, Stamp, StateQuery, Timer,
-    Timing, Turn,
+    Action, Admission, Attendance, Barrier, Begin, Ignored, Lateness, Leave, Membership, Naming,
+    NoState, Outcome, Output, Participant, Patience, Refused, RobotTimer, Sent, Stamp, StateQuery,
+    Timer, Timing, Turn,
 };
 
 type Simulator = Barrier<&'static str, &'static str>;
@@ -562,4 +562,106 @@ fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnatio
         .rev()
         .find_map(|output| outcome(vec![output]));
     assert_eq!(last.expect("both have reported").membership, [joins]);
+}
+
+/// The news and the clock's flags of the tick that was granted.
+fn granted(out: &Outputs) -> (Vec<(RobotName, Naming)>, u32) {
+    let granted = out.iter().find_map(|output| match output {
+        Output::Grant { news, clock } => Some((news.clone(), clock.news)),
+        _ => None,
+    });
+    granted.expect("a tick is granted")
+}
+
+#[test]
+fn in_a_tick_that_is_executed_again_its_record_decides_who_takes_part() {
+    let mut barrier = gathered(lateness(OnLate::Continue, 1));
+    open(&mut barrier, 0);
+    report(&mut barrier, "A", 0);
+    report(&mut barrier, "B", 0);
+
+    // A has news that do not come, so that it does not run the tick. It is not lost, whatever the rule says.
+    barrier.recall(Some(Attendance {
+        absent: [name("A")].into(),
+        ..Attendance::default()
+    }));
+    let out = open(&mut barrier, 1);
+    assert_eq!(granted(&out), (Vec::new(), 1));
+    let complete = outcome(report(&mut barrier, "B", 1)).expect("complete without A");
+    assert!(complete.membership.is_empty(), "{complete:?}");
+    let mut again = Vec::new();
+    barrier.repeat(&mut again);
+    assert_eq!(granted(&again), (Vec::new(), 1));
+
+    // Who has reported is awaited, whatever the time and the tokens say.
+    barrier.recall(Some(Attendance::default()));
+    open(&mut barrier, 2);
+    report(&mut barrier, "B", 2);
+    let mut out = Vec::new();
+    barrier.token(&name("A"), false, &mut out);
+    barrier.timer(&Timer::Deadline, &mut out);
+    assert_eq!(outcome(out), None);
+    barrier.token(&name("A"), true, &mut Vec::new());
+    let complete = outcome(report(&mut barrier, "A", 2)).expect("complete");
+    assert_eq!(complete.reports.len(), 2);
+}
+
+#[test]
+fn a_robot_that_is_lost_in_a_record_takes_part_again_where_the_record_has_it() {
+    let mut barrier = gathered(lateness(OnLate::Continue, 5));
+    let lost = Attendance {
+        absent: [name("A")].into(),
+        lost: [name("A")].into(),
+        ..Attendance::default()
+    };
+    barrier.recall(Some(lost));
+    let out = open(&mut barrier, 0);
+    let (news, _) = granted(&out);
+    assert_eq!(news[0].1.rejoin, Some(1));
+    let complete = outcome(report(&mut barrier, "B", 0)).expect("complete without A");
+    assert_eq!(complete.membership, [Membership::Lost(name("A"))]);
+    let admission = barrier.join(&name("A"), "A", &mut Vec::new());
+    assert_eq!(admission.map(|admission| admission.generation), Ok(2));
+    assert!(barrier.is_back(&name("A")));
+
+    barrier.recall(Some(Attendance {
+        absent: [name("A")].into(),
+        ..Attendance::default()
+    }));
+    open(&mut barrier, 1);
+    let complete = outcome(report(&mut barrier, "B", 1)).expect("complete without A");
+    assert!(complete.membership.is_empty(), "{complete:?}");
+
+    barrier.recall(Some(Attendance {
+        joined: [name("A")].into(),
+        ..Attendance::default()
+    }));
+    open(&mut barrier, 2);
+    assert_eq!(outcome(report(&mut barrier, "B", 2)), None);
+    let stamp = Stamp {
+        epoch: 1,
+        tick: 2,
+        generation: 2,
+    };
+    let mut out = Vec::new();
+    barrier.report(&name("A"), stamp, 0, "report", &mut out);
+    let complete = outcome(out).expect("complete");
+    assert_eq!(complete.membership, [Membership::Joined(name("A"), 2)]);
+}
+
+#[test]
+fn a_robot_is_asked_to_join_again_once() {
+    let mut barrier = gathered(lateness(OnLate::Wait, 1));
+    open(&mut barrier, 0);
+    report(&mut barrier, "A", 0);
+    report(&mut barrier, "B", 0);
+
+    barrier.ask_to_rejoin(&name("A"));
+    assert!(!barrier.is_back(&name("A")));
+    barrier
+        .join(&name("A"), "A", &mut Vec::new())
+        .expect("joins again");
+    barrier.ask_to_rejoin(&name("A"));
+    assert!(barrier.is_back(&name("A")));
+    assert!(!barrier.is_behind(&name("A"), 2));
 }

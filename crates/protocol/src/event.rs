@@ -60,6 +60,14 @@ pub enum Event {
         /// Who.
         robot: RobotName,
     },
+    /// A robot that has missed ticks takes part again as the same incarnation, and did some of them too late: what it reported
+    /// for them did not count.
+    DoneLate {
+        /// Who.
+        robot: RobotName,
+        /// Which ticks.
+        ticks: Vec<Tick>,
+    },
     /// A robot's move was refused; it stays where it is.
     Blocked {
         /// Who.
@@ -302,6 +310,7 @@ impl Event {
             Self::Joined { .. } => "joined",
             Self::Lost { .. } => "lost",
             Self::Missed { .. } => "missed",
+            Self::DoneLate { .. } => "done_late",
             Self::Blocked { .. } => "blocked",
             Self::Emotion { .. } => "emotion",
             Self::Behavior { .. } => "behavior",
@@ -506,7 +515,10 @@ impl Event {
                 simulator(LogKind::Run, format!("{how}, digest {digest}"))
             }
             // A blocked robot tries again every tick; the log would be nothing else. So with a lossy network.
-            Self::Blocked { .. } | Self::QueryLost { .. } | Self::Tick { .. } => None,
+            Self::DoneLate { .. }
+            | Self::Blocked { .. }
+            | Self::QueryLost { .. }
+            | Self::Tick { .. } => None,
         }
     }
 }

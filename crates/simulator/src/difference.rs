@@ -175,6 +175,7 @@ fn is_environment(event: &Event) -> bool {
             | Event::CommandSent { .. }
             | Event::Say { .. }
             | Event::Missed { .. }
+            | Event::DoneLate { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }
     )

@@ -98,6 +98,14 @@ impl Entry {
         changes
     }
 
+    /// Robots that took part again in the tick, with those of the ticks that they had missed which they did too late.
+    pub fn done_late(&self) -> impl Iterator<Item = (&RobotName, &[Tick])> {
+        self.events.iter().filter_map(|event| match event {
+            Event::DoneLate { robot, ticks } => Some((robot, ticks.as_slice())),
+            _ => None,
+        })
+    }
+
     /// Whether a robot's report of the tick is missing.
     #[must_use]
     pub fn has_missed(&self, name: &RobotName) -> bool {

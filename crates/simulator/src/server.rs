@@ -18,6 +18,7 @@ mod past;
 mod player;
 mod process;
 mod replay;
+mod returns;
 mod timers;
 mod viewers;
 mod watchdog;

@@ -74,6 +74,8 @@ pub struct Simulation {
     stood_at: Vec<Point>,
     /// Robots without a report of the last tick: they propose nothing and cannot be queried.
     silent: Vec<RobotName>,
+    /// Ticks that robots have done since their last report, too late for them to count.
+    late: BTreeMap<RobotName, BTreeSet<Tick>>,
     /// Robots of which a new incarnation joined in the last tick. They cannot be queried: the previous incarnation may have
     /// published another state for that tick before it died, and followers of that state cannot tell the two apart.
     newcomers: Vec<RobotName>,
@@ -129,6 +131,7 @@ impl Simulation {
             reports: BTreeMap::new(),
             stood_at: Vec::new(),
             silent: Vec::new(),
+            late: BTreeMap::new(),
             newcomers: Vec::new(),
             stopped: Vec::new(),
             incarnations: BTreeMap::new(),
@@ -393,12 +396,38 @@ impl Simulation {
             if let Some((report, commands)) = reports.remove(&name) {
                 let sent = self.number_commands(&name, commands);
                 digest.report(&name, Some((&report, &sent)));
+                self.note_done_late(&name);
                 self.note_report(&name, &report, sent);
             } else {
                 digest.report(&name, None);
                 self.silent.push(name.clone());
                 self.events.push(Event::Missed { robot: name });
             }
+        }
+    }
+
+    /// A robot has done a tick of which its report does not count, because the clock goes on without it.
+    pub fn done_late(&mut self, robot: &RobotName, tick: Tick) {
+        if tick <= self.now && self.has_not_reported_since(robot, tick) {
+            self.late.entry(robot.clone()).or_default().insert(tick);
+        }
+    }
+
+    /// Whether the last report of a robot is of an earlier tick.
+    fn has_not_reported_since(&self, robot: &RobotName, tick: Tick) -> bool {
+        let last = self.reports.get(robot);
+        last.is_none_or(|report| report.tick < tick)
+    }
+
+    /// Records what a robot that takes part again has done of the ticks that it missed: its state depends on them.
+    fn note_done_late(&mut self, robot: &RobotName) {
+        let mut ticks = self.late.remove(robot).unwrap_or_default();
+        ticks.remove(&self.now);
+        if !ticks.is_empty() {
+            self.events.push(Event::DoneLate {
+                robot: robot.clone(),
+                ticks: ticks.into_iter().collect(),
+            });
         }
     }
 
@@ -557,6 +586,10 @@ impl Simulation {
         let incarnation = self.incarnation(&robot, generation, None);
         self.incarnations
             .insert(robot.clone(), (generation, incarnation));
+        // What a predecessor did is of no consequence.
+        if let Some(ticks) = self.late.get_mut(&robot) {
+            *ticks = ticks.split_off(&self.now);
+        }
         // At tick 0 every incarnation publishes the same state.
         if self.now > 0 {
             self.newcomers.push(robot.clone());

@@ -464,6 +464,43 @@ fn who_does_not_report_stays_and_is_out_of_reach_at_the_next_tick() {
 }
 
 #[test]
+fn what_a_robot_did_too_late_is_recorded_when_it_takes_part_again() {
+    let mut simulation = simulation(TWO);
+    let mut puppets = Puppets::new(&simulation, |_, _, _| {});
+    simulation.init(&mut puppets).unwrap();
+    puppets.deaf = vec![name("B")];
+    for _ in 1..=3 {
+        let record = simulation.step(&mut puppets).unwrap();
+        assert!(
+            !record
+                .events
+                .iter()
+                .any(|event| event.kind() == "done_late")
+        );
+    }
+
+    // An answer that counted comes again, and one is of a tick that has not begun.
+    for tick in [0, 3, 1, 3, 9] {
+        simulation.done_late(&name("B"), tick);
+    }
+    puppets.deaf.clear();
+    let record = simulation.step(&mut puppets).unwrap();
+    let done_late = Event::DoneLate {
+        robot: name("B"),
+        ticks: vec![1, 3],
+    };
+    assert!(record.events.contains(&done_late), "{:?}", record.events);
+
+    let record = simulation.step(&mut puppets).unwrap();
+    assert!(
+        !record
+            .events
+            .iter()
+            .any(|event| event.kind() == "done_late")
+    );
+}
+
+#[test]
 fn each_successor_in_one_tick_draws_from_a_stream_of_its_own() {
     let mut simulation = simulation(TWO);
     let mut reported = vec![];

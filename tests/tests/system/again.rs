@@ -531,3 +531,269 @@ fn a_run_that_cannot_be_resumed_keeps_its_record() {
     lab.ok(&["run", HALL, "--run", "whole", "--duration", "60 s"]);
     assert_same(("resumed", &lab.bytes(run)), ("whole", &lab.bytes("whole")));
 }
+
+/// The hall under `on_late = "continue"`, paced, whose processes have these options in the launch file.
+struct Unattended {
+    lab: Lab,
+    run: &'static str,
+}
+
+impl Unattended {
+    /// Starts it and waits until it has reached a tick.
+    fn start(run: &'static str, options: &str, tick: u64, args: &[&str]) -> (Self, Running) {
+        let lab = Lab::new();
+        let scenario = root().join("configs/hors_doeuvres.toml");
+        let mut launch = format!("scenario = {scenario:?}\n");
+        for (name, program) in [("Butler", "cars-butler"), ("Leguin", "cars-leguin")] {
+            launch.push_str(&format!(
+                "[[process]]\nname = {name:?}\ncommand = [{program:?}]\n{options}\n"
+            ));
+        }
+        let file = lab.write("unattended.toml", &launch);
+        let all = [
+            "launch",
+            file.to_str().unwrap(),
+            "--no-console",
+            "--speed",
+            "10",
+            "--duration",
+            "120 s",
+            "--set",
+            "on_late=continue",
+            "--set",
+            "deadline=0.3 s",
+        ];
+        let launch = lab.start(run, &[&all[..], args].concat());
+        await_tick(&lab, run, tick);
+        (Self { lab, run }, launch)
+    }
+
+    /// Waits for an event of Leguin's, such as `"lost"`.
+    fn await_event(&self, event: &str) {
+        let text = match event.strip_prefix("joined ") {
+            Some(incarnation) => {
+                format!("\"joined\",\"robot\":\"Leguin\",\"generation\":{incarnation},")
+            }
+            None => format!("\"event\":\"{event}\",\"robot\":\"Leguin\""),
+        };
+        eventually(event, || {
+            let events = std::fs::read_to_string(self.lab.file(self.run, "events.jsonl")).ok()?;
+            events.contains(&text).then_some(())
+        });
+    }
+
+    /// The ticks of Leguin's events of this kind, without that of the beginning.
+    fn ticks(&self, kind: &str) -> Vec<u64> {
+        let mut ticks = Vec::new();
+        for event in self.lab.events(self.run) {
+            let is_later = kind != "joined" || event["generation"].is_u64();
+            if event["event"] == kind && event["robot"] == "Leguin" && is_later {
+                ticks.push(event["tick"].as_u64().unwrap());
+            }
+        }
+        ticks
+    }
+
+    /// Waits for further ticks.
+    fn await_ticks(&self, further: u64) {
+        let reached = complete(&self.lab.bytes(self.run)).1;
+        await_tick(&self.lab, self.run, reached + further);
+    }
+
+    /// Kills the simulator; returns the record up to the last complete tick, and that tick.
+    fn kill(&self, launch: &mut Running) -> (Vec<u8>, u64) {
+        kill_simulator(launch, self.run);
+        complete(&self.lab.bytes(self.run))
+    }
+
+    /// Resumes the run at its pace, and waits for ticks after those that were recorded, which are the same then.
+    fn resume(&self, recorded: &(Vec<u8>, u64)) -> Running {
+        let resume = ["launch", "--no-console", "--resume", self.run];
+        let folder = self.lab.out().join(self.run);
+        let again = Running::start(self.lab.cars(&resume), self.run, folder);
+        await_tick(&self.lab, self.run, recorded.1 + 5);
+        self.assert_kept(&recorded.0);
+        again
+    }
+
+    /// Resumes the run to its end, and verifies it.
+    fn finish(&self, recorded: &(Vec<u8>, u64)) {
+        let resume = ["launch", "--no-console", "--resume", self.run];
+        self.lab.ok(&[&resume[..], &["--speed", "max"]].concat());
+
+        self.assert_kept(&recorded.0);
+        let said = verify(&self.lab, self.run);
+        assert!(said.contains("the same, 240 ticks to the end"), "{said}");
+    }
+
+    fn assert_kept(&self, recorded: &[u8]) {
+        let bytes = self.lab.bytes(self.run);
+        let kept = &bytes[..recorded.len().min(bytes.len())];
+        assert_same(("resumed", kept), ("recorded", recorded));
+    }
+}
+
+/// A record up to its last complete tick, and that tick.
+fn complete(record: &[u8]) -> (Vec<u8>, u64) {
+    let text = String::from_utf8_lossy(record);
+    let mut whole = 0;
+    let mut last = 0;
+    let mut at = 0;
+    for line in text.split_inclusive('\n') {
+        at += line.len();
+        if line.contains("\"event\":\"tick\"") && line.ends_with('\n') {
+            let event: serde_json::Value = serde_json::from_str(line).unwrap();
+            last = event["tick"].as_u64().unwrap();
+            whole = at;
+        }
+    }
+    (record[..whole].to_vec(), last)
+}
+
+const RESTARTS: &str = "restart = \"on-failure\"\nbackoff = \"0.1 s\"";
+const NOT_REQUIRED: &str = "required = false";
+
+/// The clock goes on without a robot that died, and its successor takes part: no part of the scenario.
+#[test]
+fn a_run_whose_robot_was_killed_and_came_back_is_resumed_as_often_as_it_is_killed() {
+    let (hall, mut launch) = Unattended::start("killed-robot", RESTARTS, 10, &[]);
+    send(launch.process("cars-leguin"), Signal::SIGKILL);
+    hall.await_event("lost");
+    hall.await_event("joined 2");
+    hall.await_ticks(2);
+    let first = hall.kill(&mut launch);
+
+    let mut again = hall.resume(&first);
+    send(again.process("cars-leguin"), Signal::SIGKILL);
+    hall.await_event("joined 3");
+    hall.await_ticks(2);
+    let second = hall.kill(&mut again);
+    assert!(second.1 > first.1);
+    let (lost, joined) = (hall.ticks("lost"), hall.ticks("joined"));
+
+    hall.finish(&second);
+    assert_eq!((lost.len(), joined.len()), (2, 2));
+    assert_eq!(hall.ticks("lost"), lost);
+    assert_eq!(hall.ticks("joined"), joined);
+}
+
+/// A process that was stopped goes on where it was, after ticks that it has missed. Some of them it does too late.
+#[test]
+fn a_run_whose_robot_was_stopped_for_some_ticks_is_resumed() {
+    let (hall, mut launch) = Unattended::start("stopped-robot", NOT_REQUIRED, 10, &[]);
+    for _ in 0..2 {
+        let before = hall.ticks("missed").len();
+        let leguin = launch.process("cars-leguin");
+        send(leguin, Signal::SIGSTOP);
+        eventually("missed ticks", || {
+            (hall.ticks("missed").len() >= before + 3).then_some(())
+        });
+        send(leguin, Signal::SIGCONT);
+        hall.await_ticks(10);
+    }
+    let recorded = hall.kill(&mut launch);
+    let missed = hall.ticks("missed");
+    assert!(missed.len() >= 6, "{missed:?}");
+    assert!(hall.ticks("lost").is_empty(), "stopped for too long");
+    let done_late = hall.ticks("done_late");
+    assert!(!done_late.is_empty(), "it does nothing too late");
+
+    let mut again = hall.resume(&recorded);
+    let recorded = hall.kill(&mut again);
+    hall.finish(&recorded);
+    assert_eq!(hall.ticks("missed"), missed);
+    assert_eq!(hall.ticks("done_late"), done_late);
+}
+
+/// Its link was given up, as that of a robot that is cut off, and the same process returns.
+#[test]
+fn a_run_whose_robot_was_silent_until_it_was_lost_is_resumed() {
+    let (hall, mut launch) = Unattended::start("silent-robot", NOT_REQUIRED, 10, &[]);
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    hall.await_event("lost");
+    send(leguin, Signal::SIGCONT);
+    hall.await_event("joined 2");
+    hall.await_ticks(5);
+    let recorded = hall.kill(&mut launch);
+
+    let mut again = hall.resume(&recorded);
+    let recorded = hall.kill(&mut again);
+    hall.finish(&recorded);
+    assert_eq!(hall.ticks("lost").len(), 1);
+    assert_eq!(hall.ticks("joined").len(), 1);
+}
+
+/// No tick was missed: the record has nothing but the further incarnation.
+#[test]
+fn a_run_whose_robot_was_replaced_between_two_ticks_is_resumed() {
+    for (run, policy) in [("replaced", "continue"), ("replaced-awaited", "wait")] {
+        let on_late = format!("on_late={policy}");
+        let args = ["--paused", "--set", &on_late];
+        let (hall, mut launch) = Unattended::start(run, RESTARTS, 0, &args);
+        hall.lab.until_ready(run);
+        hall.lab.step(run, 10);
+        send(launch.process("cars-leguin"), Signal::SIGKILL);
+        eventually("the successor", || {
+            let status = hall.lab.ctl(run, &["status"]);
+            let robots = status["robots"].as_array().unwrap();
+            let leguin = robots.iter().find(|robot| robot["name"] == "Leguin")?;
+            let is_here = leguin["generation"] == 2 && leguin["presence"] == "here";
+            is_here.then_some(())
+        });
+        hall.lab.step(run, 5);
+        let recorded = hall.kill(&mut launch);
+
+        hall.finish(&recorded);
+        assert!(hall.ticks("missed").is_empty());
+        assert_eq!(hall.ticks("joined"), [11]);
+    }
+}
+
+/// Whether the loss is in the first tick, in the last one, or before it.
+#[test]
+fn a_robot_that_had_not_come_back_takes_part_after_the_last_tick_of_the_record() {
+    for (run, before, after) in [
+        ("lost-in-the-first-tick", 0, 4),
+        ("lost-in-the-last-tick", 20, 1),
+        ("lost-before-the-last-tick", 20, 6),
+    ] {
+        let (hall, mut launch) = Unattended::start(run, NOT_REQUIRED, 0, &["--paused"]);
+        hall.lab.until_ready(run);
+        if before > 0 {
+            hall.lab.step(run, before);
+        }
+        send(launch.process("cars-leguin"), Signal::SIGKILL);
+        let last = hall.lab.step(run, after);
+        let recorded = hall.kill(&mut launch);
+        assert_eq!(recorded.1, last);
+        assert_eq!(hall.ticks("lost"), [before + 1]);
+
+        hall.finish(&recorded);
+        assert_eq!(hall.ticks("lost"), [before + 1]);
+        assert_eq!(hall.ticks("joined"), [last + 1]);
+        let missed: Vec<u64> = (before + 1..=last).collect();
+        assert_eq!(hall.ticks("missed"), missed);
+    }
+}
+
+#[test]
+fn a_run_that_lost_a_robot_in_each_of_two_epochs_is_resumed() {
+    let run = "lost-in-two-epochs";
+    let (hall, mut launch) = Unattended::start(run, RESTARTS, 10, &[]);
+    send(launch.process("cars-leguin"), Signal::SIGKILL);
+    hall.await_event("joined 2");
+    hall.lab.ctl(run, &["init", "--seed", "7"]);
+    hall.lab.until_ready(run);
+    hall.lab.ctl(run, &["start"]);
+    hall.await_ticks(10);
+    send(launch.process("cars-leguin"), Signal::SIGKILL);
+    hall.await_event("joined 2");
+    hall.await_ticks(2);
+    let recorded = hall.kill(&mut launch);
+
+    let first = std::fs::read(hall.lab.file(run, "events-epoch1.jsonl")).unwrap();
+    hall.finish(&recorded);
+    let kept = std::fs::read(hall.lab.file(run, "events-epoch1.jsonl")).unwrap();
+    assert_same(("kept", &kept), ("first", &first));
+}

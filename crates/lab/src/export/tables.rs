@@ -298,6 +298,7 @@ fn event_cells(event: &Event) -> Vec<Cell<'_>> {
         Event::Joined { .. }
         | Event::Lost { .. }
         | Event::Missed { .. }
+        | Event::DoneLate { .. }
         | Event::Blocked { .. }
         | Event::Emotion { .. }
         | Event::Behavior { .. }
@@ -333,7 +334,9 @@ fn robot_cells(event: &Event) -> Vec<Cell<'_>> {
             ("x_m", at.x.into()),
             ("y_m", at.y.into()),
         ],
-        Event::Lost { robot } | Event::Missed { robot } => vec![("robot", robot.as_str().into())],
+        Event::Lost { robot } | Event::Missed { robot } | Event::DoneLate { robot, .. } => {
+            vec![("robot", robot.as_str().into())]
+        }
         Event::Blocked { robot, by, at } => vec![
             ("robot", robot.as_str().into()),
             ("x_m", at.x.into()),

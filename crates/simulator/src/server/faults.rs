@@ -13,13 +13,13 @@ use crate::simulation::Simulation;
 
 /// Longest wait for a launcher to carry out an order, and for a robot to go or to come back; then the run goes on and logs
 /// that it did.
-const PATIENCE: Duration = Duration::from_secs(30);
+pub(super) const PATIENCE: Duration = Duration::from_secs(30);
 /// Longest wait for a launcher to subscribe: it starts the simulator first, and a fast run may be ahead of it.
 const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
 /// While waiting, the loop looks this often whether what it waits for has come about.
-const LOOK: Duration = Duration::from_millis(20);
+pub(super) const LOOK: Duration = Duration::from_millis(20);
 /// A robot whose hang is over is asked to join again this often, and counts as back when it has joined.
-const NUDGE: Duration = Duration::from_millis(100);
+pub(super) const NUDGE: Duration = Duration::from_millis(100);
 
 impl Server {
     /// Begins to have the faults carried out that are due before the next tick, and the restarts, if there are any.

@@ -1,8 +1,13 @@
 //! The record of a run that is resumed. Up to its end the server executes the run again, as fast as the robots answer, and
 //! compares every tick with the record.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::time::Instant;
+
 use config::FileError;
-use protocol::{Epoch, RobotName};
+use lockstep::Attendance;
+use protocol::{Epoch, Event, RobotName, Tick};
 
 use crate::difference::{Difference, between};
 use crate::files::EpochFiles;
@@ -15,6 +20,16 @@ pub struct Past {
     record: Option<Record>,
     /// The tick that is executed next; `None` if no tick was completed.
     next: Option<Entry>,
+    /// Robots that did a tick too late, by tick. The record says it where they took part again, which is later.
+    done_late: BTreeMap<Tick, BTreeSet<RobotName>>,
+}
+
+/// The robots for which the clock is held until they have joined again.
+pub(super) struct Returning {
+    pub(super) robots: BTreeSet<RobotName>,
+    pub(super) begun: Instant,
+    /// When they were asked last; `None` if they have not been.
+    pub(super) asked: Option<Instant>,
 }
 
 /// How a tick that was executed again compares with the record.
@@ -35,7 +50,9 @@ impl Past {
     pub fn open(files: &EpochFiles) -> Result<Self, FileError> {
         let mut record = None;
         let mut next = None;
+        let mut done_late = BTreeMap::new();
         if files.events.exists() {
+            done_late = read_done_late(&files.events)?;
             let mut events = Record::of_events(&files.events)?;
             next = next_tick(&mut events)?;
             record = Some(events);
@@ -44,6 +61,7 @@ impl Past {
             epoch: files.epoch,
             record,
             next,
+            done_late,
         })
     }
 
@@ -71,6 +89,36 @@ impl Past {
         next.flat_map(Entry::changes_by_hand).collect()
     }
 
+    /// Who takes part in the next tick. A robot that does it too late is not absent: it does the tick again.
+    pub(super) fn attendance(&self) -> Attendance {
+        let mut attendance = Attendance::default();
+        let Some(next) = &self.next else {
+            return attendance;
+        };
+
+        for event in &next.events {
+            match event {
+                Event::Joined {
+                    robot,
+                    generation: Some(_),
+                    ..
+                } => drop(attendance.joined.insert(robot.clone())),
+                Event::Missed { robot } if !self.is_done_late(robot, next.tick) => {
+                    attendance.absent.insert(robot.clone());
+                }
+                Event::Lost { robot } => drop(attendance.lost.insert(robot.clone())),
+                _ => {}
+            }
+        }
+        attendance
+    }
+
+    /// Whether a robot did a tick too late for its answer to count.
+    pub(super) fn is_done_late(&self, robot: &RobotName, tick: Tick) -> bool {
+        let robots = self.done_late.get(&tick);
+        robots.is_some_and(|robots| robots.contains(robot))
+    }
+
     /// Compares a tick that was executed again.
     ///
     /// # Errors
@@ -95,6 +143,20 @@ impl Past {
             Ok(Repeated::Same)
         }
     }
+}
+
+/// Reads which robots did which ticks too late.
+fn read_done_late(events: &Path) -> Result<BTreeMap<Tick, BTreeSet<RobotName>>, FileError> {
+    let mut record = Record::of_events(events)?;
+    let mut done_late: BTreeMap<Tick, BTreeSet<RobotName>> = BTreeMap::new();
+    while let Some(entry) = next_tick(&mut record)? {
+        for (robot, ticks) in entry.done_late() {
+            for tick in ticks {
+                done_late.entry(*tick).or_default().insert(robot.clone());
+            }
+        }
+    }
+    Ok(done_late)
 }
 
 /// The next tick of a record. The end of a run that was stopped is none: the run goes on after its last tick.

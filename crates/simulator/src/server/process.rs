@@ -24,7 +24,7 @@ use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
 use super::orders::{Orders, Underway};
 use super::pace::Pace;
-use super::past::{Past, Repeated};
+use super::past::{Past, Repeated, Returning};
 use super::timers::Timers;
 use super::viewers::Viewers;
 use super::watchdog::{Doing, Watchdog};
@@ -166,6 +166,8 @@ impl From<FileError> for Interrupt {
 pub(super) enum Stage {
     /// The robots: to join, or to report.
     Robots,
+    /// Robots that have to join again, before or after the last tick of a run that is executed again.
+    Returns(Returning),
     /// The next tick to be due.
     Grant,
     /// The launcher, to carry out the faults that are due before the next tick.
@@ -203,7 +205,7 @@ pub struct Server {
     /// Requests that wait until the next tick has begun.
     pub(super) deferred: Vec<Query>,
     /// The record of a run that is resumed, until it has been executed again.
-    past: Option<Past>,
+    pub(super) past: Option<Past>,
     /// The subscriber to panels, while they are recorded: robots put them only if there is one.
     panel_subscriber: Option<Declared>,
     observing: Observing,
@@ -520,6 +522,13 @@ impl Server {
     fn advance(&mut self, simulation: &mut Simulation) -> Result<Next, Interrupt> {
         match &self.stage {
             Stage::Robots => return Ok(Next::Wait(self.timers.next(Instant::now()))),
+            Stage::Returns(_) => {
+                if let Some(patience) = self.await_returns() {
+                    return Ok(Next::Wait(Some(patience)));
+                }
+                self.stage = Stage::Grant;
+                return Ok(Next::Opened);
+            }
             Stage::Grant => {
                 if self.past.is_none()
                     && let Err(patience) = self.pace.take_grant(simulation.scenario().tick_s)
@@ -550,6 +559,7 @@ impl Server {
         let tick = simulation.begin_tick();
         self.stage = Stage::Robots;
         self.waiting_since = Instant::now();
+        self.recall();
         self.barrier
             .open(tick, simulation.robots_with_news(), &mut self.outputs);
         for query in std::mem::take(&mut self.deferred) {
@@ -624,6 +634,7 @@ impl Server {
     fn begin(&mut self, simulation: &mut Simulation) {
         simulation.begin_init();
         self.waiting_since = Instant::now();
+        self.recall();
         self.barrier
             .open(0, simulation.robots_with_news(), &mut self.outputs);
     }
@@ -647,11 +658,12 @@ impl Server {
     /// A tick is complete.
     fn complete(
         &mut self,
-        outcome: Outcome<Arc<Report>, CommandText>,
+        mut outcome: Outcome<Arc<Report>, CommandText>,
         simulation: &mut Simulation,
         recorder: &mut Recorder,
     ) -> Result<(), Interrupt> {
         self.blame_culprits();
+        self.take_late(&mut outcome, simulation);
         let record = simulation.end_tick(outcome);
         self.observers.note(record.tick, &record.events);
         self.watchdog.note(Some(Doing::Record));
@@ -661,12 +673,13 @@ impl Server {
         let lines = recorder.write(simulation, &record)?;
         self.watchdog.note(Some(Doing::Work));
         self.observers.log(&lines);
+        self.stage = Stage::Grant;
         if self.past.is_some() {
             self.compare(&record, recorder)?;
+            self.hold_for_returns();
         } else if record.tick == 0 {
             self.pace.ready();
         }
-        self.stage = Stage::Grant;
 
         if let Some((query, _)) = self.pace.reached(simulation.tick()) {
             self.answer_status(&query, simulation);
@@ -891,7 +904,7 @@ impl Server {
             Event::Report {
                 robot,
                 report: Ok(report),
-            } => self.on_report(&robot, report),
+            } => self.on_report(&robot, report, simulation),
             Event::Command {
                 from,
                 to,
@@ -950,12 +963,16 @@ impl Server {
         name
     }
 
-    fn on_report(&mut self, robot: &str, report: Report) {
+    fn on_report(&mut self, robot: &str, report: Report, simulation: &mut Simulation) {
         let Some(name) = self.known(robot) else {
             return;
         };
         self.observing.report(&name, report.tick);
         let stamp = Stamp::from(&report);
+        let is_of_epoch = stamp.epoch == simulation.epoch();
+        if is_of_epoch && self.barrier.is_behind(&name, stamp.generation) {
+            simulation.done_late(&name, stamp.tick);
+        }
         let commands = report.commands;
         self.barrier
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
