@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::content::{Frame, Header, TickView, Wall};
 use crate::file::{Channels, Chunk, MessageHead};
+use crate::json;
 use crate::protobuf::Protobuf;
 use crate::topic::{Topic, View};
 use crate::viewers::{self, Schema};
@@ -168,8 +169,7 @@ impl Encoder {
 
     fn add(&self, chunk: &mut Chunk, channel: u16, tick: Tick, message: &impl Serialize) {
         chunk.add_message(self.head(channel, tick), |bytes| {
-            serde_json::to_writer(bytes, message)
-                .unwrap_or_else(|error| unreachable!("a record is always JSON: {error}"));
+            json::append(bytes, message);
         });
     }
 

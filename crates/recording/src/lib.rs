@@ -9,6 +9,7 @@ mod damage;
 mod encode;
 mod file;
 mod index;
+mod json;
 mod protobuf;
 mod read;
 mod shown;

@@ -55,8 +55,8 @@ struct Queue {
 struct State {
     /// Chunks in their order. The last one gets further ticks if it is open.
     chunks: VecDeque<OpenChunk>,
-    /// A chunk that has been written, for its memory.
-    spare: Option<Chunk>,
+    /// Chunks that have been written, for their memory.
+    spare: Vec<Chunk>,
     /// Everything so far is to be on the disk.
     wants_sync: bool,
     /// Nothing more is to come.
@@ -219,7 +219,7 @@ impl State {
     /// The chunk that gets the next tick.
     fn open_chunk(&mut self) -> &mut OpenChunk {
         if self.chunks.back().is_none_or(|last| last.is_full) {
-            let chunk = self.spare.take().unwrap_or_default();
+            let chunk = self.spare.pop().unwrap_or_default();
             self.chunks.push_back(OpenChunk {
                 chunk,
                 begun: Instant::now(),
@@ -256,7 +256,7 @@ fn write(mut file: McapFile, queue: &Queue) -> io::Result<()> {
             Task::Write(mut chunk) => {
                 file.add_chunk(&chunk)?;
                 chunk.clear();
-                queue.lock().spare = Some(chunk);
+                queue.lock().spare.push(chunk);
             }
             Task::Sync => {
                 file.sync()?;

@@ -389,6 +389,8 @@ pub struct Recorder {
     seal: Seal,
     log: Option<Lines>,
     recording: Option<Writer>,
+    /// The field after the last tick, for its memory.
+    frame: Frame,
     begun: Instant,
     /// Of the tick that is written next.
     observed: Option<Observed>,
@@ -478,6 +480,7 @@ impl Recorder {
             seal: Seal::default(),
             log,
             recording,
+            frame: Frame::default(),
             begun: Instant::now(),
             observed: None,
             sync: record.sync,
@@ -565,8 +568,9 @@ impl Recorder {
             wall = wall_times(self.begun, &observed);
             panels = observed.panels;
         }
+        set_frame(&mut self.frame, simulation, record);
         let tick = TickView {
-            frame: &frame(simulation, record),
+            frame: &self.frame,
             events: &record.events,
             reports: reports(simulation, record),
             panels: &panels,
@@ -708,13 +712,13 @@ fn header(run: &RunName, simulation: &Simulation) -> Header {
     }
 }
 
-/// The field after a tick.
-fn frame(simulation: &Simulation, record: &TickRecord) -> Frame {
-    let mut robots = Vec::new();
+/// Sets the field after a tick. Its memory is used again, because what takes a kilobyte and more takes long to get.
+fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
+    frame.robots.clear();
     for name in simulation.names() {
         let last = simulation.report(name);
         let is_missed = last.is_none_or(|report| report.tick != record.tick);
-        robots.push(PlacedRobot {
+        frame.robots.push(PlacedRobot {
             name: name.clone(),
             location: simulation.location(name).unwrap_or_default(),
             blocked: simulation.is_blocked(name),
@@ -724,14 +728,16 @@ fn frame(simulation: &Simulation, record: &TickRecord) -> Frame {
         });
     }
 
-    Frame {
-        tick: record.tick,
-        robots,
-        guests_mm: guests_mm(simulation),
-        cuts: simulation.cuts(),
-        unreachable: simulation.unreachable().clone(),
-        expectations: simulation.standings(),
+    frame.guests_mm.clear();
+    for guest in simulation.world().guests() {
+        frame.guests_mm.push((guest.x * 1000.0).round() as i64);
+        frame.guests_mm.push((guest.y * 1000.0).round() as i64);
     }
+
+    frame.tick = record.tick;
+    frame.cuts = simulation.cuts();
+    frame.unreachable.clone_from(simulation.unreachable());
+    frame.expectations = simulation.standings();
 }
 
 /// The reports for a tick.
@@ -762,14 +768,4 @@ fn wall_times(begun: Instant, observed: &Observed) -> Wall {
         awaited: observed.awaited.clone(),
         late: observed.late.clone(),
     }
-}
-
-fn guests_mm(simulation: &Simulation) -> Vec<i64> {
-    let guests = simulation.world().guests();
-    let mut guests_mm = Vec::with_capacity(2 * guests.len());
-    for guest in guests {
-        guests_mm.push((guest.x * 1000.0).round() as i64);
-        guests_mm.push((guest.y * 1000.0).round() as i64);
-    }
-    guests_mm
 }
