@@ -479,14 +479,15 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
     /// Another robot's state arrived, queried or followed.
     pub fn heard(&mut self, of: RobotName, epoch: Epoch, tick: Tick, state: S) {
-        let present = self.running.or_else(|| {
-            let answer = self.answer.as_ref()?;
-            Some((answer.epoch, answer.tick))
-        });
-        // Only states near the present tick are ever asked for.
-        let is_near = present.is_some_and(|(present_epoch, present_tick)| {
-            epoch == present_epoch && tick.abs_diff(present_tick) <= 1
-        });
+        // Only states near the present tick are ever asked for. One of a tick after that under way shows that the clock has
+        // gone on without this robot. It must not take the place of the state that this tick may still ask for.
+        let is_near = match (self.running, &self.answer) {
+            (Some(running), _) => {
+                (epoch, tick) == running || (epoch, tick.saturating_add(1)) == running
+            }
+            (None, Some(answer)) => epoch == answer.epoch && tick.abs_diff(answer.tick) <= 1,
+            (None, None) => false,
+        };
         if is_near {
             self.others.entry(of).or_default().add(epoch, tick, state);
         }

@@ -409,6 +409,20 @@ fn running() -> Robot {
     robot
 }
 
+#[test]
+fn a_state_of_a_later_tick_does_not_take_the_place_of_the_one_that_is_asked_for() {
+    let mut robot = running();
+    for (tick, state) in [(0, "of tick 0"), (1, "of tick 1"), (2, "of tick 2")] {
+        robot.heard(name("B"), 1, tick, state);
+    }
+    assert_eq!(robot.ask(&name("B"), &mut Vec::new()), Some("of tick 0"));
+
+    robot.done(Vec::new(), "of tick 1", (), &mut Vec::new());
+    robot.heard(name("B"), 1, 2, "of tick 2");
+    robot.clock(clock(1, 2), &mut Vec::new());
+    assert_eq!(robot.ask(&name("B"), &mut Vec::new()), Some("of tick 1"));
+}
+
 fn run(epoch: u32, tick: u64, begin: Begin) -> Action<(), &'static str, (), ()> {
     let has_news = begin == Begin::TakeOver;
 

@@ -584,10 +584,17 @@ impl Unattended {
 
     /// The ticks of Leguin's events of this kind, without that of the beginning.
     fn ticks(&self, kind: &str) -> Vec<u64> {
+        self.ticks_of("Leguin", kind)
+    }
+
+    /// The same of any robot.
+    fn ticks_of(&self, robot: &str, kind: &str) -> Vec<u64> {
         let mut ticks = Vec::new();
-        for event in self.lab.events(self.run) {
+        let (whole, _) = complete(&self.lab.bytes(self.run));
+        for line in String::from_utf8(whole).unwrap().lines() {
+            let event: serde_json::Value = serde_json::from_str(line).unwrap();
             let is_later = kind != "joined" || event["generation"].is_u64();
-            if event["event"] == kind && event["robot"] == "Leguin" && is_later {
+            if event["event"] == kind && event["robot"] == robot && is_later {
                 ticks.push(event["tick"].as_u64().unwrap());
             }
         }
@@ -679,30 +686,38 @@ fn a_run_whose_robot_was_killed_and_came_back_is_resumed_as_often_as_it_is_kille
 
 /// A process that was stopped goes on where it was, after ticks that it has missed. Some of them it does too late.
 #[test]
-fn a_run_whose_robot_was_stopped_for_some_ticks_is_resumed() {
-    let (hall, mut launch) = Unattended::start("stopped-robot", NOT_REQUIRED, 10, &[]);
-    for _ in 0..2 {
-        let before = hall.ticks("missed").len();
-        let leguin = launch.process("cars-leguin");
-        send(leguin, Signal::SIGSTOP);
+fn a_run_whose_robots_were_stopped_for_some_ticks_is_resumed() {
+    let (hall, mut launch) = Unattended::start("stopped-robots", NOT_REQUIRED, 10, &[]);
+    for (robot, program) in [
+        ("Leguin", "cars-leguin"),
+        ("Butler", "cars-butler"),
+        ("Leguin", "cars-leguin"),
+    ] {
+        let before = hall.ticks_of(robot, "missed").len();
+        let process = launch.process(program);
+        send(process, Signal::SIGSTOP);
         eventually("missed ticks", || {
-            (hall.ticks("missed").len() >= before + 3).then_some(())
+            (hall.ticks_of(robot, "missed").len() >= before + 3).then_some(())
         });
-        send(leguin, Signal::SIGCONT);
+        send(process, Signal::SIGCONT);
         hall.await_ticks(10);
     }
     let recorded = hall.kill(&mut launch);
-    let missed = hall.ticks("missed");
-    assert!(missed.len() >= 6, "{missed:?}");
-    assert!(hall.ticks("lost").is_empty(), "stopped for too long");
-    let done_late = hall.ticks("done_late");
-    assert!(!done_late.is_empty(), "it does nothing too late");
+    let of_both = |kind| ["Leguin", "Butler"].map(|robot| hall.ticks_of(robot, kind));
+    let (missed, done_late) = (of_both("missed"), of_both("done_late"));
+    assert!(missed[0].len() >= 6 && missed[1].len() >= 3, "{missed:?}");
+    let lost = of_both("lost").concat();
+    assert!(lost.is_empty(), "stopped for too long: {lost:?}");
+    assert!(
+        done_late.iter().any(|ticks| !ticks.is_empty()),
+        "{missed:?}"
+    );
 
     let mut again = hall.resume(&recorded);
     let recorded = hall.kill(&mut again);
     hall.finish(&recorded);
-    assert_eq!(hall.ticks("missed"), missed);
-    assert_eq!(hall.ticks("done_late"), done_late);
+    assert_eq!(of_both("missed"), missed);
+    assert_eq!(of_both("done_late"), done_late);
 }
 
 /// Its link was given up, as that of a robot that is cut off, and the same process returns.
