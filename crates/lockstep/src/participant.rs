@@ -479,8 +479,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
     /// Another robot's state arrived, queried or followed.
     pub fn heard(&mut self, of: RobotName, epoch: Epoch, tick: Tick, state: S) {
-        // Only states near the present tick are ever asked for. One of a later tick shows that the clock has gone on without this
-        // robot; it must not take the place of the state that the tick under way may still ask for.
+        // Only states near the present tick are ever asked for. One of a tick after that under way shows that the clock has
+        // gone on without this robot. It must not take the place of the state that this tick may still ask for.
         let is_near = match (self.running, &self.answer) {
             (Some(running), _) => {
                 (epoch, tick) == running || (epoch, tick.saturating_add(1)) == running
