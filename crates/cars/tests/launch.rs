@@ -40,8 +40,10 @@ impl Folder {
     }
 
     fn cars(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_cars"));
+        // Who runs the tests may have told them to ignore signals, as `nohup` does, and children inherit that.
+        let mut command = Command::new("env");
         command
+            .args(["--default-signal=HUP,INT,QUIT", env!("CARGO_BIN_EXE_cars")])
             .current_dir(self.0.path())
             .env("DIR", self.0.path())
             .env_remove("NO_COLOR");
