@@ -5,7 +5,7 @@ use std::net::TcpListener;
 use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
 
-use system_tests::{Lab, programs, root};
+use system_tests::{Lab, eventually, programs, root};
 
 #[test]
 fn a_skeleton_needs_the_folder_of_the_project_where_it_is_not_around() {
@@ -49,10 +49,12 @@ fn the_programs_beside_cars_are_that_program_under_their_names() {
     let args = ["launch", "launch/hors_doeuvres.toml", "--paused"];
     let launch = lab.start(run, &args);
     for program in ["cars-sim", "cars-console", "cars-butler", "cars-leguin"] {
-        let pid = launch.process(program);
-        // As killall and pgrep find it.
-        let name = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap();
-        assert_eq!(name.trim_end(), program);
+        let comm = format!("/proc/{}/comm", launch.process(program));
+        // As killall and pgrep find it, from the moment when it has gone on as `cars`.
+        eventually(program, || {
+            let name = std::fs::read_to_string(&comm).unwrap();
+            (name.trim_end() == program).then_some(())
+        });
     }
 
     let size = |program: &str| std::fs::metadata(programs().join(program)).unwrap().len();
