@@ -55,8 +55,26 @@ impl Entry {
     /// Whether a robot took part again from this tick on.
     #[must_use]
     pub fn has_joined(&self, name: &RobotName) -> bool {
-        self.events.iter().any(|event| {
-            matches!(event, Event::Joined { robot, generation: Some(_), .. } if robot == name)
+        self.joined().any(|robot| robot == name)
+    }
+
+    /// Robots that take part again from this tick on.
+    pub fn joined(&self) -> impl Iterator<Item = &RobotName> {
+        self.events.iter().filter_map(|event| match event {
+            Event::Joined {
+                robot,
+                generation: Some(_),
+                ..
+            } => Some(robot),
+            _ => None,
+        })
+    }
+
+    /// Robots that are lost from this tick on.
+    pub fn lost(&self) -> impl Iterator<Item = &RobotName> {
+        self.events.iter().filter_map(|event| match event {
+            Event::Lost { robot } => Some(robot),
+            _ => None,
         })
     }
 
@@ -109,9 +127,15 @@ impl Entry {
     /// Whether a robot's report of the tick is missing.
     #[must_use]
     pub fn has_missed(&self, name: &RobotName) -> bool {
-        self.events
-            .iter()
-            .any(|event| matches!(event, Event::Missed { robot } if robot == name))
+        self.missed().any(|robot| robot == name)
+    }
+
+    /// Robots whose reports of the tick are missing.
+    pub fn missed(&self) -> impl Iterator<Item = &RobotName> {
+        self.events.iter().filter_map(|event| match event {
+            Event::Missed { robot } => Some(robot),
+            _ => None,
+        })
     }
 }
 

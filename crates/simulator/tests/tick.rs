@@ -463,6 +463,11 @@ fn who_does_not_report_stays_and_is_out_of_reach_at_the_next_tick() {
     assert!(!puppets.news[1][&name("B")].correction.unwrap().blocked);
 }
 
+fn has_done_late(record: &TickRecord) -> bool {
+    let mut events = record.events.iter();
+    events.any(|event| event.kind() == "done_late")
+}
+
 #[test]
 fn what_a_robot_did_too_late_is_recorded_when_it_takes_part_again() {
     let mut simulation = simulation(TWO);
@@ -471,12 +476,7 @@ fn what_a_robot_did_too_late_is_recorded_when_it_takes_part_again() {
     puppets.deaf = vec![name("B")];
     for _ in 1..=3 {
         let record = simulation.step(&mut puppets).unwrap();
-        assert!(
-            !record
-                .events
-                .iter()
-                .any(|event| event.kind() == "done_late")
-        );
+        assert!(!has_done_late(&record));
     }
 
     // An answer that counted comes again, and one is of a tick that has not begun.
@@ -492,12 +492,7 @@ fn what_a_robot_did_too_late_is_recorded_when_it_takes_part_again() {
     assert!(record.events.contains(&done_late), "{:?}", record.events);
 
     let record = simulation.step(&mut puppets).unwrap();
-    assert!(
-        !record
-            .events
-            .iter()
-            .any(|event| event.kind() == "done_late")
-    );
+    assert!(!has_done_late(&record));
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! Programs that were built on one machine and run on another one do not show folders of the first.
 
-use std::fs::Permissions;
 use std::net::TcpListener;
-use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
 
 use system_tests::{Lab, eventually, programs, root};
@@ -90,7 +88,7 @@ fn a_program_that_has_no_cars_beside_it_says_so() {
 }
 
 /// A simulator that finds the port of its launch taken, the first time it is started, and is the real one otherwise.
-const TAKEN_ONCE: &str = r#"#!/bin/sh
+const TAKEN_ONCE: &str = r#"
 if mkdir "$ONCE"; then
     for argument in "$@"; do
         case $argument in --listen=*) argument=--listen=$TAKEN;; esac
@@ -104,29 +102,24 @@ exec "$SIMULATOR" "$@"
 #[test]
 fn a_launch_whose_port_was_taken_tries_another() {
     let lab = Lab::new();
-    let folder = lab.out().join("programs");
-    std::fs::create_dir(&folder).unwrap();
-    for program in ["cars", "cars-butler", "cars-leguin", "cars-vonda"] {
-        std::fs::copy(programs().join(program), folder.join(program)).unwrap();
+    let mut launch = format!(
+        "scenario = {:?}\n[console]\nenabled = false\n\
+         [simulator]\ncommand = [\"sh\", \"-c\", '''{TAKEN_ONCE}''', \"cars-sim\"]\n",
+        root().join("configs/three_robots.toml")
+    );
+    for (name, program) in [
+        ("Butler", "cars-butler"),
+        ("Leguin", "cars-leguin"),
+        ("Vonda", "cars-vonda"),
+    ] {
+        launch += &format!("[[process]]\nname = {name:?}\ncommand = [{program:?}]\n");
     }
-    let simulator = folder.join("cars-sim");
-    std::fs::write(&simulator, TAKEN_ONCE).unwrap();
-    std::fs::set_permissions(&simulator, Permissions::from_mode(0o755)).unwrap();
+    let file = lab.write("taken.toml", &launch);
 
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
-    let output = Command::new(folder.join("cars"))
-        .current_dir(root())
-        .args([
-            "launch",
-            "launch/three_robots.toml",
-            "--run",
-            "taken",
-            "--no-console",
-            "--duration",
-            "5 s",
-            "--out",
-        ])
-        .arg(lab.out())
+    let args = ["--run", "taken", "--duration", "5 s"];
+    let output = lab
+        .cars(&[&["launch", file.to_str().unwrap()], &args[..]].concat())
         .env("ONCE", lab.out().join("once"))
         .env("TAKEN", format!("tcp/{}", taken.local_addr().unwrap()))
         .env("SIMULATOR", programs().join("cars-sim"))

@@ -3,11 +3,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::time::Instant;
 
 use config::FileError;
 use lockstep::Attendance;
-use protocol::{Epoch, Event, RobotName, Tick};
+use protocol::{Epoch, RobotName, Tick};
 
 use crate::difference::{Difference, between};
 use crate::files::EpochFiles;
@@ -22,14 +21,6 @@ pub struct Past {
     next: Option<Entry>,
     /// Robots that did a tick too late, by tick. The record says it where they took part again, which is later.
     done_late: BTreeMap<Tick, BTreeSet<RobotName>>,
-}
-
-/// The robots for which the clock is held until they have joined again.
-pub(super) struct Returning {
-    pub(super) robots: BTreeSet<RobotName>,
-    pub(super) begun: Instant,
-    /// When they were asked last; `None` if they have not been.
-    pub(super) asked: Option<Instant>,
 }
 
 /// How a tick that was executed again compares with the record.
@@ -91,26 +82,23 @@ impl Past {
 
     /// Who takes part in the next tick. A robot that does it too late is not absent: it does the tick again.
     pub(super) fn attendance(&self) -> Attendance {
-        let mut attendance = Attendance::default();
         let Some(next) = &self.next else {
-            return attendance;
+            return Attendance::default();
         };
 
-        for event in &next.events {
-            match event {
-                Event::Joined {
-                    robot,
-                    generation: Some(_),
-                    ..
-                } => drop(attendance.joined.insert(robot.clone())),
-                Event::Missed { robot } if !self.is_done_late(robot, next.tick) => {
-                    attendance.absent.insert(robot.clone());
-                }
-                Event::Lost { robot } => drop(attendance.lost.insert(robot.clone())),
-                _ => {}
-            }
+        let absent = next
+            .missed()
+            .filter(|robot| !self.is_done_late(robot, next.tick));
+        Attendance {
+            joined: next.joined().cloned().collect(),
+            absent: absent.cloned().collect(),
+            lost: next.lost().cloned().collect(),
         }
-        attendance
+    }
+
+    /// The robots that take part again from the next tick on.
+    pub(super) fn joined(&self) -> impl Iterator<Item = &RobotName> {
+        self.next.iter().flat_map(Entry::joined)
     }
 
     /// Whether a robot did a tick too late for its answer to count.

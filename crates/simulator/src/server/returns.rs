@@ -3,16 +3,26 @@
 //! of the scenario, and the clock is held before the tick of its return until it has. A robot that went on where it was does
 //! not get the ticks that it did not do, and its answers to those that it did too late do not count, as then.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use lockstep::Outcome;
+use protocol::RobotName;
 use protocol::messages::{CommandText, Report};
 
 use super::faults::{LOOK, NUDGE, PATIENCE};
-use super::past::{Past, Returning};
+use super::past::Past;
 use super::process::{Server, Stage};
 use crate::simulation::Simulation;
+
+/// The robots for which the clock is held until they have joined again.
+pub(super) struct Returning {
+    robots: BTreeSet<RobotName>,
+    begun: Instant,
+    /// When they were asked last; `None` if they have not been.
+    asked: Option<Instant>,
+}
 
 impl Server {
     /// Says who takes part in the tick that is opened next, while the run is executed again.
@@ -40,8 +50,8 @@ impl Server {
     /// Holds the clock until the robots are back that take part in the next tick as further incarnations; after the last tick
     /// of the record, until all are back. Those whose processes the scenario keeps from running come back as it has it.
     pub(super) fn hold_for_returns(&mut self) {
-        let mut robots = match &self.past {
-            Some(past) => past.attendance().joined,
+        let mut robots: BTreeSet<RobotName> = match &self.past {
+            Some(past) => past.joined().cloned().collect(),
             None => self.barrier.roster().cloned().collect(),
         };
         robots.retain(|robot| !self.barrier.is_stopped(robot));
