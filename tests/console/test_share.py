@@ -131,6 +131,31 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
     eventually("the color of the emotion", lambda: any(is_like(one, other) for one, other in colors(ring)))
 
 
+def test_pictures_are_of_a_tick_and_not_of_the_way_to_it(launch, open_page):
+    page = open_page(launch().address, reduced_motion="no-preference")
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    places = page.evaluate(
+        """() => Promise.all([import('./assets/plan.js'), import('./assets/store.js'), import('./assets/units.js'), import('./assets/vector.js')])
+        .then(([{Plan}, {Store}, {Units}, {Vector}]) => {
+            const saved = {png: (plan) => void plan.picture(), svg: (plan) => plan.drawOn(new Vector())};
+            return Object.entries(saved).map(([kind, save]) => {
+                const store = new Store();
+                const plan = new Plan(document.createElement('canvas'), store, new Units(), {draft: null}, () => {});
+                const frame = window.carsConsole.frame();
+                const there = {x: frame.robots[0].location.x + 3, y: frame.robots[0].location.y};
+                store.show(frame);
+                plan.paint(performance.now());
+                store.show({...frame, tick: frame.tick + 1, speed: 1, robots: [{...frame.robots[0], location: there}, frame.robots[1]]});
+                plan.paint(performance.now());
+                const onTheWay = plan.motion.robotsNow.get('Butler').x;
+                save(plan);
+                return [kind, onTheWay < there.x, plan.motion.robotsNow.get('Butler').x === there.x];
+            });
+        })"""
+    )
+    assert places == [["png", True, True], ["svg", True, True]]
+
+
 def test_foreign_text_in_a_drawing_is_text(launch, open_page):
     page = open_page(launch().address)
     expect(page.get_by_test_id("tick")).to_have_text("0")

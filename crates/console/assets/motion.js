@@ -76,6 +76,11 @@ export class Motion {
     return (this.farthest_m * (to_ms - from_ms)) / this.length_ms;
   }
 
+  /** Ends a glide: robots and guests are where the frame has them. */
+  arrive() {
+    this.advance(this.arrivedAt_ms + this.length_ms);
+  }
+
   /**
    * Moves robots and guests to where they are drawn at a time.
    * @param {number} now_ms

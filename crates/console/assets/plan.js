@@ -285,6 +285,7 @@ export class Plan {
    * @param {draw.Paper} paper
    */
   drawOn(paper) {
+    this.arrive();
     const pen = { ...this.pen, context: paper };
     const frame = this.motion.to;
     draw.outside(pen);
@@ -303,8 +304,15 @@ export class Plan {
     });
   }
 
-  /** A picture of what is shown. @returns {Promise<Blob | null>} */
+  /** A picture is of a tick, and not of the way to it. */
+  arrive() {
+    this.motion.arrive();
+    this.touch();
+  }
+
+  /** A picture of the tick that is shown. @returns {Promise<Blob | null>} */
   picture() {
+    this.arrive();
     this.paint(performance.now());
     return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
   }
