@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{Epoch, RobotName, RunName, Tick};
+use recording::PANEL_S;
 use robot::{LocalHost, Robot};
 use simulator::recorder::Observed;
 use simulator::scenario::FaultEnd;
@@ -67,10 +68,10 @@ pub fn execute_with(
     Ok(recorder.finish(&simulation)?)
 }
 
-/// What is observed of a tick for the recording: panels once a simulated second.
+/// What is observed of a tick for the recording: each panel as long as it is shown.
 pub(crate) fn observed(local: &Local, opened: Instant) -> Observed {
     let scenario = local.simulation.scenario();
-    let panel_interval = (1.0 / scenario.tick_s).round().max(1.0) as Tick;
+    let panel_interval = (PANEL_S / scenario.tick_s).round().max(1.0) as Tick;
     let mut panels = BTreeMap::new();
     if scenario.record.has_panels() && local.simulation.tick().is_multiple_of(panel_interval) {
         panels = local.robots.panels();

@@ -23,7 +23,7 @@ pub use content::{
 };
 pub use damage::RecordingError;
 pub use read::Recording;
-pub use shown::LastReports;
+pub use shown::{LastReports, PANEL_S};
 pub use ticks::Ticks;
 pub use write::{WriteError, Writer};
 

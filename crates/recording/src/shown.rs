@@ -10,8 +10,9 @@ use crate::content::{Header, PlacedRobot, RecordedTick};
 use crate::damage::RecordingError;
 use crate::read::Recording;
 
-/// How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states.
-const PANEL_S: f64 = 1.0;
+/// How long a panel is shown, simulated seconds: in one process, until the next one. In a fast run panels arrive more seldom, and
+/// would show old states.
+pub const PANEL_S: f64 = 2.0;
 
 impl Header {
     /// The first of the ticks of which panels are shown in a tick.

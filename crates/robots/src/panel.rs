@@ -6,8 +6,8 @@ use robot::{Face, Tone, Widget};
 
 use crate::emotion::NEUTRAL;
 
-/// Values in a panel's curve: two minutes of ticks of half a second.
-pub(crate) const SPARKLINE_LEN: usize = 240;
+/// Values in a panel's curve: a minute of ticks of half a second.
+pub(crate) const SPARKLINE_LEN: usize = 120;
 
 /// Face, name, intensity and cause of an emotion, and the appraisal that comes with it; `None` without emotions.
 pub(crate) fn affect(
