@@ -16,6 +16,10 @@ SCREENSHOTS = pathlib.Path(os.environ.get("CARS_SCREENSHOTS", ROOT / "target" / 
 expect.set_options(timeout=30_000)
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "thorough: of those that take long or repeat another test in other sizes and colors; left out by `-m 'not thorough'`")
+
+
 @pytest.fixture(scope="session")
 def browser():
     with sync_playwright() as playwright:

@@ -33,7 +33,7 @@ def shown_tick(page):
     return int(page.get_by_test_id("tick").inner_text())
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.thorough)])
 def test_a_click_on_a_command_shows_its_tick(recorded, open_page, screenshots, scheme):
     address, events = recorded
     page = open_page(address, scheme=scheme)

@@ -5,15 +5,21 @@ from playwright.sync_api import expect
 
 from lab import eventually, until
 
-SIZES = [(1440, 900), (390, 844)]
 # The design demands this on an otherwise idle machine.
 WANTED_FPS = 25
 # Of the rate with few guests at the same time: other machines are slower or under load.
 LEAST_RATIO = 0.2
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width, height", SIZES)
+@pytest.mark.parametrize(
+    "width, height, scheme",
+    [
+        (1440, 900, "light"),
+        (390, 844, "dark"),
+        pytest.param(1440, 900, "dark", marks=pytest.mark.thorough),
+        pytest.param(390, 844, "light", marks=pytest.mark.thorough),
+    ],
+)
 def test_everything_can_be_seen(launch, open_page, screenshots, width, height, scheme):
     robots = ("Butler", "Leguin", "Vonda")
     run = launch(scenario="configs/three_robots.toml", robots=robots, options=("--speed", "20"))
@@ -69,6 +75,7 @@ def test_robots_obstacles_and_floor_are_drawn_in_their_colors(launch, open_page)
     assert red > green and red > blue, (red, green, blue)
 
 
+@pytest.mark.thorough
 def test_ten_thousand_guests_move_smoothly(launch, open_page, screenshots):
     # What is measured is the page: nothing else has much to do.
     field = ("--set", 'field.size=["150 m", "150 m"]', "--set", "record.frames=false")

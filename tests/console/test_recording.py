@@ -121,6 +121,7 @@ def differing(live, recorded, screenshots):
     return found
 
 
+@pytest.mark.thorough
 def test_a_tick_has_the_same_pixels_live_and_recorded(launch, open_page, screenshots):
     run = launch()
     live = open_page(run.address, height=1500)

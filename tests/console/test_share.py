@@ -90,7 +90,7 @@ SAME = """([text, places]) => new Promise((done, failed) => {
 })"""
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.thorough)])
 def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots, scheme):
     run = launch(options=("--set", "guests.count=30"))
     page = open_page(run.address, scheme=scheme)

@@ -387,7 +387,7 @@ def test_without_the_folder_the_page_has_what_it_saw_and_says_so(launch, open_pa
     expect(first.get_by_test_id("tick")).to_have_text("30")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.thorough)])
 def test_marks_are_the_events_of_the_record(launch, open_page, screenshots, scheme):
     run = launch(scenario="configs/partition.toml", options=("--speed", "max"))
     page = open_page(run.address, 1280, 720, scheme)
@@ -520,6 +520,7 @@ def test_the_diagram_of_a_run_in_progress(launch, open_page, screenshots):
     page.screenshot(path=screenshots / "timeline-diagram-1280x720.png")
 
 
+@pytest.mark.thorough
 def test_a_diagram_of_ten_thousand_events_is_drawn_window_by_window(launch, open_page):
     run = launch(options=("--speed", "max", "--duration", "3000 s", "--set", "network.queries.loss=0.9"))
     page = open_page(run.address, 1280, 720)
@@ -545,7 +546,14 @@ def test_a_diagram_of_ten_thousand_events_is_drawn_window_by_window(launch, open
     expect(page.get_by_test_id("tick")).to_have_text("40")
 
 
-@pytest.mark.parametrize("width, height, scheme", [(1280, 720, "dark"), (390, 844, "light"), (390, 844, "dark")])
+@pytest.mark.parametrize(
+    "width, height, scheme",
+    [
+        (390, 844, "light"),
+        pytest.param(1280, 720, "dark", marks=pytest.mark.thorough),
+        pytest.param(390, 844, "dark", marks=pytest.mark.thorough),
+    ],
+)
 def test_everything_has_room(launch, open_page, screenshots, width, height, scheme):
     run = launch(options=("--speed", "max", "--duration", "50000 s"))
     page = open_page(run.address, width, height, scheme)

@@ -16,29 +16,61 @@ const AT_A_TIME: usize = 2;
 /// Longest that the tests of one file may take.
 const PATIENCE: Duration = Duration::from_secs(540);
 
+/// Which tests are run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Choice {
+    /// Those without the mark `thorough`.
+    Usual,
+    /// Those with it.
+    Thorough,
+}
+
+impl Choice {
+    fn marks(self) -> &'static str {
+        match self {
+            Self::Usual => "not thorough",
+            Self::Thorough => "thorough",
+        }
+    }
+}
+
 /// Tests the files `test_*.py` of a folder, each by a process of its own and several at a time. `python` is the start of the
 /// command line: a Python that finds what the tests import.
 ///
 /// # Panics
 /// If a test fails, with what pytest printed about its file.
-pub fn pytest(folder: &Path, python: impl Fn() -> Command + Sync) {
+pub fn pytest(folder: &Path, choice: Choice, python: impl Fn() -> Command + Sync) {
     let lab = Lab::new();
-    let files = files_of(folder);
-    let failed = objections(&files, AT_A_TIME, |file| test(lab.out(), file, python()));
+    let files = files_of(folder, choice);
+    let failed = objections(&files, AT_A_TIME, |file| {
+        let mut python = python();
+        python.args(["-m", "pytest", "-m", choice.marks()]);
+        test(lab.out(), file, python)
+    });
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-fn files_of(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let files = entries.map(|entry| entry.unwrap().path());
-    let tests: Vec<PathBuf> = files
-        .filter(|path| {
-            let name = path.file_name().unwrap().to_string_lossy();
-            name.starts_with("test_") && name.ends_with(".py")
-        })
-        .collect();
+/// The files of a folder in which there are such tests.
+fn files_of(folder: &Path, choice: Choice) -> Vec<PathBuf> {
+    let mut tests = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy();
+        let is_test = name.starts_with("test_") && name.ends_with(".py");
+        let is_usual = choice == Choice::Usual;
+        if is_test && (is_usual || has_thorough_tests(&path)) {
+            tests.push(path);
+        }
+    }
+
     assert!(!tests.is_empty(), "no tests in {}", folder.display());
     tests
+}
+
+fn has_thorough_tests(file: &Path) -> bool {
+    std::fs::read_to_string(file)
+        .unwrap()
+        .contains("pytest.mark.thorough")
 }
 
 /// Tests one file, in a process group of its own, so that nothing that it starts outlives it. Returns what pytest printed and
@@ -48,7 +80,7 @@ fn test(out: &Path, file: &Path, mut python: Command) -> Option<String> {
     let printed = out.join(format!("{name}.txt"));
     let output = File::create(&printed).unwrap();
     let mut pytest = python
-        .args(["-m", "pytest", "-v", "-ra", "--tb=short"])
+        .args(["-v", "-ra", "--tb=short"])
         .args(["-p", "no:cacheprovider", "--basetemp"])
         .arg(out.join(&*name))
         .arg(file)

@@ -3,18 +3,28 @@
 use std::path::Path;
 use std::process::Command;
 
-use system_tests::pytest::pytest;
+use system_tests::pytest::{Choice, pytest};
 use system_tests::tools::lacks_tool;
 use system_tests::{programs, root};
 
-/// Runs `tests/console` in Chromium if it is installed.
 #[test]
 fn the_page_works_in_a_browser() {
+    in_a_browser(Choice::Usual);
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn the_page_works_in_every_size_and_color_and_with_very_much() {
+    in_a_browser(Choice::Thorough);
+}
+
+/// Runs `tests/console` in Chromium if it is installed.
+fn in_a_browser(choice: Choice) {
     if let Some(missing) = missing_tools() {
         return lacks_tool("the tests of the console in a browser", &missing);
     }
 
-    pytest(&root().join("tests/console"), || {
+    pytest(&root().join("tests/console"), choice, || {
         let mut python = Command::new("python3");
         python
             .current_dir(root())

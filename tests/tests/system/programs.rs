@@ -173,6 +173,7 @@ impl Cast {
 const PLAIN: &str = "-std=c11 -O2 -ffp-contract=off";
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn leguin_in_c_is_leguin_in_rust_byte_for_byte() {
     if lacks_compiler() {
         return;
@@ -400,6 +401,7 @@ fn run_with(program: &Path, session: &[u8]) -> Output {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn no_input_breaks_leguin_in_c() {
     const STRICT: &str = "-std=c11 -O1 -g -Wall -Wextra -Wshadow -Wconversion -pedantic -Werror \
                           -fsanitize=address,undefined -fno-sanitize-recover=all";

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use protocol::random::{MAX_SEED, stream, unit};
-use system_tests::pytest::pytest;
+use system_tests::pytest::{Choice, pytest};
 use system_tests::python::python;
 use system_tests::tools::lacks_tool;
 use system_tests::{Lab, cargo, programs, root};
@@ -31,7 +31,7 @@ fn the_package_passes_its_tests() {
     }
 
     let folder = root().join("sdk/python");
-    pytest(&folder.join("tests"), || {
+    pytest(&folder.join("tests"), Choice::Usual, || {
         let mut python = python();
         python.current_dir(&folder).env("CARS_BIN_DIR", programs());
         python
@@ -121,6 +121,7 @@ fn environment(folder: &Path) -> PathBuf {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_researcher_installs_the_wheel_and_works() {
     if !is_equipped("cars, pandas, pyarrow, matplotlib, IPython, pip, venv") {
         return;

@@ -211,6 +211,7 @@ fn cuts_and_crashes_have_their_times() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_report_of_sixty_four_runs_has_a_bounded_size() {
     let lab = Lab::new();
     let mut names = Vec::new();
@@ -561,6 +562,7 @@ fn a_report_of_what_there_is_not_is_refused_before_anything_runs() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn ten_thousand_runs_over_two_factors_are_a_page_of_a_bounded_size() {
     let lab = Lab::new();
     let scenario = system_tests::root().join("configs/hors_doeuvres.toml");

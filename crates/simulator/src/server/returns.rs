@@ -12,17 +12,9 @@ use protocol::RobotName;
 use protocol::messages::{CommandText, Report};
 
 use super::faults::{LOOK, NUDGE, PATIENCE};
-use super::past::Past;
+use super::past::{Past, Returning};
 use super::process::{Server, Stage};
 use crate::simulation::Simulation;
-
-/// The robots for which the clock is held until they have joined again.
-pub(super) struct Returning {
-    robots: BTreeSet<RobotName>,
-    begun: Instant,
-    /// When they were asked last; `None` if they have not been.
-    asked: Option<Instant>,
-}
 
 impl Server {
     /// Says who takes part in the tick that is opened next, while the run is executed again.
