@@ -47,7 +47,7 @@ const SEEN = 5;
 /** Least time between two frames. */
 const FRAME_MS = 33;
 /** How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states. */
-const PANEL_S = 1;
+const PANEL_S = 2;
 /** The factor of playback at speed "max". */
 const FASTEST = 200;
 

@@ -121,7 +121,7 @@ impl Fork<'_> {
             let recorded = record.next_entry()?;
             let recorded = recorded.ok_or_else(|| miette!("the record has become shorter"))?;
             let executed = again.play(&recorded)?;
-            recorder.observe(observed(&again.local, opened));
+            recorder.observe(observed(&again.local, &executed.record, opened));
             recorder.write(&again.local.simulation, &executed.record)?;
             check_same(&recorded, &executed.into_entry())?;
             if recorded.tick == self.tick {
@@ -134,7 +134,7 @@ impl Fork<'_> {
         }
         let mut local = again.local;
         go_on(&mut local, run, |local, record, opened| {
-            recorder.observe(observed(local, opened));
+            recorder.observe(observed(local, record, opened));
             recorder.write(&local.simulation, record)?;
             Ok(())
         })?;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
-use protocol::{Epoch, RobotName, RunName, Tick};
+use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use recording::PANEL_S;
 use robot::{LocalHost, Robot};
 use simulator::recorder::Observed;
@@ -52,7 +52,7 @@ pub fn execute_with(
             none => none.insert(Recorder::begin(folder, run, simulation)?),
         };
         if recorder.is_recording() {
-            recorder.observe(observed(local, opened));
+            recorder.observe(observed(local, record, opened));
         }
         recorder.write(simulation, record)?;
         goes_on()?;
@@ -68,13 +68,17 @@ pub fn execute_with(
     Ok(recorder.finish(&simulation)?)
 }
 
-/// What is observed of a tick for the recording: each panel as long as it is shown.
-pub(crate) fn observed(local: &Local, opened: Instant) -> Observed {
+/// What is observed of a tick for the recording: panels as often as they are shown, and that of a robot whose emotion or behavior
+/// has changed.
+pub(crate) fn observed(local: &Local, record: &TickRecord, opened: Instant) -> Observed {
     let scenario = local.simulation.scenario();
-    let panel_interval = (PANEL_S / scenario.tick_s).round().max(1.0) as Tick;
+    let interval = (PANEL_S / scenario.tick_s).round().max(1.0) as Tick;
+    let is_due = record.tick.is_multiple_of(interval);
     let mut panels = BTreeMap::new();
-    if scenario.record.has_panels() && local.simulation.tick().is_multiple_of(panel_interval) {
-        panels = local.robots.panels();
+    if scenario.record.has_panels() {
+        panels = local
+            .robots
+            .panels(|robot| is_due || has_changed(robot, record));
     }
 
     Observed {
@@ -84,6 +88,14 @@ pub(crate) fn observed(local: &Local, opened: Instant) -> Observed {
         late: Vec::new(),
         panels,
     }
+}
+
+/// Whether the emotion or the behavior of a robot is another one from a tick on.
+fn has_changed(name: &RobotName, record: &TickRecord) -> bool {
+    record.events.iter().any(|event| match event {
+        Event::Emotion { robot, .. } | Event::Behavior { robot, .. } => robot == name,
+        _ => false,
+    })
 }
 
 /// Sleeps until this many seconds after `begun`.

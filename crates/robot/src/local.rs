@@ -179,12 +179,12 @@ impl LocalHost {
         self.stopped.remove(&index);
     }
 
-    /// The panel of every robot that is not stopped.
+    /// The panels of the robots that are chosen and not stopped.
     #[must_use]
-    pub fn panels(&self) -> BTreeMap<RobotName, Panel> {
+    pub fn panels(&self, is_chosen: impl Fn(&RobotName) -> bool) -> BTreeMap<RobotName, Panel> {
         let mut panels = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            if !self.stopped.contains(&index) {
+            if !self.stopped.contains(&index) && is_chosen(name) {
                 panels.insert(name.clone(), self.seats[index].panel());
             }
         }

@@ -367,15 +367,15 @@ fn cuts_panels_and_who_held_the_clock_up_are_shown() {
         assert_eq!(ticks[tick]["awaiting"], awaiting, "{tick}");
     }
 
-    // With the panels of the simulated second before, which is two ticks.
+    // With the panels of the two simulated seconds before, which are four ticks.
     let shown =
         |tick: u64| json!({"tick": tick, "robot": "Butler", "panel": panel(&format!("at {tick}"))});
     for (from, expected) in [
         (0, json!([shown(1), shown(9)])),
-        (2, json!([shown(1), shown(9)])),
-        (3, json!([shown(9)])),
-        (10, json!([shown(9)])),
-        (11, json!([])),
+        (4, json!([shown(1), shown(9)])),
+        (5, json!([shown(9)])),
+        (12, json!([shown(9)])),
+        (13, json!([])),
     ] {
         assert_eq!(get_range(&console, from, 20)["panels"], expected, "{from}");
     }
