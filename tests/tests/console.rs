@@ -591,6 +591,7 @@ const RATE_WINDOW: Duration = Duration::from_millis(600);
 const LEAST_RATIO: f64 = 0.75;
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_console_hardly_slows_a_run() {
     let lab = Lab::new();
     let run = Run::start(&lab, "con-rate");

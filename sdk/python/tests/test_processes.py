@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from lab import EXAMPLES, EXPECTS_NOTHING, PATIENCE_S, PYTHON, ROOT, Lab, assert_same
 
 EMPTY_HALL = """
@@ -159,6 +160,7 @@ def test_the_kit_finds_no_fault(lab: Lab) -> None:
     assert "not ok" not in found and "# SKIP" not in found and found.count("\nok ") >= 28, found
 
 
+@pytest.mark.thorough
 def test_the_kit_finds_no_fault_in_plain_zenoh(lab: Lab) -> None:
     """The example of the page, over zenoh's own bindings. It asks nobody and commands nobody."""
     example = [sys.executable, str(EXAMPLES / "plain_zenoh.py")]

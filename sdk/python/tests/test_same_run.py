@@ -40,7 +40,12 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+THOROUGH = ("a crash that is waited for", "a hang that is waited for")
+
+
+@pytest.mark.parametrize(
+    "fault", [pytest.param(name, marks=pytest.mark.thorough) if name in THOROUGH else name for name in FAULTS]
+)
 def test_a_leguin_that_falters_gives_the_same_run(lab: Lab, fault: str) -> None:
     """What happens to a process is part of the seed, too; who returns takes over as in Rust."""
     on_late = "wait" if "waited" in fault else "continue"

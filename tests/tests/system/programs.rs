@@ -569,6 +569,7 @@ fn robots_in_javascript_typescript_and_bash_move_feel_and_repeat_themselves() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn robots_over_stdin_and_stdout_keep_the_rules_of_the_protocol() {
     if lacks_compiler() || lacks_node() || lacks_typescript() {
         return;

@@ -26,12 +26,22 @@ fn is_equipped(modules: &str) -> bool {
 
 #[test]
 fn the_package_passes_its_tests() {
+    test_the_package(Choice::Usual);
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn the_package_passes_its_long_tests() {
+    test_the_package(Choice::Thorough);
+}
+
+fn test_the_package(choice: Choice) {
     if !is_equipped("cars, zenoh, pytest, mypy, pandas, pyarrow, polars, numpy") {
         return;
     }
 
     let folder = root().join("sdk/python");
-    pytest(&folder.join("tests"), Choice::Usual, || {
+    pytest(&folder.join("tests"), choice, || {
         let mut python = python();
         python.current_dir(&folder).env("CARS_BIN_DIR", programs());
         python

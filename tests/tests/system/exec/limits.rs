@@ -116,6 +116,7 @@ fn talker(name: &str, texts: (usize, usize), asks: &[String]) -> Talker {
 /// 92 texts of 1,000 bytes held a run for ever when receiving and sending shared a thread at the simulator; this is nearly the
 /// largest state that a report has room for, besides.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_state_as_large_as_a_message_allows_is_asked_for_in_every_tick() {
     for (label, texts) in [("large-92kb", (92, 1_000)), ("large-800kb", (200, 4_000))] {
         let talkers = [
@@ -128,6 +129,7 @@ fn a_state_as_large_as_a_message_allows_is_asked_for_in_every_tick() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn many_states_go_to_one_asker_in_every_tick() {
     let names: Vec<String> = (0..30).map(|index| format!("T{index:02}")).collect();
     let mut talkers = vec![talker("Asker", (0, 0), &names)];

@@ -337,6 +337,7 @@ fn c() -> Robot {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
     let rust = rust().plays("rust");
     let version = |program: &str| {
