@@ -1,5 +1,6 @@
 """A real launch to test the console with: simulator, robots and console, each in its own process."""
 
+import fcntl
 import itertools
 import json
 import math
@@ -44,20 +45,31 @@ FITS = """(() => {
 })()"""
 
 
-# Not the ports that the kernel gives to connections: another process would take one before it is used.
+# Not the ports that the kernel gives to connections: another process would take one before it is used. Processes of tests claim
+# theirs by locks, as `system_tests::free_port` does, until they end.
+CLAIMED = ROOT / "target" / "tmp" / "ports"
+CLAIMS = []
 PORTS = itertools.cycle(range(11_000, 31_000))
 for _ in range(os.getpid() % 20_000):
     next(PORTS)
 
 
 def free_port():
+    CLAIMED.mkdir(parents=True, exist_ok=True)
     for port in PORTS:
+        claim = open(CLAIMED / str(port), "wb")
+        try:
+            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            claim.close()
+            continue
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 probe.bind(("127.0.0.1", port))
             except OSError:
                 continue
+        CLAIMS.append(claim)
         return port
 
 

@@ -17,6 +17,7 @@ pub mod python;
 pub mod stalls;
 pub mod tools;
 
+use std::fs::File;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Output, Stdio};
@@ -271,12 +272,19 @@ fn is_held(status: &Value) -> bool {
 }
 
 /// A port of this machine at which no process listens. It is not one of those that the kernel gives to connections and to
-/// listeners without a port, so no other process takes it before it is used.
+/// listeners without a port, and other processes of tests, in Rust or Python, keep off until this one ends: nobody takes it before
+/// it is used.
+///
+/// # Panics
+/// If the folder of the claims cannot be made.
 #[must_use]
 pub fn free_port() -> u16 {
     static OFFSET: AtomicU16 = AtomicU16::new(0);
+    static CLAIMS: Mutex<Vec<File>> = Mutex::new(Vec::new());
     const FIRST: u16 = 11_000;
     const COUNT: u16 = 20_000;
+    let folder = root().join("target/tmp/ports");
+    std::fs::create_dir_all(&folder).unwrap();
 
     // Processes of tests begin at different places.
     let begin = std::process::id() % u32::from(COUNT);
@@ -284,7 +292,10 @@ pub fn free_port() -> u16 {
         let offset = u32::from(OFFSET.fetch_add(1, Ordering::Relaxed));
         let port = u32::from(FIRST) + (begin + offset) % u32::from(COUNT);
         let port = u16::try_from(port).unwrap();
-        if TcpListener::bind(("127.0.0.1", port)).is_ok() {
+
+        let claim = File::create(folder.join(port.to_string())).unwrap();
+        if claim.try_lock().is_ok() && TcpListener::bind(("127.0.0.1", port)).is_ok() {
+            CLAIMS.lock().unwrap().push(claim);
             return port;
         }
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import itertools
 import json
 import os
@@ -11,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "sdk" / "python" / "examples"
@@ -46,19 +47,30 @@ def environment(**more: str) -> dict[str, str]:
 
 PORTS = itertools.cycle(range(11_000, 31_000))
 """Not those that the kernel gives to connections: another process would take one before it is used."""
+CLAIMED = ROOT / "target" / "tmp" / "ports"
+"""Processes of tests claim theirs by locks, as ``system_tests::free_port`` does, until they end."""
+CLAIMS: list[BinaryIO] = []
 for _ in range(os.getpid() % 20_000):
     next(PORTS)
 
 
 def free_endpoint(protocol: str = "tcp") -> str:
     """An endpoint of the loopback interface at which no process listens."""
+    CLAIMED.mkdir(parents=True, exist_ok=True)
     for port in PORTS:
+        claim = open(CLAIMED / str(port), "wb")
+        try:
+            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            claim.close()
+            continue
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 probe.bind(("127.0.0.1", port))
             except OSError:
                 continue
+        CLAIMS.append(claim)
         return f"{protocol}/127.0.0.1:{port}"
     raise AssertionError("the ports never end")
 
