@@ -706,6 +706,20 @@ def test_samples_of_the_record_replace_what_was_seen(page):
     assert most_samples <= 6000 and most_spans <= 4000
 
 
+def test_the_newest_tick_is_a_sample_also_of_a_long_run(page):
+    times = run_module(
+        page,
+        """
+        const robots = [{name: 'B', location: {x: 0, y: 0}, emotion_state: 'A', behavior_state: 'S', state_variables: {}}];
+        const store = new Store();
+        store.live = {tick: 7, time_s: 3.5, robots};
+        store.refill(0, [0, 2, 4, 6].map((tick) => ({time_s: tick / 2, robots})), 7);
+        return store.liveHistory.times_s;
+        """,
+    )
+    assert times == [0, 1, 2, 3, 3.5]
+
+
 def test_the_window_stays_within_the_run(page):
     found = run_module(
         page,

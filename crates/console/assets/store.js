@@ -217,6 +217,8 @@ export class Store {
     this.liveHistory.cutFrom(from_s);
     for (const { time_s, robots } of samples) this.liveHistory.add(time_s, robots);
     for (const { time_s, robots } of this.memory.after(last)) this.liveHistory.add(time_s, robots);
+    // Of a long run not every tick is a sample, and the newest one is to be seen.
+    if (this.live) this.liveHistory.add(this.live.time_s, this.live.robots);
   }
 
   /**
