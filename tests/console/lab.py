@@ -1,7 +1,5 @@
 """A real launch to test the console with: simulator, robots and console, each in its own process."""
 
-import fcntl
-import itertools
 import json
 import math
 import os
@@ -9,11 +7,15 @@ import pathlib
 import re
 import select
 import signal
-import socket
 import subprocess
+import sys
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests" / "python"))
+
+from ports import free_port
+
 BIN = pathlib.Path(os.environ["CARS_BIN"])
 PATIENCE_S = 60.0
 
@@ -43,34 +45,6 @@ FITS = """(() => {
     const plan = document.getElementById("plan"), ratio = Math.min(2, devicePixelRatio);
     return plan.width === Math.round(plan.clientWidth * ratio) && plan.height === Math.round(plan.clientHeight * ratio);
 })()"""
-
-
-# Not the ports that the kernel gives to connections: another process would take one before it is used. Processes of tests claim
-# theirs by locks, as `system_tests::free_port` does, until they end.
-CLAIMED = ROOT / "target" / "tmp" / "ports"
-CLAIMS = []
-PORTS = itertools.cycle(range(11_000, 31_000))
-for _ in range(os.getpid() % 20_000):
-    next(PORTS)
-
-
-def free_port():
-    CLAIMED.mkdir(parents=True, exist_ok=True)
-    for port in PORTS:
-        claim = open(CLAIMED / str(port), "wb")
-        try:
-            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            claim.close()
-            continue
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind(("127.0.0.1", port))
-            except OSError:
-                continue
-        CLAIMS.append(claim)
-        return port
 
 
 class Processes:

@@ -131,27 +131,38 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
     eventually("the color of the emotion", lambda: any(is_like(one, other) for one, other in colors(ring)))
 
 
+# A plan of its own that shows the page's frame, and a place to which Butler may move.
+PLAN = """
+    const [{Plan}, {Store}, {Units}, {Vector}] =
+        await Promise.all(['plan', 'store', 'units', 'vector'].map((name) => import(`./assets/${name}.js`)));
+    const frame = window.carsConsole.frame();
+    const there = {x: frame.robots[0].location.x + 3, y: frame.robots[0].location.y};
+    const begin = () => {
+        const store = new Store();
+        const plan = new Plan(document.createElement('canvas'), store, new Units(), {draft: null}, () => {});
+        store.show(frame);
+        plan.paint(performance.now());
+        return {store, plan, butler_x: () => plan.motion.robotsNow.get('Butler').x};
+    };
+"""
+
+
 def test_pictures_are_of_a_tick_and_not_of_the_way_to_it(launch, open_page):
     page = open_page(launch().address, reduced_motion="no-preference")
     expect(page.get_by_test_id("tick")).to_have_text("0")
     places = page.evaluate(
-        """() => Promise.all([import('./assets/plan.js'), import('./assets/store.js'), import('./assets/units.js'), import('./assets/vector.js')])
-        .then(([{Plan}, {Store}, {Units}, {Vector}]) => {
-            const saved = {png: (plan) => void plan.picture(), svg: (plan) => plan.drawOn(new Vector())};
-            return Object.entries(saved).map(([kind, save]) => {
-                const store = new Store();
-                const plan = new Plan(document.createElement('canvas'), store, new Units(), {draft: null}, () => {});
-                const frame = window.carsConsole.frame();
-                const there = {x: frame.robots[0].location.x + 3, y: frame.robots[0].location.y};
-                store.show(frame);
+        f"""async () => {{ {PLAN}
+            const saved = {{png: (plan) => void plan.picture(), svg: (plan) => plan.drawOn(new Vector())}};
+            return Object.entries(saved).map(([kind, save]) => {{
+                const {{store, plan, butler_x}} = begin();
+                const robots = [{{...frame.robots[0], location: there}}, frame.robots[1]];
+                store.show({{...frame, tick: frame.tick + 1, speed: 1, robots}});
                 plan.paint(performance.now());
-                store.show({...frame, tick: frame.tick + 1, speed: 1, robots: [{...frame.robots[0], location: there}, frame.robots[1]]});
-                plan.paint(performance.now());
-                const onTheWay = plan.motion.robotsNow.get('Butler').x;
+                const onTheWay_x = butler_x();
                 save(plan);
-                return [kind, onTheWay < there.x, plan.motion.robotsNow.get('Butler').x === there.x];
-            });
-        })"""
+                return [kind, onTheWay_x < there.x, butler_x() === there.x];
+            }});
+        }}"""
     )
     assert places == [["png", True, True], ["svg", True, True]]
 
@@ -203,22 +214,15 @@ def test_reduced_motion_is_obeyed_on_the_plan(launch, open_page, motion):
     page = open_page(launch().address, reduced_motion=motion)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     moved = page.evaluate(
-        """() => Promise.all([import('./assets/plan.js'), import('./assets/store.js'), import('./assets/units.js')])
-        .then(([{Plan}, {Store}, {Units}]) => {
-            const store = new Store();
-            const plan = new Plan(document.createElement('canvas'), store, new Units(), {draft: null}, () => {});
-            const frame = window.carsConsole.frame();
-            const there = {x: frame.robots[0].location.x + 3, y: frame.robots[0].location.y};
-            store.show(frame);
-            plan.paint(performance.now());
-            const sent = {from: 'Leguin', to: 'Butler', seq: 1, tick: 1, command: 'x', fate: 'sent'};
-            const robots = [{...frame.robots[0], location: there}, frame.robots[1]];
+        f"""async () => {{ {PLAN}
+            const {{store, plan, butler_x}} = begin();
+            const sent = {{from: 'Leguin', to: 'Butler', seq: 1, tick: 1, command: 'x', fate: 'sent'}};
+            const robots = [{{...frame.robots[0], location: there}}, frame.robots[1]];
             plan.motion.arrivedAt_ms -= 500;
-            store.show({...frame, tick: frame.tick + 1, speed: 1, robots, flights: [sent]});
+            store.show({{...frame, tick: frame.tick + 1, speed: 1, robots, flights: [sent]}});
             plan.paint(performance.now());
-            const at = plan.motion.robotsNow.get('Butler').x;
-            return [at === there.x, [...plan.flights.airborne.values()][0].progress > 0.8];
-        })"""
+            return [butler_x() === there.x, [...plan.flights.airborne.values()][0].progress > 0.8];
+        }}"""
     )
     assert moved == ([True, True] if motion == "reduce" else [False, False])
 

@@ -6,8 +6,9 @@ use lab::run::Local;
 use protocol::messages::Point;
 use protocol::{RobotName, RunName};
 use robot::LocalHost;
-use simulator::scenario::Changes;
-use simulator::{Event, Scenario, Simulation};
+use scenario::Changes;
+use scenario::Scenario;
+use simulator::{Event, Simulation};
 
 use crate::root;
 

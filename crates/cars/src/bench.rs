@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
-use simulator::scenario::{Changes, Scenario};
+use scenario::{Changes, Scenario};
 
 use crate::named;
 use programs::Programs;

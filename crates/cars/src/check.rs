@@ -9,8 +9,9 @@ use config::{Changes, FileError};
 use lab::experiment::{Experiment, Plan, Request, Robots, is_experiment_file};
 use lab::folder::recorded_epochs;
 use launch::{LaunchFile, is_launch_file, scenario_file};
+use scenario::Scenario;
+use simulator::RunFolder;
 use simulator::seal::{self, Checked};
-use simulator::{RunFolder, Scenario};
 use terminal::OutputError;
 
 use crate::named;

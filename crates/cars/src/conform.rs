@@ -8,7 +8,7 @@ use config::Changes;
 use conform::{Report, Role, Rule, Setting};
 use miette::miette;
 use protocol::{RobotName, Tick};
-use simulator::Scenario;
+use scenario::Scenario;
 use terminal::OutputError;
 
 use crate::named;

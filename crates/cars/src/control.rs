@@ -11,8 +11,9 @@ use protocol::messages::{
     Command, Control, ControlAnswer, FaultKind, Intervention, LogRecord, OnLate, Presence, Status,
 };
 use protocol::{Message, RobotName, RunName, Tick, decode, encode};
+use scenario::Scenario;
+use simulator::RunFolder;
 use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
-use simulator::{RunFolder, Scenario};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::mpsc::sync_channel;

@@ -10,9 +10,9 @@ use lab::judge::judge;
 use lab::table::verdicts;
 use protocol::Epoch;
 use protocol::messages::Verdict;
-use simulator::Scenario;
+use scenario::Scenario;
+use scenario::expectations;
 use simulator::recorder::LATEST;
-use simulator::scenario::expectations;
 
 /// `cars expect`.
 #[derive(Debug, Args)]

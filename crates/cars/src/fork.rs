@@ -13,7 +13,7 @@ use lab::moment::Moment;
 use launch::RunOptions;
 use miette::{IntoDiagnostic, miette};
 use protocol::{Epoch, RunName};
-use simulator::Scenario;
+use scenario::Scenario;
 
 use crate::table;
 

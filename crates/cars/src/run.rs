@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use lab::run::check_faults;
 use miette::IntoDiagnostic;
-use simulator::Scenario;
+use scenario::Scenario;
 
 use crate::execution::ExecutionArgs;
 use crate::named;

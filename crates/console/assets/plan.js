@@ -285,7 +285,8 @@ export class Plan {
    * @param {draw.Paper} paper
    */
   drawOn(paper) {
-    this.arrive();
+    this.motion.arrive();
+    this.touch();
     const pen = { ...this.pen, context: paper };
     const frame = this.motion.to;
     draw.outside(pen);
@@ -304,15 +305,9 @@ export class Plan {
     });
   }
 
-  /** A picture is of a tick, and not of the way to it. */
-  arrive() {
-    this.motion.arrive();
-    this.touch();
-  }
-
   /** A picture of the tick that is shown. @returns {Promise<Blob | null>} */
   picture() {
-    this.arrive();
+    this.motion.arrive();
     this.paint(performance.now());
     return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
   }

@@ -14,7 +14,7 @@ use lab::run::Local;
 use lab::statistics::Estimate;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
-use simulator::Scenario;
+use scenario::Scenario;
 
 /// Runs of each round.
 const RUNS: u64 = 24;

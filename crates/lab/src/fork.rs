@@ -5,10 +5,11 @@ use std::time::Instant;
 use config::{Changes, FileError, Override, Source};
 use miette::{IntoDiagnostic, miette};
 use protocol::{Event, RobotName, RunName, Tick};
+use scenario::Parent;
+use scenario::Scenario;
 use simulator::difference::between;
 use simulator::record::{Entry, Record};
-use simulator::scenario::Parent;
-use simulator::{EpochFiles, Recorder, RunFolder, Scenario, Summary};
+use simulator::{EpochFiles, Recorder, RunFolder, Summary};
 
 use crate::reexecution::Reexecution;
 use crate::run::{check_faults, go_on, observed};

@@ -8,9 +8,10 @@ use observe::{Expectation, Observation, Watches};
 use protocol::messages::End;
 use protocol::{Event, Tick};
 use recording::{Recording, Ticks};
+use scenario::Scenario;
+use simulator::EpochFiles;
 use simulator::record::{Entry, Record};
 use simulator::summary::Judged;
-use simulator::{EpochFiles, Scenario};
 
 use crate::states::LastStates;
 

@@ -3,7 +3,8 @@
 use miette::IntoDiagnostic;
 use protocol::messages::PublicState;
 use protocol::{Event, RobotName, RunName, Tick};
-use simulator::{Scenario, Simulation, TickRecord};
+use scenario::Scenario;
+use simulator::{Simulation, TickRecord};
 use std::collections::BTreeMap;
 
 use crate::run::play;

@@ -12,8 +12,9 @@ use miette::{IntoDiagnostic, miette};
 use protocol::messages::{CommandText, News, Report};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
+use scenario::Scenario;
+use simulator::TickRecord;
 use simulator::record::Entry;
-use simulator::{Scenario, TickRecord};
 
 use crate::replayed::action;
 use crate::run::Local;

@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
-use recording::PANEL_S;
+use recording::panel_ticks;
 use robot::{LocalHost, Robot};
+use scenario::FaultEnd;
+use scenario::Scenario;
 use simulator::recorder::Observed;
-use simulator::scenario::FaultEnd;
-use simulator::{Recorder, RunFolder, Scenario, Simulation, Summary, TickRecord};
+use simulator::{Recorder, RunFolder, Simulation, Summary, TickRecord};
 
 /// Longest sleep of a run that is not as fast as possible, before it looks whether it is to go on.
 const NAP: Duration = Duration::from_millis(50);
@@ -72,8 +73,7 @@ pub fn execute_with(
 /// has changed.
 pub(crate) fn observed(local: &Local, record: &TickRecord, opened: Instant) -> Observed {
     let scenario = local.simulation.scenario();
-    let interval = (PANEL_S / scenario.tick_s).round().max(1.0) as Tick;
-    let is_due = record.tick.is_multiple_of(interval);
+    let is_due = record.tick.is_multiple_of(panel_ticks(scenario.tick_s));
     let mut panels = BTreeMap::new();
     if scenario.record.has_panels() {
         panels = local

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use config::{Changes, FileError};
 use miette::{IntoDiagnostic, miette};
 use protocol::{RobotName, Tick};
+use scenario::Scenario;
 use simulator::difference::{Difference, between};
 use simulator::record::Record;
 use simulator::recorder::{EVENTS, SUMMARY};
-use simulator::{EpochFiles, Scenario, seal};
+use simulator::{EpochFiles, seal};
 
 use crate::reexecution::Reexecution;
 

@@ -10,8 +10,8 @@ use config::speed::SpeedError;
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use protocol::RobotName;
+use scenario::Scenario;
 use serde::Deserialize;
-use simulator::Scenario;
 use toml::Spanned;
 
 use super::restart::Restart;

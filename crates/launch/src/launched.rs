@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use config::{FileError, Source};
 use protocol::RobotName;
+use scenario::Scenario;
 use serde::{Deserialize, Serialize};
+use simulator::RunFolder;
 use simulator::recorder::LAUNCHED;
-use simulator::{RunFolder, Scenario};
 
 use super::file::LaunchFile;
 

@@ -10,8 +10,9 @@ use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName};
+use scenario::{Scenario, roster};
+use simulator::RunFolder;
 use simulator::recorder::{LOGS, SCENARIO};
-use simulator::{RunFolder, Scenario, roster};
 
 use super::compose;
 use super::endpoint;

@@ -6,8 +6,9 @@ use config::units::Time;
 use config::{Changes, Override, Speed};
 use protocol::RunName;
 use protocol::name::BadName;
+use scenario::Scenario;
+use simulator::RunFolder;
 use simulator::recorder::RunLock;
-use simulator::{RunFolder, Scenario};
 
 use super::launched::Launched;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use pyo3::prelude::*;
 use robot::{Robot, RobotName};
-use simulator::Scenario;
+use scenario::Scenario;
 
 use crate::error::UnknownRobot;
 use crate::seat::{Failure, PythonRobot};

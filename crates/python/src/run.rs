@@ -14,7 +14,8 @@ use lab::run::{check_faults, execute_with};
 use launch::{RunOptions, scenario_file};
 use miette::{IntoDiagnostic, miette};
 use pyo3::prelude::*;
-use simulator::{RunFolder, Scenario};
+use scenario::Scenario;
+use simulator::RunFolder;
 
 use crate::error::{plain, reported};
 use crate::interrupt::Watch;

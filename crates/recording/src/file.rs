@@ -7,8 +7,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Write};
 
-use mcap::MAGIC;
-use mcap::records::op;
+use crate::format::{MAGIC, Record, op};
 
 /// Level of compression. Level 1 takes 1.6 times as long and saves a fifth of the bytes.
 const COMPRESSION_LEVEL: i32 = -1;
@@ -344,7 +343,7 @@ impl McapFile {
         self.records.extend_from_slice(&offsets_start.to_le_bytes());
         let crc = crc32fast::hash(&self.records);
         self.records.extend_from_slice(&crc.to_le_bytes());
-        self.records.extend_from_slice(MAGIC);
+        self.records.extend_from_slice(&MAGIC);
         self.write()
     }
 
@@ -378,63 +377,5 @@ impl Index {
         }
         record.end();
         bytes
-    }
-}
-
-/// A record that is appended to bytes: an operation code, its length, and fields in little-endian.
-struct Record<'a> {
-    bytes: &'a mut Vec<u8>,
-    /// Where its body begins.
-    body: usize,
-}
-
-impl<'a> Record<'a> {
-    fn begin(bytes: &'a mut Vec<u8>, op: u8) -> Self {
-        bytes.push(op);
-        bytes.extend_from_slice(&[0; 8]);
-        Self {
-            body: bytes.len(),
-            bytes,
-        }
-    }
-
-    fn u16(&mut self, value: u16) {
-        self.bytes.extend_from_slice(&value.to_le_bytes());
-    }
-
-    fn u32(&mut self, value: u32) {
-        self.bytes.extend_from_slice(&value.to_le_bytes());
-    }
-
-    fn u64(&mut self, value: u64) {
-        self.bytes.extend_from_slice(&value.to_le_bytes());
-    }
-
-    fn text(&mut self, text: &str) {
-        self.u32(text.len() as u32);
-        self.bytes.extend_from_slice(text.as_bytes());
-    }
-
-    /// Texts by texts, with the length of all.
-    fn map(&mut self, map: &BTreeMap<String, String>) {
-        let mut len = 0;
-        for (key, value) in map {
-            len += 4 + key.len() + 4 + value.len();
-        }
-        self.u32(len as u32);
-        for (key, value) in map {
-            self.text(key);
-            self.text(value);
-        }
-    }
-
-    fn body(&self) -> &[u8] {
-        &self.bytes[self.body..]
-    }
-
-    /// Ends the record: its length is known.
-    fn end(self) {
-        let len = (self.bytes.len() - self.body) as u64;
-        self.bytes[self.body - 8..self.body].copy_from_slice(&len.to_le_bytes());
     }
 }

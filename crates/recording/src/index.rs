@@ -5,10 +5,8 @@ use std::fs::{File, Metadata};
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::Path;
 
-use mcap::MAGIC;
-use mcap::records::{ChunkHeader, Record, op};
-
 use crate::damage::{Name, RecordingError};
+use crate::format::{Fields, MAGIC, op};
 
 /// Bytes of a record before its body: operation code and length.
 const RECORD_HEAD: u64 = 9;
@@ -47,6 +45,29 @@ pub(crate) struct Index {
     pub(crate) is_finished: bool,
     /// Where a file without an index goes on.
     pub(crate) end: u64,
+}
+
+/// What a chunk has before its content.
+struct ChunkHeader<'a> {
+    start_ns: u64,
+    end_ns: u64,
+    /// Bytes before compression.
+    size: u64,
+    checksum: u32,
+    compression: &'a str,
+}
+
+impl<'a> ChunkHeader<'a> {
+    /// Reads the fields of a chunk up to the length of its content.
+    fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(Self {
+            start_ns: fields.u64()?,
+            end_ns: fields.u64()?,
+            size: fields.u64()?,
+            checksum: fields.u32()?,
+            compression: fields.text()?,
+        })
+    }
 }
 
 /// A record, not decoded.
@@ -167,25 +188,14 @@ impl Bytes {
             is_finished: true,
             ..Index::default()
         };
-        let mut rest = summary;
-        while !rest.is_empty() {
-            let (head, after) = rest.split_at_checked(RECORD_HEAD as usize)?;
-            let len = usize::try_from(little_endian(&head[1..])).ok()?;
-            let (body, after) = after.split_at_checked(len)?;
-            rest = after;
-
-            if head[0] == op::CHUNK_INDEX
-                && let Record::ChunkIndex(chunk) = mcap::parse_record(head[0], body).ok()?
-            {
-                index.chunks.push(Chunk {
-                    offset: chunk.chunk_start_offset,
-                    start_ns: chunk.message_start_time,
-                    end_ns: chunk.message_end_time,
-                    size: chunk.uncompressed_size,
-                });
-            }
-            if head[0] == op::ATTACHMENT_INDEX {
-                index.scenario = Some(little_endian(body.get(..8)?));
+        let mut summary = Fields(summary);
+        while !summary.0.is_empty() {
+            let (op, body) = summary.record()?;
+            let mut fields = Fields(body);
+            match op {
+                op::CHUNK_INDEX => index.chunks.push(indexed_chunk(&mut fields)?),
+                op::ATTACHMENT_INDEX => index.scenario = Some(fields.u64()?),
+                _ => {}
             }
         }
 
@@ -200,13 +210,7 @@ impl Bytes {
             index.end = offset;
             match record.op {
                 op::CHUNK => {
-                    let header = self.chunk_header(&record)?;
-                    index.chunks.push(Chunk {
-                        offset,
-                        start_ns: header.message_start_time,
-                        end_ns: header.message_end_time,
-                        size: header.uncompressed_size,
-                    });
+                    index.chunks.push(self.scanned_chunk(offset, &record)?);
                 }
                 op::ATTACHMENT => index.scenario = Some(offset),
                 op::HEADER | op::METADATA | op::MESSAGE_INDEX => {}
@@ -226,26 +230,21 @@ impl Bytes {
         Ok(index)
     }
 
-    /// The header of a chunk, without its content.
-    fn chunk_header(&self, record: &RecordHead) -> Result<ChunkHeader, RecordingError> {
-        // Four numbers of 8 bytes, a checksum, and the name of a compression with its length.
-        let len = record.len.min(4 * 8 + 4 + 4 + 16);
-        let mut body = self.read(record.body, len)?;
-        let at = 8 + 8 + 8 + 4;
-        let compression = body.get(at..at + 4).map_or(u64::MAX, little_endian);
-        let size_at = usize::try_from(compression).unwrap_or(usize::MAX);
-        let size_at = size_at.saturating_add(at + 4);
+    /// The chunk at an offset, of which only the header is read.
+    fn scanned_chunk(&self, offset: u64, record: &RecordHead) -> Result<Chunk, RecordingError> {
+        // Three numbers of 8 bytes, a checksum, and the name of a compression with its length.
+        let len = record.len.min(3 * 8 + 4 + 4 + 16);
+        let body = self.read(record.body, len)?;
+        let header = ChunkHeader::read(&mut Fields(&body));
+        let header =
+            header.ok_or_else(|| self.name.damaged(record.body, &"a chunk without a header"))?;
 
-        // The size of a content that is left out.
-        match body.get_mut(size_at..size_at.saturating_add(8)) {
-            Some(size) => size.fill(0),
-            None => return Err(self.name.damaged(record.body, &"a chunk without a header")),
-        }
-        match mcap::parse_record(op::CHUNK, &body) {
-            Ok(Record::Chunk { header, .. }) => Ok(header),
-            Ok(_) => Err(self.name.damaged(record.body, &"not a chunk")),
-            Err(error) => Err(self.name.damaged(record.body, &error)),
-        }
+        Ok(Chunk {
+            offset,
+            start_ns: header.start_ns,
+            end_ns: header.end_ns,
+            size: header.size,
+        })
     }
 
     /// The content of a chunk: decompressed and compared with its checksum.
@@ -256,23 +255,23 @@ impl Bytes {
         let record = record.filter(|record| record.op == op::CHUNK);
         let record = record.ok_or_else(|| damaged(&"no chunk where the index has one"))?;
         let body = self.body(&record)?;
-        let parsed = mcap::parse_record(op::CHUNK, &body);
-        let Ok(Record::Chunk { header, data }) = parsed else {
-            return Err(damaged(&"not a chunk"));
-        };
-        if header.message_start_time != chunk.start_ns || header.message_end_time != chunk.end_ns {
+        let mut fields = Fields(&body);
+        let header = ChunkHeader::read(&mut fields).ok_or_else(|| damaged(&"not a chunk"))?;
+        let compressed = fields.u64().and_then(|len| fields.bytes(len));
+        let compressed = compressed.ok_or_else(|| damaged(&"not a chunk"))?;
+        if header.start_ns != chunk.start_ns || header.end_ns != chunk.end_ns {
             return Err(damaged(&"its times are not those of the index"));
         }
-        if header.uncompressed_size > MAX_BYTES {
+        if header.size > MAX_BYTES {
             return Err(damaged(&"a length is wrong"));
         }
 
-        let size = header.uncompressed_size as usize;
-        let content = match header.compression.as_str() {
-            "zstd" => zstd::bulk::decompress(&data, size).map_err(|error| damaged(&error))?,
+        let size = header.size as usize;
+        let content = match header.compression {
+            "zstd" => zstd::bulk::decompress(compressed, size).map_err(|error| damaged(&error))?,
             other => return Err(damaged(&format!("unknown compression {other:?}"))),
         };
-        if content.len() != size || crc32fast::hash(&content) != header.uncompressed_crc {
+        if content.len() != size || crc32fast::hash(&content) != header.checksum {
             return Err(damaged(&"the checksum is wrong"));
         }
         Ok(content)
@@ -299,17 +298,35 @@ impl Bytes {
     }
 }
 
-/// The data in the body of an attachment, after two times and two texts.
-fn attached(body: &[u8]) -> Option<&[u8]> {
-    let rest = after_text(body.get(2 * 8..)?)?;
-    let (len, data) = after_text(rest)?.split_at_checked(8)?;
-    data.get(..usize::try_from(little_endian(len)).ok()?)
+/// A chunk as the index has it.
+fn indexed_chunk(fields: &mut Fields<'_>) -> Option<Chunk> {
+    let start_ns = fields.u64()?;
+    let end_ns = fields.u64()?;
+    let offset = fields.u64()?;
+    let _record_len = fields.u64()?;
+    // Where the messages of each channel are.
+    let places_len = fields.u32()?;
+    fields.bytes(places_len.into())?;
+    let _places_record_len = fields.u64()?;
+    fields.text()?;
+    let _compressed_size = fields.u64()?;
+
+    Some(Chunk {
+        offset,
+        start_ns,
+        end_ns,
+        size: fields.u64()?,
+    })
 }
 
-/// What follows a text, which has its length before it.
-fn after_text(bytes: &[u8]) -> Option<&[u8]> {
-    let (len, rest) = bytes.split_at_checked(4)?;
-    rest.get(usize::try_from(little_endian(len)).ok()?..)
+/// The data in the body of an attachment, after two times and two texts.
+fn attached(body: &[u8]) -> Option<&[u8]> {
+    let mut fields = Fields(body);
+    fields.bytes(2 * 8)?;
+    fields.text()?;
+    fields.text()?;
+    let len = fields.u64()?;
+    fields.bytes(len)
 }
 
 /// At most eight bytes as a number.

@@ -8,6 +8,7 @@ pub mod content;
 mod damage;
 mod encode;
 mod file;
+mod format;
 mod index;
 mod json;
 mod protobuf;
@@ -23,7 +24,7 @@ pub use content::{
 };
 pub use damage::RecordingError;
 pub use read::Recording;
-pub use shown::{LastReports, PANEL_S};
+pub use shown::{LastReports, panel_ticks};
 pub use ticks::Ticks;
 pub use write::{WriteError, Writer};
 

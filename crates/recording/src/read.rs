@@ -5,12 +5,12 @@ use std::fmt::Display;
 use std::fs::File;
 use std::path::Path;
 
-use mcap::records::{Record, op};
 use protocol::{Event, Line, RobotName, Tick};
 use serde::de::DeserializeOwned;
 
 use crate::content::{Frame, Header, Json, RawTick, RecordedTick, TickEvents, Wall};
 use crate::damage::{Name, RecordingError};
+use crate::format::{Fields, op};
 use crate::index::{Bytes, Chunk};
 use crate::topic::Topic;
 
@@ -388,12 +388,9 @@ fn read_preamble(
         .into_iter()
         .filter(|(op, _)| *op == op::CHANNEL)
     {
-        let record = mcap::parse_record(op::CHANNEL, body);
-        let Ok(Record::Channel(channel)) = record else {
-            return Err(damaged(&"a channel cannot be read"));
-        };
-        if let Some(topic) = Topic::parse(&channel.topic) {
-            topics.insert(channel.id, topic);
+        let (id, topic) = channel(body).ok_or_else(|| damaged(&"a channel cannot be read"))?;
+        if let Some(topic) = Topic::parse(topic) {
+            topics.insert(id, topic);
         }
     }
 
@@ -409,16 +406,20 @@ fn read_preamble(
     Err(bytes.name.headless())
 }
 
+/// Number and topic in the body of a channel.
+fn channel(body: &[u8]) -> Option<(u16, &str)> {
+    let mut fields = Fields(body);
+    let id = fields.u16()?;
+    let _schema = fields.u16()?;
+    Some((id, fields.text()?))
+}
+
 /// The records of a chunk, each with its operation code; `None` if a length is wrong.
 fn records(content: &[u8]) -> Option<Vec<(u8, &[u8])>> {
     let mut records = Vec::new();
-    let mut rest = content;
-    while !rest.is_empty() {
-        let (head, after) = rest.split_at_checked(9)?;
-        let len = u64::from_le_bytes(head[1..].try_into().ok()?);
-        let (body, after) = after.split_at_checked(usize::try_from(len).ok()?)?;
-        records.push((head[0], body));
-        rest = after;
+    let mut content = Fields(content);
+    while !content.0.is_empty() {
+        records.push(content.record()?);
     }
     Some(records)
 }
@@ -430,11 +431,16 @@ fn messages(content: &[u8]) -> Option<Vec<Message<'_>>> {
         if op != op::MESSAGE {
             continue;
         }
-        let (head, json) = body.split_at_checked(2 + 4 + 8 + 8)?;
+
+        let mut fields = Fields(body);
+        let channel = fields.u16()?;
+        let _sequence = fields.u32()?;
+        let time_ns = fields.u64()?;
+        let _publish_time_ns = fields.u64()?;
         messages.push(Message {
-            channel: u16::from_le_bytes(head[..2].try_into().ok()?),
-            time_ns: u64::from_le_bytes(head[6..14].try_into().ok()?),
-            json,
+            channel,
+            time_ns,
+            json: fields.0,
         });
     }
     Some(messages)

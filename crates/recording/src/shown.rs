@@ -10,16 +10,20 @@ use crate::content::{Header, PlacedRobot, RecordedTick};
 use crate::damage::RecordingError;
 use crate::read::Recording;
 
-/// How long a panel is shown, simulated seconds: in one process, until the next one. In a fast run panels arrive more seldom, and
-/// would show old states.
-pub const PANEL_S: f64 = 2.0;
+/// How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states.
+const PANEL_S: f64 = 2.0;
+
+/// For how many ticks a panel is shown: in one process, until the next one.
+#[must_use]
+pub fn panel_ticks(tick_s: f64) -> Tick {
+    (PANEL_S / tick_s).round().max(1.0) as Tick
+}
 
 impl Header {
     /// The first of the ticks of which panels are shown in a tick.
     #[must_use]
     pub fn first_of_panels(&self, tick: Tick) -> Tick {
-        let lifetime = (PANEL_S / self.tick_s).round().max(1.0) as Tick;
-        tick.saturating_sub(lifetime - 1)
+        tick.saturating_sub(panel_ticks(self.tick_s) - 1)
     }
 }
 

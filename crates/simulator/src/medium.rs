@@ -10,8 +10,8 @@ use protocol::messages::{CommandText, Cut, Delivery};
 use protocol::random::{Stream, stream, unit};
 use protocol::{RobotName, Seq, Tick};
 
-use crate::scenario::Network;
-use crate::scenario::network::{Burst, Channel, Counted, ticks};
+use scenario::Network;
+use scenario::network::{Burst, Channel, Counted, ticks};
 
 /// A command that a robot or the operator has sent.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
-use crate::scenario::{Changes, Override, Scenario};
 use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
 use crate::{RunFolder, Summary};
 use bus::endpoint::connectable;
@@ -15,6 +14,7 @@ use config::{Speed, shipped};
 use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::messages::End;
+use scenario::{Changes, Override, Scenario};
 
 /// Exit status where another process has the address at which the simulator is to listen.
 pub const ADDRESS_TAKEN: u8 = 3;

@@ -15,14 +15,14 @@ use protocol::{Epoch, Event, Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
 
-use crate::files::{EpochFiles, LOCK, check_log_name};
+use crate::files::{EpochFiles, LOCK};
 use crate::record::Record;
-use crate::scenario::{Scenario, SyncPoint};
 use crate::seal::{self, Seal};
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::Summary;
+use scenario::{Scenario, SyncPoint};
 
-pub use crate::files::{
+pub use scenario::files::{
     ENDPOINT, EVENTS, LATEST, LAUNCHED, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO, SUMMARY,
 };
 
@@ -220,7 +220,7 @@ impl RunFolder {
         let scenario: toml::Table = toml::from_str(&scenario).unwrap_or_default();
         let record = scenario.get("record");
         let name = record.and_then(|record| record.get("log_name")?.as_str());
-        let name = name.filter(|name| check_log_name(name).is_ok());
+        let name = name.filter(|name| scenario::files::check_log_name(name).is_ok());
         self.file(name.unwrap_or(LOG))
     }
 

@@ -17,7 +17,7 @@ use world::{Body, HallError, Verdict, World};
 
 use crate::digest::{Digest, TickDigest};
 use crate::medium::{Arrival, Medium, SentCommand};
-use crate::scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
+use scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
 
 /// Most bodies in the news of a robot, so that the news fit into a message.
 const MAX_BODIES: usize = 4096;

@@ -13,8 +13,9 @@ use protocol::messages::{
     CommandText, Cut, FaultKind, Intervention, News, OnLate, Performative, Point, Report,
 };
 use protocol::{RobotName, Tick};
-use simulator::diagnostic::Source;
-use simulator::{Event, Scenario, Simulation, TickRecord};
+use scenario::Scenario;
+use scenario::diagnostic::Source;
+use simulator::{Event, Simulation, TickRecord};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";

@@ -8,8 +8,8 @@ use std::path::Path;
 use protocol::event::Cause;
 use protocol::messages::{CommandText, Performative};
 use protocol::{Event, RobotName};
-use simulator::Scenario;
-use simulator::diagnostic::{FileError, Source};
+use scenario::Scenario;
+use scenario::diagnostic::{FileError, Source};
 use simulator::medium::{Decision, Medium, SentCommand};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\

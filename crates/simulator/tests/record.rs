@@ -10,9 +10,10 @@ use std::sync::Arc;
 use lockstep::{Exchange, Outcome};
 use protocol::messages::{CommandText, End, News, Report};
 use protocol::{RobotName, RunName, Tick};
-use simulator::diagnostic::Source;
+use scenario::Scenario;
+use scenario::diagnostic::Source;
 use simulator::recorder::{EVENTS, RECORDING};
-use simulator::{Recorder, RunFolder, Scenario, Simulation};
+use simulator::{Recorder, RunFolder, Simulation};
 
 /// Robots that miss every tick.
 struct Absent;

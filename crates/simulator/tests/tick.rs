@@ -11,8 +11,9 @@ use lockstep::{Exchange, Outcome, Sent};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{CommandText, Delivery, News, Performative, Point, Report, SensedKind};
 use protocol::{RobotName, RunName, Tick};
-use simulator::diagnostic::Source;
-use simulator::{Event, Scenario, Simulation, TickRecord};
+use scenario::Scenario;
+use scenario::diagnostic::Source;
+use simulator::{Event, Simulation, TickRecord};
 
 /// News of a tick, by robot.
 type AllNews = BTreeMap<RobotName, News>;

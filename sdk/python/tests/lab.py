@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import fcntl
-import itertools
 import json
 import os
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, TypeVar
+
+from ports import free_port
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "sdk" / "python" / "examples"
@@ -43,36 +42,6 @@ def environment(**more: str) -> dict[str, str]:
     # Scripts find the interpreter of these tests.
     own["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), own.get("PATH", "")])
     return own | more
-
-
-PORTS = itertools.cycle(range(11_000, 31_000))
-"""Not those that the kernel gives to connections: another process would take one before it is used."""
-CLAIMED = ROOT / "target" / "tmp" / "ports"
-"""Processes of tests claim theirs by locks, as ``system_tests::free_port`` does, until they end."""
-CLAIMS: list[BinaryIO] = []
-for _ in range(os.getpid() % 20_000):
-    next(PORTS)
-
-
-def free_endpoint(protocol: str = "tcp") -> str:
-    """An endpoint of the loopback interface at which no process listens."""
-    CLAIMED.mkdir(parents=True, exist_ok=True)
-    for port in PORTS:
-        claim = open(CLAIMED / str(port), "wb")
-        try:
-            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            claim.close()
-            continue
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind(("127.0.0.1", port))
-            except OSError:
-                continue
-        CLAIMS.append(claim)
-        return f"{protocol}/127.0.0.1:{port}"
-    raise AssertionError("the ports never end")
 
 
 # The exit status of a run is that of the verdict on it, which is of no concern here.
@@ -151,7 +120,7 @@ class Lab:
         """Starts a simulator of this scenario; gives the environment of those who take part."""
         file = self.folder / f"{run}.toml"
         file.write_text(scenario)
-        endpoint = free_endpoint(protocol)
+        endpoint = f"{protocol}/127.0.0.1:{free_port()}"
         out = ["--run", run, "--listen", endpoint, "--out", str(self.folder)]
         self._simulators[run] = self.start([str(self.programs / "cars-sim"), str(file), *out, *arguments])
         return {"CARS_RUN": run, "CARS_CONNECT": endpoint}

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
 use lab::hunt::{Budget, Kind, Options, Subject, hunt};
-use simulator::scenario::Changes;
+use scenario::Changes;
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();

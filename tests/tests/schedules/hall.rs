@@ -7,9 +7,10 @@ use protocol::messages::StateVariables;
 use protocol::random::unit;
 use protocol::{Epoch, RobotName, RunName, Tick};
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, Variable};
-use simulator::diagnostic::Source;
-use simulator::scenario::Changes;
-use simulator::{Scenario, Simulation};
+use scenario::Changes;
+use scenario::Scenario;
+use scenario::diagnostic::Source;
+use simulator::Simulation;
 
 /// Ticks of every epoch.
 pub(crate) const TICKS: Tick = 40;

@@ -8,7 +8,8 @@ use lockstep::{Begin, Membership, Naming, Outcome, Sent, Turn};
 use protocol::messages::{CommandText, PublicState, Report};
 use protocol::{Generation, RobotName, RunName, Tick};
 use robot::{Done, Network, Seat, Undelivered};
-use simulator::{Scenario, Simulation, TickRecord};
+use scenario::Scenario;
+use simulator::{Simulation, TickRecord};
 
 use crate::hall::make;
 

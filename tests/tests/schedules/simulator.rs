@@ -56,7 +56,7 @@ pub(crate) struct Simulator {
 }
 
 impl Simulator {
-    pub(crate) fn new(plan: &Plan, scenario: &simulator::Scenario) -> Self {
+    pub(crate) fn new(plan: &Plan, scenario: &scenario::Scenario) -> Self {
         let barrier = Barrier::new(
             scenario.robots.keys().cloned(),
             plan.lateness.clone(),

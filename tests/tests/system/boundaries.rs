@@ -20,8 +20,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("robot", &["bus", "lockstep", "protocol", "terminal"]),
     ("robots", &["robot", "affect", "lockstep", "protocol"]),
     (
+        "scenario",
+        &[
+            "world",
+            "config",
+            "lockstep",
+            "observe",
+            "protocol",
+            "recording",
+        ],
+    ),
+    (
         "simulator",
         &[
+            "scenario",
             "world",
             "bus",
             "config",
@@ -40,6 +52,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "launch",
         &[
+            "scenario",
             "simulator",
             "robot",
             "bus",
@@ -51,6 +64,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "lab",
         &[
+            "scenario",
             "simulator",
             "robot",
             "robots",
@@ -69,6 +83,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "launch",
             "lab",
+            "scenario",
             "simulator",
             "console",
             "robot",
@@ -86,6 +101,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "lab",
             "launch",
+            "scenario",
             "simulator",
             "robots",
             "robot",
@@ -101,6 +117,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "system-tests",
         &[
+            "scenario",
             "simulator",
             "robot",
             "robots",

@@ -9,8 +9,8 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
-use simulator::Scenario;
-use simulator::diagnostic::Source;
+use scenario::Scenario;
+use scenario::diagnostic::Source;
 use system_tests::{programs, root};
 
 /// One thing that goes wrong in a file.
@@ -297,7 +297,7 @@ fn the_number_of_guests_has_a_limit() {
     let text = |count: usize| {
         format!("[field]\nsize = [\"400 m\", \"400 m\"]\n[guests]\ncount = {count}\n")
     };
-    let most = simulator::scenario::MAX_GUESTS;
+    let most = scenario::MAX_GUESTS;
     let (code, printed) = check(folder.path(), "most.toml", &text(most));
     assert_eq!(code, Some(0), "{printed}");
 

@@ -17,8 +17,9 @@ use protocol::messages::{
 };
 use protocol::{Epoch, Message, RobotName, RunName, Tick, decode, encode};
 use robot::Robot;
-use simulator::scenario::Changes;
-use simulator::{Scenario, Simulation};
+use scenario::Changes;
+use scenario::Scenario;
+use simulator::Simulation;
 use system_tests::root;
 
 use crate::process::{Machine, MachineAction, Others, Process};

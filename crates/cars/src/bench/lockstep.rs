@@ -278,8 +278,8 @@ fn write(workload: &Workload<'_>, scenario: &str) -> miette::Result<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use simulator::Scenario;
-    use simulator::diagnostic::Source;
+    use scenario::Scenario;
+    use scenario::diagnostic::Source;
 
     use super::*;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use simulator::Scenario;
+use scenario::Scenario;
 
 /// Size of the clock in the star and in the TCP barrier, bytes; about as long as a real one.
 pub(super) const CLOCK_BYTES: usize = 64;

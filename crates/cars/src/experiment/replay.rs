@@ -9,7 +9,8 @@ use lab::folder::read_summary;
 use launch::RunOptions;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
-use simulator::{RunFolder, Scenario, Summary};
+use scenario::Scenario;
+use simulator::{RunFolder, Summary};
 
 use super::launcher::launcher;
 use crate::run::execute;

@@ -10,9 +10,10 @@ use miette::{IntoDiagnostic, miette};
 use protocol::messages::{Parameters, Report};
 use protocol::{Epoch, Event, Line, RobotName, RunName, Tick};
 use recording::{Recording, Ticks};
+use scenario::Scenario;
 use serde::de::DeserializeOwned;
+use simulator::RunFolder;
 use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
-use simulator::{RunFolder, Scenario};
 
 use super::episode::RobotState;
 

@@ -2,7 +2,7 @@
 
 use config::{Changes, FileError, Override};
 use miette::miette;
-use simulator::Scenario;
+use scenario::Scenario;
 
 use super::condition::Condition;
 use super::file::{Arm, Experiment};

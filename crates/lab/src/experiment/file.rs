@@ -9,8 +9,8 @@ use config::{FileError, Source, shipped};
 use observe::expect::check_all;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
+use scenario::Scenario;
 use serde::Deserialize;
-use simulator::Scenario;
 use toml::Spanned;
 
 use super::condition::{

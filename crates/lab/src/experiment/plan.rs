@@ -9,8 +9,8 @@ use std::sync::OnceLock;
 
 use config::{Changes, FileError, Override, Source};
 use miette::{IntoDiagnostic, WrapErr, miette};
+use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use simulator::Scenario;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::case::Case;

@@ -9,8 +9,9 @@ use observe::Observation;
 use protocol::Event;
 use protocol::messages::Verdict;
 use recording::{Recording, Ticks};
+use scenario::Scenario;
+use simulator::RunFolder;
 use simulator::recorder::RECORDING;
-use simulator::{RunFolder, Scenario};
 use toml::{Table, Value};
 
 use super::follow::{Ended, Follow};

@@ -7,8 +7,9 @@ use config::Override;
 use miette::{IntoDiagnostic, miette};
 use observe::{Measured, Observation, Probe};
 use protocol::RunName;
+use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use simulator::{Scenario, Summary};
+use simulator::Summary;
 
 use super::follow::{Ended, Follow};
 use super::plan::{Plan, Robots, Unit};

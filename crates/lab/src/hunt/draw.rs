@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use protocol::messages::Point;
 use protocol::random::{Stream, unit};
 use protocol::{RobotName, Tick};
-use simulator::Scenario;
-use simulator::scenario::MAX_GUESTS;
+use scenario::MAX_GUESTS;
+use scenario::Scenario;
 
 use super::fault::{Absence, Effect, Kind, Link, Messages, PlannedFault, Span};
 use super::trial::Played;

@@ -9,7 +9,8 @@ use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Seq, Tick};
 use robot::Robot;
-use simulator::{Scenario, TickRecord};
+use scenario::Scenario;
+use simulator::TickRecord;
 
 use super::case::Case;
 use super::coverage::{Fate, Feature};

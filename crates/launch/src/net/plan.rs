@@ -5,9 +5,9 @@
 use config::units::Time;
 use config::{FileError, Source};
 use protocol::{RobotName, Tick};
+use scenario::Scenario;
+use scenario::network::Partition;
 use serde::Deserialize;
-use simulator::Scenario;
-use simulator::scenario::network::Partition;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -10,9 +10,9 @@ use protocol::messages::{
 use protocol::{Epoch, RobotName, decode, encode};
 
 use super::process::{Interrupt, Server, Stage};
-use crate::diagnostic::Source;
-use crate::scenario::{OnLate, Scenario};
 use crate::simulation::Simulation;
+use config::diagnostic::Source;
+use scenario::{OnLate, Scenario};
 
 /// Why a run in progress does not go to another tick.
 const NOT_SOUGHT: &str = "a run in progress cannot be sought: its ticks take place once, in order; `cars replay RUN` shows a \

@@ -13,12 +13,12 @@ use protocol::messages::{
 };
 use protocol::{Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 
-use crate::diagnostic::FileError;
 use crate::difference::Difference;
 use crate::recorder::{Observed, Recorder, RunFolder};
-use crate::scenario::Scenario;
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::{Summary, Wall};
+use config::diagnostic::FileError;
+use scenario::Scenario;
 
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;

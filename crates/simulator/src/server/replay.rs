@@ -17,8 +17,8 @@ use protocol::messages::{
 use protocol::{RobotName, RunName, Tick, decode, encode};
 use recording::{Recording, RecordingError};
 
-use crate::diagnostic::Source;
-use crate::scenario::Scenario;
+use config::diagnostic::Source;
+use scenario::Scenario;
 
 use super::control::{answer_setup, refuse};
 use super::inbox::{Events, Inbox, Work, inbox};

@@ -5,9 +5,9 @@
 use std::path::Path;
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
-use simulator::Scenario;
-use simulator::diagnostic::{FileError, Source};
-use simulator::scenario::{Changes, OnLate};
+use scenario::Scenario;
+use scenario::diagnostic::{FileError, Source};
+use scenario::{Changes, OnLate};
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
     Scenario::parse(
@@ -210,7 +210,7 @@ fn a_plain_roster_is_the_experiment_of_the_paper() {
         name: "CARSConfig.txt".into(),
         text: "# who\nButler\n\nLeguin\nVonda\n".into(),
     };
-    let text = simulator::roster::scenario_of(&source).unwrap();
+    let text = scenario::roster::scenario_of(&source).unwrap();
     let scenario = Scenario::parse(&text, Path::new(".")).unwrap();
     let names: Vec<String> = scenario.roster().iter().map(ToString::to_string).collect();
     assert_eq!(names, ["Butler", "Leguin", "Vonda"]);
@@ -220,7 +220,7 @@ fn a_plain_roster_is_the_experiment_of_the_paper() {
         name: "CARSConfig.txt".into(),
         text: "Butler\nLe guin\n".into(),
     };
-    let error = shown(&simulator::roster::scenario_of(&bad).unwrap_err());
+    let error = shown(&scenario::roster::scenario_of(&bad).unwrap_err());
     assert!(error.contains("2 │ Le guin"), "{error}");
 }
 

@@ -162,6 +162,6 @@ impl Partition {
 }
 
 /// A time in ticks, rounded to the nearest.
-pub(crate) fn ticks(time_s: f64, tick_s: f64) -> Tick {
+pub fn ticks(time_s: f64, tick_s: f64) -> Tick {
     (time_s / tick_s).round() as Tick
 }

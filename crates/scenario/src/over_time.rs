@@ -70,7 +70,7 @@ impl Scenario {
     }
 
     /// Robots that a fault wants to start again before a tick.
-    pub(crate) fn restarts_wanted_at(&self, tick: Tick) -> BTreeSet<RobotName> {
+    pub fn restarts_wanted_at(&self, tick: Tick) -> BTreeSet<RobotName> {
         let faults = self.faults_at(tick).iter();
         let restarts = faults.filter(|fault| fault.is_restart() && fault.at == tick);
         restarts.map(|fault| fault.robot.clone()).collect()

@@ -164,11 +164,11 @@ impl Scenario {
 }
 
 /// A point for the environment.
-pub(crate) fn to_world(point: Point) -> world::Point {
+pub fn to_world(point: Point) -> world::Point {
     world::Point::new(point.x, point.y)
 }
 
 /// A point for messages.
-pub(crate) fn to_wire(point: world::Point) -> Point {
+pub fn to_wire(point: world::Point) -> Point {
     Point::new(point.x, point.y)
 }

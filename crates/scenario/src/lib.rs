@@ -4,15 +4,19 @@ mod by_hand;
 pub mod change;
 mod checked;
 pub mod fault;
+pub mod files;
 mod lateness;
 pub mod network;
 mod over_time;
 mod placing;
 mod raw;
+pub mod roster;
 mod setup;
 
 use std::path::Path;
 
+/// Source texts and their errors, which [`Scenario::parse`] takes and returns.
+pub use config::diagnostic;
 pub use config::{Changes, Override};
 use config::{FileError, Source};
 use observe::Expectation;
@@ -21,7 +25,7 @@ pub use protocol::messages::OnLate;
 
 pub use change::{Change, Parent};
 pub use checked::{DEFAULT_SEED, MAX_GUESTS, Record, RobotSpec, Scenario, SyncPoint};
-pub(crate) use checked::{to_wire, to_world};
+pub use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use lateness::Lateness;
 pub use network::Network;

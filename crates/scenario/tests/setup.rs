@@ -6,9 +6,9 @@ use std::path::Path;
 
 use protocol::RobotName;
 use protocol::messages::{Point, Range, Setup};
-use simulator::Scenario;
-use simulator::diagnostic::Source;
-use simulator::scenario::MAX_GUESTS;
+use scenario::MAX_GUESTS;
+use scenario::Scenario;
+use scenario::diagnostic::Source;
 
 fn scenario() -> Scenario {
     let text = "seed = 7\nduration = \"33 s\"\n[guests]\ncount = 5\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n\

@@ -19,7 +19,7 @@ pub struct Fault {
 
 impl Fault {
     /// The order to begin the fault.
-    pub(crate) fn begin_order(&self) -> ProcessOrder {
+    pub fn begin_order(&self) -> ProcessOrder {
         let for_s = match self.end {
             FaultEnd::After(wall_s) => Some(wall_s),
             FaultEnd::At(_) | FaultEnd::Never => None,
@@ -28,12 +28,12 @@ impl Fault {
     }
 
     /// The order to end the fault.
-    pub(crate) fn end_order(&self) -> ProcessOrder {
+    pub fn end_order(&self) -> ProcessOrder {
         self.order(false, None)
     }
 
     /// Whether the process is gone or stopped before a tick, or takes part again from that tick on.
-    pub(crate) fn is_absence_at(&self, tick: Tick) -> bool {
+    pub fn is_absence_at(&self, tick: Tick) -> bool {
         let is_absence = matches!(self.kind, FaultKind::Crash | FaultKind::Hang);
         let lasts = match self.end {
             FaultEnd::At(end) => tick <= end,
@@ -44,7 +44,7 @@ impl Fault {
     }
 
     /// What is certain of the fault before a tick: one that has not ended by then may end in any way later.
-    pub(crate) fn before(&self, tick: Tick) -> Self {
+    pub fn before(&self, tick: Tick) -> Self {
         let end = match self.end {
             FaultEnd::At(end) if end >= tick => FaultEnd::Never,
             end => end,
@@ -56,13 +56,13 @@ impl Fault {
     }
 
     /// Whether the process is killed and started again at once.
-    pub(crate) fn is_restart(&self) -> bool {
+    pub fn is_restart(&self) -> bool {
         self.kind == FaultKind::Restart
     }
 
     /// Whether the fault holds the process in a tick, which is complete or not. One that ends by the wall clock lasts until the
     /// tick is complete for which the clock waits.
-    pub(crate) fn holds(&self, tick: Tick, is_complete: bool) -> bool {
+    pub fn holds(&self, tick: Tick, is_complete: bool) -> bool {
         let is_over = match self.end {
             FaultEnd::At(end) => end <= tick,
             FaultEnd::After(_) => self.at < tick || is_complete,
