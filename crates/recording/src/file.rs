@@ -9,8 +9,8 @@ use std::io::{self, Write};
 
 use crate::format::{MAGIC, Record, op};
 
-/// Level of compression. Level 1 takes 1.6 times as long and saves a fifth of the bytes.
-const COMPRESSION_LEVEL: i32 = -1;
+/// Level of compression. Level -1 saves an eighth of the bytes, for a tenth more of the time that recording takes.
+const COMPRESSION_LEVEL: i32 = -4;
 const COMPRESSION: &str = "zstd";
 
 /// The content of a chunk: records one after the other, not compressed.
