@@ -347,7 +347,7 @@ impl Server {
             .subscribe(&self.keys.all_waiting(), move |key, bytes| {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
                 let waiting = decode(key, &robot, bytes);
-                inbox.send(Event::Waiting { robot, waiting });
+                inbox.send_and_work(Event::Waiting { robot, waiting });
             })?;
 
         let inbox = self.inbox.clone();
@@ -460,7 +460,7 @@ impl Server {
         let panels = self.bus.subscribe(&self.keys.panels(), move |key, bytes| {
             let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
             let panel = decode(key, &robot, bytes);
-            inbox.send(Event::Panel { robot, panel });
+            inbox.send_and_work(Event::Panel { robot, panel });
         })?;
         self.panel_subscriber = Some(panels);
         Ok(())
