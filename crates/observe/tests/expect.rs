@@ -269,10 +269,10 @@ fn always_is_about_states() {
     let mut run = Run::of("always = { robot = 'A', variable = 'tray', at_least = 1, below = 31 }");
     // Before a robot has reported, nothing is known of it.
     run.quiet_until(2);
-    run.robot("A").variables.insert("tray".into(), 30.0.into());
+    run.robot("A").variables.insert("tray", 30.0.into());
     run.quiet_until(5);
     assert_eq!(run.watch.end(End::Finished).verdict, Verdict::Pass);
-    run.robot("A").variables.insert("tray".into(), 31.0.into());
+    run.robot("A").variables.insert("tray", 31.0.into());
     assert_eq!(run.verdict(&[]), Some(Verdict::Fail));
 }
 
@@ -284,7 +284,7 @@ fn a_variable_that_is_not_published_leaves_it_undecided() {
         "never = { stalled = { progress = ['A.trai'], for = '60 s' } }",
     ] {
         let mut run = Run::of(entry);
-        run.robot("A").variables.insert("tray".into(), 30.0.into());
+        run.robot("A").variables.insert("tray", 30.0.into());
         run.quiet_until(5);
         let judgment = run.watch.end(End::Finished);
         assert_eq!(judgment.verdict, Verdict::Undecided);
@@ -326,14 +326,14 @@ fn progress_is_a_variable_that_rises() {
         Run::of("never = { stalled = { progress = ['A.served', 'B.trips'], for = '2 s' } }");
     for robot in ["A", "B"] {
         let variables = &mut run.robot(robot).variables;
-        variables.insert("served".into(), 0.0.into());
-        variables.insert("trips".into(), 0.0.into());
+        variables.insert("served", 0.0.into());
+        variables.insert("trips", 0.0.into());
     }
     run.quiet_until(4);
-    run.robot("B").variables.insert("trips".into(), 1.0.into());
+    run.robot("B").variables.insert("trips", 1.0.into());
     run.quiet_until(7);
     // Falling is no progress.
-    run.robot("B").variables.insert("trips".into(), 0.0.into());
+    run.robot("B").variables.insert("trips", 0.0.into());
     run.quiet_until(8);
     let judgment = run.tick(&[]).unwrap();
     assert_eq!(judgment.verdict, Verdict::Fail);

@@ -24,9 +24,9 @@ fn report() -> Report {
         emotion_state: "HAPPY".into(),
         behavior_state: "SERVE".into(),
         state_variables: [
-            ("treats".into(), 7.0.into()),
-            ("need".into(), true.into()),
-            ("who".into(), "x".into()),
+            ("treats", 7.0.into()),
+            ("need", true.into()),
+            ("who", "x".into()),
         ]
         .into(),
         commands: 3,

@@ -123,8 +123,8 @@ impl Action {
 
     /// Publishes this state variable. A number must be finite: JSON has no NaN, so another one is dropped and logged.
     #[must_use]
-    pub fn variable(mut self, name: impl Into<String>, value: impl Into<Variable>) -> Self {
-        self.state_variables.insert(name.into(), value.into());
+    pub fn variable(mut self, name: impl AsRef<str>, value: impl Into<Variable>) -> Self {
+        self.state_variables.insert(name, value.into());
         self
     }
 }

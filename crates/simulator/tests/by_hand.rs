@@ -11,6 +11,7 @@ use lockstep::{Exchange, Outcome, Sent};
 use protocol::event::Cause;
 use protocol::messages::{
     CommandText, Cut, FaultKind, Intervention, News, OnLate, Performative, Point, Report,
+    StateVariables,
 };
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
@@ -84,7 +85,7 @@ impl Exchange<News, Arc<Report>, CommandText> for Robots {
                 direction_rad: 0.0,
                 emotion_state: "CALM".to_owned(),
                 behavior_state: "IDLE".to_owned(),
-                state_variables: BTreeMap::new(),
+                state_variables: StateVariables::new(),
                 commands: commands.len() as u32,
                 log: Vec::new(),
             };

@@ -9,7 +9,9 @@ use std::sync::Arc;
 
 use lockstep::{Exchange, Outcome, Sent};
 use protocol::event::{Blocker, Cause};
-use protocol::messages::{CommandText, Delivery, News, Performative, Point, Report, SensedKind};
+use protocol::messages::{
+    CommandText, Delivery, News, Performative, Point, Report, SensedKind, StateVariables,
+};
 use protocol::{RobotName, RunName, Tick};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
@@ -57,7 +59,7 @@ impl<F: FnMut(&RobotName, &mut Report, &mut Commands)> Puppets<F> {
             direction_rad: 0.0,
             emotion_state: "CALM".into(),
             behavior_state: "IDLE".into(),
-            state_variables: BTreeMap::new(),
+            state_variables: StateVariables::new(),
             commands: 0,
             log: vec![],
         }
@@ -538,7 +540,7 @@ fn every_value_that_a_robot_reports_is_in_the_digest() {
         |report, _| report.direction_rad = 1e-6,
         |report, _| report.emotion_state = "CALN".into(),
         |report, _| report.behavior_state = "IDLF".into(),
-        |report, _| drop(report.state_variables.insert("x".into(), 1.0.into())),
+        |report, _| drop(report.state_variables.insert("x", 1.0.into())),
         |_, commands| *commands = vec![command("operator", "x")],
         |_, commands| *commands = vec![command("operator", "y")],
         |_, commands| *commands = vec![command("A", "x")],

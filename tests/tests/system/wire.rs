@@ -8,7 +8,7 @@ use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{
     Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, LogKind, LogRecord, News, OnLate,
-    Performative, Point, PublicState, Refusal, Report, Status, Welcome,
+    Performative, Point, PublicState, Refusal, Report, StateVariables, Status, Welcome,
 };
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
@@ -248,7 +248,7 @@ impl Hand {
             direction_rad: 0.0,
             emotion_state: "CALM".into(),
             behavior_state: "IDLE".into(),
-            state_variables: [].into(),
+            state_variables: StateVariables::new(),
             commands: 0,
             log: vec![],
         }

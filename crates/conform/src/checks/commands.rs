@@ -202,7 +202,7 @@ fn numbers(transcript: &Transcript) -> BTreeMap<String, f64> {
 
     variables
         .filter_map(|(name, value)| match value {
-            Variable::Number(number) => Some((name.clone(), *number)),
+            Variable::Number(number) => Some((name.to_owned(), *number)),
             _ => None,
         })
         .collect()

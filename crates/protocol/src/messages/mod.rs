@@ -9,6 +9,7 @@ mod performative;
 mod point;
 mod state;
 mod step;
+mod variables;
 
 pub use crate::codec::FieldError;
 pub use control::{
@@ -25,8 +26,9 @@ pub use observe::{
 };
 pub use performative::Performative;
 pub use point::Point;
-pub use state::{Answer, PublicState, StateVariables, Variable};
+pub use state::{Answer, PublicState};
 pub use step::{
     Clock, Command, CommandText, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS,
     News, Parameters, Refusal, Report, SensedBody, SensedKind, SensedRobot, Waiting, Welcome,
 };
+pub use variables::{StateVariables, Variable};

@@ -7,7 +7,7 @@ use super::control::{Awaited, FaultKind, Phase, Presence};
 use super::limits::{few, finite, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
-use super::state::StateVariables;
+use super::variables::StateVariables;
 use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 

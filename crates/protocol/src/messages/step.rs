@@ -9,7 +9,8 @@ use super::limits::{counted, few, finite, is_false, is_zero, short};
 use super::numbers::{Epoch, Generation, Tick};
 use super::performative::Performative;
 use super::point::Point;
-use super::state::{PublicState, StateVariables, check_variables};
+use super::state::PublicState;
+use super::variables::{StateVariables, check_variables};
 use crate::codec::{FieldError, Message};
 use crate::name::{RobotName, RunName};
 

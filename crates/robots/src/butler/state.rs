@@ -192,17 +192,16 @@ impl State {
             ("start_x_m", self.start.x.into()),
             ("start_y_m", self.start.y.into()),
         ]
-        .map(|(name, value)| (name.to_owned(), value))
         .into();
         if let Some(table) = self.table.or(self.refiller.first_location()) {
-            variables.insert("table_x_m".to_owned(), table.x.into());
-            variables.insert("table_y_m".to_owned(), table.y.into());
+            variables.insert("table_x_m", table.x.into());
+            variables.insert("table_y_m", table.y.into());
         }
         if let Some(belief) = self.mind.belief() {
-            variables.insert("belief".to_owned(), belief.into());
+            variables.insert("belief", belief.into());
         }
         if let Some(plan) = self.mind.plan() {
-            variables.insert("plan".to_owned(), plan.name().into());
+            variables.insert("plan", plan.name().into());
         }
         variables
     }

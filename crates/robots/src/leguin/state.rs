@@ -108,7 +108,6 @@ impl State {
             ("home_x_m", self.home.x.into()),
             ("home_y_m", self.home.y.into()),
         ]
-        .map(|(name, value)| (name.to_owned(), value))
         .into()
     }
 

@@ -1,12 +1,11 @@
 //! The robot's ticks.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use lockstep::{Begin, Sent, Turn};
 use protocol::keys::STATE;
 use protocol::messages::{
-    CommandText, News, Performative, Point, PublicState, Report, Variable, Welcome,
+    CommandText, News, Performative, Point, PublicState, Report, StateVariables, Variable, Welcome,
 };
 use protocol::random::unit;
 use protocol::{Epoch, RobotName, Tick};
@@ -122,7 +121,7 @@ impl Host {
         let angle = unit(&mut walker.random) * 3.0;
         let turn = if wrong.is("number.angles") { 7.0 } else { 0.0 };
 
-        let mut state_variables: BTreeMap<String, Variable> = [
+        let mut state_variables: StateVariables = [
             ("received".to_owned(), Variable::from(walker.received)),
             ("last".to_owned(), Variable::from(walker.last.clone())),
         ]

@@ -13,7 +13,7 @@ use bus::{Bus, Role};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
     Clock, Command, Control, ControlAnswer, End, JoinAnswer, News, Performative, Point, Report,
-    Waiting,
+    StateVariables, Waiting,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Generation, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
@@ -394,7 +394,7 @@ fn report(epoch: Epoch, tick: Tick, generation: Generation) -> Report {
         direction_rad: 0.0,
         emotion_state: "FORGED".into(),
         behavior_state: "FORGED".into(),
-        state_variables: [].into(),
+        state_variables: StateVariables::new(),
         commands: 0,
         log: Vec::new(),
     }
