@@ -85,7 +85,7 @@ impl Echo {
 
     fn look(&mut self, cars: &mut Cars<'_>) {
         let near = cars.bodies().len() as f64;
-        self.seen.insert("near".to_owned(), near.into());
+        self.seen.insert("near", near.into());
 
         for other in &cars.welcome().roster {
             if other == cars.name() {

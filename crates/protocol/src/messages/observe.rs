@@ -214,10 +214,12 @@ impl Message for Panel {
             );
             return Err(FieldError::new("widgets", reason));
         }
-        self.widgets
-            .iter()
-            .enumerate()
-            .try_for_each(|(i, widget)| widget.check(&format!("widgets[{i}]")))
+        for (i, widget) in self.widgets.iter().enumerate() {
+            widget.check().map_err(|error| {
+                FieldError::new(format!("widgets[{i}].{}", error.field), error.reason)
+            })?;
+        }
+        Ok(())
     }
 }
 
@@ -288,11 +290,12 @@ pub enum Widget {
 }
 
 impl Widget {
-    fn check(&self, field: &str) -> Result<(), FieldError> {
+    /// Checks the fields of the widget. Errors have paths from the widget on: this runs for every panel.
+    fn check(&self) -> Result<(), FieldError> {
         match self {
             Self::Text { label, text } | Self::Badge { label, text, .. } => {
-                short(label, &format!("{field}.label"))?;
-                short(text, &format!("{field}.text"))
+                short(label, "label")?;
+                short(text, "text")
             }
             Self::Bar {
                 label,
@@ -300,30 +303,28 @@ impl Widget {
                 min,
                 max,
             } => {
-                short(label, &format!("{field}.label"))?;
-                finite(*value, &format!("{field}.value"))?;
-                finite(*min, &format!("{field}.min"))?;
-                finite(*max, &format!("{field}.max"))
+                short(label, "label")?;
+                finite(*value, "value")?;
+                finite(*min, "min")?;
+                finite(*max, "max")
             }
-            Self::Face { intensity, .. } => finite(*intensity, &format!("{field}.intensity")),
+            Self::Face { intensity, .. } => finite(*intensity, "intensity"),
             Self::Sparkline { label, values } => {
-                few(values.len(), &format!("{field}.values"))?;
-                short(label, &format!("{field}.label"))?;
-                values
-                    .iter()
-                    .try_for_each(|value| finite(*value, &format!("{field}.values")))
+                few(values.len(), "values")?;
+                short(label, "label")?;
+                values.iter().try_for_each(|value| finite(*value, "values"))
             }
             Self::Table { rows } => {
-                few(rows.iter().map(Vec::len).sum(), &format!("{field}.rows"))?;
+                few(rows.iter().map(Vec::len).sum(), "rows")?;
                 rows.iter()
                     .flatten()
-                    .try_for_each(|cell| short(cell, &format!("{field}.rows")))
+                    .try_for_each(|cell| short(cell, "rows"))
             }
             // The size of a picture is bounded by that of a message.
-            Self::Svg { label, .. } => short(label, &format!("{field}.label")),
+            Self::Svg { label, .. } => short(label, "label"),
             Self::Button { label, command } => {
-                short(label, &format!("{field}.label"))?;
-                short(command, &format!("{field}.command"))
+                short(label, "label")?;
+                short(command, "command")
             }
         }
     }
