@@ -42,7 +42,22 @@ impl FieldError {
 }
 
 /// A message of the contract: typed JSON plus the limits that JSON cannot say.
-pub trait Message: Serialize + DeserializeOwned {
+///
+/// Reading and writing a type takes much code. `as_json!` makes methods of each message that are compiled once, in this crate,
+/// instead of in every crate that calls [`encode`] or [`decode`].
+pub trait Message: Sized {
+    /// Writes the message.
+    fn to_json(&self) -> Vec<u8>;
+
+    /// Reads a message, unchecked. Unknown fields are ignored.
+    ///
+    /// # Errors
+    /// What is wrong with the JSON. [`Message::wrong_field`] has the path of the field as well, and takes longer.
+    fn from_json(json: &[u8]) -> Result<Self, serde_json::Error>;
+
+    /// Reads a message that is known to be malformed once more, to find the field that is wrong.
+    fn wrong_field(json: &[u8]) -> FieldError;
+
     /// Checks what the type cannot: finite numbers, bounded sizes.
     ///
     /// # Errors
@@ -52,9 +67,32 @@ pub trait Message: Serialize + DeserializeOwned {
     }
 }
 
+/// The methods of [`Message`] that read and write JSON.
+macro_rules! as_json {
+    () => {
+        fn to_json(&self) -> Vec<u8> {
+            $crate::codec::write(self)
+        }
+
+        fn from_json(json: &[u8]) -> Result<Self, serde_json::Error> {
+            serde_json::from_slice(json)
+        }
+
+        fn wrong_field(json: &[u8]) -> $crate::codec::FieldError {
+            $crate::codec::explain::<Self>(json)
+        }
+    };
+}
+
+pub(crate) use as_json;
+
 /// Writes a message.
 #[must_use]
 pub fn encode<M: Message>(message: &M) -> Vec<u8> {
+    message.to_json()
+}
+
+pub(crate) fn write(message: &impl Serialize) -> Vec<u8> {
     // Messages are structs of numbers, strings and maps with string keys: there is no value of theirs that JSON
     // cannot write.
     serde_json::to_vec(message)
@@ -95,9 +133,9 @@ pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Ma
         return Err(malformed(".".to_owned(), reason));
     }
 
-    let message: M = match serde_json::from_slice(bytes) {
-        Ok(message) => message,
-        Err(_) => return Err(explain::<M>(bytes, malformed)),
+    let Ok(message) = M::from_json(bytes) else {
+        let FieldError { field, reason } = M::wrong_field(bytes);
+        return Err(malformed(field, reason));
     };
     message
         .check()
@@ -105,15 +143,15 @@ pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Ma
     Ok(message)
 }
 
-/// Reads a message that is known to be malformed once more, to find the path of the field that is wrong.
-fn explain<M: Message>(bytes: &[u8], malformed: impl Fn(String, String) -> Malformed) -> Malformed {
+/// Finds the path of the field that is wrong in a malformed message.
+pub(crate) fn explain<M: DeserializeOwned>(bytes: &[u8]) -> FieldError {
     let mut json = serde_json::Deserializer::from_slice(bytes);
     let read: Result<M, _> = serde_path_to_error::deserialize(&mut json);
     let after = read.map(|_| json.end());
 
     match after {
-        Err(error) => malformed(error.path().to_string(), error.inner().to_string()),
-        Ok(Err(error)) => malformed(".".to_owned(), error.to_string()),
-        Ok(Ok(())) => malformed(".".to_owned(), "not valid JSON".to_owned()),
+        Err(error) => FieldError::new(error.path().to_string(), error.inner().to_string()),
+        Ok(Err(error)) => FieldError::new(".", error.to_string()),
+        Ok(Ok(())) => FieldError::new(".", "not valid JSON"),
     }
 }

@@ -299,6 +299,14 @@ impl Line {
         serde_json::to_string(self)
             .unwrap_or_else(|error| unreachable!("an event is always JSON: {error}"))
     }
+
+    /// Reads a line of `events.jsonl`.
+    ///
+    /// # Errors
+    /// What is wrong with the JSON.
+    pub fn from_json(json: &[u8]) -> Result<Self, serde_json::Error> {
+        serde_json::from_slice(json)
+    }
 }
 
 impl Event {

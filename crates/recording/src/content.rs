@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{Awaited, Cut, LogRecord, Panel, Point, Report, Standing};
-use protocol::{Epoch, Event, RobotName, RunName, Tick};
+use protocol::{Epoch, Event, Message, RobotName, RunName, Tick};
 use schemars::JsonSchema;
 use serde::de::{Error, IgnoredAny};
 use serde::{Deserialize, Serialize};
@@ -156,11 +156,11 @@ impl RawTick {
     pub(crate) fn decode(self) -> Result<RecordedTick, serde_json::Error> {
         let mut reports = BTreeMap::new();
         for (robot, report) in self.reports {
-            reports.insert(robot, serde_json::from_slice(&report.0)?);
+            reports.insert(robot, Report::from_json(&report.0)?);
         }
         let mut panels = BTreeMap::new();
         for (robot, panel) in self.panels {
-            panels.insert(robot, serde_json::from_slice(&panel.0)?);
+            panels.insert(robot, Panel::from_json(&panel.0)?);
         }
 
         Ok(RecordedTick {

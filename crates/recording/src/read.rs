@@ -362,7 +362,7 @@ impl Partial {
             Topic::Header => {}
             Topic::Frame => self.frame = Some(parse(json)?),
             Topic::Wall => self.wall = Some(parse(json)?),
-            Topic::Events => self.events.push(parse::<Line>(json)?.event),
+            Topic::Events => self.events.push(Line::from_json(json)?.event),
             Topic::Report(robot) => {
                 self.reports.insert(robot.clone(), Json::unchecked(json));
             }

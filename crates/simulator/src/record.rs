@@ -231,7 +231,7 @@ impl Record {
         }
 
         self.number += 1;
-        let line = serde_json::from_slice(&raw.bytes).map_err(|error| self.malformed(&error))?;
+        let line = Line::from_json(&raw.bytes).map_err(|error| self.malformed(&error))?;
         Ok(Some(line))
     }
 

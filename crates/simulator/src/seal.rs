@@ -151,7 +151,7 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
         if !raw.is_whole {
             return Ok(checked); // A line that the simulator was about to write.
         }
-        let Ok(line) = serde_json::from_slice::<Line>(&raw.bytes) else {
+        let Ok(line) = Line::from_json(&raw.bytes) else {
             return Err(damaged(path, &checked, "the last of them is not an event"));
         };
         if line.event.is_sealed() {

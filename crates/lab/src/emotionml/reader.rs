@@ -252,7 +252,7 @@ impl Playback {
 
 /// The next tick that the events tell of; `None` after the last complete one.
 fn next_of(lines: &mut Lines, replay: &mut Replay) -> miette::Result<Option<Snapshot>> {
-    while let Some(line) = lines.next::<Line>()? {
+    while let Some(line) = lines.next(Line::from_json)? {
         let tick = line.tick;
         if let Some(robots) = replay.apply(line.event) {
             return Ok(Some(Snapshot { tick, robots }));
@@ -356,24 +356,27 @@ impl Lines {
 
     /// The first line, which must exist.
     fn first<T: DeserializeOwned>(&mut self) -> miette::Result<T> {
-        self.next()?
+        self.next(|json| serde_json::from_slice(json))?
             .ok_or_else(|| miette!("{} holds no run yet", self.path.display()))
     }
 
-    /// The next line; `None` at the end of the file or at an incomplete last line.
-    fn next<T: DeserializeOwned>(&mut self) -> miette::Result<Option<T>> {
+    /// The next line, as `read` reads it; `None` at the end of the file or at an incomplete last line.
+    fn next<T>(
+        &mut self,
+        read: impl Fn(&[u8]) -> Result<T, serde_json::Error>,
+    ) -> miette::Result<Option<T>> {
         let mut bytes = Vec::new();
-        let read = self
+        let taken = self
             .reader
             .by_ref()
             .take(MAX_LINE_BYTES)
             .read_until(b'\n', &mut bytes);
-        read.map_err(|error| miette!("cannot read {}: {error}", self.path.display()))?;
+        taken.map_err(|error| miette!("cannot read {}: {error}", self.path.display()))?;
         self.number += 1;
         let is_whole = bytes.ends_with(b"\n") || bytes.len() as u64 == MAX_LINE_BYTES;
 
-        match serde_json::from_slice(&bytes) {
-            Ok(value) => Ok(Some(value)),
+        match read(&bytes) {
+            Ok(line) => Ok(Some(line)),
             Err(_) if bytes.is_empty() => Ok(None),
             Err(_) if !is_whole => {
                 self.is_incomplete = true;

@@ -7,7 +7,7 @@ use super::limits::{counted, few, finite, is_false, short};
 use super::log::LogRecord;
 use super::numbers::{Epoch, Generation, Tick};
 use super::point::Point;
-use crate::codec::{FieldError, Message};
+use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
 
 /// A request to the simulator. It never goes through the barrier: it is answered at once, also while the clock is held.
@@ -85,6 +85,8 @@ pub enum Control {
 }
 
 impl Message for Control {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         match self {
             Self::Speed {
@@ -255,6 +257,8 @@ pub struct LogFile {
 }
 
 impl Message for ControlAnswer {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         match self {
             Self::Log { lines } => few(lines.len(), "lines"),
@@ -341,6 +345,8 @@ pub struct FaultOrder {
 }
 
 impl Message for FaultOrder {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         few(self.orders.len(), "orders")
     }

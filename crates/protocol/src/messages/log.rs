@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::short;
 use super::numbers::{Epoch, Tick};
-use crate::codec::{FieldError, Message};
+use crate::codec::{FieldError, Message, as_json};
 
 /// One line of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,6 +25,8 @@ pub struct LogRecord {
 }
 
 impl Message for LogRecord {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         short(&self.source, "source")?;
         short(&self.text, "text")

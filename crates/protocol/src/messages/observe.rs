@@ -8,7 +8,7 @@ use super::limits::{few, finite, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
 use super::variables::StateVariables;
-use crate::codec::{FieldError, Message};
+use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
 
 /// The field at a moment, published at a display rate while somebody watches.
@@ -168,7 +168,9 @@ pub struct Standing {
     pub verdict: Option<Verdict>,
 }
 
-impl Message for WorldFrame {}
+impl Message for WorldFrame {
+    as_json!();
+}
 
 /// A robot in a [`WorldFrame`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -206,6 +208,8 @@ pub struct Panel {
 pub const MAX_WIDGETS: usize = 64;
 
 impl Message for Panel {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         if self.widgets.len() > MAX_WIDGETS {
             let reason = format!(

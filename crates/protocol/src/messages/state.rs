@@ -8,7 +8,7 @@ use super::numbers::{Epoch, Tick};
 use super::performative::Performative;
 use super::point::Point;
 use super::variables::{StateVariables, check_variables};
-use crate::codec::{FieldError, Message, encode};
+use crate::codec::{FieldError, Message, as_json, encode};
 use crate::keys::STATE;
 
 /// The answer to all six queries of the common robot interface at once: the robot as it reported itself for `tick`.
@@ -33,6 +33,8 @@ pub struct PublicState {
 }
 
 impl Message for PublicState {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")?;
         self.location.check("location")?;
@@ -62,7 +64,9 @@ fn tell() -> Performative {
     Performative::Tell
 }
 
-impl Message for Answer {}
+impl Message for Answer {
+    as_json!();
+}
 
 impl PublicState {
     /// The reply to the query called `what` ([`crate::keys::QUERIES`] or [`STATE`]), encoded; `None` if there is no such query.

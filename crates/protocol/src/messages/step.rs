@@ -11,7 +11,7 @@ use super::performative::Performative;
 use super::point::Point;
 use super::state::PublicState;
 use super::variables::{StateVariables, check_variables};
-use crate::codec::{FieldError, Message};
+use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
 
 /// A robot asks to take part.
@@ -34,6 +34,8 @@ pub struct JoinRequest {
 }
 
 impl Message for JoinRequest {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         short(&self.instance, "instance")?;
         short(&self.sdk, "sdk")
@@ -55,7 +57,9 @@ pub enum JoinAnswer {
     },
 }
 
-impl Message for JoinAnswer {}
+impl Message for JoinAnswer {
+    as_json!();
+}
 
 /// Why a robot may not take part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -158,6 +162,8 @@ pub struct Clock {
 }
 
 impl Message for Clock {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")
     }
@@ -234,6 +240,8 @@ impl News {
 }
 
 impl Message for News {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")?;
         self.commands
@@ -323,6 +331,8 @@ impl Report {
 }
 
 impl Message for Report {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         self.proposal.check("proposal")?;
         finite(self.speed_mps, "speed_mps")?;
@@ -369,6 +379,8 @@ pub struct CommandText {
 }
 
 impl Message for Command {
+    as_json!();
+
     fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")?;
         short(&self.command, "command")
@@ -386,7 +398,9 @@ pub struct Waiting {
     pub on: RobotName,
 }
 
-impl Message for Waiting {}
+impl Message for Waiting {
+    as_json!();
+}
 
 /// One sensed body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
