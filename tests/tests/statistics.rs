@@ -5,12 +5,12 @@
 
 use std::process::Command;
 
-use lab::statistics::{
+use protocol::random::{self, Stream};
+use serde_json::{Value, json};
+use statistics::{
     Estimate, Interval, LogRank, RestrictedMeans, SignFlip, Survival, TimeTo, bootstrap, dominance,
     ecdf, quantile, resample, share_of_events,
 };
-use protocol::random::{self, Stream};
-use serde_json::{Value, json};
 use system_tests::root;
 use system_tests::tools::{lacks_tool, python};
 

@@ -11,10 +11,10 @@ use config::Changes;
 use lab::experiment::engine::{self, Options, Queue};
 use lab::experiment::{Experiment, Plan, Request, Robots, Store};
 use lab::run::Local;
-use lab::statistics::Estimate;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
 use scenario::Scenario;
+use statistics::Estimate;
 
 /// Runs of each round.
 const RUNS: u64 = 24;

@@ -1,8 +1,9 @@
 //! One encode, one decode. JSON, because any language can speak it and people can read it.
 
 use schemars::JsonSchema;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+
+use crate::path;
 
 /// Largest message that is accepted, in bytes.
 pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
@@ -52,11 +53,8 @@ pub trait Message: Sized {
     /// Reads a message, unchecked. Unknown fields are ignored.
     ///
     /// # Errors
-    /// What is wrong with the JSON. [`Message::wrong_field`] has the path of the field as well, and takes longer.
+    /// What is wrong with the JSON.
     fn from_json(json: &[u8]) -> Result<Self, serde_json::Error>;
-
-    /// Reads a message that is known to be malformed once more, to find the field that is wrong.
-    fn wrong_field(json: &[u8]) -> FieldError;
 
     /// Checks what the type cannot: finite numbers, bounded sizes.
     ///
@@ -76,10 +74,6 @@ macro_rules! as_json {
 
         fn from_json(json: &[u8]) -> Result<Self, serde_json::Error> {
             serde_json::from_slice(json)
-        }
-
-        fn wrong_field(json: &[u8]) -> $crate::codec::FieldError {
-            $crate::codec::explain::<Self>(json)
         }
     };
 }
@@ -133,25 +127,10 @@ pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Ma
         return Err(malformed(".".to_owned(), reason));
     }
 
-    let Ok(message) = M::from_json(bytes) else {
-        let FieldError { field, reason } = M::wrong_field(bytes);
-        return Err(malformed(field, reason));
-    };
+    let message = M::from_json(bytes)
+        .map_err(|error| malformed(path::of(&error, bytes), error.to_string()))?;
     message
         .check()
         .map_err(|FieldError { field, reason }| malformed(field, reason))?;
     Ok(message)
-}
-
-/// Finds the path of the field that is wrong in a malformed message.
-pub(crate) fn explain<M: DeserializeOwned>(bytes: &[u8]) -> FieldError {
-    let mut json = serde_json::Deserializer::from_slice(bytes);
-    let read: Result<M, _> = serde_path_to_error::deserialize(&mut json);
-    let after = read.map(|_| json.end());
-
-    match after {
-        Err(error) => FieldError::new(error.path().to_string(), error.inner().to_string()),
-        Ok(Err(error)) => FieldError::new(".", error.to_string()),
-        Ok(Ok(())) => FieldError::new(".", "not valid JSON"),
-    }
 }

@@ -12,6 +12,7 @@ pub mod event;
 pub mod keys;
 pub mod messages;
 pub mod name;
+mod path;
 pub mod plain;
 pub mod random;
 pub mod schema;

@@ -12,6 +12,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
     ("diagram", &["protocol"]),
+    ("statistics", &["protocol"]),
     ("observe", &["config", "protocol"]),
     ("report", &["diagram"]),
     ("bus", &["protocol"]),
@@ -76,6 +77,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "protocol",
             "recording",
             "report",
+            "statistics",
         ],
     ),
     (
@@ -127,6 +129,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "bus",
             "protocol",
             "recording",
+            "statistics",
         ],
     ),
 ];

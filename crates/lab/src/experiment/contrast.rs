@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::estimate::{conditions_of, numbers, times};
 use super::file::Experiment;
 use super::outcome::Outcome;
-use crate::statistics::{
+use statistics::{
     Bootstrapped, LogRank, RestrictedMeans, SignFlip, TimeTo, bootstrap, dominance, holm,
     share_of_events,
 };
@@ -185,7 +185,7 @@ mod tests {
 
     use super::super::estimate::Estimated;
     use super::*;
-    use crate::statistics::Interval;
+    use statistics::Interval;
 
     /// Runs of the shipped experiment under two conditions with eight seeds, in which an arm is so much better than the
     /// baseline, and deadlocks in every second run, while the baseline never does.

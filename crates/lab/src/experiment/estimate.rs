@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::file::Experiment;
 use super::outcome::Outcome;
-use crate::statistics::{Estimate, Survival, TimeTo, quantile};
+use statistics::{Estimate, Survival, TimeTo, quantile};
 
 /// One measure of the runs of an arm under a condition.
 #[derive(Debug, Clone, Serialize)]

@@ -7,7 +7,7 @@ use report::{Part, decimals_for, fixed};
 
 use super::study::{Study, is_shown, label};
 use crate::experiment::{Contrast, Difference};
-use crate::statistics::Bootstrapped;
+use statistics::Bootstrapped;
 
 /// Most comparisons that a sentence names.
 const MOST_NAMED: usize = 8;

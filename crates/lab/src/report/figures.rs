@@ -14,7 +14,7 @@ use super::limits::{MOST_PANELS, limited};
 use super::study::{CellPlace, Study, axis, is_shown, label, level_number, named};
 use super::words::capitalized;
 use crate::experiment::{Contrast, Difference};
-use crate::statistics::{Bootstrapped, Survival, ecdf, quantile};
+use statistics::{Bootstrapped, Survival, ecdf, quantile};
 
 /// Most rows of a table.
 const MOST_ROWS: usize = 500;

@@ -6,7 +6,7 @@ use observe::Measure;
 use report::Estimate;
 
 use crate::experiment::{Arm, Condition, Contrast, Outcome, Results, Shown};
-use crate::statistics::{self, Survival, TimeTo};
+use statistics::{Survival, TimeTo};
 
 /// Largest p value, after Holm's correction, of a difference that is stated.
 const SHOWN_P: f64 = 0.05;

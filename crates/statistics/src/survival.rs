@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::distribution::{chi_square_1_tail, normal_quantile};
+use crate::distribution::{chi_square_1_tail, normal_quantile};
 
 /// A time, seconds, and whether it ends with the event; otherwise the run ends then, without the event (right-censored).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -320,8 +320,8 @@ fn weighted_mean_s(sorted: &[(usize, TimeTo)], weights: &[usize], n: usize, unti
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::{bootstrap, ecdf};
     use super::*;
+    use crate::{bootstrap, ecdf};
 
     fn sample(events: &[f64], censored: &[f64]) -> Vec<TimeTo> {
         let mut times = Vec::new();

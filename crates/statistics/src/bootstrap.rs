@@ -3,8 +3,8 @@
 use rand_xoshiro::rand_core::Rng;
 use serde::Serialize;
 
-use super::distribution::{normal_cdf, normal_quantile};
-use super::sample::{mean, quantile_of_sorted};
+use crate::distribution::{normal_cdf, normal_quantile};
+use crate::sample::{mean, quantile_of_sorted};
 
 /// Number of resamples of an interval.
 pub const RESAMPLES: usize = 10_000;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::distribution::student_975;
+use crate::distribution::student_975;
 
 /// A mean with its 95 % confidence interval.
 ///
