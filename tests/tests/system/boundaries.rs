@@ -114,6 +114,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "terminal",
         ],
     ),
+    ("stabby", &[]),
     ("zenoh-link-tcp", &[]),
     ("zenoh-link-tls", &["zenoh-link-tcp"]),
     (
