@@ -11,7 +11,6 @@ use protocol::messages::{Parameters, Report};
 use protocol::{Epoch, Event, Line, RobotName, RunName, Tick};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
-use serde::de::DeserializeOwned;
 use simulator::RunFolder;
 use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
 
@@ -252,7 +251,7 @@ impl Playback {
 
 /// The next tick that the events tell of; `None` after the last complete one.
 fn next_of(lines: &mut Lines, replay: &mut Replay) -> miette::Result<Option<Snapshot>> {
-    while let Some(line) = lines.next(Line::from_json)? {
+    while let Some(line) = lines.next()? {
         let tick = line.tick;
         if let Some(robots) = replay.apply(line.event) {
             return Ok(Some(Snapshot { tick, robots }));
@@ -355,16 +354,13 @@ impl Lines {
     }
 
     /// The first line, which must exist.
-    fn first<T: DeserializeOwned>(&mut self) -> miette::Result<T> {
-        self.next(|json| serde_json::from_slice(json))?
+    fn first(&mut self) -> miette::Result<Line> {
+        self.next()?
             .ok_or_else(|| miette!("{} holds no run yet", self.path.display()))
     }
 
-    /// The next line, as `read` reads it; `None` at the end of the file or at an incomplete last line.
-    fn next<T>(
-        &mut self,
-        read: impl Fn(&[u8]) -> Result<T, serde_json::Error>,
-    ) -> miette::Result<Option<T>> {
+    /// The next line; `None` at the end of the file or at an incomplete last line.
+    fn next(&mut self) -> miette::Result<Option<Line>> {
         let mut bytes = Vec::new();
         let taken = self
             .reader
@@ -375,7 +371,7 @@ impl Lines {
         self.number += 1;
         let is_whole = bytes.ends_with(b"\n") || bytes.len() as u64 == MAX_LINE_BYTES;
 
-        match read(&bytes) {
+        match Line::from_json(&bytes) {
             Ok(line) => Ok(Some(line)),
             Err(_) if bytes.is_empty() => Ok(None),
             Err(_) if !is_whole => {
