@@ -73,7 +73,7 @@ pub(crate) fn texts<'a>(value: &'a mut Value, found: &mut Vec<&'a mut String>) {
     }
 }
 
-/// Whether nobody but this machine reaches a listener there. What cannot be read counts as reachable.
+/// Whether a listener there can be reached from this machine only. An endpoint that cannot be read counts as reachable.
 ///
 /// ```
 /// use bus::endpoint::is_local;
@@ -95,7 +95,7 @@ pub fn is_local(endpoint: &str) -> bool {
     host_and_port(address).is_some_and(|(host, _)| is_loopback(host))
 }
 
-/// Where to connect on this machine to somebody who listens at `endpoint`: an address that means "all of mine", as
+/// Where to connect on this machine to a listener at `endpoint`: an address that means "all of mine", as
 /// `0.0.0.0`, is none that a certificate could name.
 #[must_use]
 pub fn connectable(endpoint: &str) -> String {

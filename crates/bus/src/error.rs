@@ -17,9 +17,9 @@ pub enum BusError {
     },
     /// A simulator would be open to a network.
     #[error(
-        "{0} can be reached from other machines, and whoever reaches it may control the run and pose as any robot; \
+        "{0} can be reached from other machines, and every process that reaches it may control the run and pose as any robot; \
          either secure the run (`cars secure init` says how) and listen at tls/…, or say --insecure if you trust \
-         everybody who can reach it"
+         every process that can reach it"
     )]
     Exposed(String),
     /// A client would connect to a secured run without a certificate.
@@ -30,7 +30,7 @@ pub enum BusError {
     NoCertificate(String),
     /// A configuration with access control does not fit a listener without certificates.
     #[error(
-        "{0} is not encrypted, so nobody could show a certificate there: a secured run listens at tls/…"
+        "{0} is not encrypted, so no client can present a certificate there: a secured run listens at tls/…"
     )]
     Unencrypted(String),
     /// A session that was open cannot do what was asked.

@@ -638,7 +638,7 @@ fn relay_listens(listen: &[String], overrides: Option<&PathBuf>) -> Result<Vec<S
 ///
 /// # Errors
 /// [`BusError::Exposed`] says what it would mean, and what to do. [`BusError::Unencrypted`] if the configuration has
-/// access control and the endpoint no certificates: it would refuse everybody.
+/// access control and the endpoint no certificates: it would refuse every client.
 pub fn check_exposure(
     listen: &str,
     overrides: Option<&PathBuf>,

@@ -93,7 +93,7 @@ pub fn simulator_config(keys: &Keys, robots: &[RobotName], credentials: &Credent
         .map(|(name, _)| format!("{{ id: {name:?}, cert_common_names: [{name:?}] }}"));
     tree.add(
         "access_control/subjects",
-        "Who somebody is, is what the certificate says.",
+        "The certificate states the name of its owner.",
         &list(subjects),
     );
     let policies = grants.iter().map(|(name, grants)| policy(name, grants));

@@ -26,7 +26,7 @@ pub(crate) const CLIENT_MODE: Setting = setting(
 pub(crate) const ROUTER_MODE: Setting = setting(
     "mode",
     "\"router\"",
-    "Everybody connects here, and nobody to anybody else.",
+    "All processes connect here, and to no other process.",
 );
 
 /// What every session is set to, unless a configuration file says otherwise.
@@ -84,7 +84,7 @@ pub(crate) const SETTINGS: [Setting; 13] = [
     setting(
         "transport/unicast/accept_timeout",
         "2000",
-        "Who connects and says nothing is in nobody's way for long, milliseconds.",
+        "A connection that sends nothing is closed after this time, milliseconds.",
     ),
     setting(
         "transport/unicast/open_timeout",

@@ -50,7 +50,7 @@ pub fn performances(
 }
 
 fn add_commands(performances: &mut BTreeMap<RobotName, Performance>, record: &TickRecord) {
-    for event in &record.events {
+    for event in record.events.iter() {
         let Event::CommandSent { to, command, .. } = event else {
             continue;
         };

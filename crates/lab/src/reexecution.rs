@@ -45,7 +45,7 @@ impl Executed {
     pub(crate) fn into_entry(self) -> Entry {
         Entry {
             tick: self.record.tick,
-            events: self.record.events,
+            events: Arc::unwrap_or_clone(self.record.events),
             reports: self.reports,
         }
     }

@@ -1,6 +1,6 @@
 //! The lock-step as two state machines: [`Barrier`] on the simulator's side, [`Participant`] on a robot's.
 //!
-//! They do no I/O. Whoever drives them feeds what happens (a decoded message, a liveliness token that was declared or
+//! They do no I/O. Their caller feeds what happens (a decoded message, a liveliness token that was declared or
 //! undeclared, a timer that fired) and carries out what they return: messages to put, timers to set, ticks to run. Both are
 //! ordinary values that can be cloned, compared and hashed. The simulator's server and the robots' host drive them over the
 //! bus, [`Exchange`] is the same in one process, the deterministic simulation drives them over a simulated network, and the

@@ -89,7 +89,7 @@ impl Cars {
         with_cars(|cars| cars.was_blocked())
     }
 
-    /// Robots within its sensing range now. Sensing is physical: no cut network hides anybody.
+    /// Robots within its sensing range now. Sensing is physical: a cut in the network hides no body.
     #[getter]
     fn sensed_robots<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let sensed = with_cars(|cars| cars.sensed_robots().to_vec())?;

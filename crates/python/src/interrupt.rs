@@ -67,7 +67,7 @@ pub(crate) fn interruptible<T: Send + 'static>(
             if interruption.is_some() {
                 return Err(error);
             }
-            // Whoever it waits for may wait for the lock of Python.
+            // What it waits for may need the lock of Python.
             py.detach(&stop);
             interruption = Some(error);
         }

@@ -1,4 +1,4 @@
-//! Whether somebody comes nearer: the time since a distance was last smaller than ever before.
+//! Whether another robot comes nearer: the time since a distance was last smaller than ever before.
 
 use serde::{Deserialize, Serialize};
 

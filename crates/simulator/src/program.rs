@@ -63,7 +63,7 @@ struct Args {
     /// and compared with it, and goes on from there.
     #[arg(long, conflicts_with_all = ["seed", "duration", "set"])]
     resume: bool,
-    /// Stay when the run is over and nobody has stopped it, so that `init` begins the next one with the same processes: always,
+    /// Stay when the run ends without being stopped, so that `init` begins the next one with the same processes: always,
     /// or while a browser shows the run in a console.
     #[arg(long, value_name = "WHEN", num_args = 0..=1, default_missing_value = "always")]
     stay: Option<StayMode>,

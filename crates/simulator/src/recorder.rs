@@ -6,12 +6,13 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use config::FileError;
 use protocol::event::log_line;
 use protocol::messages::{Awaited, End, LogRecord, Panel, Report};
-use protocol::{Epoch, Event, Line, PROTOCOL_VERSION, RobotName, RunName};
+use protocol::{Epoch, Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
 
@@ -381,6 +382,14 @@ pub struct Observed {
     pub panels: BTreeMap<RobotName, Panel>,
 }
 
+/// A tick that was noted and is not written: all that writing it needs beside the frame.
+struct Noted {
+    record: TickRecord,
+    lines: Vec<LogRecord>,
+    reports: Vec<(RobotName, Arc<Report>)>,
+    observed: Option<Observed>,
+}
+
 /// Writes the record of one epoch.
 pub struct Recorder {
     folder: RunFolder,
@@ -389,8 +398,10 @@ pub struct Recorder {
     seal: Seal,
     log: Option<Lines>,
     recording: Option<Writer>,
-    /// The field after the last tick, for its memory.
+    /// The field after the tick that was noted last. Its memory is used again.
     frame: Frame,
+    /// What was noted and is not written.
+    noted: Option<Noted>,
     begun: Instant,
     /// Of the tick that is written next.
     observed: Option<Observed>,
@@ -481,6 +492,7 @@ impl Recorder {
             log,
             recording,
             frame: Frame::default(),
+            noted: None,
             begun: Instant::now(),
             observed: None,
             sync: record.sync,
@@ -495,6 +507,7 @@ impl Recorder {
     /// # Errors
     /// [`FileError`] if a file cannot be written or renamed.
     pub fn supersede_record(&mut self) -> Result<(), FileError> {
+        self.write_noted()?;
         self.sync()?;
         for name in std::mem::take(&mut self.drafts) {
             let draft = self.folder.file(&format!("{name}{DRAFT}"));
@@ -524,56 +537,97 @@ impl Recorder {
         simulation: &Simulation,
         record: &TickRecord,
     ) -> Result<Vec<LogRecord>, FileError> {
-        // The events of the end belong to the last tick, which is recorded already. The recording is finished first: a record
-        // whose events have an end is whole.
-        let is_end = matches!(record.events.last(), Some(Event::End { .. }));
-        if is_end && let Some(recording) = self.recording.take() {
-            finish(recording, record).map_err(|error| unrecordable(&error))?;
-        }
+        let lines = self.note(simulation, record)?;
+        self.write_noted()?;
+        Ok(lines)
+    }
+
+    /// Notes all that is recorded of a tick, so that the next one may begin before [`Self::write_noted`] writes it. Returns the
+    /// lines of the log, for observers.
+    ///
+    /// # Errors
+    /// [`FileError`] if the tick that was noted before cannot be written.
+    pub fn note(
+        &mut self,
+        simulation: &Simulation,
+        record: &TickRecord,
+    ) -> Result<Vec<LogRecord>, FileError> {
+        self.write_noted()?;
 
         let mut lines = Vec::new();
-        for line in record.lines() {
-            self.summary.count(simulation, &line);
-            let time_s = simulation.time_s(line.tick);
-            let log_record = line.event.log_record(simulation.epoch(), line.tick, time_s);
-            lines.extend(log_record);
+        let time_s = simulation.time_s(record.tick);
+        for event in record.events.iter() {
+            self.summary.count(simulation, record.tick, event);
+            lines.extend(event.log_record(simulation.epoch(), record.tick, time_s));
+        }
+        let mut reports = Vec::new();
+        if self.recording.is_some() && !record.is_end() {
+            set_frame(&mut self.frame, simulation, record);
+            reports = simulation.reports_of(record.tick);
+        }
+
+        self.noted = Some(Noted {
+            record: record.clone(),
+            lines: lines.clone(),
+            reports,
+            observed: self.observed.take(),
+        });
+        Ok(lines)
+    }
+
+    /// Writes the tick that was noted, if it is not written yet.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be written.
+    pub fn write_noted(&mut self) -> Result<(), FileError> {
+        let Some(noted) = self.noted.take() else {
+            return Ok(());
+        };
+
+        // The events of the end belong to the last tick, which is recorded already. The recording is finished first: a record
+        // whose events have an end is whole.
+        let is_end = noted.record.is_end();
+        if is_end && let Some(recording) = self.recording.take() {
+            finish(recording, &noted.record).map_err(|error| unrecordable(&error))?;
+        }
+
+        for line in noted.record.lines() {
             self.add_event(&line)?;
         }
         self.events.flush()?;
-        self.write_log(&lines)?;
+        self.write_log(&noted.lines)?;
 
-        if self.recording.is_some() && !is_end {
-            self.record_tick(simulation, record)?;
+        if self.recording.is_some() {
+            self.record_tick(&noted)?;
         }
 
         if is_end || self.is_sync_due() {
             self.sync()?;
         }
-        Ok(lines)
+        Ok(())
     }
 
-    fn record_tick(
-        &mut self,
-        simulation: &Simulation,
-        record: &TickRecord,
-    ) -> Result<(), FileError> {
-        let observed = self.observed.take();
+    fn record_tick(&mut self, noted: &Noted) -> Result<(), FileError> {
         let Some(recording) = &mut self.recording else {
             return Ok(());
         };
 
+        let none = BTreeMap::new();
         let mut wall = Wall::default();
-        let mut panels = BTreeMap::new();
-        if let Some(observed) = observed {
-            wall = wall_times(self.begun, &observed);
-            panels = observed.panels;
+        let mut panels = &none;
+        if let Some(observed) = &noted.observed {
+            wall = wall_times(self.begun, observed);
+            panels = &observed.panels;
         }
-        set_frame(&mut self.frame, simulation, record);
+        let mut reports = BTreeMap::new();
+        for (robot, report) in &noted.reports {
+            reports.insert(robot, report.as_ref());
+        }
         let tick = TickView {
             frame: &self.frame,
-            events: &record.events,
-            reports: reports(simulation, record),
-            panels: &panels,
+            events: &noted.record.events,
+            reports,
+            panels,
             wall: &wall,
         };
         recording.tick(&tick).map_err(|error| unrecordable(&error))
@@ -676,7 +730,7 @@ fn superseded_prefix(file: &str) -> String {
 
 /// Ends a recording with the events of the end of the run.
 fn finish(mut recording: Writer, end: &TickRecord) -> Result<(), WriteError> {
-    for event in &end.events {
+    for event in end.events.iter() {
         recording.end(end.tick, event)?;
     }
     recording.finish()
@@ -738,21 +792,6 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
     frame.cuts = simulation.cuts();
     frame.unreachable.clone_from(simulation.unreachable());
     frame.expectations = simulation.standings();
-}
-
-/// The reports for a tick.
-fn reports<'a>(
-    simulation: &'a Simulation,
-    record: &TickRecord,
-) -> BTreeMap<&'a RobotName, &'a Report> {
-    let mut reports = BTreeMap::new();
-    for name in simulation.names() {
-        let last = simulation.report(name);
-        if let Some(report) = last.filter(|report| report.tick == record.tick) {
-            reports.insert(name, report);
-        }
-    }
-    reports
 }
 
 /// The times of a tick that is complete now.

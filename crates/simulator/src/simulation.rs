@@ -28,16 +28,22 @@ pub type Reports = Outcome<Arc<Report>, CommandText>;
 /// Reports and commands by robot.
 type ReportsByName = BTreeMap<RobotName, (Arc<Report>, Vec<Sent<CommandText>>)>;
 
-/// A complete tick.
-#[derive(Debug)]
+/// A complete tick. Copies share its events.
+#[derive(Debug, Clone)]
 pub struct TickRecord {
     /// The tick.
     pub tick: Tick,
     /// Its events in a fixed order; the last one has the digest.
-    pub events: Vec<Event>,
+    pub events: Arc<Vec<Event>>,
 }
 
 impl TickRecord {
+    /// Whether it is the end of the run, which belongs to the last tick.
+    #[must_use]
+    pub fn is_end(&self) -> bool {
+        matches!(self.events.last(), Some(Event::End { .. }))
+    }
+
     /// The lines of `events.jsonl`.
     pub fn lines(&self) -> impl Iterator<Item = Line> + '_ {
         self.events.iter().map(|event| Line {
@@ -357,7 +363,7 @@ impl Simulation {
         });
         TickRecord {
             tick: self.tick,
-            events: std::mem::take(&mut self.events),
+            events: Arc::new(std::mem::take(&mut self.events)),
         }
     }
 
@@ -775,7 +781,7 @@ impl Simulation {
         });
         TickRecord {
             tick: self.tick,
-            events,
+            events: Arc::new(events),
         }
     }
 
@@ -937,6 +943,17 @@ impl Simulation {
     #[must_use]
     pub fn report(&self, name: &RobotName) -> Option<&Report> {
         self.reports.get(name).map(Arc::as_ref)
+    }
+
+    /// The reports for a tick, of the robots that have not missed it.
+    pub(crate) fn reports_of(&self, tick: Tick) -> Vec<(RobotName, Arc<Report>)> {
+        let mut reports = Vec::new();
+        for (name, report) in &self.reports {
+            if report.tick == tick {
+                reports.push((name.clone(), report.clone()));
+            }
+        }
+        reports
     }
 
     /// The last state variables of a robot.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use protocol::messages::{End, StateVariables, Verdict};
-use protocol::{Event, Line, RobotName, RunName, Tick};
+use protocol::{Event, RobotName, RunName, Tick};
 use serde::{Deserialize, Serialize};
 
 pub use network::{CutSummary, LinkSummary, NetworkSummary};
@@ -138,14 +138,14 @@ impl Summary {
         }
     }
 
-    /// Counts an event.
-    pub fn count(&mut self, simulation: &Simulation, line: &Line) {
+    /// Counts an event of a tick.
+    pub fn count(&mut self, simulation: &Simulation, tick: Tick, event: &Event) {
         let tick_s = simulation.scenario().tick_s;
-        self.network.count(simulation, line.tick, &line.event);
+        self.network.count(simulation, tick, event);
 
-        match &line.event {
-            Event::Emotion { robot, to, .. } => self.enter_emotion(robot, to, line.tick, tick_s),
-            Event::Behavior { robot, to, .. } => self.enter_behavior(robot, to, line.tick, tick_s),
+        match event {
+            Event::Emotion { robot, to, .. } => self.enter_emotion(robot, to, tick, tick_s),
+            Event::Behavior { robot, to, .. } => self.enter_behavior(robot, to, tick, tick_s),
             Event::Blocked { robot, .. } => self.robot(robot).blocked += 1,
             Event::CommandSent { from, command, .. } => {
                 *self.robot(from).sent.entry(command.clone()).or_default() += 1;
@@ -165,7 +165,7 @@ impl Summary {
             } => {
                 let judged = Judged {
                     verdict: *verdict,
-                    tick: line.tick,
+                    tick: tick,
                     because: because.clone(),
                 };
                 self.expectations.insert(expectation.clone(), judged);

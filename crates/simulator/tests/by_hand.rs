@@ -162,7 +162,7 @@ fn links(simulation: &Simulation) -> Vec<String> {
 fn lost(records: &[TickRecord]) -> Vec<(Tick, Cause)> {
     let mut lost = Vec::new();
     for record in records {
-        for event in &record.events {
+        for event in record.events.iter() {
             if let Event::CommandDropped { because, .. } = event {
                 lost.push((record.tick, *because));
             }
@@ -241,7 +241,7 @@ fn what_the_record_says_was_done_gives_the_same_record() {
     let (_, records) = play_by_hand(scenario(""), &everything());
     let (_, again) = play(scenario(""), |tick, simulation| {
         let mut changes = Vec::new();
-        for event in &records[tick as usize].events {
+        for event in records[tick as usize].events.iter() {
             if let Event::Changed { set, by_hand: true } = event {
                 changes.push(set.clone());
             }
@@ -290,7 +290,7 @@ fn what_is_undone_before_its_tick_has_no_effect() {
             (3, Intervention::Recover { robot: name("B") }),
         ],
     );
-    let happened = records.iter().flat_map(|record| &record.events);
+    let happened = records.iter().flat_map(|record| record.events.iter());
     assert!(
         !happened
             .clone()

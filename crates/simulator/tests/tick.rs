@@ -148,7 +148,7 @@ fn delivery(from: &str, text: &str) -> Delivery {
 /// What refused moves in a tick, in the order of robots.
 fn blockers(record: &TickRecord) -> Vec<Blocker> {
     let mut blockers = vec![];
-    for event in &record.events {
+    for event in record.events.iter() {
         if let Event::Blocked { by, .. } = event {
             blockers.push(by.clone());
         }
@@ -160,7 +160,7 @@ fn blockers(record: &TickRecord) -> Vec<Blocker> {
 /// Commands that were dropped in a tick: sender, target, number, cause.
 fn dropped(record: &TickRecord) -> Vec<(String, String, u64, Cause)> {
     let mut dropped = vec![];
-    for event in &record.events {
+    for event in record.events.iter() {
         if let Event::CommandDropped {
             from,
             to,

@@ -203,7 +203,7 @@ fn digest_of(scenario: &Scenario) -> String {
     let mut delivered = 0;
     for _ in 0..TICKS {
         let record = simulation.step(&mut robots).expect("only tick 0 can fail");
-        for event in &record.events {
+        for event in record.events.iter() {
             delivered += u32::from(matches!(event, simulator::Event::CommandDelivered { .. }));
         }
     }

@@ -298,7 +298,7 @@ impl World {
     /// Each command that was sent is recorded once.
     fn check_commands(&mut self, outcome: &Reports, record: &TickRecord) {
         let mut recorded: BTreeMap<RobotName, usize> = BTreeMap::new();
-        for event in &record.events {
+        for event in record.events.iter() {
             if let Recorded::CommandSent { from, .. } = event {
                 *recorded.entry(from.clone()).or_default() += 1;
             }

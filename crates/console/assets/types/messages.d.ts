@@ -558,7 +558,7 @@ export interface Panel {
   widgets: Widget[];
 }
 /**
- * The field at a moment, published at a display rate while somebody watches.
+ * The field at a moment, published at a display rate while there are subscribers.
  */
 export interface WorldFrame {
   /**

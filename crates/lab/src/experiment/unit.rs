@@ -182,8 +182,8 @@ fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::
     let mut summary = None;
     let simulation = play(scenario, &run, |simulation, record| {
         let summary = summary.get_or_insert_with(|| Summary::begin(&run, simulation));
-        for line in record.lines() {
-            summary.count(simulation, &line);
+        for event in record.events.iter() {
+            summary.count(simulation, record.tick, event);
         }
         follower.observe(&Observation {
             tick: record.tick,

@@ -226,7 +226,7 @@ impl Notes {
 
     fn note(&mut self, record: &TickRecord) {
         self.played.ticks = record.tick;
-        for event in &record.events {
+        for event in record.events.iter() {
             self.note_event(record.tick, event);
         }
     }

@@ -11,7 +11,7 @@ use super::variables::StateVariables;
 use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
 
-/// The field at a moment, published at a display rate while somebody watches.
+/// The field at a moment, published at a display rate while there are subscribers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WorldFrame {
     /// The run.

@@ -387,7 +387,7 @@ impl Message for Command {
     }
 }
 
-/// A robot that cannot finish its tick says for whose answer it waits, so that nobody else is blamed.
+/// A robot that cannot finish its tick reports which robot's answer it waits for, so that it is not held responsible itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Waiting {
     /// Epoch.

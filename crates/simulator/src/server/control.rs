@@ -238,7 +238,7 @@ impl Server {
         if self.barrier.is_announced() {
             return self.answer_status(&query, simulation);
         }
-        // Only the last one to step is kept waiting; whoever came before is told how far things are.
+        // Only the last client that steps is kept waiting; the one before gets the status as it is.
         let until = simulation.tick() + self.pace.pending_steps + u64::from(self.barrier.is_open());
         if let Some((earlier, _)) = self
             .pace

@@ -110,7 +110,7 @@ impl<W: Work> Inbox<W> {
         }
     }
 
-    /// Returns whether anybody takes events: otherwise the process ends, and no event matters any more.
+    /// Returns whether events are still taken: otherwise the process ends, and no event matters any more.
     fn enqueue(&self, event: W::Event) -> bool {
         self.desk.queued.fetch_add(1, Ordering::SeqCst);
         self.queue.send(event).is_ok()

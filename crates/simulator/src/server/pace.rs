@@ -15,7 +15,7 @@ const MAX_STEPS: u64 = 1_000_000;
 /// The pace of the clock.
 pub(super) struct Pace {
     pub(super) phase: Phase,
-    /// What to do once everybody is there.
+    /// Whether the clock is held once every robot is connected.
     pub(super) starts_paused: bool,
     pub(super) speed: Option<f64>,
     pub(super) due: Instant,
@@ -48,7 +48,7 @@ impl Pace {
         } else {
             Phase::Running
         };
-        // Whoever presses init later wants to press start, too.
+        // After `init`, a later epoch waits for `start`.
         self.starts_paused = true;
         (self.pending_steps, self.stepping) = (0, None);
         self.due = Instant::now();
@@ -112,6 +112,11 @@ impl Pace {
         self.phase = Phase::Paused;
         self.pending_steps += n;
         Ok(())
+    }
+
+    /// Whether the next tick is due as soon as one is complete, and nobody waits for a step.
+    pub(super) fn is_at_full_speed(&self) -> bool {
+        self.phase == Phase::Running && self.speed.is_none() && self.stepping.is_none()
     }
 
     /// Who is to be told that a tick is reached.

@@ -123,7 +123,7 @@ impl Past {
     pub(super) fn compare(&mut self, executed: &TickRecord) -> Result<Repeated, FileError> {
         let executed = Entry {
             tick: executed.tick,
-            events: executed.events.clone(),
+            events: executed.events.to_vec(),
             reports: None,
         };
         let recorded = self.next.take().unwrap_or_default();

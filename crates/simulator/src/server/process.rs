@@ -53,7 +53,7 @@ pub struct Options {
     pub repeat_after: Duration,
 }
 
-/// Whether a simulator process stays when a run is over that nobody has stopped: then `init` begins another epoch, with the same
+/// Whether a simulator process stays when a run ends without being stopped: then `init` begins another epoch, with the same
 /// processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stay {
@@ -670,7 +670,11 @@ impl Server {
         if self.observing.is_on {
             recorder.observe(self.observing.take(record.tick, self.waiting_since));
         }
-        let lines = recorder.write(simulation, &record)?;
+        let lines = recorder.note(simulation, &record)?;
+        // At full speed a tick is written while the robots run the next one.
+        if !self.pace.is_at_full_speed() {
+            recorder.write_noted()?;
+        }
         self.watchdog.note(Some(Doing::Work));
         self.observers.log(&lines);
         self.stage = Stage::Grant;
@@ -827,7 +831,7 @@ impl Server {
         }]);
     }
 
-    /// The run is over, and the process stays: answers requests until one begins another epoch, or nobody is there any more.
+    /// The run is over, and the process stays: answers requests until one begins another epoch, or no browser shows the run any more.
     fn linger(&mut self, simulation: &mut Simulation) -> Result<Option<Duration>, Interrupt> {
         while let Some(event) = self.events.try_next() {
             self.handle(event, simulation)?;
@@ -1064,7 +1068,12 @@ impl Work for Running {
     fn work(&mut self) -> Result<Option<Duration>, Interrupt> {
         self.server.watchdog.note(Some(Doing::Work));
         let outcome = match &mut self.recorder {
-            Recording::On(recorder) => self.server.work(&mut self.simulation, recorder),
+            Recording::On(recorder) => {
+                let outcome = self.server.work(&mut self.simulation, recorder);
+                self.server.watchdog.note(Some(Doing::Record));
+                recorder.write_noted()?;
+                outcome
+            }
             Recording::Over(_) => self.server.linger(&mut self.simulation),
         };
         self.server.watchdog.note(None);
