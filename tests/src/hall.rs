@@ -53,7 +53,7 @@ impl Hall {
     /// Runs one tick; returns its events.
     pub fn step(&mut self) -> Vec<Event> {
         let record = self.simulation.step(&mut self.robots);
-        record.expect("only tick 0 can fail").events
+        record.expect("only tick 0 can fail").events.to_vec()
     }
 
     /// Simulated time, seconds.

@@ -520,8 +520,8 @@ mod tests {
         for (tick, happening) in ticks.iter().enumerate() {
             let mut state_variables = StateVariables::new();
             if let Some(v) = happening.v {
-                state_variables.insert("v".to_owned(), Variable::Number(v));
-                state_variables.insert("is_high".to_owned(), Variable::Flag(v > 3.0));
+                state_variables.insert("v", Variable::Number(v));
+                state_variables.insert("is_high", Variable::Flag(v > 3.0));
             }
             variables.insert(name("A"), state_variables);
             observe(&mut probe, tick, &happening.events, &variables);

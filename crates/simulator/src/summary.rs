@@ -165,7 +165,7 @@ impl Summary {
             } => {
                 let judged = Judged {
                     verdict: *verdict,
-                    tick: tick,
+                    tick,
                     because: because.clone(),
                 };
                 self.expectations.insert(expectation.clone(), judged);

@@ -288,7 +288,7 @@ fn a_command_sent_in_a_tick_is_named_by_the_next_clock_in_the_order_of_senders()
     assert!(news[1].is_empty() && news[3].is_empty());
 
     let mut delivered = vec![];
-    for event in &records[2].events {
+    for event in records[2].events.iter() {
         if let Event::CommandDelivered { from, to, seq } = event {
             delivered.push((from.as_str(), to.as_str(), *seq));
         }

@@ -373,7 +373,7 @@ impl World {
             let differs = expected
                 .events
                 .iter()
-                .zip(&record.events)
+                .zip(record.events.iter())
                 .find(|(a, b)| a != b);
             self.fail_wrong(format!(
                 "tick {}: expected and recorded: {differs:?}",

@@ -570,9 +570,9 @@ fn events_in_order(order: [&str; 3]) -> Vec<Event> {
         (robot, welcome)
     });
     let mut robots = LocalHost::new(seats.into());
-    let mut events = simulation.init(&mut robots).unwrap().events;
+    let mut events = simulation.init(&mut robots).unwrap().events.to_vec();
     for _ in 0..simulation.scenario().ticks {
-        events.extend(simulation.step(&mut robots).unwrap().events);
+        events.extend(simulation.step(&mut robots).unwrap().events.to_vec());
     }
 
     events

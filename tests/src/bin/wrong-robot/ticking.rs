@@ -127,7 +127,7 @@ impl Host {
         ]
         .into();
         if let Some(seen) = seen {
-            state_variables.insert("seen_x_m".to_owned(), Variable::from(seen.x));
+            state_variables.insert("seen_x_m", Variable::from(seen.x));
         }
 
         let state = PublicState {
@@ -175,7 +175,7 @@ impl Host {
         }
         let mut state_variables = state.state_variables.clone();
         if wrong.is("number.finite") {
-            state_variables.insert("ratio".to_owned(), Variable::Number(f64::NAN));
+            state_variables.insert("ratio", Variable::Number(f64::NAN));
         }
 
         Report {

@@ -26,7 +26,7 @@ impl Wrong {
         };
 
         let raw: Value = serde_json::from_slice(bytes).ok()?;
-        let known = serde_json::to_value(&message).ok()?;
+        let known = serde_json::from_slice(&message.to_json()).ok()?;
         let is_refused = self.is("compat.unknown-fields") && has_unknown_fields(&raw, &known)
             || self.is("number.integers:refused") && has_integers_for_floats(&raw, &known);
         (!is_refused).then_some(message)
