@@ -542,11 +542,11 @@ impl Recorder {
         Ok(lines)
     }
 
-    /// Notes all that is recorded of a tick, so that the next one may begin before [`Self::write_noted`] writes it. Returns the
-    /// lines of the log, for observers.
+    /// Notes all that is recorded of a tick, so that the next one may begin before [`Self::write_noted`] writes it; with
+    /// `sync = "tick"` it is written here. Returns the lines of the log, for observers.
     ///
     /// # Errors
-    /// [`FileError`] if the tick that was noted before cannot be written.
+    /// [`FileError`] if it, or the tick that was noted before, cannot be written.
     pub fn note(
         &mut self,
         simulation: &Simulation,
@@ -572,6 +572,10 @@ impl Recorder {
             reports,
             observed: self.observed.take(),
         });
+        // Such a tick is on the disk before the next one begins.
+        if matches!(self.sync, SyncPoint::Tick) {
+            self.write_noted()?;
+        }
         Ok(lines)
     }
 
