@@ -23,6 +23,8 @@ def newest(page):
 
 
 def scrub(page, to):
+    # A bar takes no value below its beginning, which is the first tick that the page saw until it has found the recording.
+    until(page, f"""Number(document.querySelector('[data-testid="scrub"]')?.min ?? Infinity) <= {to}""")
     page.get_by_test_id("scrub").evaluate(
         "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true})); }", to
     )

@@ -185,15 +185,18 @@ impl StateVariables {
         }
     }
 
-    /// Keeps the variables for which `is_kept` returns true.
+    /// Keeps the variables for which `is_kept` returns true. It is called once for each, in the order of the names.
     pub fn retain(&mut self, mut is_kept: impl FnMut(&str, &Variable) -> bool) {
-        let mut kept = self.iter().map(|(name, value)| is_kept(name, value));
-        if kept.all(|is_kept| is_kept) {
-            return;
-        }
-        drop(kept);
+        // Where all are kept, nothing is copied.
+        let dropped = self.iter().position(|(name, value)| !is_kept(name, value));
+        let Some(first) = dropped else { return };
 
-        Arc::make_mut(&mut self.0).retain(|(name, value)| is_kept(name, value));
+        let mut index = 0;
+        Arc::make_mut(&mut self.0).retain(|(name, value)| {
+            let at = index;
+            index += 1;
+            at < first || (at > first && is_kept(name, value))
+        });
     }
 
     /// Names and values, in the order of the names.
@@ -344,6 +347,30 @@ mod tests {
         entries
             .map(|(name, value)| (*name, Variable::Number(*value)))
             .collect()
+    }
+
+    #[test]
+    fn retain_asks_once_for_each() {
+        for dropped in [
+            &[][..],
+            &["a"],
+            &["c"],
+            &["a", "b"],
+            &["b", "d"],
+            &["a", "b", "c", "d"],
+        ] {
+            let mut kept = variables(&[("a", 1.0), ("b", 2.0), ("c", 3.0), ("d", 4.0)]);
+            let mut asked = String::new();
+            kept.retain(|name, _| {
+                asked += name;
+                !dropped.contains(&name)
+            });
+            assert_eq!(asked, "abcd", "{dropped:?}");
+            let names: Vec<&str> = kept.iter().map(|(name, _)| name).collect();
+            let mut expected = vec!["a", "b", "c", "d"];
+            expected.retain(|name| !dropped.contains(name));
+            assert_eq!(names, expected);
+        }
     }
 
     #[test]
