@@ -1,5 +1,7 @@
 //! The record of a run, as the recorder writes it.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::fs::File;
