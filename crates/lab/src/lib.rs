@@ -1,6 +1,6 @@
 //! Work with runs: executing a scenario in this process ([`run`]), reading a run's folder ([`folder`]), executing a recorded
-//! run again ([`verify`]) and comparing two runs ([`diff`]), repeating runs and comparing teams
-//! ([`experiment`]), judging recorded runs ([`judge`]), presenting results ([`table`], [`mod@diagram`], [`report`]), exporting runs
+//! run again ([`verify`]) and comparing two runs ([`diff`]), repeating runs and comparing teams ([`experiment`]),
+//! judging recorded runs ([`judge`]), presenting results ([`table`], [`mod@diagram`], [`report`]), exporting runs
 //! ([`export`], [`trace`], [`emotionml`]), letting them go on otherwise ([`fork`]), hunting for faults under which
 //! expectations fail ([`hunt`]), playing single robots from their records ([`replayed`]),
 //! and writing commands that can be typed ([`shell`]).

@@ -387,7 +387,8 @@ struct Noted {
     record: TickRecord,
     lines: Vec<LogRecord>,
     reports: Vec<(RobotName, Arc<Report>)>,
-    observed: Option<Observed>,
+    panels: BTreeMap<RobotName, Panel>,
+    wall: Wall,
 }
 
 /// Writes the record of one epoch.
@@ -560,6 +561,12 @@ impl Recorder {
             self.summary.count(simulation, record.tick, event);
             lines.extend(event.log_record(simulation.epoch(), record.tick, time_s));
         }
+        let mut wall = Wall::default();
+        let mut panels = BTreeMap::new();
+        if let Some(observed) = self.observed.take() {
+            wall = wall_times(self.begun, &observed);
+            panels = observed.panels;
+        }
         let mut reports = Vec::new();
         if self.recording.is_some() && !record.is_end() {
             set_frame(&mut self.frame, simulation, record);
@@ -570,13 +577,20 @@ impl Recorder {
             record: record.clone(),
             lines: lines.clone(),
             reports,
-            observed: self.observed.take(),
+            panels,
+            wall,
         });
         // Such a tick is on the disk before the next one begins.
         if matches!(self.sync, SyncPoint::Tick) {
             self.write_noted()?;
         }
         Ok(lines)
+    }
+
+    /// Whether a tick is noted and not written.
+    #[must_use]
+    pub fn has_noted(&self) -> bool {
+        self.noted.is_some()
     }
 
     /// Writes the tick that was noted, if it is not written yet.
@@ -616,13 +630,6 @@ impl Recorder {
             return Ok(());
         };
 
-        let none = BTreeMap::new();
-        let mut wall = Wall::default();
-        let mut panels = &none;
-        if let Some(observed) = &noted.observed {
-            wall = wall_times(self.begun, observed);
-            panels = &observed.panels;
-        }
         let mut reports = BTreeMap::new();
         for (robot, report) in &noted.reports {
             reports.insert(robot, report.as_ref());
@@ -631,8 +638,8 @@ impl Recorder {
             frame: &self.frame,
             events: &noted.record.events,
             reports,
-            panels,
-            wall: &wall,
+            panels: &noted.panels,
+            wall: &noted.wall,
         };
         recording.tick(&tick).map_err(|error| unrecordable(&error))
     }

@@ -8,13 +8,14 @@ use std::fs::File;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use lockstep::{Exchange, Outcome};
 use protocol::messages::{CommandText, End, News, Report};
 use protocol::{RobotName, RunName, Tick};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::recorder::{EVENTS, RECORDING};
+use simulator::recorder::{EVENTS, Observed, RECORDING, RunLock};
 use simulator::{Recorder, RunFolder, Simulation};
 
 /// Robots that miss every tick.
@@ -35,14 +36,7 @@ impl Exchange<News, Arc<Report>, CommandText> for Absent {
 #[test]
 fn events_have_no_end_unless_the_recording_is_finished() {
     let out = tempfile::tempdir().unwrap();
-    let run = RunName::new("unfinished").unwrap();
-    let folder = RunFolder::new(out.path(), &run);
-    let source = Source {
-        name: "test".into(),
-        text: "duration = \"10 s\"\n[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n".into(),
-    };
-    let scenario = Scenario::parse(&source, Path::new(".")).unwrap();
-    let _lock = folder.create(&scenario).unwrap();
+    let (folder, _lock, scenario) = prepare(out.path(), "");
 
     // The recording is a pipe: what is written after its reader has gone is an error.
     let pipe = folder.file(RECORDING);
@@ -50,7 +44,7 @@ fn events_have_no_end_unless_the_recording_is_finished() {
     assert!(made.success());
     let reader = std::thread::spawn(move || File::open(pipe).unwrap());
     let mut simulation = Simulation::new(scenario, 1).unwrap();
-    let mut recorder = Recorder::begin(&folder, &run, &simulation).unwrap();
+    let mut recorder = Recorder::begin(&folder, &run(), &simulation).unwrap();
     let reader = reader.join().unwrap();
     let tick = simulation.init(&mut Absent).unwrap();
     recorder.write(&simulation, &tick).unwrap();
@@ -64,22 +58,32 @@ fn events_have_no_end_unless_the_recording_is_finished() {
     assert!(!events.contains("\"event\":\"end\""), "{events}");
 }
 
-/// Plays ten seconds with twenty guests. Returns the events, those of the recording included, and how many lines the events had
-/// after each tick was noted.
-fn record(settings: &str, is_deferred: bool) -> (String, String, Vec<usize>) {
-    let out = tempfile::tempdir().unwrap();
-    let run = RunName::new("noted").unwrap();
-    let folder = RunFolder::new(out.path(), &run);
+/// A folder for the record of a run of ten seconds with one robot, and its scenario with further settings.
+fn prepare(out: &Path, settings: &str) -> (RunFolder, RunLock, Scenario) {
+    let folder = RunFolder::new(out, &run());
     let source = Source {
         name: "test".into(),
         text: format!(
-            "duration = \"10 s\"\nguests = {{ count = 20 }}\n{settings}\n[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n"
+            "duration = \"10 s\"\n{settings}\n[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n"
         ),
     };
     let scenario = Scenario::parse(&source, Path::new(".")).unwrap();
-    let _lock = folder.create(&scenario).unwrap();
+    let lock = folder.create(&scenario).unwrap();
+    (folder, lock, scenario)
+}
+
+fn run() -> RunName {
+    RunName::new("recorded").unwrap()
+}
+
+/// Plays a run with twenty guests. Returns the events, what is in the recording, and how many lines the events had after each
+/// tick was noted.
+fn record(settings: &str, is_deferred: bool) -> (String, String, Vec<usize>) {
+    let out = tempfile::tempdir().unwrap();
+    let settings = format!("guests = {{ count = 20 }}\n{settings}");
+    let (folder, _lock, scenario) = prepare(out.path(), &settings);
     let mut simulation = Simulation::new(scenario, 1).unwrap();
-    let mut recorder = Recorder::begin(&folder, &run, &simulation).unwrap();
+    let mut recorder = Recorder::begin(&folder, &run(), &simulation).unwrap();
     let events = || std::fs::read_to_string(folder.file(EVENTS)).unwrap();
 
     let mut lines = Vec::new();
@@ -98,7 +102,7 @@ fn record(settings: &str, is_deferred: bool) -> (String, String, Vec<usize>) {
     recorder.write(&simulation, &end).unwrap();
 
     let recording = recording::Recording::open(&folder.file(RECORDING)).unwrap();
-    let ticks = recording.read(0, 20).unwrap();
+    let ticks = recording.read(0, 21).unwrap();
     let frames: Vec<_> = ticks
         .iter()
         .map(|tick| (&tick.frame, &tick.events))
@@ -122,4 +126,34 @@ fn with_sync_at_each_tick_a_noted_tick_is_written_at_once() {
         .lines()
         .position(|line| line.contains("\"event\":\"tick\""));
     assert_eq!(lines[0], first.unwrap() + 1, "{events}");
+}
+
+#[test]
+fn a_tick_is_complete_when_it_is_noted_and_not_when_it_is_written() {
+    let out = tempfile::tempdir().unwrap();
+    let (folder, _lock, scenario) = prepare(out.path(), "");
+    let mut simulation = Simulation::new(scenario, 1).unwrap();
+    let mut recorder = Recorder::begin(&folder, &run(), &simulation).unwrap();
+    let opened = Instant::now();
+    let tick = simulation.init(&mut Absent).unwrap();
+    recorder.observe(Observed {
+        opened,
+        reports: BTreeMap::new(),
+        awaited: Vec::new(),
+        late: Vec::new(),
+        panels: BTreeMap::new(),
+    });
+    recorder.note(&simulation, &tick).unwrap();
+    let most = opened.elapsed();
+
+    // However long the tick waits to be written.
+    std::thread::sleep(Duration::from_millis(5));
+    recorder.write_noted().unwrap();
+    let end = simulation.end(End::Finished);
+    recorder.write(&simulation, &end).unwrap();
+
+    let recording = recording::Recording::open(&folder.file(RECORDING)).unwrap();
+    let wall = &recording.read(0, 1).unwrap()[0].wall;
+    let took = Duration::from_nanos(wall.completed_ns - wall.opened_ns);
+    assert!(took <= most, "{took:?} of at most {most:?}");
 }

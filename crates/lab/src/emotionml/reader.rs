@@ -362,12 +362,12 @@ impl Lines {
     /// The next line; `None` at the end of the file or at an incomplete last line.
     fn next(&mut self) -> miette::Result<Option<Line>> {
         let mut bytes = Vec::new();
-        let taken = self
+        let read = self
             .reader
             .by_ref()
             .take(MAX_LINE_BYTES)
             .read_until(b'\n', &mut bytes);
-        taken.map_err(|error| miette!("cannot read {}: {error}", self.path.display()))?;
+        read.map_err(|error| miette!("cannot read {}: {error}", self.path.display()))?;
         self.number += 1;
         let is_whole = bytes.ends_with(b"\n") || bytes.len() as u64 == MAX_LINE_BYTES;
 

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-
-use super::estimate::{conditions_of, numbers, times};
-use super::file::Experiment;
-use super::outcome::Outcome;
 use statistics::{
     Bootstrapped, LogRank, RestrictedMeans, SignFlip, TimeTo, bootstrap, dominance, holm,
     share_of_events,
 };
+
+use super::estimate::{conditions_of, numbers, times};
+use super::file::Experiment;
+use super::outcome::Outcome;
 
 /// The difference between an arm and the baseline in one measure under one condition.
 #[derive(Debug, Clone, Serialize)]
@@ -182,10 +182,10 @@ mod tests {
     use std::path::Path;
 
     use observe::Measured;
+    use statistics::Interval;
 
     use super::super::estimate::Estimated;
     use super::*;
-    use statistics::Interval;
 
     /// Runs of the shipped experiment under two conditions with eight seeds, in which an arm is so much better than the
     /// baseline, and deadlocks in every second run, while the baseline never does.

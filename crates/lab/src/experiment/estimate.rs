@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use observe::Measure;
 use serde::Serialize;
+use statistics::{Estimate, Survival, TimeTo, quantile};
 
 use super::file::Experiment;
 use super::outcome::Outcome;
-use statistics::{Estimate, Survival, TimeTo, quantile};
 
 /// One measure of the runs of an arm under a condition.
 #[derive(Debug, Clone, Serialize)]

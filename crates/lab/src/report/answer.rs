@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use observe::Measure;
 use report::{Part, decimals_for, fixed};
+use statistics::Bootstrapped;
 
 use super::study::{Study, is_shown, label};
 use crate::experiment::{Contrast, Difference};
-use statistics::Bootstrapped;
 
 /// Most comparisons that a sentence names.
 const MOST_NAMED: usize = 8;

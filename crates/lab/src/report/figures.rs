@@ -9,12 +9,12 @@ use report::{
     Panel, Part, Step, Steps, Table, Trend, TrendLine, TrendPoint, decimals_for, fixed,
     round_range,
 };
+use statistics::{Bootstrapped, Survival, ecdf, quantile};
 
 use super::limits::{MOST_PANELS, limited};
 use super::study::{CellPlace, Study, axis, is_shown, label, level_number, named};
 use super::words::capitalized;
 use crate::experiment::{Contrast, Difference};
-use statistics::{Bootstrapped, Survival, ecdf, quantile};
 
 /// Most rows of a table.
 const MOST_ROWS: usize = 500;

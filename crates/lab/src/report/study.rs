@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use observe::Measure;
 use report::Estimate;
+use statistics::{Survival, TimeTo};
 
 use crate::experiment::{Arm, Condition, Contrast, Outcome, Results, Shown};
-use statistics::{Survival, TimeTo};
 
 /// Largest p value, after Holm's correction, of a difference that is stated.
 const SHOWN_P: f64 = 0.05;

@@ -693,6 +693,15 @@ impl Server {
         Ok(())
     }
 
+    /// Writes the tick that is complete and not written, if there is one.
+    fn write_noted(&self, recorder: &mut Recorder) -> Result<(), FileError> {
+        if !recorder.has_noted() {
+            return Ok(());
+        }
+        self.watchdog.note(Some(Doing::Record));
+        recorder.write_noted()
+    }
+
     /// Shows a tick that observers have not seen, if it is time for a frame. Returns how long to wait at most before looking
     /// again, at most `patience`.
     fn show_owed(
@@ -831,7 +840,8 @@ impl Server {
         }]);
     }
 
-    /// The run is over, and the process stays: answers requests until one begins another epoch, or no browser shows the run any more.
+    /// The run is over, and the process stays: answers requests until one begins another epoch, or no browser shows the run any
+    /// more.
     fn linger(&mut self, simulation: &mut Simulation) -> Result<Option<Duration>, Interrupt> {
         while let Some(event) = self.events.try_next() {
             self.handle(event, simulation)?;
@@ -1070,9 +1080,8 @@ impl Work for Running {
         let outcome = match &mut self.recorder {
             Recording::On(recorder) => {
                 let outcome = self.server.work(&mut self.simulation, recorder);
-                self.server.watchdog.note(Some(Doing::Record));
-                recorder.write_noted()?;
-                outcome
+                let written = self.server.write_noted(recorder);
+                written.map_err(Interrupt::from).and(outcome)
             }
             Recording::Over(_) => self.server.linger(&mut self.simulation),
         };
