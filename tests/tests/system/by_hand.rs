@@ -44,6 +44,18 @@ fn of_kind(lab: &Lab, run: &str, kind: &str, field: &str) -> Vec<(u64, String)> 
     found
 }
 
+/// Waits until the clock waits for Leguin; returns the status then.
+fn held_by_leguin(lab: &Lab, run: &str) -> Value {
+    eventually("the clock to be held", || {
+        let status = lab.ctl(run, &["status"]);
+        let awaited = status["awaiting"].as_array().unwrap();
+        awaited
+            .iter()
+            .any(|awaited| awaited["name"] == "Leguin")
+            .then_some(status)
+    })
+}
+
 fn verified(lab: &Lab, run: &str) {
     let said = lab.ok(&["verify", run]);
     assert!(said.contains("the same, 120 ticks to the end"), "{said}");
@@ -168,14 +180,7 @@ fn a_clock_that_waits_for_a_robot_is_freed_by_hand_and_nothing_changes() {
     lab.step(run, 5);
     lab.ctl(run, &["hang", "Leguin"]);
     lab.ctl(run, &["start"]);
-    let held = eventually("the clock to be held", || {
-        let status = lab.ctl(run, &["status"]);
-        let awaited = status["awaiting"].as_array().unwrap();
-        awaited
-            .iter()
-            .any(|awaited| awaited["name"] == "Leguin")
-            .then_some(status)
-    });
+    let held = held_by_leguin(&lab, run);
     // A process that is told to stop may do another tick before it does.
     let held_after = held["tick"].as_u64().unwrap();
     assert!((5..20).contains(&held_after), "{held}");
@@ -195,12 +200,13 @@ fn going_on_without_a_late_robot_is_an_event_and_is_executed_again() {
     lab.step(run, 5);
     let leguin = launch.process("cars-leguin");
     send(leguin, Signal::SIGSTOP);
-    lab.ctl(run, &["start"]);
+    // Stepped, so that the run is there to be asked until it is told to go to its end.
+    lab.ctl(run, &["step", "20"]);
+    held_by_leguin(&lab, run);
     lab.ctl(run, &["late", "continue", "--robot", "Leguin"]);
-    eventually("the clock to go on", || {
-        (lab.ctl(run, &["status"])["tick"].as_u64()? > 20).then_some(())
-    });
+    assert_eq!(lab.settled(run), 25);
     send(leguin, Signal::SIGCONT);
+    lab.ctl(run, &["start"]);
     launch.finish();
     let changed = of_kind(&lab, run, "changed", "set");
     let (_, last) = changed.last().unwrap();
