@@ -43,7 +43,7 @@ pub(crate) fn affect(
             label: "why".to_owned(),
             text: frame.why(circumstances),
         },
-        table(&[
+        table([
             (
                 "goal congruence",
                 format!("{:.2}", appraisal.goal_congruence()),
@@ -76,13 +76,9 @@ fn emotion(name: &str, tone: Tone) -> Widget {
 }
 
 /// A table of names and values.
-pub(crate) fn table(rows: &[(&str, String)]) -> Widget {
-    Widget::Table {
-        rows: rows
-            .iter()
-            .map(|(name, value)| vec![(*name).to_owned(), value.clone()])
-            .collect(),
-    }
+pub(crate) fn table<const N: usize>(rows: [(&str, String); N]) -> Widget {
+    let rows = rows.map(|(name, value)| vec![name.to_owned(), value]);
+    Widget::Table { rows: rows.into() }
 }
 
 /// A duration, as text.

@@ -652,7 +652,7 @@ impl Butler {
         let measures = &state.measures;
         let called = panel::yes(state.called);
         let hurried = panel::yes(state.hurried);
-        panel::table(&[
+        panel::table([
             ("time to empty", panel::seconds(measures.time_to_empty_s)),
             ("time to refill", panel::seconds(measures.time_to_refill_s)),
             ("need ratio", format!("{:.2}", measures.need_ratio)),

@@ -450,7 +450,7 @@ impl Leguin {
             Some(goal) => format!("{:.1} m", state.at.distance_m(goal)),
             None => "-".to_owned(),
         };
-        panel::table(&[
+        panel::table([
             ("waiter", self.parameters.waiter.clone()),
             ("way to go", distance),
             ("hurried", panel::yes(state.hurried).to_owned()),
