@@ -79,7 +79,7 @@ impl Robot for Butler {
         let roster = &cars.welcome().roster;
         if !roster.iter().any(|robot| robot.as_str() == refiller) {
             cars.log(format!(
-                "error: no robot is called {refiller}; nobody will refill the tray"
+                "error: no robot is called {refiller}; the tray will not be refilled"
             ));
         }
         Ok(())

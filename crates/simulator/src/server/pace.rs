@@ -114,7 +114,7 @@ impl Pace {
         Ok(())
     }
 
-    /// Whether the next tick is due as soon as one is complete, and nobody waits for a step.
+    /// Whether the next tick is due as soon as one is complete, and no one waits for a step.
     pub(super) fn is_at_full_speed(&self) -> bool {
         self.phase == Phase::Running && self.speed.is_none() && self.stepping.is_none()
     }
