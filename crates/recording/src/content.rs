@@ -45,6 +45,22 @@ impl Header {
         (tick as f64 * self.tick_s * 1e9).round() as u64
     }
 
+    /// What every reader of the format shows of the file.
+    pub(crate) fn metadata(&self) -> BTreeMap<String, String> {
+        let mut metadata = BTreeMap::from([
+            ("run".to_owned(), self.run.to_string()),
+            ("epoch".to_owned(), self.epoch.to_string()),
+            ("seed".to_owned(), self.seed.to_string()),
+            ("version".to_owned(), self.version.clone()),
+            ("protocol".to_owned(), self.protocol.to_string()),
+            ("tick_s".to_owned(), self.tick_s.to_string()),
+        ]);
+        if let Some(commit) = &self.commit {
+            metadata.insert("commit".to_owned(), commit.clone());
+        }
+        metadata
+    }
+
     /// The tick at a simulated time in nanoseconds.
     #[must_use]
     pub fn tick_at(&self, time_ns: u64) -> Tick {

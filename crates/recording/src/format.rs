@@ -116,6 +116,19 @@ impl<'a> Fields<'a> {
         std::str::from_utf8(self.bytes(len.into())?).ok()
     }
 
+    /// Texts by texts, which have their length before them.
+    pub(crate) fn map(&mut self) -> Option<BTreeMap<String, String>> {
+        let len = self.u32()?;
+        let mut entries = Fields(self.bytes(len.into())?);
+        let mut map = BTreeMap::new();
+        while !entries.0.is_empty() {
+            let key = entries.text()?;
+            let value = entries.text()?;
+            map.insert(key.to_owned(), value.to_owned());
+        }
+        Some(map)
+    }
+
     /// A record: its operation code and its body.
     pub(crate) fn record(&mut self) -> Option<(u8, &'a [u8])> {
         let op = self.u8()?;

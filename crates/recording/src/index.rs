@@ -1,5 +1,6 @@
 //! Where the parts of a file are: read from the index at its end, or found record by record in a file that has none.
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::fs::{File, Metadata};
 use std::os::unix::fs::{FileExt, MetadataExt};
@@ -12,6 +13,14 @@ use crate::format::{Fields, MAGIC, op};
 const RECORD_HEAD: u64 = 9;
 /// Bytes of the record at the end of a finished file.
 const FOOTER: u64 = RECORD_HEAD + 20;
+/// Bytes of the record between the data and the index.
+const DATA_END: u64 = RECORD_HEAD + 4;
+/// In the place of a checksum: the program that wrote the file did not compute it.
+const NO_CHECKSUM: u64 = 0;
+/// In the place of an operation code: nothing was written here.
+const UNWRITTEN: u8 = 0;
+/// Bytes that are read at once where all of a file is read.
+const BLOCK: u64 = 1 << 20;
 /// Longest record and largest chunk, bytes. A chunk ends after 256 KiB; one tick of thousands of robots can be longer.
 const MAX_BYTES: u64 = 1 << 30;
 
@@ -41,6 +50,8 @@ pub(crate) struct Index {
     pub(crate) chunks: Vec<Chunk>,
     /// Offset of the attached scenario.
     pub(crate) scenario: Option<u64>,
+    /// Offsets of the records of metadata.
+    pub(crate) metadata: Vec<u64>,
     /// Whether the file was finished.
     pub(crate) is_finished: bool,
     /// Where a file without an index goes on.
@@ -195,6 +206,7 @@ impl Bytes {
             match op {
                 op::CHUNK_INDEX => index.chunks.push(indexed_chunk(&mut fields)?),
                 op::ATTACHMENT_INDEX => index.scenario = Some(fields.u64()?),
+                op::METADATA_INDEX => index.metadata.push(fields.u64()?),
                 _ => {}
             }
         }
@@ -213,8 +225,11 @@ impl Bytes {
                     index.chunks.push(self.scanned_chunk(offset, &record)?);
                 }
                 op::ATTACHMENT => index.scenario = Some(offset),
-                op::HEADER | op::METADATA | op::MESSAGE_INDEX => {}
+                op::METADATA => index.metadata.push(offset),
+                op::HEADER | op::MESSAGE_INDEX => {}
                 op::DATA_END => return Ok(index),
+                // After a loss of power a file may be longer than what was written of it.
+                UNWRITTEN if self.is_unwritten(offset)? => break,
                 other => {
                     let reason = format!("an unknown record of type {other}");
                     return Err(self.name.damaged(offset, &reason));
@@ -228,6 +243,79 @@ impl Bytes {
             return Err(self.name.damaged(offset, &"a length is wrong"));
         }
         Ok(index)
+    }
+
+    /// Whether all bytes from an offset on are zero.
+    fn is_unwritten(&self, offset: u64) -> Result<bool, RecordingError> {
+        let mut is_zero = true;
+        self.for_blocks(offset, self.len, |block| {
+            is_zero &= block.iter().all(|byte| *byte == 0);
+        })?;
+        Ok(is_zero)
+    }
+
+    /// Calls `each` with the bytes of a range, block by block.
+    fn for_blocks(
+        &self,
+        from: u64,
+        to: u64,
+        mut each: impl FnMut(&[u8]),
+    ) -> Result<(), RecordingError> {
+        let mut offset = from;
+        while offset < to {
+            let len = BLOCK.min(to - offset);
+            each(&self.read(offset, len)?);
+            offset += len;
+        }
+        Ok(())
+    }
+
+    /// Checks that a file that was finished has the bytes that were written. A checksum does not tell which byte is another one.
+    pub(crate) fn check(&self) -> Result<(), RecordingError> {
+        if !self.has_end()? {
+            return Ok(());
+        }
+
+        let footer = self.len - MAGIC.len() as u64 - FOOTER;
+        let summary = self.summary()?;
+        let summary = summary.ok_or_else(|| {
+            let reason = "the index from here to the end, or before, does not have its checksum";
+            self.name.damaged(footer, &reason)
+        })?;
+
+        let data_end = footer - summary.len() as u64 - DATA_END;
+        let record = self.record_at(data_end)?;
+        let record = record.filter(|record| record.op == op::DATA_END);
+        let record = record
+            .ok_or_else(|| self.name.damaged(data_end, &"no end of the data before the index"))?;
+        let stated = little_endian(&self.body(&record)?);
+        if stated == NO_CHECKSUM {
+            return Ok(());
+        }
+
+        let mut covered = crc32fast::Hasher::new();
+        self.for_blocks(0, data_end, |block| covered.update(block))?;
+        if u64::from(covered.finalize()) != stated {
+            let reason = format!("the first {data_end} bytes do not have their checksum");
+            return Err(self.name.damaged(0, &reason));
+        }
+        Ok(())
+    }
+
+    /// The record of metadata at an offset: its name, and what it has.
+    pub(crate) fn metadata(
+        &self,
+        offset: u64,
+    ) -> Result<(String, BTreeMap<String, String>), RecordingError> {
+        let damaged = || self.name.damaged(offset, &"metadata that cannot be read");
+
+        let record = self.record_at(offset)?;
+        let record = record.filter(|record| record.op == op::METADATA);
+        let body = self.body(&record.ok_or_else(damaged)?)?;
+        let mut fields = Fields(&body);
+        let name = fields.text().ok_or_else(damaged)?;
+        let metadata = fields.map().ok_or_else(damaged)?;
+        Ok((name.to_owned(), metadata))
     }
 
     /// The chunk at an offset, of which only the header is read.
@@ -268,6 +356,7 @@ impl Bytes {
 
         let size = header.size as usize;
         let content = match header.compression {
+            "" => compressed.to_vec(),
             "zstd" => zstd::bulk::decompress(compressed, size).map_err(|error| damaged(&error))?,
             other => return Err(damaged(&format!("unknown compression {other:?}"))),
         };

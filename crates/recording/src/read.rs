@@ -13,6 +13,7 @@ use crate::damage::{Name, RecordingError};
 use crate::format::{Fields, op};
 use crate::index::{Bytes, Chunk};
 use crate::topic::Topic;
+use crate::METADATA;
 
 /// Ticks that are read from the file in one go.
 pub(crate) const AT_ONCE: Tick = 64;
@@ -26,6 +27,7 @@ pub struct Recording {
     /// The chunks with ticks, in their order.
     chunks: Vec<TickChunk>,
     scenario: Option<u64>,
+    metadata: Vec<u64>,
     is_finished: bool,
     /// Where a file that is not finished goes on.
     end: u64,
@@ -67,16 +69,20 @@ impl Recording {
         let bytes = Bytes::new(name, file)?;
         let index = bytes.index()?;
 
-        let mut chunks = index.chunks.into_iter();
-        let preamble = chunks.next().ok_or_else(|| bytes.name.headless())?;
-        let (header, topics) = read_preamble(&bytes, &preamble)?;
+        let mut chunks = index.chunks;
+        let first = chunks.first().ok_or_else(|| bytes.name.headless())?;
+        let preamble = read_preamble(&bytes, first)?;
+        if !preamble.has_ticks {
+            chunks.remove(0);
+        }
 
         let mut recording = Self {
             bytes,
-            header,
-            topics,
+            header: preamble.header,
+            topics: preamble.topics,
             chunks: Vec::new(),
             scenario: index.scenario,
+            metadata: index.metadata,
             is_finished: index.is_finished,
             end: index.end,
         };
@@ -140,6 +146,23 @@ impl Recording {
         let offset = self.scenario.ok_or_else(|| self.bytes.name.headless())?;
         let text = self.bytes.attachment(offset)?;
         String::from_utf8(text).map_err(|error| self.bytes.name.damaged(offset, &error))
+    }
+
+    /// Checks what no tick depends on: that the metadata is that of the header, and, of a finished file, that every byte outside
+    /// the chunks is as it was written.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if the file cannot be read or is damaged.
+    pub fn check(&self) -> Result<(), RecordingError> {
+        for offset in &self.metadata {
+            let (name, metadata) = self.bytes.metadata(*offset)?;
+            if name == METADATA && metadata != self.header.metadata() {
+                let reason = "the metadata is not that of the header";
+                return Err(self.bytes.name.damaged(*offset, &reason));
+            }
+        }
+
+        self.bytes.check()
     }
 
     /// Reads the ticks from `from` up to and excluding `to`; fewer if the recording ends before.
@@ -330,8 +353,8 @@ impl Recording {
         Ok(ticks.pop().and_then(|mut tick| tick.reports.remove(robot)))
     }
 
-    /// Adds chunks with their ticks, of which none may be left out. The end of a run may be in a chunk of its own, with the
-    /// last tick.
+    /// Adds chunks with their ticks, of which none may be left out. A chunk may go on with the last tick of the one before: so
+    /// does the end of a run, and other programs that write the file anew end a chunk anywhere.
     fn add_chunks(
         &mut self,
         chunks: impl IntoIterator<Item = Chunk>,
@@ -341,7 +364,7 @@ impl Recording {
             let last = self.header.tick_at(chunk.end_ns);
             let before = self.chunks.last().map(|chunk| chunk.last);
             let due = before.map_or(0, |tick| tick.saturating_add(1));
-            let goes_on = before == Some(first) && first == last;
+            let goes_on = before == Some(first);
             if last < first || (first != due && !goes_on) {
                 let reason = format!("ticks {first} to {last} where tick {due} is due");
                 return Err(self.bytes.name.damaged(chunk.offset, &reason));
@@ -374,11 +397,16 @@ impl Partial {
     }
 }
 
-/// The header and the channels, which are in the first chunk.
-fn read_preamble(
-    bytes: &Bytes,
-    chunk: &Chunk,
-) -> Result<(Header, BTreeMap<u16, Topic>), RecordingError> {
+/// What the first chunk has.
+struct Preamble {
+    header: Header,
+    topics: BTreeMap<u16, Topic>,
+    /// Whether the first ticks are in it, too: where another program has written the file anew.
+    has_ticks: bool,
+}
+
+/// Reads the header and the channels, which are in the first chunk.
+fn read_preamble(bytes: &Bytes, chunk: &Chunk) -> Result<Preamble, RecordingError> {
     let damaged = |reason: &dyn Display| bytes.name.damaged(chunk.offset, reason);
 
     let content = bytes.chunk(chunk)?;
@@ -394,16 +422,27 @@ fn read_preamble(
         }
     }
 
+    let mut header: Option<Header> = None;
+    let mut has_ticks = false;
     for message in messages(&content).unwrap_or_default() {
-        if topics.get(&message.channel) == Some(&Topic::Header) {
-            let header: Header = parse(message.json).map_err(|error| damaged(&error))?;
-            if header.tick_s.is_finite() && header.tick_s > 0.0 {
-                return Ok((header, topics));
+        match topics.get(&message.channel) {
+            Some(Topic::Header) => {
+                header = Some(parse(message.json).map_err(|error| damaged(&error))?);
             }
-            return Err(damaged(&format!("a tick cannot last {} s", header.tick_s)));
+            Some(_) => has_ticks = true,
+            None => {}
         }
     }
-    Err(bytes.name.headless())
+
+    let header = header.ok_or_else(|| bytes.name.headless())?;
+    if !(header.tick_s.is_finite() && header.tick_s > 0.0) {
+        return Err(damaged(&format!("a tick cannot last {} s", header.tick_s)));
+    }
+    Ok(Preamble {
+        header,
+        topics,
+        has_ticks,
+    })
 }
 
 /// Number and topic in the body of a channel.

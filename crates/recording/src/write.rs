@@ -1,6 +1,6 @@
 //! Writes a recording: ticks are encoded where they are handed over, and compressed and written by a thread of its own.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -281,25 +281,10 @@ impl Drop for Over<'_> {
 /// Writes what does not change: metadata, the scenario, and all channels with the header in a chunk of their own.
 fn begin(path: &Path, header: &Header, scenario: &str, encoder: &Encoder) -> io::Result<McapFile> {
     let mut file = McapFile::begin(File::create(path)?, "cars", encoder.channels().clone())?;
-    file.add_metadata(METADATA, &metadata(header))?;
+    file.add_metadata(METADATA, &header.metadata())?;
     file.attach(SCENARIO, "application/toml", scenario.as_bytes())?;
     file.add_chunk(&encoder.preamble())?;
     Ok(file)
-}
-
-fn metadata(header: &Header) -> BTreeMap<String, String> {
-    let mut metadata = BTreeMap::from([
-        ("run".to_owned(), header.run.to_string()),
-        ("epoch".to_owned(), header.epoch.to_string()),
-        ("seed".to_owned(), header.seed.to_string()),
-        ("version".to_owned(), header.version.clone()),
-        ("protocol".to_owned(), header.protocol.to_string()),
-        ("tick_s".to_owned(), header.tick_s.to_string()),
-    ]);
-    if let Some(commit) = &header.commit {
-        metadata.insert("commit".to_owned(), commit.clone());
-    }
-    metadata
 }
 
 fn wait<'a>(done: &Condvar, state: MutexGuard<'a, State>) -> MutexGuard<'a, State> {

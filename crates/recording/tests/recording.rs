@@ -297,6 +297,73 @@ fn a_damaged_byte_is_an_error_that_names_the_place_or_changes_nothing() {
     assert!(errors > 50, "{errors}");
 }
 
+/// Whether every byte of the file is found to be as it was written.
+fn is_as_written(folder: &Path, bytes: &[u8]) -> bool {
+    let path = folder.join("other.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    let Ok(recording) = Recording::open(&path) else {
+        return false;
+    };
+    recording.is_finished() && recording.check().is_ok()
+}
+
+#[test]
+fn a_changed_byte_anywhere_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(write(folder.path(), 300)).unwrap();
+    assert!(is_as_written(folder.path(), &bytes));
+
+    let inner = (800..bytes.len() - 1200).step_by(bytes.len() / 100);
+    let begin = 0..800;
+    let end = bytes.len() - 1200..bytes.len();
+    for at in begin.chain(inner).chain(end) {
+        let mut changed = bytes.clone();
+        changed[at] ^= 1;
+        assert!(!is_as_written(folder.path(), &changed), "byte {at}");
+    }
+}
+
+#[test]
+fn metadata_of_a_file_without_an_end_is_compared_with_its_header() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = std::fs::read(write(folder.path(), 300)).unwrap();
+    bytes.truncate(bytes.len() - 100);
+    let path = folder.path().join("other.mcap");
+    let seed = b"seed\x01\0\0\07";
+    let at = bytes.windows(seed.len()).position(|part| part == seed);
+    let at = at.unwrap() + seed.len() - 1;
+
+    std::fs::write(&path, &bytes).unwrap();
+    Recording::open(&path).unwrap().check().unwrap();
+    bytes[at] = b'8';
+    std::fs::write(&path, &bytes).unwrap();
+    let error = Recording::open(&path).unwrap().check().unwrap_err();
+    assert!(error.to_string().contains("the metadata"), "{error}");
+}
+
+#[test]
+fn zeros_after_the_last_chunk_were_never_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(write(folder.path(), TICKS)).unwrap();
+    let cut = &bytes[..bytes.len() / 2];
+    let ticks = check(folder.path(), cut, "cut").unwrap();
+
+    // Behind a whole record, or within one, as a file system leaves it.
+    let ends = record_ends(&bytes);
+    let whole = ends.iter().rfind(|end| **end <= cut.len()).unwrap();
+    for (kept, zeros) in [(*whole, 1), (*whole, 4096), (*whole, 3 << 20)] {
+        let longer = [&bytes[..kept], &vec![0; zeros]].concat();
+        assert_eq!(check(folder.path(), &longer, "zeros").unwrap(), ticks);
+    }
+    let error = check(
+        folder.path(),
+        &[&bytes[..*whole], &[0; 4096], &bytes[*whole..cut.len()]].concat(),
+        "a hole",
+    );
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains(&format!("damaged at byte {whole}")), "{error}");
+}
+
 /// The offset after each record of a file and, of every record, whether a reader sees it whole there.
 fn record_ends(bytes: &[u8]) -> Vec<usize> {
     let mut ends = Vec::new();
