@@ -59,11 +59,11 @@ impl Comparison {
         if !one.is_end() && !other.is_end() {
             self.ticks += 1;
         }
-        // The digest is that of everything up to its tick, so it never agrees again.
+        // Digest and field follow from everything up to their tick, so they hardly agree again.
         let difference = if self.first.is_none() {
             between(one, other)
         } else {
-            between(&one.without_digest(), &other.without_digest())
+            between(&one.without_past(), &other.without_past())
         };
         let Some(difference) = difference else {
             return;

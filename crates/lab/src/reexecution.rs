@@ -11,6 +11,7 @@ use lockstep::{Exchange, Membership, Outcome};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{CommandText, News, Report};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
+use recording::Frame;
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
 use scenario::Scenario;
 use simulator::TickRecord;
@@ -38,6 +39,8 @@ pub(crate) struct Executed {
     pub(crate) record: TickRecord,
     /// What each robot reported, if the record has it, too.
     reports: Option<BTreeMap<RobotName, Report>>,
+    /// The field after the tick, if the record has it, too.
+    frame: Option<Frame>,
 }
 
 impl Executed {
@@ -47,6 +50,8 @@ impl Executed {
             tick: self.record.tick,
             events: Arc::unwrap_or_clone(self.record.events),
             reports: self.reports,
+            frame: self.frame,
+            recorded_events: None,
         }
     }
 }
@@ -92,6 +97,7 @@ impl Reexecution {
             return Ok(Executed {
                 record,
                 reports: None,
+                frame: None,
             });
         }
 
@@ -114,8 +120,11 @@ impl Reexecution {
         } else {
             simulation.step(&mut exchange)
         };
+        let record = record.into_diagnostic()?;
+        let frame = recorded.frame.is_some();
         Ok(Executed {
-            record: record.into_diagnostic()?,
+            frame: frame.then(|| simulator::recorder::frame(simulation, &record)),
+            record,
             reports: recorded.reports.is_some().then_some(reports),
         })
     }

@@ -6,10 +6,10 @@ use config::{Changes, FileError};
 use miette::{IntoDiagnostic, miette};
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
-use simulator::difference::{Difference, between};
+use simulator::difference::{Difference, between, between_headers, in_recording};
 use simulator::record::Record;
-use simulator::recorder::{EVENTS, SUMMARY};
-use simulator::{EpochFiles, seal};
+use simulator::recorder::{self, EVENTS, SUMMARY};
+use simulator::{EpochFiles, Simulation, seal};
 
 use crate::reexecution::Reexecution;
 
@@ -47,8 +47,11 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         digest: String::new(),
         reports_to: None,
         from_record: BTreeMap::new(),
-        difference: None,
+        difference: header_difference(&record, &again.local.simulation),
     };
+    if verification.difference.is_some() {
+        return Ok(verification);
+    }
 
     let mut next = record.next_entry()?;
     if next.is_none() {
@@ -57,7 +60,8 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
     }
     while let Some(recorded) = next {
         let executed = again.play(&recorded)?.into_entry();
-        verification.difference = between(&recorded, &executed);
+        verification.difference =
+            between(&recorded, &executed).or_else(|| in_recording(&recorded, &executed));
         if verification.difference.is_some() {
             break;
         }
@@ -74,9 +78,18 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
     if verification.difference.is_none() {
         // What nothing depends on may be damaged, too.
         seal::check(&files.events)?;
+        if let Some(recording) = record.recording() {
+            recording.check().into_diagnostic()?;
+        }
         check_end(files, &record, &verification, has_recording)?;
     }
     Ok(verification)
+}
+
+/// The first field of the recording's header that is not that of the scenario.
+fn header_difference(record: &Record, simulation: &Simulation) -> Option<Difference> {
+    let header = record.recording()?.header();
+    between_headers(header, &recorder::header(&header.run, simulation))
 }
 
 /// Checks that the scenario beside the record is the one that the recording contains.

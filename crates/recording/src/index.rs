@@ -286,8 +286,10 @@ impl Bytes {
         let data_end = footer - summary.len() as u64 - DATA_END;
         let record = self.record_at(data_end)?;
         let record = record.filter(|record| record.op == op::DATA_END);
-        let record = record
-            .ok_or_else(|| self.name.damaged(data_end, &"no end of the data before the index"))?;
+        let record = record.ok_or_else(|| {
+            self.name
+                .damaged(data_end, &"no end of the data before the index")
+        })?;
         let stated = little_endian(&self.body(&record)?);
         if stated == NO_CHECKSUM {
             return Ok(());

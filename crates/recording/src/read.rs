@@ -8,12 +8,12 @@ use std::path::Path;
 use protocol::{Event, Line, RobotName, Tick};
 use serde::de::DeserializeOwned;
 
+use crate::METADATA;
 use crate::content::{Frame, Header, Json, RawTick, RecordedTick, TickEvents, Wall};
 use crate::damage::{Name, RecordingError};
 use crate::format::{Fields, op};
 use crate::index::{Bytes, Chunk};
 use crate::topic::Topic;
-use crate::METADATA;
 
 /// Ticks that are read from the file in one go.
 pub(crate) const AT_ONCE: Tick = 64;

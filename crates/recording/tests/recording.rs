@@ -361,7 +361,10 @@ fn zeros_after_the_last_chunk_were_never_written() {
         "a hole",
     );
     let error = error.unwrap_err().to_string();
-    assert!(error.contains(&format!("damaged at byte {whole}")), "{error}");
+    assert!(
+        error.contains(&format!("damaged at byte {whole}")),
+        "{error}"
+    );
 }
 
 /// The offset after each record of a file and, of every record, whether a reader sees it whole there.

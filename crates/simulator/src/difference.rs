@@ -3,15 +3,17 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use protocol::messages::Report;
 use protocol::{Event, RobotName, Tick};
+use recording::Header;
 use serde::Serialize;
 use serde_json::Value;
 
 use crate::record::Entry;
 
 /// Fields of a report that count epochs and processes, which the record does not compare.
-const NOT_COMPARED: [&str; 2] = ["epoch", "generation"];
+const REPORT_NOT_COMPARED: [&str; 2] = ["epoch", "generation"];
+/// Fields of a header that name the run and the program.
+const HEADER_NOT_COMPARED: [&str; 4] = ["run", "version", "commit", "protocol"];
 
 /// Where two runs differ first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -47,7 +49,8 @@ impl fmt::Display for Difference {
 
 /// The first difference between two entries for the same tick; `None` if they are equal.
 ///
-/// What the environment did comes before what robots did about it. Reports say more than the events that follow from them.
+/// What the environment did comes before what robots did about it. Reports say more than the events that follow from them, and the
+/// field more than a digest.
 #[must_use]
 pub fn between(a: &Entry, b: &Entry) -> Option<Difference> {
     let in_events = first_event(a, b);
@@ -55,7 +58,36 @@ pub fn between(a: &Entry, b: &Entry) -> Option<Difference> {
         return Some(difference);
     }
 
-    first_report(a, b).or(in_events.map(|(difference, _)| difference))
+    first_report(a, b)
+        .or_else(|| first_in_frame(a, b))
+        .or(in_events.map(|(difference, _)| difference))
+}
+
+/// The first difference between the events that the recording of an entry has and those of another entry.
+#[must_use]
+pub fn in_recording(recorded: &Entry, executed: &Entry) -> Option<Difference> {
+    let events = recorded.recorded_events.as_ref()?;
+    let recorded = Entry {
+        tick: recorded.tick,
+        events: events.clone(),
+        ..Entry::default()
+    };
+    let mut difference = between(&recorded, executed)?;
+    difference.field = format!("{} in the recording", difference.field);
+    Some(difference)
+}
+
+/// The first field in which two headers of recordings differ that follow from a scenario; `None` if there is none.
+#[must_use]
+pub fn between_headers(a: &Header, b: &Header) -> Option<Difference> {
+    let [one, other] = [a, b].map(|header| without(header, &HEADER_NOT_COMPARED));
+    let (field, values) = first_field(&one, &other)?;
+    Some(Difference {
+        tick: 0,
+        robot: None,
+        field: format!("header.{field}"),
+        values,
+    })
 }
 
 /// The first difference between the events, and whether it is one of the environment.
@@ -104,7 +136,8 @@ fn first_report(a: &Entry, b: &Entry) -> Option<Difference> {
     let other = b.reports.as_ref()?;
     let names: BTreeSet<&RobotName> = one.keys().chain(other.keys()).collect();
     for name in names {
-        let jsons = [one.get(name), other.get(name)].map(|report| report.map(report_to_json));
+        let jsons = [one.get(name), other.get(name)]
+            .map(|report| report.map(|report| without(report, &REPORT_NOT_COMPARED)));
         let found = match &jsons {
             [Some(one), Some(other)] => first_field(one, other),
             [one, other] => Some((
@@ -122,6 +155,33 @@ fn first_report(a: &Entry, b: &Entry) -> Option<Difference> {
         }
     }
     None
+}
+
+/// The first difference between the fields that both have.
+fn first_in_frame(a: &Entry, b: &Entry) -> Option<Difference> {
+    let one = a.frame.as_ref()?;
+    let other = b.frame.as_ref()?;
+    if one == other {
+        return None;
+    }
+
+    for (placed, other) in one.robots.iter().zip(&other.robots) {
+        if let Some((field, values)) = first_field(&to_json(placed), &to_json(other)) {
+            return Some(Difference {
+                tick: a.tick,
+                robot: Some(placed.name.clone()),
+                field,
+                values,
+            });
+        }
+    }
+    let (field, values) = first_field(&to_json(one), &to_json(other))?;
+    Some(Difference {
+        tick: a.tick,
+        robot: None,
+        field: format!("frame.{field}"),
+        values,
+    })
 }
 
 /// The path of the first field in which two values differ, and the two values of it.
@@ -187,11 +247,12 @@ fn robot_of(event: &Value) -> Option<RobotName> {
     RobotName::new(robot.as_str()?).ok()
 }
 
-fn report_to_json(report: &Report) -> Value {
-    let mut json = to_json(report);
+/// A value without some of its fields.
+fn without(value: &impl Serialize, names: &[&str]) -> Value {
+    let mut json = to_json(value);
     if let Some(fields) = json.as_object_mut() {
-        for field in NOT_COMPARED {
-            fields.remove(field);
+        for name in names {
+            fields.remove(*name);
         }
     }
     json
@@ -222,7 +283,7 @@ mod tests {
         Entry {
             tick: 7,
             events,
-            reports: None,
+            ..Entry::default()
         }
     }
 

@@ -7,7 +7,7 @@ use config::FileError;
 use lockstep::Sent;
 use protocol::messages::{CommandText, Report};
 use protocol::{Event, Line, RobotName, Tick};
-use recording::{Recording, RecordingError, Ticks};
+use recording::{Frame, Recording, RecordingError, Ticks};
 
 use crate::files::EpochFiles;
 use crate::seal::RawLines;
@@ -20,8 +20,10 @@ pub struct Record {
     number: usize,
     /// The tick of the next entry.
     tick: Tick,
-    /// What robots reported, if it was recorded and is read, too.
+    /// The recording, if there is one and it is read, too.
     recorded: Option<Ticks>,
+    /// Events that the recording has with those of the last entry, and after them: at the last tick, those of the end of the run.
+    events_after: Option<Vec<Event>>,
 }
 
 /// A complete tick of a record, or the end of the run.
@@ -33,6 +35,10 @@ pub struct Entry {
     pub events: Vec<Event>,
     /// What each robot reported, if the record has it.
     pub reports: Option<BTreeMap<RobotName, Report>>,
+    /// The field after the tick, if the record has it.
+    pub frame: Option<Frame>,
+    /// The events once more, as the recording has them, if it has the tick.
+    pub recorded_events: Option<Vec<Event>>,
 }
 
 impl Entry {
@@ -42,14 +48,17 @@ impl Entry {
         matches!(self.events.last(), Some(Event::End { .. }))
     }
 
-    /// The entry without the digest of the run up to it.
+    /// The events and reports of the entry, without what follows from all ticks before: digest and field.
     #[must_use]
-    pub fn without_digest(&self) -> Self {
-        let mut entry = self.clone();
-        entry
-            .events
-            .retain(|event| !matches!(event, Event::Tick { .. } | Event::End { .. }));
-        entry
+    pub fn without_past(&self) -> Self {
+        let mut events = self.events.clone();
+        events.retain(|event| !matches!(event, Event::Tick { .. } | Event::End { .. }));
+        Self {
+            tick: self.tick,
+            events,
+            reports: self.reports.clone(),
+            ..Self::default()
+        }
     }
 
     /// Whether a robot took part again from this tick on.
@@ -165,6 +174,7 @@ impl Record {
             number: 0,
             tick: 0,
             recorded: None,
+            events_after: None,
         })
     }
 
@@ -200,9 +210,11 @@ impl Record {
             }
             let is_last = event.is_sealed();
             entry.events.push(event);
-            if is_last && !is_end {
+            if is_last && is_end {
+                entry.recorded_events = self.events_after.take();
+            } else if is_last {
                 self.tick += 1;
-                entry.reports = self.reports()?;
+                self.add_recorded(&mut entry)?;
             }
             if is_last {
                 return Ok(Some(entry));
@@ -212,14 +224,30 @@ impl Record {
         Ok(None)
     }
 
-    /// What robots reported for the next tick; `None` where the recording has ended earlier than the events.
-    fn reports(&mut self) -> Result<Option<BTreeMap<RobotName, Report>>, FileError> {
+    /// Adds what the recording has of a tick: nothing where it has ended earlier than the events.
+    fn add_recorded(&mut self, entry: &mut Entry) -> Result<(), FileError> {
         let Some(recorded) = &mut self.recorded else {
-            return Ok(None);
+            return Ok(());
+        };
+        let after = self.events_after.take().unwrap_or_default();
+        if !after.is_empty() {
+            let before = entry.tick.saturating_sub(1);
+            return Err(FileError::new(format!(
+                "the recording has events of tick {before} that {} does not have",
+                self.path.display()
+            )));
+        }
+        let tick = recorded.next_tick().map_err(|error| unreadable(&error))?;
+        let Some(mut tick) = tick else {
+            return Ok(());
         };
 
-        let tick = recorded.next_tick().map_err(|error| unreadable(&error))?;
-        Ok(tick.map(|tick| tick.reports))
+        let own = entry.events.len().min(tick.events.len());
+        self.events_after = Some(tick.events.split_off(own));
+        entry.recorded_events = Some(tick.events);
+        entry.reports = Some(tick.reports);
+        entry.frame = Some(tick.frame);
+        Ok(())
     }
 
     fn next_line(&mut self) -> Result<Option<Line>, FileError> {

@@ -759,7 +759,9 @@ fn unrecordable(error: &WriteError) -> FileError {
     unwritable(&error.path, &error.error)
 }
 
-fn header(run: &RunName, simulation: &Simulation) -> Header {
+/// The header of the recording of an epoch.
+#[must_use]
+pub fn header(run: &RunName, simulation: &Simulation) -> Header {
     let scenario = simulation.scenario();
     Header {
         run: run.clone(),
@@ -775,6 +777,14 @@ fn header(run: &RunName, simulation: &Simulation) -> Header {
         obstacles: scenario.obstacles.iter().map(|at| [at.x, at.y]).collect(),
         robots: simulation.names().to_vec(),
     }
+}
+
+/// The field after a tick that is complete.
+#[must_use]
+pub fn frame(simulation: &Simulation, record: &TickRecord) -> Frame {
+    let mut frame = Frame::default();
+    set_frame(&mut frame, simulation, record);
+    frame
 }
 
 /// Sets the field after a tick. Its memory is used again, because what takes a kilobyte and more takes long to get.

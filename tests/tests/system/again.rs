@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use nix::sys::signal::Signal;
+use protocol::Event;
+use recording::{Header, RecordedTick, Recording, Writer};
 use system_tests::processes::{Running, nobody_is_left, send};
 use system_tests::{Lab, assert_same, eventually, root};
 
@@ -331,6 +333,79 @@ fn a_record_that_is_not_whole_is_not_the_same() {
         "90 s",
     );
     assert!(fails("scenario").contains("was changed since the run"));
+}
+
+/// Writes the recording of a run anew with something changed, whole and with its checksums.
+fn forge(lab: &Lab, run: &str, change: impl Fn(&mut Header, &mut RecordedTick)) {
+    let path = lab.file(run, "run.mcap");
+    let ticks = lab.recorded(run);
+    let recording = Recording::open(&path).unwrap();
+    let mut header = recording.header().clone();
+    let scenario = recording.scenario().unwrap();
+    change(&mut header, &mut ticks[0].clone());
+
+    let mut writer = Writer::create(&path, &header, &scenario).unwrap();
+    for mut tick in ticks {
+        change(&mut header, &mut tick);
+        writer.tick(&tick.view()).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn what_only_the_recording_has_is_compared_too() {
+    let lab = Lab::new();
+    let run = "forged";
+    let forged = |change: fn(&mut Header, &mut RecordedTick)| {
+        lab.ok(&["run", HALL, "--run", run, "--duration", "60 s"]);
+        forge(&lab, run, change);
+        let (code, said) = lab.fails(&["verify", run]);
+        assert_eq!(code, 1, "{said}");
+        said
+    };
+
+    lab.ok(&["run", HALL, "--run", run, "--duration", "60 s"]);
+    forge(&lab, run, |_, _| {});
+    assert!(verify(&lab, run).contains("the same, 120 ticks to the end"));
+
+    let said = forged(|_, tick| {
+        if tick.tick() == 30 {
+            tick.frame.robots[1].location.x += 0.5;
+        }
+    });
+    assert!(said.contains("tick 30, Leguin, location.x"), "{said}");
+    let said = forged(|_, tick| {
+        if tick.tick() == 31 {
+            tick.frame.guests_mm[7] += 1;
+        }
+    });
+    assert!(said.contains("tick 31, frame.guests_mm.7"), "{said}");
+    let said = forged(|_, tick| {
+        for event in &mut tick.events {
+            if let Event::Emotion { to, .. } = event {
+                "CONCERNEX".clone_into(to);
+            }
+        }
+    });
+    assert!(
+        said.contains("Butler, emotion.to in the recording"),
+        "{said}"
+    );
+    let said = forged(|_, tick| {
+        if tick.tick() == 120 {
+            tick.events.pop();
+        }
+    });
+    assert!(said.contains("tick 120, event in the recording"), "{said}");
+    let said = forged(|_, tick| {
+        if tick.tick() == 50 {
+            let event = tick.events[0].clone();
+            tick.events.push(event);
+        }
+    });
+    assert!(said.contains("has events of tick 50"), "{said}");
+    let said = forged(|header, _| header.seed = 7);
+    assert!(said.contains("tick 0, header.seed"), "{said}");
 }
 
 #[test]

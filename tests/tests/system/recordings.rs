@@ -300,3 +300,20 @@ fn a_recording_of_which_only_the_end_is_missing_is_unfinished() {
         "{said}"
     );
 }
+
+/// As a program that repairs files does it: chunks end anywhere.
+#[test]
+fn a_recording_that_another_program_wrote_anew_is_read() {
+    let lab = Lab::new();
+    let args = ["--duration", "60 s", "--run", "anew"];
+    lab.ok(&[&["run", "configs/hors_doeuvres.toml"][..], &args].concat());
+    let written = lab.recorded("anew");
+    let script = root().join("tests/recording/write_anew.py");
+    if python(&script, &lab.file("anew", "run.mcap")).is_none() {
+        return;
+    }
+
+    assert_eq!(lab.recorded("anew"), written);
+    let said = lab.ok(&["verify", "anew"]);
+    assert!(said.contains("the same, 120 ticks to the end"), "{said}");
+}

@@ -124,7 +124,7 @@ impl Past {
         let executed = Entry {
             tick: executed.tick,
             events: executed.events.to_vec(),
-            reports: None,
+            ..Entry::default()
         };
         let recorded = self.next.take().unwrap_or_default();
         if let Some(difference) = between(&recorded, &executed) {
