@@ -1,6 +1,6 @@
 //! `cars verify` and `cars diff`: recorded runs, executed again and compared.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -12,7 +12,7 @@ use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::verify::{Verification, verify as verify_epoch};
 use launch::{Launch, LaunchOptions, RunOptions};
 use miette::{IntoDiagnostic, miette};
-use protocol::RobotName;
+use protocol::{Event, RobotName};
 use simulator::difference::Difference;
 use simulator::record::Record;
 use simulator::{EpochFiles, RunFolder};
@@ -53,15 +53,19 @@ pub(crate) struct DiffArgs {
 pub(crate) fn verify(args: &VerifyArgs) -> miette::Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
     let epochs = recorded_epochs(&folder)?;
-    let are_several = epochs.len() > 1;
+    let last = epochs.len();
     if args.processes {
         return verify_processes(&folder, &epochs);
     }
 
-    for files in epochs {
-        let verification = verify_epoch(&files)?;
-        let epoch = are_several.then_some(files.epoch);
-        OutputError::unless_closed(terminal::print_line(describe(&verification, epoch)))?;
+    for (number, files) in (1..).zip(&epochs) {
+        let verification = verify_epoch(files)?;
+        let mut text = String::new();
+        if last > 1 {
+            text += &format!("epoch {}: ", files.epoch);
+        }
+        text += &describe(&verification, number < last);
+        OutputError::unless_closed(terminal::print_line(text))?;
         if verification.difference.is_some() {
             return Ok(ExitCode::FAILURE);
         }
@@ -77,10 +81,10 @@ fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result
             "the run has several epochs, which were begun by hand"
         ));
     };
-    if was_handled(files)? {
+    if let Some(input) = input_of_chance(files)? {
         return Err(miette!(
-            help = "`cars verify` without --processes does these again",
-            "the run has commands of an operator, or changes by hand"
+            help = "`cars verify` without --processes takes it from the record",
+            "processes that are started again would not do the same: the run has {input}"
         ));
     }
 
@@ -112,16 +116,42 @@ fn conclude(text: &str, are_same: bool) -> miette::Result<ExitCode> {
     }
 }
 
-/// Whether a person sent commands or changed something.
-fn was_handled(files: &EpochFiles) -> Result<bool, FileError> {
+/// What an epoch has that does not follow from its scenario: what a person did, or ticks that a robot missed without a fault of
+/// the scenario. `None` if it has nothing of the kind.
+fn input_of_chance(files: &EpochFiles) -> Result<Option<String>, FileError> {
     let operator = RobotName::operator();
+    let mut faulty: BTreeSet<RobotName> = BTreeSet::new();
     let mut record = Record::of_events(&files.events)?;
     while let Some(entry) = record.next_entry()? {
-        if !entry.commands_of(&operator).is_empty() || !entry.changes_by_hand().is_empty() {
-            return Ok(true);
+        let tick = entry.tick;
+        if !entry.commands_of(&operator).is_empty() {
+            return Ok(Some(format!(
+                "commands of an operator, from tick {tick} on"
+            )));
+        }
+        if !entry.changes_by_hand().is_empty() {
+            return Ok(Some(format!("changes by hand, from tick {tick} on")));
+        }
+
+        // A robot of which a fault is over is on its way back.
+        for event in &entry.events {
+            match event {
+                Event::Fault { robot, .. } => {
+                    faulty.insert(robot.clone());
+                }
+                Event::Joined { robot, .. } => {
+                    faulty.remove(robot);
+                }
+                _ => {}
+            }
+        }
+        if let Some(robot) = entry.missed().find(|robot| !faulty.contains(*robot)) {
+            return Ok(Some(format!(
+                "ticks that {robot} missed without a fault of the scenario, from tick {tick} on"
+            )));
         }
     }
-    Ok(false)
+    Ok(None)
 }
 
 /// Options of a launch that shows nothing, as fast as possible.
@@ -166,17 +196,19 @@ pub(crate) fn diff(args: &DiffArgs) -> miette::Result<ExitCode> {
     conclude(&text, comparison.are_same())
 }
 
-fn describe(verification: &Verification, epoch: Option<u32>) -> String {
-    let mut text = epoch.map_or_else(String::new, |epoch| format!("epoch {epoch}: "));
+fn describe(verification: &Verification, is_followed: bool) -> String {
+    let mut text = String::new();
     match &verification.difference {
         Some(difference) => {
             text += &describe_difference(difference, ["recorded", "executed again"]);
         }
         None => {
-            let end = if verification.has_end {
-                "to the end"
-            } else {
-                "and no end (the simulator was killed, or the run is in progress)"
+            let end = match (verification.has_end, is_followed) {
+                (true, _) => "to the end",
+                (false, true) => "to the epoch that was begun after it",
+                (false, false) => {
+                    "and no end (the simulator was killed, or the run is in progress)"
+                }
             };
             text += &format!(
                 "the same, {} ticks {end}, digest {}",

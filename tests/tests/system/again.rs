@@ -185,6 +185,44 @@ fn what_an_operator_and_the_machine_did_is_taken_from_the_record() {
     assert!(events.contains("\"from\":\"operator\""));
 }
 
+#[test]
+fn ticks_that_a_robot_missed_are_not_repeated_by_processes() {
+    let lab = Lab::new();
+    let run = "missed";
+    let mut launch = lab.start(
+        run,
+        &[
+            "launch",
+            HALL,
+            "--no-console",
+            "--paused",
+            "--speed",
+            "max",
+            "--duration",
+            "60 s",
+            "--set",
+            "on_late=continue",
+            "--set",
+            "deadline=0.3 s",
+        ],
+    );
+    lab.until_ready(run);
+    lab.step(run, 5);
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    lab.step(run, 3);
+    send(leguin, Signal::SIGCONT);
+    lab.ctl(run, &["start"]);
+    launch.finish();
+
+    assert!(verify(&lab, run).contains("the same, 120 ticks to the end"));
+    let (code, refused) = lab.fails(&["verify", run, "--processes"]);
+    assert_eq!(code, 1);
+    let refused = refused.split_whitespace().collect::<Vec<_>>().join(" ");
+    let reason = "that Leguin missed without a fault of the scenario, from tick 6 on";
+    assert!(refused.contains(reason), "{refused}");
+}
+
 /// Changes the first place where a text stands after another one in a file.
 fn replace(file: &Path, after: &str, from: &str, to: &str) {
     let text = std::fs::read_to_string(file).unwrap();
