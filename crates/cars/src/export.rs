@@ -7,6 +7,7 @@ use clap::Args;
 use lab::export::sheet::Format;
 use lab::export::{Wanted, export as export_epochs};
 use lab::folder::{find, recorded_epoch, recorded_epochs};
+use miette::miette;
 use protocol::Epoch;
 use terminal::OutputError;
 
@@ -68,6 +69,13 @@ pub(crate) fn export(args: &ExportArgs) -> miette::Result<ExitCode> {
     }
     for file in exported.files {
         OutputError::unless_closed(terminal::print_line(file.display()))?;
+    }
+    if !exported.damage.is_empty() {
+        return Err(miette!(
+            help = "everything else was exported",
+            "{}",
+            exported.damage.join("\n")
+        ));
     }
     Ok(ExitCode::SUCCESS)
 }

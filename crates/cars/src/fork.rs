@@ -14,8 +14,13 @@ use launch::RunOptions;
 use miette::{IntoDiagnostic, miette};
 use protocol::{Epoch, RunName};
 use scenario::Scenario;
+use scenario::files::{EVENTS, LATEST, LOGS, RECORDING, SCENARIO};
+use simulator::RunFolder;
 
 use crate::table;
+
+/// The lock file in the folder of a run.
+const LOCK: &str = ".lock";
 
 /// `cars fork`.
 #[derive(Debug, Args)]
@@ -100,12 +105,89 @@ pub(crate) fn fork(args: ForkArgs) -> miette::Result<ExitCode> {
         out: args.out,
         set: Vec::new(),
     };
+    let before = Before::of(&options.out, &place);
     let (folder, _lock) = options.folder(&run, &scenario)?;
-    let summary = fork.execute(scenario, &run, &folder)?;
+    let executed = fork.execute(scenario, &run, &folder);
+    let summary = executed.inspect_err(|_| before.restore(&folder))?;
     if !args.quiet {
         table::print(&summary, folder.path())?;
     }
     Ok(ExitCode::from(summary.verdict().exit_status()))
+}
+
+/// What was there before a fork made its folder.
+struct Before {
+    has_folder: bool,
+    /// The link to the latest run.
+    link: PathBuf,
+    /// Where it led.
+    latest: Option<PathBuf>,
+}
+
+impl Before {
+    fn of(out: &Path, place: &Path) -> Self {
+        let link = out.join(LATEST);
+        Self {
+            has_folder: place.exists(),
+            latest: std::fs::read_link(&link).ok(),
+            link,
+        }
+    }
+
+    /// Removes what a fork that failed has made. Files of others stay in a folder that was there before.
+    fn restore(&self, folder: &RunFolder) {
+        if let Err(error) = self.remove(folder) {
+            let place = folder.path().display();
+            terminal::note(format_args!("note: {place} could not be removed: {error}"));
+        }
+        // Without the link, runs have to be named.
+        let _unlinked = self.restore_link(folder);
+    }
+
+    fn remove(&self, folder: &RunFolder) -> std::io::Result<()> {
+        if !self.has_folder {
+            return std::fs::remove_dir_all(folder.path());
+        }
+
+        // The scenario has the name of the log. It stays beside files of others, so that the folder is still that of a run.
+        for file in [folder.log(), folder.file(EVENTS), folder.file(RECORDING)] {
+            if file.exists() {
+                std::fs::remove_file(file)?;
+            }
+        }
+        if has_others(folder)? {
+            return Ok(());
+        }
+        std::fs::remove_dir_all(folder.path())
+    }
+
+    fn restore_link(&self, folder: &RunFolder) -> std::io::Result<()> {
+        let latest = std::fs::read_link(&self.link)?;
+        if latest.file_name() != folder.path().file_name() {
+            return Ok(()); // Another run has begun since.
+        }
+
+        std::fs::remove_file(&self.link)?;
+        match &self.latest {
+            Some(latest) if self.link.with_file_name(latest).exists() => {
+                std::os::unix::fs::symlink(latest, &self.link)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a folder has more than what every run's folder has from the beginning.
+fn has_others(folder: &RunFolder) -> std::io::Result<bool> {
+    for entry in std::fs::read_dir(folder.path())? {
+        let name = entry?.file_name();
+        let is_own = [SCENARIO, LOCK, LOGS].iter().any(|own| name == *own);
+        if !is_own {
+            return Ok(true);
+        }
+    }
+    let mut logs = std::fs::read_dir(folder.file(LOGS))?;
+    Ok(logs.next().is_some())
 }
 
 fn is_same_place(one: &Path, other: &Path) -> bool {

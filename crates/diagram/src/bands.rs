@@ -3,6 +3,7 @@
 use protocol::messages::FaultKind;
 use protocol::{RobotName, Tick};
 
+use crate::changes;
 use crate::items::{Band, BandKind, Items};
 use crate::labels::Area;
 use crate::lanes::{BEHAVIOR_PX, EMOTION_PX, STRIP_PX};
@@ -60,9 +61,6 @@ fn draw_band(picture: &mut Picture, band: &Band) {
     }
     picture.close();
 }
-
-/// Most letters of a change on the picture; the title has all of it.
-const CHANGE_LETTERS: usize = 40;
 
 /// What the bands of a kind look like.
 struct Look {
@@ -221,19 +219,22 @@ fn draw_held_up(picture: &mut Picture, items: &Items) {
 
 /// Ticks from which on the scenario is another one.
 fn draw_changes(picture: &mut Picture, items: &Items) {
-    for change in &items.changes {
-        let title = picture.titles.change(change);
-        let x = picture.scale.x(change.tick);
-        let top = picture.lanes.top();
-        let bottom = picture.lanes.bottom;
-        picture.open("change", change.tick, &title);
-        picture.path("turn", &[(x, top), (x, bottom)]);
-        picture.close();
+    let top = picture.lanes.top();
+    let bottom = picture.lanes.bottom;
+    let first = picture.lanes.all.first().map(|lane| lane.name.clone());
+    for changes in items.changes.chunk_by(|one, next| one.tick == next.tick) {
+        let tick = changes[0].tick;
+        let x = picture.scale.x(tick);
+        for change in changes {
+            let title = picture.titles.change(change);
+            picture.open("change", tick, &title);
+            picture.path("turn", &[(x, top), (x, bottom)]);
+            picture.close();
+        }
 
-        let first = picture.lanes.all.first().map(|lane| lane.name.clone());
-        if let Some(robot) = first {
-            let text = shortened(&change.set, CHANGE_LETTERS);
-            mark(picture, &robot, x + 4.0, change.tick, &text);
+        if let Some(robot) = &first {
+            let text = changes::in_words(changes, picture.window.tick_s);
+            mark(picture, robot, x + 4.0, tick, &text);
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::lanes::Lanes;
 use crate::legend::draw_legend;
 use crate::markup::{Markup, number};
 use crate::options::Options;
-use crate::picture::{LABEL_PX, Label, OUTSIDE_PX, Picture, Window};
+use crate::picture::{HEADING_PX, LABEL_PX, Label, OUTSIDE_PX, Picture, Window};
 use crate::scale::{Scale, Width};
 use crate::shading::{Shaded, shaded};
 use crate::style::style;
@@ -23,6 +23,10 @@ use crate::words::{Titles, shortened, width_px};
 const RIGHT_PX: f64 = 22.0;
 /// Space below the lanes for the axis, pixels.
 const AXIS_PX: f64 = 36.0;
+/// Least width of a legend, pixels: its longest entries fit.
+const LEGEND_PX: f64 = 300.0;
+/// Most letters of the title.
+const TITLE_LETTERS: usize = 120;
 /// Most letters of a robot's name in front of its lane.
 const NAME_LETTERS: usize = 18;
 
@@ -74,6 +78,12 @@ fn begin(robots: Vec<RobotName>, items: &Items, window: Window, options: &Option
     links.extend(items.cuts.iter().map(|cut| (&cut.from, &cut.to)));
     let lanes = Lanes::new(&names, &links);
 
+    let most_px = (options.max_width_px - lanes.left_px - RIGHT_PX).max(100.0);
+    let mut least_px = width_px(&heading(window, options), HEADING_PX);
+    if options.has_legend {
+        least_px = least_px.max(LEGEND_PX);
+    }
+    let least_px = least_px.min(most_px);
     let busy = busy_ticks(items);
     let scale = Scale::new(
         window.from,
@@ -81,11 +91,13 @@ fn begin(robots: Vec<RobotName>, items: &Items, window: Window, options: &Option
         (!options.is_whole).then_some(&busy),
         lanes.left_px,
         Width {
-            most_px: (options.max_width_px - lanes.left_px - RIGHT_PX).max(100.0),
+            least_px,
+            most_px,
             tick_px: options.tick_px,
         },
     );
-    let mut labels = Labels::between(scale.left_px(), scale.right_px() + OUTSIDE_PX);
+    let right_px = scale.right_px().max(scale.left_px() + least_px);
+    let mut labels = Labels::between(scale.left_px(), right_px + OUTSIDE_PX);
     for lane in &lanes.all {
         labels.take(Area {
             left: scale.left_px(),
@@ -100,6 +112,7 @@ fn begin(robots: Vec<RobotName>, items: &Items, window: Window, options: &Option
         svg: Markup::default(),
         lanes,
         scale,
+        right_px,
         labels,
         placed: Vec::new(),
         window,
@@ -215,19 +228,23 @@ fn cut_label(area: &Shaded<'_>) -> String {
     }
 }
 
+/// The text above the lanes.
+fn heading(window: Window, options: &Options) -> String {
+    let ticks = format!("ticks {} to {}", window.from, window.to);
+    if options.title.is_empty() {
+        return ticks;
+    }
+    format!("{} · {ticks}", shortened(&options.title, TITLE_LETTERS))
+}
+
 /// Puts the root around the picture.
 fn finish(picture: Picture, height: f64, options: &Options) -> String {
-    let width = picture.scale.right_px() + RIGHT_PX;
+    let width = picture.right_px + RIGHT_PX;
     let Window {
         from, to, tick_s, ..
     } = picture.window;
     let left = picture.scale.left_px();
-    let heading = format!("ticks {from} to {to}");
-    let heading = if options.title.is_empty() {
-        heading
-    } else {
-        format!("{} · {heading}", shortened(&options.title, 120))
-    };
+    let heading = heading(picture.window, options);
 
     let mut svg = Markup::default();
     svg.tag("svg")

@@ -125,6 +125,8 @@ pub(crate) struct HeldUp {
 pub(crate) struct Change {
     pub(crate) tick: Tick,
     pub(crate) set: String,
+    /// The change before it of the same part of the scenario, if there was one.
+    pub(crate) before: Option<String>,
 }
 
 /// Everything in a window.

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 /// Width of the columns by which places are found, pixels.
 const COLUMN_PX: f64 = 64.0;
+/// Least distance of two labels beside each other, pixels.
+const GAP_PX: f64 = 5.0;
 /// Height of a label, pixels.
 pub(crate) const HEIGHT_PX: f64 = 13.0;
 
@@ -116,7 +118,11 @@ impl Labels {
 
         let best = free.iter().find(|area| !overlaps(&self.avoided, area));
         let area = *best.or(free.first())?;
-        self.take(area);
+        self.take(Area {
+            left: area.left - GAP_PX,
+            width: area.width + 2.0 * GAP_PX,
+            ..area
+        });
         Some(area)
     }
 }
@@ -142,9 +148,11 @@ mod tests {
     fn labels_do_not_overlap_and_those_without_a_place_are_left_out() {
         let mut labels = Labels::between(0.0, 200.0);
         let first = Area::of_label(10.0, 50.0, 60.0);
-        let beside = Area::of_label(70.0, 50.0, 60.0);
+        let close = Area::of_label(70.0, 50.0, 60.0);
+        let beside = Area::of_label(75.0, 50.0, 60.0);
 
         assert_eq!(labels.place(&[first, beside]), Some(first));
+        assert_eq!(labels.place(&[close]), None);
         assert_eq!(labels.place(&[first, beside]), Some(beside));
         assert_eq!(labels.place(&[first, beside]), None);
         let outside = Area::of_label(150.0, 50.0, 60.0);

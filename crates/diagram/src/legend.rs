@@ -9,6 +9,8 @@ use crate::words::{shortened, width_px};
 
 /// Most letters of a name in the legend.
 const NAME_LETTERS: usize = 24;
+/// Distance of two rows of entries, pixels.
+const ROW_PX: f64 = 16.0;
 /// Width of a sign, pixels.
 const SIGN_PX: f64 = 17.0;
 
@@ -118,8 +120,7 @@ pub(crate) fn draw_legend(picture: &mut Picture, items: &Items) -> f64 {
     let mut signs = Sign::ALL.to_vec();
     signs.retain(|sign| sign.occurs(picture, items));
     if !signs.is_empty() {
-        draw_signs(picture, &signs, y);
-        y += 17.0;
+        y = draw_signs(picture, &signs, y) + 17.0;
     }
 
     for (kind, caption) in [
@@ -134,13 +135,20 @@ pub(crate) fn draw_legend(picture: &mut Picture, items: &Items) -> f64 {
     y - 4.0
 }
 
-/// Draws the signs in one row with the base line `y`.
-fn draw_signs(picture: &mut Picture, signs: &[Sign], y: f64) {
+/// Draws the signs in as many rows as they need, the first one with the base line `y`; returns that of the last one.
+fn draw_signs(picture: &mut Picture, signs: &[Sign], y: f64) -> f64 {
     let left = picture.scale.left_px();
+    let right = picture.right_px;
     picture.text("muted", left - CAPTION_PX, y, "end", "sign");
 
     let mut x = left;
+    let mut y = y;
     for sign in signs {
+        let width = SIGN_PX + 22.0 + width_px(sign.name(), LABEL_PX);
+        if x + width > right && x > left {
+            x = left;
+            y += ROW_PX;
+        }
         let class = if *sign == Sign::Lost {
             "legend lost"
         } else {
@@ -150,8 +158,9 @@ fn draw_signs(picture: &mut Picture, signs: &[Sign], y: f64) {
         sign.draw(picture, x, y - 3.5);
         picture.text("", x + SIGN_PX + 6.0, y, "start", sign.name());
         picture.close();
-        x += SIGN_PX + 22.0 + width_px(sign.name(), LABEL_PX);
+        x += width;
     }
+    y
 }
 
 fn entries(picture: &Picture, items: &Items, kind: BandKind) -> Vec<Entry> {
@@ -178,7 +187,7 @@ fn entries(picture: &Picture, items: &Items, kind: BandKind) -> Vec<Entry> {
 fn draw_entries(picture: &mut Picture, caption: &str, entries: &[Entry], y: f64) -> f64 {
     const MOST_ENTRIES: usize = 40;
     let left = picture.scale.left_px();
-    let right = picture.scale.right_px();
+    let right = picture.right_px;
     picture.text("muted", left - CAPTION_PX, y, "end", caption);
 
     let mut x = left;
@@ -187,7 +196,7 @@ fn draw_entries(picture: &mut Picture, caption: &str, entries: &[Entry], y: f64)
         let width = 16.0 + width_px(name, LABEL_PX) + 14.0;
         if x + width > right && x > left {
             x = left;
-            y += 16.0;
+            y += ROW_PX;
         }
         picture.svg.tag("g").with("class", "legend").open();
         picture.rect(class, x, y - 9.0, 12.0, 11.0);

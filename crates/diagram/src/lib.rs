@@ -5,6 +5,7 @@
 
 mod axis;
 mod bands;
+mod changes;
 mod commands;
 mod draw;
 mod items;

@@ -13,6 +13,8 @@ use crate::words::Titles;
 pub(crate) const LABEL_PX: f64 = 10.5;
 /// Distance of the captions below the lanes from where the lanes begin, pixels.
 pub(crate) const CAPTION_PX: f64 = 22.0;
+/// Font of the text above the lanes, pixels.
+pub(crate) const HEADING_PX: f64 = 12.0;
 /// How far lines reach out of the window when they come from before it or go on after it, pixels.
 pub(crate) const OUTSIDE_PX: f64 = 10.0;
 
@@ -59,6 +61,8 @@ pub(crate) struct Picture {
     pub(crate) svg: Markup,
     pub(crate) lanes: Lanes,
     pub(crate) scale: Scale,
+    /// The right end of what is above and below the lanes, which may be narrower, pixels.
+    pub(crate) right_px: f64,
     pub(crate) labels: Labels,
     /// Labels are drawn after everything else.
     pub(crate) placed: Vec<Label>,

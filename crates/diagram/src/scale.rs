@@ -15,7 +15,7 @@ const QUIET_TICKS: Tick = 40;
 const MARGIN_TICKS: Tick = 4;
 /// Width of a tick in a window of many ticks, pixels.
 const TICK_PX: f64 = 4.0;
-/// Most width of a tick, pixels.
+/// Most width of a tick, unless the axis would be narrower than it has to be, pixels.
 const WIDEST_TICK_PX: f64 = 16.0;
 /// Width that short windows fill, pixels.
 const USUAL_PX: f64 = 1000.0;
@@ -34,6 +34,8 @@ pub(crate) struct Piece {
 /// How wide an axis is.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Width {
+    /// At least, unless the width of a tick is given, pixels.
+    pub(crate) least_px: f64,
     /// At most, pixels.
     pub(crate) most_px: f64,
     /// Of a tick, if that is given, pixels.
@@ -71,6 +73,7 @@ impl Scale {
         let quiet: Tick = gaps.iter().map(|(begin, end)| end - begin).sum();
         let shown = (end - begin - quiet).max(1) as f64;
         let usual_px = (USUAL_PX / shown).clamp(TICK_PX, WIDEST_TICK_PX);
+        let usual_px = usual_px.max(width.least_px / shown);
         let usual_px = width.tick_px.unwrap_or(usual_px);
         let tick_px = usual_px.min((most_px - gaps.len() as f64 * GAP_PX) / shown);
 
@@ -171,6 +174,7 @@ mod tests {
 
     fn most(most_px: f64) -> Width {
         Width {
+            least_px: 0.0,
             most_px,
             tick_px: None,
         }
@@ -197,6 +201,23 @@ mod tests {
     fn a_window_that_is_not_wide_has_no_gap() {
         let scale = Scale::new(0, 200, Some(&BTreeSet::from([0, 150])), 0.0, most(4000.0));
         assert_eq!(scale.pieces().len(), 1);
+    }
+
+    #[test]
+    fn a_short_window_has_the_least_width_unless_the_width_of_a_tick_is_given() {
+        let width = Width {
+            least_px: 300.0,
+            ..most(4000.0)
+        };
+        let scale = Scale::new(5, 6, None, 50.0, width);
+        assert_eq!(scale.right_px() - scale.left_px(), 300.0);
+
+        let width = Width {
+            tick_px: Some(7.0),
+            ..width
+        };
+        let scale = Scale::new(5, 6, None, 50.0, width);
+        assert_eq!(scale.right_px() - scale.left_px(), 7.0);
     }
 
     #[test]

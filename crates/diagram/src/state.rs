@@ -21,6 +21,8 @@ pub struct State {
     cuts: BTreeMap<(RobotName, RobotName), Cut>,
     /// The last lost queries of each pair.
     queries: BTreeMap<(RobotName, RobotName), QueriesLost>,
+    /// The last change of each part of the scenario, by its path.
+    set: BTreeMap<String, String>,
 }
 
 /// What is in progress at a robot, each with the tick in which it began.
@@ -114,6 +116,7 @@ impl State {
             | Event::CommandDropped { .. } => self.command(tick, event, items),
             Event::Changed { set, .. } => items.changes.push(Change {
                 tick,
+                before: self.replace_setting(set),
                 set: set.clone(),
             }),
             Event::Init { .. }
@@ -164,6 +167,14 @@ impl State {
         items.commands.extend(self.commands.values().cloned());
         items.cuts.extend(self.cuts.values().cloned());
         items.queries.extend(self.queries.values().cloned());
+    }
+
+    /// Notes a change; returns the last one of the same part of the scenario.
+    fn replace_setting(&mut self, set: &str) -> Option<String> {
+        let (path, _) = set.split_once('=')?;
+        let below = format!("{path}.");
+        self.set.retain(|other, _| !other.starts_with(&below));
+        self.set.insert(path.to_owned(), set.to_owned())
     }
 
     fn robot(&mut self, name: &RobotName) -> &mut RobotState {

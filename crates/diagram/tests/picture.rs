@@ -5,7 +5,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
-use diagram::{Diagram, MOST_ITEMS, Options, State, TooMuch};
+use diagram::{Diagram, MOST_ITEMS, Options, State, TooMuch, width_px};
 use protocol::event::Cause;
 use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason};
 use protocol::{Event, RobotName, Tick};
@@ -537,6 +537,81 @@ fn a_change_of_the_scenario_is_a_line_with_what_is_set() {
     assert_eq!(tick(changes[0]), 7);
     assert!(title(changes[0]).contains(&set), "{}", title(changes[0]));
     assert!(text.contains(&format!(">{set}<")), "{text}");
+}
+
+#[test]
+fn changes_by_hand_are_named_by_what_they_do() {
+    let hang = r#"{ at = "5 s", do = "hang", robot = "Leguin" }"#;
+    let over = r#"{ at = "5 s", do = "hang", robot = "Leguin", until = "10 s" }"#;
+    let crash = r#"{ at = "10 s", do = "crash", robot = "Butler" }"#;
+    let changed = |tick, set: String| (tick, Event::Changed { set, by_hand: true });
+    let events = [
+        changed(10, format!("fault=[{hang}]")),
+        changed(20, format!("fault=[{over}, {crash}]")),
+        changed(20, r#"robot.Leguin.on_late="wait""#.to_owned()),
+        changed(20, r#"robot.Butler.on_late="wait""#.to_owned()),
+    ];
+
+    // What was set before the window is known, too.
+    for from in [0, 15] {
+        let text = draw(&events, from, 40);
+        let document = Document::parse(&text).unwrap();
+        let mut labels = Vec::new();
+        for label in of_class(&document, "mark") {
+            labels.push(label.text().unwrap());
+        }
+        let last = r#"recover Leguin, crash Butler, +2"#;
+        let expected: &[&str] = if from == 0 {
+            &["hang Leguin", last]
+        } else {
+            &[last]
+        };
+        assert_eq!(labels, expected, "{text}");
+    }
+}
+
+#[test]
+fn heading_and_legend_fit_however_short_the_window_is() {
+    let mut events = Vec::new();
+    for (seq, event) in [sent(1, "refill"), sent(2, "hurry"), sent(3, "come")]
+        .into_iter()
+        .enumerate()
+    {
+        events.push((5, event));
+        events.push((5, delayed(seq as u64 + 1, 9)));
+    }
+    events.push((5, dropped(1, Cause::Loss)));
+    events.push((5, doubled(2)));
+    events.push((5, cut("Butler", "Leguin")));
+    events.push((
+        5,
+        Event::Missed {
+            robot: name("Leguin"),
+        },
+    ));
+    let title = "a title of a run that is not short, seed 17";
+
+    for tick_px in [None, Some(3.0)] {
+        let options = Options {
+            title: title.to_owned(),
+            tick_px,
+            ..Options::default()
+        };
+        let text = draw_with(&events, 5, 5, options).unwrap();
+        let document = Document::parse(&text).unwrap();
+        let width = number(document.root_element(), "width");
+
+        let heading = &of_class(&document, "heading")[0];
+        let heading_px = width_px(heading.text().unwrap(), 12.0);
+        assert!(number(*heading, "x") + heading_px <= width, "{text}");
+        let entries = of_class(&document, "legend");
+        assert!(entries.len() > 7, "{text}");
+        for entry in entries {
+            let label = entry.last_element_child().unwrap();
+            let right = number(label, "x") + width_px(label.text().unwrap(), 10.5);
+            assert!(right <= width, "{right} of {width}: {text}");
+        }
+    }
 }
 
 #[test]

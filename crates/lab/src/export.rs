@@ -33,12 +33,15 @@ pub struct Exported {
     pub files: Vec<PathBuf>,
     /// What they leave out, for people, a sentence each.
     pub notes: Vec<String>,
+    /// Damage of recordings, with what it leaves out, a sentence each. What could be read before it is in the files.
+    pub damage: Vec<String>,
 }
 
 /// Exports epochs of a run to a folder, which is made if it does not exist. Files of an earlier export are replaced.
 ///
 /// # Errors
-/// [`FileError`] if the record cannot be read to its end, or a file cannot be written. No file is written then.
+/// [`FileError`] if events are damaged, a file cannot be read, or one cannot be written. No file is written then. Damage of a
+/// recording is no error here, but part of what is returned.
 pub fn export(
     epochs: &[EpochFiles],
     folder: &Path,
@@ -59,9 +62,13 @@ fn write(epochs: &[EpochFiles], folder: &Path, wanted: &Wanted) -> Result<Export
     let mut exported = Exported::default();
     let mut drafts = Vec::new();
     if !wanted.tables.is_empty() {
+        let formats = &wanted.tables;
         let notes = &mut exported.notes;
-        drafts.extend(tables::write_events(epochs, folder, &wanted.tables, notes)?);
-        drafts.extend(tables::write_states(epochs, folder, &wanted.tables, notes)?);
+        drafts.extend(tables::write_events(epochs, folder, formats, notes)?);
+        let damages = &mut exported.damage;
+        drafts.extend(tables::write_states(
+            epochs, folder, formats, notes, damages,
+        )?);
     }
     if wanted.has_shiviz {
         drafts.push(shiviz::write(epochs, &folder.join(SHIVIZ))?);

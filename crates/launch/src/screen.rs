@@ -75,10 +75,10 @@ pub(super) struct ScreenHandle {
 }
 
 impl ScreenHandle {
-    /// A line of the run's log.
+    /// A line of the run's log. Quiet shows none: the observer is also there for faults and for the console.
     pub(super) fn log(&self, record: LogRecord) {
         // The simulator's error output and the bar show late robots already.
-        if record.kind != LogKind::Late {
+        if !self.is_quiet && record.kind != LogKind::Late {
             self.try_queue(Show::Log(record));
         }
     }
@@ -422,11 +422,13 @@ mod tests {
             is_quiet: true,
             ..look(false)
         };
-        let (_, err) = shown(quiet, |screen| {
+        let (out, err) = shown(quiet, |screen| {
+            screen.log(record("going home"));
             screen.output(1, "chatter".to_owned(), false);
             screen.output(1, "trouble".to_owned(), true);
         });
         assert_eq!(err, "Leguin    | trouble\n");
+        assert_eq!(out, "");
     }
 
     /// Blocks until released, like a terminal after Ctrl-S.

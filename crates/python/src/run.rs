@@ -123,5 +123,7 @@ pub(crate) fn export(py: Python<'_>, run: PathBuf, into: PathBuf) -> PyResult<Ve
         let epochs = recorded_epochs(&RunFolder::at(run)).into_diagnostic()?;
         Ok(export_epochs(&epochs, &into, &wanted)?)
     });
-    Ok(exported.map_err(reported)?.notes)
+    let mut exported = exported.map_err(reported)?;
+    exported.notes.append(&mut exported.damage);
+    Ok(exported.notes)
 }

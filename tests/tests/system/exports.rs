@@ -281,6 +281,55 @@ fn a_run_that_was_killed_or_not_recorded_is_exported_as_far_as_it_goes() {
 }
 
 #[test]
+fn what_a_damaged_recording_has_before_the_damage_is_exported() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--run", "hall", "--duration", "120 s"]);
+    export(&lab, "hall", "whole", &BOTH);
+    let recording = lab.file("hall", "run.mcap");
+    let whole = std::fs::read(&recording).unwrap();
+    let table = |folder: &str, name: &str| {
+        let path = lab.out().join(folder).join(name);
+        std::fs::read_to_string(path).unwrap()
+    };
+    let damaged = |folder: &str, bytes: &[u8]| {
+        std::fs::write(&recording, bytes).unwrap();
+        let place = lab.out().join(folder);
+        let args = [
+            &["export", "hall", "-o", place.to_str().unwrap()],
+            &BOTH[..],
+        ]
+        .concat();
+        let output = lab.cars(&args).output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        let printed = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(printed.lines().count(), 6, "{printed}");
+        assert_eq!(table(folder, "events.csv"), table("whole", "events.csv"));
+        let words = String::from_utf8_lossy(&output.stderr);
+        let words = words.split_whitespace().filter(|word| *word != "│");
+        words.collect::<Vec<_>>().join(" ")
+    };
+
+    // A byte in a chunk; the index still names all of them.
+    let mut bytes = whole.clone();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    let said = damaged("chunk", &bytes);
+    assert!(said.contains("run.mcap: damaged at byte"), "{said}");
+    for name in ["states.csv", "variables.csv"] {
+        let [part, all] = ["chunk", "whole"].map(|folder| table(folder, name));
+        assert!(part.lines().count() > 1 && part.len() < all.len(), "{said}");
+        assert!(all.starts_with(&part), "{name}");
+    }
+    let ticks = (table("chunk", "states.csv").lines().count() - 1) / 2;
+    assert!(said.contains(&format!("after {ticks} ticks")), "{said}");
+
+    // Nothing but the first bytes.
+    let said = damaged("head", &whole[..20]);
+    assert!(said.contains("run.mcap is not a recording"), "{said}");
+    assert_eq!(table("head", "states.csv").lines().count(), 1);
+}
+
+#[test]
 fn commands_are_arrows_in_shiviz() {
     let lab = Lab::new();
     play_hostile(&lab, "exports-arrows");
@@ -494,19 +543,6 @@ fn an_export_that_fails_names_the_reason_and_leaves_nothing_behind() {
         "cannot write",
     );
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
-
-    // A byte in the middle, found when events are exported already.
-    let mut bytes = std::fs::read(&recording).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    std::fs::write(&recording, &bytes).unwrap();
-    fails(
-        &["export", "hall", "--csv", "--parquet", "-o", &tables],
-        1,
-        "run.mcap",
-    );
-    bytes[middle] ^= 1;
-    std::fs::write(&recording, &bytes).unwrap();
 
     // A folder that was there stays, with what was in it.
     std::fs::create_dir_all(place("other/variables.csv")).unwrap();

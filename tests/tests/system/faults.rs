@@ -310,6 +310,21 @@ fn what_the_clock_does_about_late_robots_changes_while_it_is_held() {
 }
 
 #[test]
+fn a_quiet_launch_prints_no_log_also_where_the_scenario_has_faults() {
+    let lab = Lab::new();
+    let mut args = vec!["launch", FILE, "--run", "quiet", "--no-console", "--quiet"];
+    args.extend(["--speed", "max", "--duration", "60 s"]);
+    args.extend(["--set", "on_late=continue", "--set"]);
+    args.push(r#"fault=[{ robot = "Leguin", do = "crash", at = "20 s", until = "30 s" }]"#);
+    let output = lab.cars(&args).output().unwrap();
+
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(printed, "");
+    let log = std::fs::read_to_string(lab.file("quiet", "cars.log")).unwrap();
+    assert!(log.contains("Leguin"), "{log}");
+}
+
+#[test]
 fn a_crash_of_the_scenario_happens_at_its_tick_and_is_the_same_every_time() {
     let lab = Lab::new();
     let fault = "fault=[{ robot = \"Leguin\", do = \"crash\", at = \"40 s\", until = \"70 s\" }]";

@@ -236,7 +236,22 @@ fn a_fork_that_cannot_be_made_is_refused_and_the_run_is_kept() {
     let scenario = lab.file("parent", "scenario.toml");
     let text = std::fs::read_to_string(&scenario).unwrap();
     std::fs::write(&scenario, text.replacen("seed = 2002", "seed = 2003", 1)).unwrap();
-    refused(&["parent@30"], "it differs from its record at tick 0");
+    let reason = "it differs from its record at tick 0";
+    refused(&["parent@30"], reason);
+    assert!(!lab.out().join("parent-fork-30").exists());
+    let latest = || std::fs::read_link(lab.out().join("latest")).unwrap();
+    assert_eq!(latest().to_str(), Some("parent"));
+
+    // In the place of a run, that one is cleared, and what is not of a run is kept.
+    lab.ok(&["run", SCENARIO, "--run", "place", "--duration", "5 s"]);
+    let args = ["parent@30", "--run", "place"];
+    std::fs::write(lab.file("place", "notes.txt"), "kept").unwrap();
+    refused(&args, reason);
+    assert!(!lab.file("place", "events.jsonl").exists());
+    assert!(!lab.file("place", "run.mcap").exists());
+    std::fs::remove_file(lab.file("place", "notes.txt")).unwrap();
+    refused(&args, reason);
+    assert!(!lab.out().join("place").exists());
 }
 
 #[test]
@@ -261,6 +276,7 @@ fn a_robot_of_another_language_cannot_go_on_in_a_fork() {
 
     let (_, said) = lab.fails(&["fork", "bruno@10"]);
     assert!(said.contains("Bruno cannot go on"), "{said}");
+    assert!(!lab.out().join("bruno-fork-10").exists());
 }
 
 #[test]

@@ -188,6 +188,13 @@ fn a_simulator_that_is_killed_leaves_a_recording() {
     assert!(ticks.iter().all(|tick| tick.reports.len() == 2));
     assert!(ticks.iter().any(|tick| !tick.panels.is_empty()));
     assert!(ticks.iter().all(|tick| tick.wall.reports_ns.len() == 2));
+
+    // As `docs/recordings.md` says of other readers.
+    let script = root().join("tests/recording/killed.py");
+    if let Some(output) = python(&script, &file) {
+        let count = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(count.trim(), recording.len().to_string());
+    }
 }
 
 /// The hall, of which Leguin crashes and returns, without holding the clock.

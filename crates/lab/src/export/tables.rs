@@ -6,7 +6,7 @@ use config::FileError;
 use protocol::event::Blocker;
 use protocol::messages::{Report, Variable};
 use protocol::{Epoch, Event, RobotName, Seq, Tick};
-use recording::{PlacedRobot, RecordedTick, Recording, Ticks};
+use recording::{PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
 use serde::Serialize;
 use simulator::EpochFiles;
 use simulator::record::{Entry, Record};
@@ -169,16 +169,17 @@ fn is_last(files: &EpochFiles) -> bool {
         .is_some_and(|name| name == EVENTS_FILE)
 }
 
-/// Writes the states of the robots, and their state variables. Epochs without a recording have neither. Adds what is left out to
-/// `notes`, a sentence each.
+/// Writes the states of the robots, and their state variables. Epochs without a recording have neither; those of a damaged one
+/// end before the damage. Adds what is left out to `notes`, and damage to `damages`, a sentence each.
 ///
 /// # Errors
-/// [`FileError`] if a recording cannot be read, or a file cannot be written.
+/// [`FileError`] if a recording that is whole cannot be read, or a file cannot be written.
 pub(super) fn write_states(
     epochs: &[EpochFiles],
     folder: &Path,
     formats: &[Format],
     notes: &mut Vec<String>,
+    damages: &mut Vec<String>,
 ) -> Result<Vec<Draft>, FileError> {
     let mut recorded = Vec::new();
     for files in epochs {
@@ -199,30 +200,75 @@ pub(super) fn write_states(
     let mut states = Sheet::create(folder, "states", formats, columns(&STATES))?;
     let mut variables = Sheet::create(folder, "variables", formats, columns(&VARIABLES))?;
     for files in recorded {
-        let recording = Recording::open(&files.recording).map_err(|error| unreadable(&error))?;
-        if !recording.is_finished() {
-            notes.push(format!(
-                "{} was not finished: states go to the end of its last whole chunk, {} ticks",
-                files.recording.display(),
-                recording.len()
-            ));
-        }
-
-        let tick_s = recording.header().tick_s;
-        let mut ticks = Ticks::of(recording);
-        while let Some(tick) = ticks.next_tick().map_err(|error| unreadable(&error))? {
-            let when = When {
-                epoch: files.epoch,
-                tick: tick.tick(),
-                time_s: tick.tick() as f64 * tick_s,
-            };
-            add_states(&mut states, &mut variables, when, &tick)?;
-        }
+        add_recording(&mut states, &mut variables, files, notes, damages)?;
     }
 
     let mut drafts = states.finish()?;
     drafts.extend(variables.finish()?);
     Ok(drafts)
+}
+
+/// Adds the robots of all ticks of an epoch, as far as its recording is undamaged.
+fn add_recording(
+    states: &mut Sheet,
+    variables: &mut Sheet,
+    files: &EpochFiles,
+    notes: &mut Vec<String>,
+    damages: &mut Vec<String>,
+) -> Result<(), FileError> {
+    let recording = match Recording::open(&files.recording) {
+        Ok(recording) => recording,
+        Err(error) => {
+            let damage = damage(error)?;
+            damages.push(format!(
+                "{damage}: epoch {} has no states and variables",
+                files.epoch
+            ));
+            return Ok(());
+        }
+    };
+    if !recording.is_finished() {
+        notes.push(format!(
+            "{} was not finished: states go to the end of its last whole chunk, {} ticks",
+            files.recording.display(),
+            recording.len()
+        ));
+    }
+
+    let tick_s = recording.header().tick_s;
+    let mut ticks = Ticks::of(recording);
+    let mut count: u64 = 0;
+    loop {
+        let tick = match ticks.next_tick() {
+            Ok(Some(tick)) => tick,
+            Ok(None) => return Ok(()),
+            Err(error) => {
+                let damage = damage(error)?;
+                damages.push(format!(
+                    "{damage}: states and variables of epoch {} end before it, after {count} ticks",
+                    files.epoch
+                ));
+                return Ok(());
+            }
+        };
+        let when = When {
+            epoch: files.epoch,
+            tick: tick.tick(),
+            time_s: tick.tick() as f64 * tick_s,
+        };
+        add_states(states, variables, when, &tick)?;
+        count += 1;
+    }
+}
+
+/// The damage of a recording; an error if the recording could not be read at all, whatever is in it.
+fn damage(error: RecordingError) -> Result<RecordingError, FileError> {
+    match error {
+        RecordingError::Unreadable { .. } => Err(FileError::new(error.to_string())),
+        RecordingError::Damaged { .. }
+        | RecordingError::Headless { .. }
+        | RecordingError::NoSuchTick { .. } => Ok(error),
+    }
 }
 
 /// Adds the robots of a tick.
@@ -496,8 +542,4 @@ fn json_name(kind: &impl Serialize) -> Value<'static> {
         Ok(serde_json::Value::String(name)) => name.into(),
         _ => unreachable!("a kind is written as its name"),
     }
-}
-
-fn unreadable(error: &recording::RecordingError) -> FileError {
-    FileError::new(error.to_string())
 }
