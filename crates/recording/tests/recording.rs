@@ -329,7 +329,7 @@ fn metadata_of_a_file_without_an_end_is_compared_with_its_header() {
     let mut bytes = std::fs::read(write(folder.path(), 300)).unwrap();
     bytes.truncate(bytes.len() - 100);
     let path = folder.path().join("other.mcap");
-    let seed = b"seed\x01\0\0\07";
+    let seed = b"seed\x01\x00\x00\x007";
     let at = bytes.windows(seed.len()).position(|part| part == seed);
     let at = at.unwrap() + seed.len() - 1;
 
