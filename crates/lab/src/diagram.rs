@@ -66,16 +66,18 @@ pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette:
     }
 
     let mut notes = Vec::new();
-    let awaited = awaited(files, from, to).unwrap_or_else(|error| {
+    let held_up = HeldUp::read(files, from, to).unwrap_or_else(|error| {
         notes.push(format!("{error}: ticks that were held up are not marked"));
-        BTreeMap::new()
+        HeldUp::default()
     });
     let mut diagram = Diagram::new(state, tick_s, from, options);
     let mut has_end = false;
+    let mut last = from;
     while let Some(entry) = next.take_if(|entry| entry.tick <= to) {
+        last = entry.tick;
         has_end = entry.is_end();
         // The end of a run is another entry of its last tick.
-        let awaited = awaited.get(&entry.tick).filter(|_| !has_end);
+        let awaited = held_up.awaited.get(&entry.tick).filter(|_| !has_end);
         let awaited = awaited.map_or(&[][..], Vec::as_slice);
         diagram.tick(entry.tick, &entry.events, awaited);
         next = record.next_entry()?;
@@ -83,6 +85,13 @@ pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette:
     if next.is_none() && !has_end {
         notes.push(format!(
             "{events} has no end: the simulator was killed, or the run is in progress"
+        ));
+    }
+
+    if let Some(end) = held_up.end.filter(|end| *end <= last) {
+        notes.push(format!(
+            "{} is complete up to before tick {end}: ticks that were held up from there on are not marked",
+            files.recording.display()
         ));
     }
 
@@ -105,22 +114,29 @@ fn beginning(entry: &Entry) -> Option<(u64, f64)> {
     })
 }
 
-/// For whom the clock was held, by tick, as far as the epoch was recorded.
-fn awaited(
-    files: &EpochFiles,
-    from: Tick,
-    to: Tick,
-) -> Result<BTreeMap<Tick, Vec<Awaited>>, RecordingError> {
-    let mut awaited = BTreeMap::new();
-    if !files.recording.exists() {
-        return Ok(awaited);
-    }
+/// For whom the clock was held, as far as the epoch was recorded.
+#[derive(Default)]
+struct HeldUp {
+    /// By tick.
+    awaited: BTreeMap<Tick, Vec<Awaited>>,
+    /// The first tick that the recording does not have; `None` without a recording.
+    end: Option<Tick>,
+}
 
-    let recording = Recording::open(&files.recording)?;
-    recording.for_events(from, to.saturating_add(1), |tick| {
-        if !tick.awaited.is_empty() {
-            awaited.insert(tick.tick, tick.awaited);
+impl HeldUp {
+    fn read(files: &EpochFiles, from: Tick, to: Tick) -> Result<Self, RecordingError> {
+        let mut held_up = Self::default();
+        if !files.recording.exists() {
+            return Ok(held_up);
         }
-    })?;
-    Ok(awaited)
+
+        let recording = Recording::open(&files.recording)?;
+        held_up.end = Some(recording.len());
+        recording.for_events(from, to.saturating_add(1), |tick| {
+            if !tick.awaited.is_empty() {
+                held_up.awaited.insert(tick.tick, tick.awaited);
+            }
+        })?;
+        Ok(held_up)
+    }
 }

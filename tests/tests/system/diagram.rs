@@ -237,6 +237,17 @@ fn an_unfinished_run_is_drawn_up_to_where_it_is_recorded() {
     let output = lab.cars(&["diagram", "hall"]).output().unwrap();
     let notes = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(notes.contains("has no end"), "{notes}");
+    assert!(!notes.contains("are not marked"), "{notes}");
+
+    // Of the recording less is left than of the events: who was waited for is not known from there on.
+    let recording = lab.file("hall", "run.mcap");
+    let bytes = std::fs::read(&recording).unwrap();
+    std::fs::write(&recording, &bytes[..bytes.len() / 3]).unwrap();
+    let len = lab.recorded("hall").len();
+    let output = lab.cars(&["diagram", "hall"]).output().unwrap();
+    let notes = String::from_utf8_lossy(&output.stderr).into_owned();
+    let note = format!("complete up to before tick {len}: ticks that were held up");
+    assert!(notes.contains(&note), "{notes}");
 }
 
 #[test]

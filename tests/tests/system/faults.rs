@@ -7,7 +7,7 @@ use nix::sys::signal::Signal;
 use protocol::keys::Keys;
 use protocol::messages::Clock;
 use protocol::{RunName, encode};
-use system_tests::processes::{nobody_is_left, send};
+use system_tests::processes::{Running, nobody_is_left, send};
 use system_tests::stalls::Stalls;
 use system_tests::{Lab, PATIENCE, assert_same, has_played, root, side_by_side};
 
@@ -24,17 +24,26 @@ fn launch_file(lab: &Lab, leguin: &str) -> String {
     lab.write("launch.toml", &text).to_str().unwrap().to_owned()
 }
 
+/// A launch of a minute that has done some ticks, of which Leguin's process, which is returned, is stopped then. It goes on when it
+/// is told to `start`: a run that is not paused may have ended by the time its process is stopped.
+fn with_leguin_stopped(lab: &Lab, run: &str, more: &[&str]) -> (Running, u32) {
+    let mut args = vec!["launch", FILE, "--duration", "60 s", "--paused"];
+    args.extend(more);
+    let launch = lab.start(run, &args);
+    lab.until_ready(run);
+    lab.step(run, 2);
+
+    let leguin = launch.process("cars-leguin");
+    send(leguin, Signal::SIGSTOP);
+    (launch, leguin)
+}
+
 #[test]
 fn a_stopped_robot_holds_the_clock_costs_nothing_and_changes_nothing() {
     let lab = Lab::new();
-    let mut launch = lab.start(
-        "hang",
-        &["launch", FILE, "--duration", "60 s", "--speed", "10"],
-    );
-    launch.prints("behavior");
-    let leguin = launch.process("cars-leguin");
+    let (mut launch, leguin) = with_leguin_stopped(&lab, "hang", &["--speed", "10"]);
     let stopped = Instant::now();
-    send(leguin, Signal::SIGSTOP);
+    lab.ctl("hang", &["start"]);
     let said = launch.prints_after("Leguin (", Some(stopped));
     println!(
         "the terminal named whom it waits for after {:?}",
@@ -153,25 +162,10 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
     for (mode, end) in [("abort", "aborted"), ("continue", "finished")] {
         let run = format!("late-{mode}");
         let set = format!("on_late={mode}");
-        let mut launch = lab.start(
-            &run,
-            &[
-                "launch",
-                FILE,
-                "--speed",
-                "10",
-                "--duration",
-                "30 s",
-                "--set",
-                &set,
-                "--set",
-                PATIENT,
-            ],
-        );
-        launch.prints("behavior");
-        let leguin = launch.process("cars-leguin");
-        send(leguin, Signal::SIGSTOP);
+        let args = ["--speed", "10", "--set", &set, "--set", PATIENT];
+        let (mut launch, leguin) = with_leguin_stopped(&lab, &run, &args);
         set_deadline(&lab, &run, "0.5 s");
+        lab.ctl(&run, &["start"]);
         if mode == "continue" {
             launch.prints("missed the tick");
             send(leguin, Signal::SIGCONT);
@@ -269,12 +263,8 @@ fn a_robot_that_is_stuck_does_not_freeze_the_others() {
 #[test]
 fn what_the_clock_does_about_late_robots_changes_while_it_is_held() {
     let lab = Lab::new();
-    let mut launch = lab.start(
-        "late-change",
-        &["launch", FILE, "--speed", "20", "--duration", "60 s"],
-    );
-    launch.prints("behavior");
-    send(launch.process("cars-leguin"), Signal::SIGSTOP);
+    let (mut launch, _) = with_leguin_stopped(&lab, "late-change", &["--speed", "20"]);
+    lab.ctl("late-change", &["start"]);
     launch.prints("waiting for");
     let status = lab.ok(&["ctl", "status", "--run", "late-change"]);
     assert!(status.contains("Leguin"), "{status}");

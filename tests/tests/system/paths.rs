@@ -1,15 +1,26 @@
 //! Programs that were built on one machine and run on another one do not show folders of the first.
 
 use std::net::TcpListener;
+use std::path::Path;
 use std::process::Command;
 
 use system_tests::{Lab, eventually, programs, root};
+
+/// Copies a program, in a process of its own: while another test starts a process, that one would still have the file open to
+/// write, and what is open to write cannot be run.
+fn copy(program: &str, to: &Path) {
+    let copied = Command::new("cp")
+        .arg(programs().join(program))
+        .arg(to)
+        .status();
+    assert!(copied.unwrap().success());
+}
 
 #[test]
 fn a_skeleton_needs_the_folder_of_the_project_where_it_is_not_around() {
     let elsewhere = tempfile::tempdir().unwrap();
     let cars = elsewhere.path().join("cars");
-    std::fs::copy(programs().join("cars"), &cars).unwrap();
+    copy("cars", &cars);
     let output = Command::new(cars)
         .current_dir(elsewhere.path())
         .args(["new", "robot", "Rosie", "--lang", "rust"])
@@ -71,7 +82,7 @@ fn the_programs_beside_cars_are_that_program_under_their_names() {
 fn a_program_that_has_no_cars_beside_it_says_so() {
     let lab = Lab::new();
     let alone = lab.out().join("cars-sim");
-    std::fs::copy(programs().join("cars-sim"), &alone).unwrap();
+    copy("cars-sim", &alone);
 
     let output = Command::new(&alone).arg("--version").output().unwrap();
     assert_eq!(output.status.code(), Some(1));
