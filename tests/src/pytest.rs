@@ -1,5 +1,6 @@
 //! Tests in Python.
 
+use std::cmp::Reverse;
 use std::fs::File;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -64,6 +65,8 @@ fn files_of(folder: &Path, choice: Choice) -> Vec<PathBuf> {
     }
 
     assert!(!tests.is_empty(), "no tests in {}", folder.display());
+    // The longest first, so that no long one is left when all others are done.
+    tests.sort_by_key(|path| Reverse(path.metadata().unwrap().len()));
     tests
 }
 
