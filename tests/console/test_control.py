@@ -29,7 +29,7 @@ def test_step_start_pause_speed_and_init(launch, open_page):
 
     page.get_by_test_id("btn-start").click()
     shows(page, "running")
-    until(page, "window.carsConsole.frame().tick > 20")
+    until(page, "window.carsConsole.frame()?.tick > 20")
     assert run.status()["phase"] == "running"
 
     page.get_by_test_id("speed").select_option("5")

@@ -90,7 +90,7 @@ def test_the_window_is_moved_and_follows_playback(recorded, open_page):
 
     page.get_by_test_id("speed").select_option("max")
     page.get_by_test_id("play").click()
-    until(page, "window.carsConsole.frame().tick === 400")
+    until(page, "window.carsConsole.frame()?.tick === 400")
     eventually("the window of the last tick", lambda: window(page)[1] == 400)
 
 

@@ -98,7 +98,7 @@ def test_start_and_init_ask_about_a_draft(launch, open_page):
     page.keyboard.press(" ")
     page.get_by_test_id("draft-apply").click()
     eventually("the epoch", lambda: run.status()["epoch"] == 3 and run.status()["phase"] == "running")
-    frame = eventually("the frame", lambda: page.evaluate("window.carsConsole.frame().epoch === 3 && window.carsConsole.frame()"))
+    frame = eventually("the frame", lambda: page.evaluate("window.carsConsole.frame()?.epoch === 3 && window.carsConsole.frame()"))
     assert len(frame["guests"]) == 9
 
 
@@ -205,7 +205,7 @@ def test_obstacles_are_placed_moved_and_removed_by_keys(launch, open_page):
     eventually("the epoch", lambda: run.status()["epoch"] == 2)
     placed = eventually(
         "the obstacles",
-        lambda: page.evaluate("window.carsConsole.frame().epoch === 2 && window.carsConsole.frame().obstacles"),
+        lambda: page.evaluate("window.carsConsole.frame()?.epoch === 2 && window.carsConsole.frame().obstacles"),
     )
     assert abs(placed[1][1] - placed[1][0] - 5 * BODY_M) < 0.01, placed
 

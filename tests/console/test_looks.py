@@ -27,7 +27,7 @@ def test_everything_can_be_seen(launch, open_page, screenshots, width, height, s
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("trails").check()
     page.get_by_test_id("btn-start").click()
-    until(page, "window.carsConsole.frame().tick > 40")
+    until(page, "window.carsConsole.frame()?.tick > 40")
 
     name = f"{width}x{height}-{scheme}"
     for tab in ("log", "charts", "setup"):
@@ -86,7 +86,7 @@ def test_ten_thousand_guests_move_smoothly(launch, open_page, screenshots):
         page = open_page(run.address)
         expect(page.get_by_test_id("tick")).to_have_text("0")
         page.get_by_test_id("btn-start").click()
-        until(page, "window.carsConsole.frame().tick > 10")
+        until(page, "window.carsConsole.frame()?.tick > 10")
         assert len(page.evaluate("window.carsConsole.frame().guests")) == guests
         pages.append(page)
 

@@ -89,7 +89,7 @@ def test_a_robot_has_the_color_of_its_place_in_the_roster(launch, open_page):
     page = open_page(launch().address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     ask = "(names) => import('./assets/palette.js').then(({robotColor}) => names.map(robotColor))"
-    until(page, "window.carsConsole.frame().robots.length === 2")
+    until(page, "window.carsConsole.frame()?.robots.length === 2")
     butler, leguin = page.evaluate(ask, ["Butler", "Leguin"])
     assert butler != leguin
 

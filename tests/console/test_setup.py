@@ -25,7 +25,7 @@ def at(page, x_m, y_m):
 def apply(page, run, epoch=2):
     page.get_by_test_id("setup-apply").click()
     eventually("the epoch", lambda: run.status()["epoch"] == epoch and run.status()["phase"] == "ready")
-    until(page, f"window.carsConsole.frame().epoch === {epoch}")
+    until(page, f"window.carsConsole.frame()?.epoch === {epoch}")
 
 
 def test_obstacles_that_are_clicked_block_a_robot(launch, open_page):

@@ -99,7 +99,7 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
         page.get_by_test_id("btn-step").click()
         expect(page.get_by_test_id("tick")).to_have_text(str(tick))
     expect(page.get_by_test_id("panel-Butler").get_by_test_id("face")).to_be_visible()
-    until(page, "window.carsConsole.frame().tick === 3")
+    until(page, "window.carsConsole.frame()?.tick === 3")
 
     with page.expect_download() as download:
         page.get_by_test_id("vector").click()

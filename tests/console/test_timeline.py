@@ -100,7 +100,7 @@ def test_clicks_seek(launch, open_page):
     words = line.inner_text()
     line.click()
     time_s = float(re.match(r"\s*([\d.]+) s", words)[1])
-    until(page, f"window.carsConsole.frame().time_s === {time_s}")
+    until(page, f"window.carsConsole.frame()?.time_s === {time_s}")
     expect(page.locator(".line.picked").first).to_be_visible()
     # The lines after it stay, for the next click.
     expect(page.locator("[data-testid=log] .line")).to_have_count(count)
@@ -131,19 +131,19 @@ def test_the_log_seeks_by_keyboard(launch, open_page):
     *_, before_s, last_s = sorted(set(times_s))
 
     def is_shown(time_s):
-        until(page, f"window.carsConsole.frame().time_s === {time_s}")
+        until(page, f"window.carsConsole.frame()?.time_s === {time_s}")
         expect(page.locator(".line.picked").first).to_have_text(re.compile(rf"^\s*{time_s:.1f} s"))
 
     page.get_by_test_id("log").focus()
     page.keyboard.press("Enter")
     page.keyboard.press("ArrowUp")
-    until(page, "window.carsConsole.frame().tick < 64")
+    until(page, "window.carsConsole.frame()?.tick < 64")
     while page.evaluate("window.carsConsole.frame().time_s") > before_s:
         is_shown(last_s)
         page.keyboard.press("ArrowUp")
     is_shown(before_s)
     page.keyboard.press("ArrowDown")
-    until(page, f"window.carsConsole.frame().time_s === {last_s}")
+    until(page, f"window.carsConsole.frame()?.time_s === {last_s}")
     page.keyboard.press("l")
     expect(page.locator(".line.picked")).to_have_count(0)
     expect(page.get_by_test_id("tick")).to_have_text("64")
@@ -439,18 +439,18 @@ def test_epochs_are_chosen(launch, open_page, screenshots):
     step_to(page, 12)
     page.get_by_test_id("btn-init").click()
     expect(page.get_by_test_id("tick")).to_have_text("0")
-    until(page, "window.carsConsole.frame().epoch === 2")
+    until(page, "window.carsConsole.frame()?.epoch === 2")
     step_to(page, 5)
 
     page.get_by_test_id("epoch").select_option("1")
-    until(page, "window.carsConsole.frame().epoch === 1")
+    until(page, "window.carsConsole.frame()?.epoch === 1")
     expect(page.get_by_test_id("tick")).to_have_text("0")
     scrub(page, 12)
     expect(page.get_by_test_id("tick")).to_have_text("12")
     eventually("the charts of the epoch", lambda: samples(page)[0][-1] == 6)
     page.screenshot(path=screenshots / "timeline-epochs-1280x720.png")
     page.get_by_test_id("live").click()
-    until(page, "window.carsConsole.frame().epoch === 2")
+    until(page, "window.carsConsole.frame()?.epoch === 2")
     expect(page.get_by_test_id("tick")).to_have_text("5")
     eventually("the charts of now", lambda: samples(page)[0][-1] == 2.5)
 
@@ -459,7 +459,7 @@ def test_epochs_are_chosen(launch, open_page, screenshots):
         expect(other.get_by_test_id("epoch")).to_be_visible()
         expect(other.get_by_test_id("epoch")).to_have_value("2")
         other.get_by_test_id("epoch").select_option("1")
-        until(other, "window.carsConsole.frame().epoch === 1")
+        until(other, "window.carsConsole.frame()?.epoch === 1")
         scrub(other, 11)
         expect(other.get_by_test_id("tick")).to_have_text("11")
         expect(other.get_by_test_id("log")).to_contain_text("initialized")
@@ -471,7 +471,7 @@ def test_an_epoch_that_comes_late_is_still_the_one_that_was_chosen(launch, open_
     expect(page.get_by_test_id("tick")).to_have_text("0")
     step_to(page, 12)
     page.get_by_test_id("btn-init").click()
-    until(page, "window.carsConsole.frame().epoch === 2")
+    until(page, "window.carsConsole.frame()?.epoch === 2")
     step_to(page, 3)
 
     # What is recorded of the epoch in progress is asked for all the time. Whole ticks are, where one is to be shown.
@@ -487,7 +487,7 @@ def test_an_epoch_that_comes_late_is_still_the_one_that_was_chosen(launch, open_
         route.continue_()
     page.unroute(whole_ticks)
 
-    until(page, "window.carsConsole.frame().epoch === 1")
+    until(page, "window.carsConsole.frame()?.epoch === 1")
     expect(page.get_by_test_id("scrub")).to_have_attribute("max", "12")
     scrub(page, 12)
     expect(page.get_by_test_id("tick")).to_have_text("12")
