@@ -185,6 +185,15 @@ impl Lab {
         Running::start(command, run, self.folder.path().join(run))
     }
 
+    /// A launch at full speed that has gathered its robots and waits for `start`.
+    pub fn paused(&self, run: &str, file: &str, more: &[&str]) -> Running {
+        let mut args = vec!["launch", file, "--paused", "--speed", "max"];
+        args.extend(more);
+        let launch = self.start(run, &args);
+        self.until_ready(run);
+        launch
+    }
+
     /// Requests something of a run in progress; returns the status with which the simulator replies.
     pub fn ctl(&self, run: &str, args: &[&str]) -> Value {
         let mut all = vec!["ctl"];

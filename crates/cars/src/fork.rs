@@ -14,13 +14,10 @@ use launch::RunOptions;
 use miette::{IntoDiagnostic, miette};
 use protocol::{Epoch, RunName};
 use scenario::Scenario;
-use scenario::files::{EVENTS, LATEST, LOGS, RECORDING, SCENARIO};
+use scenario::files::{EVENTS, LATEST, LOCK, LOGS, RECORDING, SCENARIO};
 use simulator::RunFolder;
 
 use crate::table;
-
-/// The lock file in the folder of a run.
-const LOCK: &str = ".lock";
 
 /// `cars fork`.
 #[derive(Debug, Args)]

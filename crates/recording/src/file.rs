@@ -9,7 +9,8 @@ use std::io::{self, Write};
 
 use crate::format::{MAGIC, Record, op};
 
-/// Level of compression. From level 3 on `.cargo/config.toml` leaves out what zstd would use, to compile less C code. Level -1 saves an eighth of the bytes, for a tenth more of the time that recording takes.
+/// Level of compression. From level 3 on `.cargo/config.toml` leaves out what zstd would use, to compile less C code. Level -1 saves
+/// an eighth of the bytes, for a tenth more of the time that recording takes.
 const COMPRESSION_LEVEL: i32 = -4;
 const COMPRESSION: &str = "zstd";
 

@@ -149,8 +149,13 @@ impl Bytes {
         Ok(end.is_some_and(|end| end <= self.len).then_some(record))
     }
 
-    fn body(&self, record: &RecordHead) -> Result<Vec<u8>, RecordingError> {
-        self.read(record.body, record.len)
+    /// The body of the record at an offset; `None` if there is no whole record with this operation code.
+    fn body_at(&self, offset: u64, op: u8) -> Result<Option<Vec<u8>>, RecordingError> {
+        let record = self.record_at(offset)?;
+        let record = record.filter(|record| record.op == op);
+        record
+            .map(|record| self.read(record.body, record.len))
+            .transpose()
     }
 
     /// Finds the parts of the file.
@@ -284,13 +289,11 @@ impl Bytes {
         })?;
 
         let data_end = footer - summary.len() as u64 - DATA_END;
-        let record = self.record_at(data_end)?;
-        let record = record.filter(|record| record.op == op::DATA_END);
-        let record = record.ok_or_else(|| {
+        let stated = self.body_at(data_end, op::DATA_END)?.ok_or_else(|| {
             self.name
                 .damaged(data_end, &"no end of the data before the index")
         })?;
-        let stated = little_endian(&self.body(&record)?);
+        let stated = little_endian(&stated);
         if stated == NO_CHECKSUM {
             return Ok(());
         }
@@ -311,9 +314,7 @@ impl Bytes {
     ) -> Result<(String, BTreeMap<String, String>), RecordingError> {
         let damaged = || self.name.damaged(offset, &"metadata that cannot be read");
 
-        let record = self.record_at(offset)?;
-        let record = record.filter(|record| record.op == op::METADATA);
-        let body = self.body(&record.ok_or_else(damaged)?)?;
+        let body = self.body_at(offset, op::METADATA)?.ok_or_else(damaged)?;
         let mut fields = Fields(&body);
         let name = fields.text().ok_or_else(damaged)?;
         let metadata = fields.map().ok_or_else(damaged)?;
@@ -341,10 +342,8 @@ impl Bytes {
     pub(crate) fn chunk(&self, chunk: &Chunk) -> Result<Vec<u8>, RecordingError> {
         let damaged = |reason: &dyn Display| self.name.damaged(chunk.offset, reason);
 
-        let record = self.record_at(chunk.offset)?;
-        let record = record.filter(|record| record.op == op::CHUNK);
-        let record = record.ok_or_else(|| damaged(&"no chunk where the index has one"))?;
-        let body = self.body(&record)?;
+        let body = self.body_at(chunk.offset, op::CHUNK)?;
+        let body = body.ok_or_else(|| damaged(&"no chunk where the index has one"))?;
         let mut fields = Fields(&body);
         let header = ChunkHeader::read(&mut fields).ok_or_else(|| damaged(&"not a chunk"))?;
         let compressed = fields.u64().and_then(|len| fields.bytes(len));
@@ -375,9 +374,7 @@ impl Bytes {
                 .damaged(offset, &"the attached scenario is damaged")
         };
 
-        let record = self.record_at(offset)?;
-        let record = record.filter(|record| record.op == op::ATTACHMENT);
-        let body = self.body(&record.ok_or_else(damaged)?)?;
+        let body = self.body_at(offset, op::ATTACHMENT)?.ok_or_else(damaged)?;
         let (covered, stated) = body
             .split_at_checked(body.len().saturating_sub(4))
             .ok_or_else(damaged)?;

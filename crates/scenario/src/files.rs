@@ -12,6 +12,8 @@ pub const RECORDING: &str = recording::FILE;
 pub const SUMMARY: &str = "summary.json";
 /// How the run was launched, to resume it.
 pub const LAUNCHED: &str = "launched.json";
+/// Lock file of the process that writes the record.
+pub const LOCK: &str = ".lock";
 /// Folder with the output of each process.
 pub const LOGS: &str = "logs";
 /// Endpoint of the simulator during the run.

@@ -67,6 +67,10 @@ pub fn between(a: &Entry, b: &Entry) -> Option<Difference> {
 #[must_use]
 pub fn in_recording(recorded: &Entry, executed: &Entry) -> Option<Difference> {
     let events = recorded.recorded_events.as_ref()?;
+    if *events == executed.events {
+        return None;
+    }
+
     let recorded = Entry {
         tick: recorded.tick,
         events: events.clone(),

@@ -4,9 +4,6 @@ use std::path::PathBuf;
 
 use protocol::Epoch;
 
-/// Lock file of the process that writes the record.
-pub(crate) const LOCK: &str = ".lock";
-
 /// The files of the record of one epoch.
 #[derive(Debug, Clone)]
 pub struct EpochFiles {

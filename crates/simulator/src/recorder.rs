@@ -16,7 +16,7 @@ use protocol::{Epoch, Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
 
-use crate::files::{EpochFiles, LOCK};
+use crate::files::EpochFiles;
 use crate::record::Record;
 use crate::seal::{self, Seal};
 use crate::simulation::{Simulation, TickRecord};
@@ -24,7 +24,8 @@ use crate::summary::Summary;
 use scenario::{Scenario, SyncPoint};
 
 pub use scenario::files::{
-    ENDPOINT, EVENTS, LATEST, LAUNCHED, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO, SUMMARY,
+    ENDPOINT, EVENTS, LATEST, LAUNCHED, LOCK, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO,
+    SUMMARY,
 };
 
 /// The folder of a run: `OUT/NAME`.

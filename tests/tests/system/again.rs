@@ -189,24 +189,9 @@ fn what_an_operator_and_the_machine_did_is_taken_from_the_record() {
 fn ticks_that_a_robot_missed_are_not_repeated_by_processes() {
     let lab = Lab::new();
     let run = "missed";
-    let mut launch = lab.start(
-        run,
-        &[
-            "launch",
-            HALL,
-            "--no-console",
-            "--paused",
-            "--speed",
-            "max",
-            "--duration",
-            "60 s",
-            "--set",
-            "on_late=continue",
-            "--set",
-            "deadline=0.3 s",
-        ],
-    );
-    lab.until_ready(run);
+    let mut args = vec!["--no-console", "--duration", "60 s"];
+    args.extend(["--set", "on_late=continue", "--set", "deadline=0.3 s"]);
+    let mut launch = lab.paused(run, HALL, &args);
     lab.step(run, 5);
     let leguin = launch.process("cars-leguin");
     send(leguin, Signal::SIGSTOP);

@@ -10,19 +10,9 @@ const FILE: &str = "launch/hors_doeuvres.toml";
 
 /// A launch that has gathered its robots and waits for `start`.
 fn paused(lab: &Lab, run: &str, more: &[&str]) -> Running {
-    let mut args = vec![
-        "launch",
-        FILE,
-        "--no-console",
-        "--paused",
-        "--speed",
-        "max",
-        "--duration",
-        "60 s",
-    ];
+    let mut args = vec!["--no-console", "--duration", "60 s"];
     args.extend(more);
-    let launch = lab.start(run, &args);
-    lab.until_ready(run);
+    let launch = lab.paused(run, FILE, &args);
     // The launcher joins as an observer when the simulator answers.
     eventually("the launcher", || {
         let restarted = lab.cars(&["ctl", "restart", "Leguin", "--run", run]);

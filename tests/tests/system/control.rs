@@ -15,12 +15,7 @@ fn status(lab: &Lab, run: &str) -> Value {
 
 /// A launch that has gathered its robots and waits for `start`.
 fn paused(lab: &Lab, run: &str, more: &[&str]) -> Running {
-    let mut args = vec!["launch", FILE, "--paused", "--speed", "max"];
-    args.extend(more);
-    let launch = lab.start(run, &args);
-    lab.until_ready(run);
-
-    launch
+    lab.paused(run, FILE, more)
 }
 
 #[test]
