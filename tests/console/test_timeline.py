@@ -413,6 +413,7 @@ def test_marks_are_the_events_of_the_record(launch, open_page, screenshots, sche
     expect(page.get_by_test_id("tick")).to_have_text(str(cuts[0]))
     page.screenshot(path=screenshots / f"timeline-marks-1280x720-{scheme}.png")
 
+    assert run.simulator.wait(PATIENCE_S) == 0
     other = open_page(start_console(run.processes, "--recording", run.run_folder), 390, 844, scheme)
     expect(other.get_by_test_id("tick")).to_have_text("0")
     eventually("the cuts", lambda: marks(other, "cut") == cuts)
@@ -454,8 +455,7 @@ def test_epochs_are_chosen(launch, open_page, screenshots):
     expect(page.get_by_test_id("tick")).to_have_text("5")
     eventually("the charts of now", lambda: samples(page)[0][-1] == 2.5)
 
-    # A late page and a recording have both epochs, and the log of both.
-    for other in (open_page(run.address), open_page(start_console(run.processes, "--recording", run.run_folder))):
+    def has_both_epochs(other):
         expect(other.get_by_test_id("epoch")).to_be_visible()
         expect(other.get_by_test_id("epoch")).to_have_value("2")
         other.get_by_test_id("epoch").select_option("1")
@@ -463,6 +463,12 @@ def test_epochs_are_chosen(launch, open_page, screenshots):
         scrub(other, 11)
         expect(other.get_by_test_id("tick")).to_have_text("11")
         expect(other.get_by_test_id("log")).to_contain_text("initialized")
+
+    # A late page and a recording have both epochs, and the log of both.
+    has_both_epochs(open_page(run.address))
+    run.control("stop")
+    assert run.simulator.wait(PATIENCE_S) == 0
+    has_both_epochs(open_page(start_console(run.processes, "--recording", run.run_folder)))
 
 
 def test_an_epoch_that_comes_late_is_still_the_one_that_was_chosen(launch, open_page):

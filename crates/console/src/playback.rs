@@ -28,7 +28,9 @@ pub(crate) enum OpenError {
     )]
     Unreadable(#[from] RecordingError),
     /// It has no tick.
-    #[error("{0}: no tick was completed")]
+    #[error(
+        "{0}: no tick was completed, or none is written yet, which takes a run in progress two seconds at most"
+    )]
     Empty(String),
     /// The folder of a run in progress has no recording that can be read.
     #[error("nothing is recorded yet, or the scenario sets `frames = false` under [record]")]
