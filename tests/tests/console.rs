@@ -533,6 +533,7 @@ fn a_slow_browser_is_shown_the_newest_frame() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_stalled_browser_costs_no_memory() {
     let lab = Lab::new();
     let run = Run::start(&lab, "con-stuck");

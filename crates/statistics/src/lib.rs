@@ -3,7 +3,7 @@
 //! named streams with fixed seeds: the same outcomes give the same numbers to the last bit on every platform.
 //!
 //! The code is our own because `statrs`, the crate for such distributions, calls the platform's `ln` and `exp`, and has
-//! neither the bootstrap nor survival. `tests/tests/statistics.rs` compares all of it with SciPy and lifelines.
+//! neither the bootstrap nor survival. `tests/tests/system/statistics.rs` compares all of it with SciPy and lifelines.
 
 mod bootstrap;
 mod distribution;

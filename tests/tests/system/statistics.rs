@@ -1,8 +1,6 @@
 //! The laboratory's statistics, compared with SciPy and lifelines over samples of many kinds. What is exact agrees to 1e-9; what
 //! is drawn agrees within its own error, and to 1e-9 where the same draws are given to both.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::process::Command;
 
 use protocol::random::{self, Stream};
