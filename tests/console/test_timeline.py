@@ -23,8 +23,10 @@ def newest(page):
 
 
 def scrub(page, to):
-    # A bar takes no value below its beginning, which is the first tick that the page saw until it has found the recording.
-    until(page, f"""Number(document.querySelector('[data-testid="scrub"]')?.min ?? Infinity) <= {to}""")
+    # A bar takes no value outside of it. It begins with the first tick that the page saw until the page has found the recording,
+    # and ends with the last one of the epoch before until the chosen one is drawn.
+    bar = """document.querySelector('[data-testid="scrub"]')"""
+    until(page, f"Number({bar}?.min ?? Infinity) <= {to} && {to} <= Number({bar}?.max ?? 0)")
     page.get_by_test_id("scrub").evaluate(
         "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true})); }", to
     )
