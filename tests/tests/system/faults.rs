@@ -24,10 +24,10 @@ fn launch_file(lab: &Lab, leguin: &str) -> String {
     lab.write("launch.toml", &text).to_str().unwrap().to_owned()
 }
 
-/// A launch of a minute that has done some ticks, of which Leguin's process, which is returned, is stopped then. It goes on when it
-/// is told to `start`: a run that is not paused may have ended by the time its process is stopped.
-fn with_leguin_stopped(lab: &Lab, run: &str, more: &[&str]) -> (Running, u32) {
-    let mut args = vec!["launch", FILE, "--duration", "60 s", "--paused"];
+/// A launch that has done some ticks, of which Leguin's process, which is returned, is stopped then. It goes on when it is told to
+/// `start`: a run that is not paused may have ended by the time its process is stopped.
+fn with_leguin_stopped(lab: &Lab, run: &str, duration: &str, more: &[&str]) -> (Running, u32) {
+    let mut args = vec!["launch", FILE, "--duration", duration, "--paused"];
     args.extend(more);
     let launch = lab.start(run, &args);
     lab.until_ready(run);
@@ -41,7 +41,7 @@ fn with_leguin_stopped(lab: &Lab, run: &str, more: &[&str]) -> (Running, u32) {
 #[test]
 fn a_stopped_robot_holds_the_clock_costs_nothing_and_changes_nothing() {
     let lab = Lab::new();
-    let (mut launch, leguin) = with_leguin_stopped(&lab, "hang", &["--speed", "10"]);
+    let (mut launch, leguin) = with_leguin_stopped(&lab, "hang", "60 s", &["--speed", "10"]);
     let stopped = Instant::now();
     lab.ctl("hang", &["start"]);
     let said = launch.prints_after("Leguin (", Some(stopped));
@@ -163,7 +163,7 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
         let run = format!("late-{mode}");
         let set = format!("on_late={mode}");
         let args = ["--speed", "10", "--set", &set, "--set", PATIENT];
-        let (mut launch, leguin) = with_leguin_stopped(&lab, &run, &args);
+        let (mut launch, leguin) = with_leguin_stopped(&lab, &run, "60 s", &args);
         set_deadline(&lab, &run, "0.5 s");
         lab.ctl(&run, &["start"]);
         if mode == "continue" {
@@ -187,7 +187,9 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
 #[test]
 fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
     let lab = Lab::new();
-    let set = [
+    let args = [
+        "--speed",
+        "20",
         "--set",
         "robot.Leguin.on_late=continue",
         "--set",
@@ -195,13 +197,10 @@ fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
         "--set",
         "lose_after=3",
     ];
-    let mut args = vec!["launch", FILE, "--speed", "20", "--duration", "300 s"];
-    args.extend(set);
-    let mut launch = lab.start("late-own", &args);
-    launch.prints("behavior");
-    let leguin = launch.process("cars-leguin");
-    send(leguin, Signal::SIGSTOP);
-    set_deadline(&lab, "late-own", "0.5 s");
+    let (mut launch, leguin) = with_leguin_stopped(&lab, "late-own", "300 s", &args);
+    // Three of them are over long before the lease of her link, which would lose her, too.
+    set_deadline(&lab, "late-own", "0.1 s");
+    lab.ctl("late-own", &["start"]);
     launch.prints("is lost");
     set_deadline(&lab, "late-own", "60 s");
     send(leguin, Signal::SIGCONT);
@@ -263,7 +262,7 @@ fn a_robot_that_is_stuck_does_not_freeze_the_others() {
 #[test]
 fn what_the_clock_does_about_late_robots_changes_while_it_is_held() {
     let lab = Lab::new();
-    let (mut launch, _) = with_leguin_stopped(&lab, "late-change", &["--speed", "20"]);
+    let (mut launch, _) = with_leguin_stopped(&lab, "late-change", "60 s", &["--speed", "20"]);
     lab.ctl("late-change", &["start"]);
     launch.prints("waiting for");
     let status = lab.ok(&["ctl", "status", "--run", "late-change"]);
