@@ -18,6 +18,9 @@ use host::Host;
 use wrong::Wrong;
 
 fn main() -> ExitCode {
+    // As robots in Rust do: half the processor time.
+    bus::runtime::use_one_thread();
+
     let wrong = Wrong(argument("--wrong").unwrap_or_default());
     let name = argument("--name").unwrap_or_else(|| "Walker".to_owned());
 
