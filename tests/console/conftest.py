@@ -65,8 +65,9 @@ def launched(tmp_path):
 
 
 @pytest.fixture
-def open_page(browser):
-    """Opens pages. A test fails if one of them logs an error or warning, throws, or opens a dialog."""
+def open_page(browser, launch, launched):
+    """Opens pages. A test fails if one of them logs an error or warning, throws, or opens a dialog. Pages are closed before the
+    runs that they show end, which they would log: `launch` and `launched` are here for that."""
     contexts = []
     errors = []
 

@@ -40,7 +40,7 @@ def test_the_plan_says_draft_while_the_set_up_is_not_that_of_the_run(launch, ope
     expect(draft).to_be_hidden()
 
 
-def test_an_edit_while_the_set_up_is_read_is_kept(open_page, launch):
+def test_an_edit_while_the_set_up_is_read_is_kept(launch, open_page):
     """The set-up of a new epoch is requested; what is edited before the answer comes is not replaced by it."""
     run = launch()
     held = []

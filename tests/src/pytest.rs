@@ -13,7 +13,7 @@ use nix::unistd::Pid;
 use crate::{Lab, is_within, objections};
 
 /// How many files are tested at a time. They mostly wait.
-const AT_A_TIME: usize = 3;
+const AT_A_TIME: usize = 2;
 /// Longest that the tests of one file may take.
 const PATIENCE: Duration = Duration::from_secs(540);
 
