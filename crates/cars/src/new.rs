@@ -239,11 +239,7 @@ impl Template<'_> {
 
     fn fill(&self, text: &str) -> String {
         let package = self.name.to_lowercase().replace('.', "-");
-        let robot_crate = self.cars.join("crates/robot").display().to_string();
-        let tcp_crate = self.cars.join("vendor/zenoh-link-tcp");
-        let tcp_crate = tcp_crate.display().to_string();
-        let tls_crate = self.cars.join("vendor/zenoh-link-tls");
-        let tls_crate = tls_crate.display().to_string();
+        let quoted = |place: &str| format!("{:?}", self.cars.join(place).display().to_string());
         let mut text = text
             .replace("@COMMAND@", self.skeleton.command)
             .replace("@PROGRAM@", self.skeleton.typed);
@@ -256,9 +252,10 @@ impl Template<'_> {
             .replace("@HINT@", self.skeleton.hint)
             .replace("@FOLDER@", &self.folder)
             .replace("@PACKAGE@", &format!("cars-{package}"))
-            .replace("@ROBOT_CRATE@", &format!("{robot_crate:?}"))
-            .replace("@TCP_CRATE@", &format!("{tcp_crate:?}"))
-            .replace("@TLS_CRATE@", &format!("{tls_crate:?}"))
+            .replace("@ROBOT_CRATE@", &quoted("crates/robot"))
+            .replace("@TCP_CRATE@", &quoted("vendor/zenoh-link-tcp"))
+            .replace("@TLS_CRATE@", &quoted("vendor/zenoh-link-tls"))
+            .replace("@STABBY_CRATE@", &quoted("vendor/stabby"))
             .replace("@CARS@", &self.cars.display().to_string())
             .replace("@NAME@", self.name)
     }
