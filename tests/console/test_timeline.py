@@ -608,8 +608,8 @@ def test_the_legend_names_the_emotions_by_color(launch, open_page):
 
 
 MODULES = """async () => {
-  const [{Memory}, {Marks}, {History}, {TimeWindow}, {Store}] = await Promise.all(
-    ['memory', 'marks', 'history', 'window', 'store'].map((name) => import(`./assets/${name}.js`)));
+  const [{Memory}, {Marks}, {History}, {TimeWindow}, {Store}, {LogView}] = await Promise.all(
+    ['memory', 'marks', 'history', 'window', 'store', 'log'].map((name) => import(`./assets/${name}.js`)));
   const BODY
 }"""
 
@@ -686,6 +686,29 @@ def test_lines_of_record_and_of_the_run_are_merged_once(page):
     assert found[0] == "0a 4x 5a 5b 6a 6a 7late"
     assert found[1] == "0a 4x 5a 5b 6a 6a 7late 8c 8d 9e 0next"
     assert found[2:4] == [10000, "m20000"]
+
+
+def test_lines_that_arrive_while_the_tick_moves_are_shown_once(page):
+    found = run_module(
+        page,
+        """
+        const line = (tick) => ({epoch: 1, tick, time_s: tick / 2, source: 'Butler', kind: 'say', text: `m${tick}`});
+        const place = document.createElement('div');
+        const store = new Store();
+        const log = new LogView(place, store, () => {});
+        const shown = (tick) => {
+          log.showUntil({epoch: 1, tick});
+          log.render();
+          return [...place.querySelectorAll('.log-rows .line')].map((row) => log.lines.get(row).tick);
+        };
+        const first = shown(0);
+        store.addRecorded([line(0), line(2), line(4), line(6)]);
+        const second = shown(4);
+        store.addRecorded([line(8), line(9)]);
+        return [first, second, shown(8), shown(9), shown(2)];
+        """,
+    )
+    assert found == [[], [0, 2, 4], [0, 2, 4, 6, 8], [0, 2, 4, 6, 8, 9], [0, 2]]
 
 
 def test_samples_of_the_record_replace_what_was_seen(page):

@@ -120,6 +120,8 @@ export class LogView {
 
     const from = this.until;
     const isForward = moment !== null && from !== null && isAfter(moment, from) && moment.epoch === from.epoch;
+    // Lines that arrived since are taken in first: else they would be added here, and again when they are rendered.
+    if (isForward) this.render();
     this.until = moment;
     if (!isForward) return this.rebuild();
 
