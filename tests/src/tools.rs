@@ -15,6 +15,19 @@ pub fn lacks_tool(test: &str, what: &str) {
     skip(test, what);
 }
 
+/// Whether Python has these modules, separated by commas. Skips a test otherwise; `install` installs their packages.
+#[must_use]
+pub fn has_modules(test: &str, modules: &str, install: &str) -> bool {
+    let import = format!("import {modules}");
+    let imported = Command::new("python3").args(["-c", &import]).output();
+    let is_there = imported.is_ok_and(|output| output.status.success());
+    if !is_there {
+        lacks_tool(test, &format!("`{install}`"));
+    }
+
+    is_there
+}
+
 /// Runs a script in Python with a text as its input, to its end.
 ///
 /// # Panics

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use serde_json::Value;
-use system_tests::tools::{lacks_tool, python};
+use system_tests::tools::{has_modules, python};
 use system_tests::{programs, root};
 
 use super::{Trial, UNITS, checked};
@@ -13,11 +13,8 @@ const UNITS_PER_TASK: usize = 7;
 
 #[test]
 fn the_pods_of_a_job_give_the_results_of_this_machine() {
-    let imported = Command::new("python3")
-        .args(["-c", "import kubernetes_validate, yaml"])
-        .output();
-    if !imported.is_ok_and(|output| output.status.success()) {
-        lacks_tool("Kubernetes", "`pip install kubernetes-validate`");
+    let install = "pip install kubernetes-validate";
+    if !has_modules("Kubernetes", "kubernetes_validate, yaml", install) {
         return;
     }
 

@@ -6,18 +6,16 @@ use std::process::{Command, Output};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use system_tests::processes::send;
-use system_tests::tools::lacks_tool;
+use system_tests::tools::{has_modules, lacks_tool};
 use system_tests::{Lab, eventually, root};
 
 const HALL: &str = "configs/hors_doeuvres.toml";
 
 /// Runs Python in a folder; `None` if one of the packages is missing.
 fn python(folder: &Path, packages: &[&str], args: &[&str]) -> Option<Output> {
-    let import = format!("import {}", packages.join(", "));
-    let imported = Command::new("python3").args(["-c", &import]).output();
-    if !imported.is_ok_and(|output| output.status.success()) {
-        let need = format!("`pip install {}`", packages.join(" "));
-        lacks_tool("reading exports in Python", &need);
+    let modules = packages.join(", ");
+    let install = format!("pip install {}", packages.join(" "));
+    if !has_modules("reading exports in Python", &modules, &install) {
         return None;
     }
 

@@ -10,16 +10,14 @@ use recording::Recording;
 use recording::content::Missed;
 use serde_json::Value;
 use system_tests::processes::send;
-use system_tests::tools::lacks_tool;
+use system_tests::tools::has_modules;
 use system_tests::{Lab, eventually, root};
 
 /// Runs a Python script on a file; `None` if a package is missing.
 fn python(script: &Path, file: &Path) -> Option<Output> {
-    let import = "import foxglove_schemas_protobuf, mcap";
-    let has_packages = Command::new("python3").args(["-c", import]).output();
-    if !has_packages.is_ok_and(|output| output.status.success()) {
-        let command = "`pip install mcap foxglove-schemas-protobuf`";
-        lacks_tool("reading recordings in Python", command);
+    let modules = "foxglove_schemas_protobuf, mcap";
+    let install = "pip install mcap foxglove-schemas-protobuf";
+    if !has_modules("reading recordings in Python", modules, install) {
         return None;
     }
 

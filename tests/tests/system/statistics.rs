@@ -1,8 +1,6 @@
 //! The laboratory's statistics, compared with SciPy and lifelines over samples of many kinds. What is exact agrees to 1e-9; what
 //! is drawn agrees within its own error, and to 1e-9 where the same draws are given to both.
 
-use std::process::Command;
-
 use protocol::random::{self, Stream};
 use serde_json::{Value, json};
 use statistics::{
@@ -10,7 +8,7 @@ use statistics::{
     ecdf, quantile, resample, share_of_events,
 };
 use system_tests::root;
-use system_tests::tools::{lacks_tool, python};
+use system_tests::tools::{has_modules, python};
 
 /// Sizes of samples: the least that has an interval, those below and above the limit of exact tests, and more than one word
 /// of signs.
@@ -23,11 +21,8 @@ type Draw = fn(&mut Stream) -> f64;
 
 #[test]
 fn all_numbers_are_those_of_scipy_and_lifelines() {
-    let imported = Command::new("python3")
-        .args(["-c", "import lifelines, scipy"])
-        .output();
-    if !imported.is_ok_and(|output| output.status.success()) {
-        lacks_tool("the statistics", "`pip install scipy lifelines`");
+    let install = "pip install scipy lifelines";
+    if !has_modules("the statistics", "lifelines, scipy", install) {
         return;
     }
 
