@@ -28,6 +28,12 @@ pub fn has_modules(test: &str, modules: &str, install: &str) -> bool {
     is_there
 }
 
+/// Whether there is a Python for robots of a test. Skips the test otherwise.
+#[must_use]
+pub fn has_python(test: &str) -> bool {
+    has_modules(test, "sys", "apt-get install python3")
+}
+
 /// Runs a script in Python with a text as its input, to its end.
 ///
 /// # Panics

@@ -6,10 +6,12 @@ use std::process::{Command, Output};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use system_tests::processes::send;
-use system_tests::tools::{has_modules, lacks_tool};
+use system_tests::tools::{has_modules, has_python, lacks_tool};
 use system_tests::{Lab, eventually, root};
 
 const HALL: &str = "configs/hors_doeuvres.toml";
+/// What is skipped where there is no Python.
+const HOSTILE: &str = "exports of a hostile robot in Python";
 
 /// Runs Python in a folder; `None` if one of the packages is missing.
 fn python(folder: &Path, packages: &[&str], args: &[&str]) -> Option<Output> {
@@ -144,6 +146,10 @@ fn play_hostile(lab: &Lab, run: &str) {
 
 #[test]
 fn tables_have_every_value_of_the_record_also_of_hostile_robots() {
+    if !has_python(HOSTILE) {
+        return;
+    }
+
     let lab = Lab::new();
     play_hostile(&lab, "exports-hostile");
     let printed = export(&lab, "exports-hostile", "tables", &BOTH);
@@ -329,6 +335,10 @@ fn what_a_damaged_recording_has_before_the_damage_is_exported() {
 
 #[test]
 fn commands_are_arrows_in_shiviz() {
+    if !has_python(HOSTILE) {
+        return;
+    }
+
     let lab = Lab::new();
     play_hostile(&lab, "exports-arrows");
     let log = export(&lab, "exports-arrows", "log", &["--shiviz"]);

@@ -1,6 +1,7 @@
 //! States as large as a message allows, asked for in every tick, end to end between processes.
 
 use system_tests::processes::nobody_is_left;
+use system_tests::tools::has_python;
 use system_tests::{Lab, assert_same};
 
 /// Asks the robots named after the first word, in every tick, and publishes as many texts of so many bytes.
@@ -118,6 +119,10 @@ fn talker(name: &str, texts: (usize, usize), asks: &[String]) -> Talker {
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
 fn a_state_as_large_as_a_message_allows_is_asked_for_in_every_tick() {
+    if !has_python("large states of robots in Python") {
+        return;
+    }
+
     for (label, texts) in [("large-92kb", (92, 1_000)), ("large-800kb", (200, 4_000))] {
         let talkers = [
             talker("A", texts, &[]),
@@ -131,6 +136,10 @@ fn a_state_as_large_as_a_message_allows_is_asked_for_in_every_tick() {
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
 fn many_states_go_to_one_asker_in_every_tick() {
+    if !has_python("large states of robots in Python") {
+        return;
+    }
+
     let names: Vec<String> = (0..30).map(|index| format!("T{index:02}")).collect();
     let mut talkers = vec![talker("Asker", (0, 0), &names)];
     for name in &names {
