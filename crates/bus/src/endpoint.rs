@@ -105,6 +105,7 @@ pub fn connectable(endpoint: &str) -> String {
     let Some((host, port)) = host_and_port(address) else {
         return endpoint.to_owned();
     };
+
     match host.parse::<IpAddr>() {
         Ok(IpAddr::V4(Ipv4Addr::UNSPECIFIED)) => {
             format!("{protocol}/{}:{port}", Ipv4Addr::LOCALHOST)

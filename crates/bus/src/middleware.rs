@@ -215,6 +215,7 @@ impl Bus {
                 handle(sample.key_expr().as_str(), &sample.payload().to_bytes());
             })
             .wait();
+
         let declared = used("subscribe to", keys, declared)?;
         Ok(Declared::new(declared))
     }
@@ -299,11 +300,13 @@ impl Bus {
                 .with(zenoh::handlers::FifoChannel::new(8))
                 .wait(),
         )?;
+
         while let Ok(reply) = replies.recv() {
             if let Some(answer) = Reply::read(reply) {
                 return Ok(Some(answer));
             }
         }
+
         Ok(None)
     }
 
@@ -353,6 +356,7 @@ impl Bus {
                 }
             })
             .wait();
+
         used("ask", key, asked)
     }
 
@@ -368,6 +372,7 @@ impl Bus {
         BusError,
     > {
         let key_expr = used("ask", key, KeyExpr::new(key.to_owned()))?;
+
         Ok(self
             .session
             .get(zenoh::query::Selector::owned(
@@ -415,6 +420,7 @@ impl Bus {
                 handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put);
             })
             .wait();
+
         let declared = used("watch", keys, declared)?;
         Ok(Declared::new(declared))
     }
@@ -652,13 +658,16 @@ pub fn check_exposure(
         })?,
         None => Guards::default(),
     };
+
     if guards.has_access_control && !is_tls(listen) {
         return Err(BusError::Unencrypted(listen.to_owned()));
     }
+
     let is_guarded = guards.has_access_control && guards.wants_certificates;
     if is_local(listen) || is_guarded || trusts_network {
         return Ok(());
     }
+
     Err(BusError::Exposed(listen.to_owned()))
 }
 

@@ -41,6 +41,7 @@ pub fn client_config(name: &str, credentials: &Credentials) -> String {
          // cars/RUN/join/{name}.\n",
         credentials.validity
     );
+
     let mut tree = Tree::of([CLIENT_MODE].iter().chain(&SETTINGS));
     let endpoints = format!("[{:?}]", tls_endpoint());
     tree.add(
@@ -54,6 +55,7 @@ pub fn client_config(name: &str, credentials: &Credentials) -> String {
         "20000",
     );
     tree.add_tls("connect", credentials);
+
     tree.write(&mut text);
     text
 }
@@ -68,15 +70,18 @@ pub fn simulator_config(keys: &Keys, robots: &[RobotName], credentials: &Credent
          // {}. `cars-sim --zenoh-config FILE --listen tls/127.0.0.1:7447` uses it.\n",
         credentials.validity
     );
+
     let mut tree = Tree::of([ROUTER_MODE].iter().chain(&SETTINGS));
     let endpoints = format!("[{:?}]", tls_endpoint());
     tree.add("listen/endpoints", "Where it listens.", &endpoints);
     tree.add_tls("listen", credentials);
+
     let mut grants: Vec<(&str, Vec<Grant>)> = robots
         .iter()
         .map(|robot| (robot.as_str(), of_robot(keys, robot)))
         .collect();
     grants.extend([OPERATOR, CONSOLE].map(|name| (name, of_operator(keys))));
+
     tree.add("access_control/enabled", "", "true");
     tree.add(
         "access_control/default_permission",
@@ -88,6 +93,7 @@ pub fn simulator_config(keys: &Keys, robots: &[RobotName], credentials: &Credent
         "What may be said, and on which keys.",
         &rules(keys, &grants),
     );
+
     let subjects = grants
         .iter()
         .map(|(name, _)| format!("{{ id: {name:?}, cert_common_names: [{name:?}] }}"));
@@ -96,12 +102,14 @@ pub fn simulator_config(keys: &Keys, robots: &[RobotName], credentials: &Credent
         "The certificate states the name of its owner.",
         &list(subjects),
     );
+
     let policies = grants.iter().map(|(name, grants)| policy(name, grants));
     tree.add(
         "access_control/policies",
         "Who may do what.",
         &list(policies),
     );
+
     tree.write(&mut text);
     text
 }
@@ -182,12 +190,14 @@ impl Tree {
         let mut add = |key: &str, why: &str, value: &str| {
             self.add(&format!("transport/link/tls/{key}"), why, value);
         };
+
         add("enable_mtls", "Both sides show a certificate.", "true");
         add(
             "verify_name_on_connect",
             "The simulator's names the host it is reached by.",
             "true",
         );
+
         for (key, why, pem) in [
             (
                 "root_ca_certificate_base64".to_owned(),
@@ -220,6 +230,7 @@ impl Tree {
             *text += &value.replace('\n', &format!("\n{indent}"));
             return;
         }
+
         text.push_str("{\n");
         for (name, branch) in &self.branches {
             if !branch.why.is_empty() {

@@ -273,6 +273,7 @@ impl Request {
         if let Some(what) = self.intervention() {
             return Ok(Control::Intervene { what });
         }
+
         Ok(match self {
             Self::Init { seed } => Control::Init {
                 seed: *seed,
@@ -436,6 +437,7 @@ fn headline(status: &Status) -> String {
     let speed = status
         .speed
         .map_or("max".to_owned(), |speed| format!("{speed}x"));
+
     format!(
         "{} {}  tick {}  {:.1} of {:.1} s  speed {speed}  seed {}  epoch {}\n",
         status.run,

@@ -273,12 +273,15 @@ impl PlanArgs {
             Some(out) => out.clone(),
             None => Path::new(OUT).join(&request.name),
         };
+
         let plan = Plan::new(&request)?;
         plan.check()?;
         plan.check_begins()?;
+
         for change in plan.changes_since(&folder)? {
             terminal::note(change);
         }
+
         plan.save(&folder)?;
         Ok((plan, folder))
     }
@@ -298,6 +301,7 @@ impl PlanArgs {
                 self.file.display()
             ));
         }
+
         Ok(())
     }
 
@@ -413,6 +417,7 @@ fn name_verdicts(results: &Results) -> Verdict {
     for judged in results.judged() {
         let verdict = judged.verdict();
         worst = worst.max(verdict);
+
         let units = match verdict {
             Verdict::Pass => continue,
             Verdict::Undecided => &judged.undecided,
@@ -426,6 +431,7 @@ fn name_verdicts(results: &Results) -> Verdict {
             results.plan.unit(units[0]).describe()
         ));
     }
+
     worst
 }
 
@@ -434,6 +440,7 @@ fn name_defects(results: &Results) {
     for damage in &results.damages {
         terminal::note(damage);
     }
+
     if !results.missing.is_empty() {
         terminal::note(format_args!(
             "{} of {} units are missing, the first is {}",
@@ -442,6 +449,7 @@ fn name_defects(results: &Results) {
             results.missing[0]
         ));
     }
+
     for unit in results.conflicts.iter().take(NAMED) {
         let unit = results.plan.unit(*unit).describe();
         terminal::note(format_args!(

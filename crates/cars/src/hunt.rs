@@ -234,6 +234,7 @@ fn coverage_in_words(coverage: &Coverage) -> String {
         };
         others += &format!("{plans:>8}  {line}\n");
     }
+
     format!(
         "plans  in which it occurred\n{others}\nkinds of faults, in plans: {}\n",
         faults.join(", ")

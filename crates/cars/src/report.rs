@@ -64,6 +64,7 @@ fn find_run(out: &Path, subject: &Path) -> miette::Result<RunFolder> {
             subject.display()
         ));
     }
+
     if subject.is_file() {
         return Err(miette!(
             help = "play it first, with `cars run` or `cars experiment run`, and report the folder that it leaves",
@@ -71,6 +72,7 @@ fn find_run(out: &Path, subject: &Path) -> miette::Result<RunFolder> {
             subject.display()
         ));
     }
+
     find(out, subject)
 }
 

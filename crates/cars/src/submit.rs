@@ -158,6 +158,7 @@ impl EngineArgs {
                 return Err(miette!("{option} has no meaning with --engine {engine}"));
             }
         }
+
         Ok(())
     }
 
@@ -168,6 +169,7 @@ impl EngineArgs {
             (None, _) => std::env::current_exe().into_diagnostic()?,
         };
         let per_task = self.units_per_task.map(NonZero::get);
+
         Ok(Tasks {
             name: plan.name().to_owned(),
             program: text(&program)?,

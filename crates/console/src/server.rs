@@ -292,10 +292,12 @@ async fn ticks(
     else {
         return bad_range();
     };
+
     let wanted = Wanted { from, count, every };
     if !wanted.is_valid() {
         return bad_range();
     }
+
     let answer = move |app: &App| with_epoch(app, epoch, |recording| read_ticks(recording, wanted));
     read(app, answer).await
 }
@@ -324,6 +326,7 @@ async fn diagram(
         Ok(Query(window)) if window.is_valid() => window,
         _ => return bad_window(),
     };
+
     let answer = move |app: &App| {
         with_epoch(app, window.epoch, |recording| {
             draw_diagram(recording, window)

@@ -57,6 +57,7 @@ fn draw_gaps(picture: &mut Picture) {
     let top = picture.lanes.top() - 2.0;
     let bottom = picture.lanes.bottom;
     let pieces = picture.scale.pieces().to_vec();
+
     for gap in pieces.iter().filter(|piece| piece.is_gap) {
         let time = seconds(gap.end - gap.begin, picture.window.tick_s);
         let title = format!(
@@ -65,12 +66,14 @@ fn draw_gaps(picture: &mut Picture) {
         );
         let middle = gap.begin + (gap.end - gap.begin) / 2;
         picture.open("gap", middle, &title);
+
         let left = gap.left_px + 8.0;
         let right = gap.right_px - 8.0;
         picture.rect("paper", left, top, right - left, bottom - top + 6.0);
         for x in [left, right] {
             picture.path("zigzag", &zigzag(x, top, bottom + 6.0));
         }
+
         let center = (left + right) / 2.0;
         picture.text("muted", center, top + 2.0, "middle", &format!("… {time} …"));
         picture.close();

@@ -188,10 +188,12 @@ impl Changed {
             let is_over = self
                 .tick(partition, "until")?
                 .is_some_and(|until| until <= tick);
+
             if has_begun && !is_over {
                 cut.extend(separated(partition)?);
             }
         }
+
         Some(cut)
     }
 
@@ -200,6 +202,7 @@ impl Changed {
         let Some(value) = table.get(key) else {
             return Some(None);
         };
+
         let (number, unit) = value.as_str()?.trim().split_once(' ')?;
         let unit_s = match unit.trim() {
             "ms" => 0.001,
@@ -208,6 +211,7 @@ impl Changed {
             "h" => 3600.0,
             _ => return None,
         };
+
         let time_s = number.parse::<f64>().ok()? * unit_s;
         Some(Some((time_s / self.tick_s).round() as Tick))
     }
@@ -253,6 +257,7 @@ fn links(verb: &str, links: BTreeSet<Link>) -> Option<String> {
             }
         }
     }
+
     match pairs.len() {
         0 => None,
         1..=MOST_LINKS => {

@@ -151,6 +151,7 @@ fn busy_ticks(items: &Items) -> BTreeSet<Tick> {
 fn draw_lanes(picture: &mut Picture) {
     let left = picture.scale.left_px();
     let right = picture.scale.right_px();
+
     for lane in picture.lanes.all.clone() {
         picture
             .svg
@@ -158,6 +159,7 @@ fn draw_lanes(picture: &mut Picture) {
             .with("class", "lane")
             .with("data-robot", lane.name.as_str())
             .open();
+
         let name = shortened(lane.name.as_str(), NAME_LETTERS);
         picture.text("name", left - 12.0, lane.middle() + 6.0, "end", &name);
         let middle = lane.middle() + 2.0;
@@ -216,6 +218,7 @@ fn cut_label(area: &Shaded<'_>) -> String {
         .iter()
         .map(|cut| (&cut.from).max(&cut.to))
         .collect();
+
     match area.cuts[..] {
         [cut] => format!("{} → {} cut", cut.from, cut.to),
         _ if pairs.len() == 1 && targets.len() == 1 => {

@@ -57,6 +57,7 @@ impl Sign {
     fn occurs(self, picture: &Picture, items: &Items) -> bool {
         let window = picture.window;
         let commands = &items.commands;
+
         match self {
             Self::Command => !commands.is_empty(),
             Self::Delayed => commands.iter().any(|command| command.until.is_some()),
@@ -78,6 +79,7 @@ impl Sign {
     /// Draws it from `x` on; `y` is its middle.
     fn draw(self, picture: &mut Picture, x: f64, y: f64) {
         let end = x + SIGN_PX;
+
         match self {
             Self::Command => {
                 picture.path("line", &[(x, y), (end - 3.0, y)]);

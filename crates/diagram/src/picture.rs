@@ -108,6 +108,7 @@ impl Picture {
             d.push(' ');
             d += &number(*y);
         }
+
         self.svg
             .tag("path")
             .with("class", class)
@@ -118,6 +119,7 @@ impl Picture {
     /// A cross.
     pub(crate) fn cross(&mut self, class: &str, x: f64, y: f64) {
         const ARM_PX: f64 = 4.0;
+
         let d = format!(
             "M{} {}l8 8M{} {}l8 -8",
             number(x - ARM_PX),

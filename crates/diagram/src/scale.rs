@@ -100,6 +100,7 @@ impl Scale {
             (end - begin) as f64 * self.tick_px
         };
         let right_px = left_px + width_px;
+
         self.pieces.push(Piece {
             begin,
             end,
@@ -107,6 +108,7 @@ impl Scale {
             right_px,
             is_gap,
         });
+
         right_px
     }
 

@@ -96,6 +96,7 @@ impl State {
                 queries,
             } => {
                 self.heal(from, to, tick, items);
+
                 let cut = Cut {
                     from: from.clone(),
                     to: to.clone(),
@@ -280,6 +281,7 @@ impl State {
                 },
             });
         }
+
         if begins {
             self.robot(name).faults.push((kind, tick));
         }
@@ -339,6 +341,7 @@ impl State {
                     is_doubled: false,
                     ends: Vec::new(),
                 };
+
                 let before = self.commands.insert((from.clone(), *seq), sent);
                 items.commands.extend(before);
             }

@@ -140,6 +140,7 @@ impl Titles {
 
     pub(crate) fn cuts(self, cuts: &[&Cut]) -> String {
         const MOST: usize = 12;
+
         let mut title = "cut:".to_owned();
         for cut in cuts.iter().take(MOST) {
             let what = match (cut.commands, cut.queries) {
@@ -154,9 +155,11 @@ impl Titles {
                 self.period(cut.period)
             );
         }
+
         if cuts.len() > MOST {
             title += &format!(" and {} more links", cuts.len() - MOST);
         }
+
         title
     }
 

@@ -62,6 +62,7 @@ pub fn recorded_epoch(folder: &RunFolder, number: Option<Epoch>) -> Result<Epoch
         None => epochs.pop(),
         Some(number) => epochs.into_iter().find(|files| files.epoch == number),
     };
+
     chosen.ok_or_else(|| {
         FileError::new(format!(
             "{} has no epoch {}, the last one is {last}",

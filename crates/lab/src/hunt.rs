@@ -283,6 +283,7 @@ impl Hunt<'_> {
             };
             cases.push(Case::of(faults));
         }
+
         cases
     }
 
@@ -329,6 +330,7 @@ impl Hunt<'_> {
             if !self.wanted.contains(name) {
                 continue;
             }
+
             if let Some(known) = self.known(name, &signs) {
                 known.plans += 1;
             } else if self.report.findings.len() >= MAX_FINDINGS {
@@ -337,6 +339,7 @@ impl Hunt<'_> {
                 self.find(name, plan, case, played, progress)?;
             }
         }
+
         Ok(())
     }
 
@@ -396,6 +399,7 @@ impl Hunt<'_> {
         let failure = &played.failed[name];
         let faults = case.faults.iter().map(|fault| fault.in_words(tick_s));
         let file = file::name(&self.subject.file, name, self.options.seed, plan);
+
         Finding {
             expectation: name.to_owned(),
             because: failure.because.clone(),

@@ -158,10 +158,12 @@ impl Reexecution {
     /// Lets robots go and come as they did.
     fn repeat_membership(&mut self, recorded: &Entry) {
         self.script.set(recorded);
+
         let names = self.local.simulation.names().to_vec();
         for name in &names {
             let is_missing = recorded.has_missed(name);
             let has_joined = recorded.has_joined(name);
+
             if is_missing || has_joined {
                 self.local.robots.crash(name);
                 self.absent.insert(name.clone());
@@ -205,6 +207,7 @@ impl Reexecution {
                 ));
             }
         }
+
         Ok(())
     }
 }
@@ -260,6 +263,7 @@ impl Repeated<'_> {
                 _ => {}
             }
         }
+
         membership
     }
 }

@@ -133,6 +133,7 @@ fn no_reports(recording: &Path, name: &RobotName, robots: Option<&[RobotName]>) 
             for robot in robots {
                 names.push(robot.as_str());
             }
+
             FileError::new(format!("{place} has no robot {name}"))
                 .with_help(format!("its robots are {}", names.join(", ")))
         }

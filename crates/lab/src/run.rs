@@ -110,6 +110,7 @@ fn wait_until(
         if left.is_zero() {
             return Ok(());
         }
+
         std::thread::sleep(left.min(NAP));
         goes_on()?;
     }
@@ -172,6 +173,7 @@ fn go_on_with(
         let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
         each(local, &record, opened)?;
     }
+
     let end = local.simulation.end(End::Finished);
     each(local, &end, Instant::now())
 }
@@ -335,5 +337,6 @@ pub fn make_robots_with(
         })?;
         robots.insert(name.clone(), robot);
     }
+
     Ok(robots)
 }

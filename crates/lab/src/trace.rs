@@ -126,6 +126,7 @@ impl Trace {
                 self.end - 1
             ));
         }
+
         notes
     }
 
@@ -301,6 +302,7 @@ impl<'a, W: Write> Writer<'a, W> {
             let Some(thread) = self.threads.get(&robot.name).copied() else {
                 continue;
             };
+
             let args = json!({ "tick": number });
             if let Some(arrived) = tick.wall.reports_ns.get(&robot.name) {
                 self.has_reports = true;
@@ -319,6 +321,7 @@ impl<'a, W: Write> Writer<'a, W> {
                 })?;
             }
         }
+
         Ok(())
     }
 

@@ -130,6 +130,7 @@ impl Launch {
         options: LaunchOptions,
     ) -> miette::Result<Self> {
         let secured = secured(&options, &file)?;
+
         Ok(Self {
             what,
             options,
@@ -253,10 +254,12 @@ impl Launch {
             has_console: self.options.has_console,
             opens_browser: self.options.opens_browser,
         };
+
         let mut planned = plan::plan(&self.file, &execution)?;
         for link in &self.options.links {
             link.apply(&mut planned)?;
         }
+
         Ok(planned)
     }
 

@@ -95,6 +95,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(300);
 pub(super) async fn watch_stops(group: Group, name: String, screen: ScreenHandle) {
     let file = format!("/proc/{}/stat", group.0);
     let mut was_stopped = false;
+
     // The name of the program, in parentheses, may contain anything; the state follows it.
     while let Ok(text) = std::fs::read_to_string(&file)
         && let Some((_, fields)) = text.rsplit_once(") ")
@@ -107,6 +108,7 @@ pub(super) async fn watch_stops(group: Group, name: String, screen: ScreenHandle
                 format!("{name} runs again")
             });
         }
+
         was_stopped = is_stopped;
         tokio::time::sleep(LOOK_EVERY).await;
     }

@@ -288,6 +288,7 @@ impl Secured {
     ) -> miette::Result<Self> {
         let folder = std::path::absolute(folder).into_diagnostic()?;
         let secured = Self { folder };
+
         for name in [SIMULATOR, OPERATOR].into_iter().chain(names) {
             let file = secured.config_of(name);
             if !file.is_file() {
@@ -299,6 +300,7 @@ impl Secured {
                 ));
             }
         }
+
         Ok(secured)
     }
 

@@ -123,6 +123,7 @@ impl Supervisor {
         screen: ScreenHandle,
     ) -> Self {
         let (queue, events) = tokio::sync::mpsc::unbounded_channel();
+
         Self {
             processes: planned.into_iter().map(Supervised::new).collect(),
             logs: logs.to_owned(),
@@ -339,6 +340,7 @@ impl Supervisor {
         if stage != self.stage {
             return; // The phase ended before its grace period.
         }
+
         match stage {
             Shutdown::Running | Shutdown::GivenUp => {
                 unreachable!("these phases have no grace period")

@@ -445,10 +445,12 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
                 if self.rules.hold(Rule::RepeatsClock) {
                     self.repeat(out);
                 }
+
                 let roster: Vec<RobotName> = self.members.keys().cloned().collect();
                 for name in roster {
                     self.stand_in(&name, out);
                 }
+
                 out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
             }
             Timer::Deadline if self.phase == Phase::Open && self.attendance.is_none() => {

@@ -513,6 +513,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         if self.standing == Standing::Left {
             return;
         }
+
         match timer {
             RobotTimer::Join if self.standing == Standing::Joining => out.push(Action::Join),
             RobotTimer::JoinPatience if self.admission.is_none() => {

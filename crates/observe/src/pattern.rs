@@ -91,8 +91,10 @@ fn kinds() -> BTreeMap<String, BTreeMap<String, Domain>> {
                 fields.insert(name.clone(), domain(&schema, field));
             }
         }
+
         kinds.insert(kind, fields);
     }
+
     kinds
 }
 

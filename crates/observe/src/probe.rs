@@ -144,6 +144,7 @@ impl<'a> Probe<'a> {
                         return Err(self.no_variable(&counter.robot, &counter.variable));
                     }
                 }
+
                 Ok(tally.measured(now_s))
             }
         }
@@ -333,6 +334,7 @@ impl ShareTally<'_> {
                 }
                 _ => continue,
             };
+
             if *of == self.definition.robot {
                 let is_in = states.contains(to);
                 self.change(is_in, observation.time_s);

@@ -49,8 +49,10 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
     let name = robot.as_str();
     let says = ["report", "waiting", "panel", STATE].map(|what| keys.robot(name, what));
     let commands = keys.robot("*", &format!("command/{name}"));
+
     let mut asks = state_keys(keys, "*");
     asks.push(keys.join_as(robot));
+
     vec![
         grant(
             "says",
@@ -82,8 +84,10 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
 pub fn of_operator(keys: &Keys) -> Vec<Grant> {
     let mut asks = state_keys(keys, "*");
     asks.push(keys.control());
+
     let panels = keys.robot("*", "panel");
     let commands = keys.robot("*", &format!("command/{OPERATOR}"));
+
     vec![
         grant("commands", &["put"], vec![commands]),
         grant("asks", &["query"], asks),

@@ -51,6 +51,7 @@ fn placeholder(name: &'static str) -> RobotName {
 fn channels() -> Vec<Channel> {
     let run = RunName::new("RUN-").unwrap_or_else(|error| unreachable!("a legal name: {error}"));
     let (keys, robot, from) = (Keys::new(&run), placeholder("NAME-"), placeholder("FROM-"));
+
     let channel = |name, key, what, messages, operations| Channel {
         name,
         key,
@@ -58,6 +59,7 @@ fn channels() -> Vec<Channel> {
         messages,
         operations,
     };
+
     let mut channels = vec![
         channel(
             "clock",
@@ -176,6 +178,7 @@ fn channels() -> Vec<Channel> {
             &[],
         ),
     ];
+
     let query = |name| {
         let what = "One field of what a robot lets others know. Parameters tick and epoch.";
         channel(
@@ -226,6 +229,7 @@ impl Channel {
                 reference(&["components", "messages", name]),
             )
         };
+
         json!({
             "parameters": parameters(&address),
             "address": address,
@@ -237,16 +241,19 @@ impl Channel {
     fn operation(&self, operation: &Operation) -> (String, Value) {
         let channel = || reference(&["channels", self.name]);
         let message = |name: &str| json!([reference(&["channels", self.name, "messages", name])]);
+
         let plain = |verb: &str, action: &str, name: &str| {
             let operation =
                 json!({ "action": action, "channel": channel(), "messages": message(name) });
             (format!("{verb}_{}", self.name), operation)
         };
+
         let query = |verb: &str, action: &str, with: &str, answer: &str| {
             let (name, mut operation) = plain(verb, action, with);
             operation["reply"] = json!({ "channel": channel(), "messages": message(answer) });
             (name, operation)
         };
+
         match operation {
             Send(name) => plain("put", "send", name),
             Receive(name) => plain("receive", "receive", name),
@@ -261,6 +268,7 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
     fn one<M: JsonSchema>(schemas: &mut SchemaGenerator) -> Schema {
         schemas.subschema_for::<M>()
     }
+
     type Of = fn(&mut SchemaGenerator) -> Schema;
     let all: [(&str, Of); 15] = [
         ("answer", one::<Answer>),
@@ -279,8 +287,10 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
         ("waiting", one::<Waiting>),
         ("world_frame", one::<WorldFrame>),
     ];
+
     let described = |(name, of): (&str, Of)| (name.to_owned(), json!({ "payload": of(schemas) }));
     let mut messages: Map<String, Value> = all.into_iter().map(described).collect();
+
     let summary =
         "A query without a payload; its parameters say as of which tick: `tick=12;epoch=1`.";
     messages.insert("query".to_owned(), json!({ "summary": summary }));
@@ -295,6 +305,7 @@ pub fn document() -> Value {
     settings.definitions_path = "/components/schemas".into();
     settings.meta_schema = None;
     let mut schemas = settings.into_generator();
+
     let messages = messages(&mut schemas);
     let channels = channels();
     let operations = channels.iter().flat_map(|channel| {
@@ -303,6 +314,7 @@ pub fn document() -> Value {
             .iter()
             .map(|operation| channel.operation(operation))
     });
+
     json!({
         "asyncapi": "3.0.0",
         "info": {

@@ -374,6 +374,7 @@ impl Event {
             Self::CommandDropped { from, to, seq, .. } => (from, to, seq, "", Fate::Dropped),
             _ => return None,
         };
+
         Some(Flight {
             tick,
             from: from.clone(),
@@ -388,6 +389,7 @@ impl Event {
     fn readable(&self) -> Option<(String, LogKind, String)> {
         let simulator = |kind, text: String| Some(("simulator".to_owned(), kind, text));
         let says = |robot: &RobotName, kind, text: String| Some((robot.to_string(), kind, text));
+
         match self {
             Self::Init { seed, .. } => simulator(LogKind::Run, format!("initialized, seed {seed}")),
             Self::Joined {
@@ -428,6 +430,7 @@ impl Event {
                 } else {
                     format!("fault over: {what} no more")
                 };
+
                 says(robot, LogKind::Membership, text)
             }
             Self::Emotion { robot, from, to } => says(

@@ -26,6 +26,7 @@ fn checked(name: &str) -> Result<String, BadName> {
             reason,
         })
     };
+
     if name.is_empty() {
         return refuse("it is empty");
     }
@@ -41,6 +42,7 @@ fn checked(name: &str) -> Result<String, BadName> {
             "only letters, digits, '_', '-' and '.' may stand in it, and no leading '.'",
         );
     }
+
     Ok(name.to_owned())
 }
 

@@ -16,6 +16,7 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
     fn one<M: JsonSchema>() -> Schema {
         schema_for!(M)
     }
+
     [
         ("answer", one::<Answer>()),
         ("clock", one::<Clock>()),

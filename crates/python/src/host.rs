@@ -62,12 +62,14 @@ pub(crate) fn take_part(
 ) -> PyResult<&'static str> {
     let args = RobotArgs::try_parse_from(arguments)
         .map_err(|error| PyValueError::new_err(error.to_string()))?;
+
     let failure = Failure::default();
     let mut seated: Robots = Vec::new();
     for (name, object) in robots {
         let name = RobotName::new(&name).map_err(crate::error::plain)?;
         seated.push((name, Box::new(PythonRobot::new(&object, &failure)?)));
     }
+
     play(py, seated, &args, &failure)
 }
 
@@ -78,9 +80,11 @@ fn play(
     failure: &Failure,
 ) -> PyResult<&'static str> {
     use_one_thread(py)?;
+
     let options = args.options();
     let connected = interruptible(py, move || Host::connect(robots, options), || {})?;
     let host = connected.map_err(|error| exception(&error, failure))?;
+
     let stopper = host.stopper();
     let ended = interruptible(py, move || host.run(), || stopper.stop())?;
     match ended {

@@ -20,9 +20,11 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
     error::print_without_colors();
+
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<cars::Cars>()?;
     module.add_class::<stream::Stream>()?;
+
     module.add_function(wrap_pyfunction!(stream::stream, module)?)?;
     module.add_function(wrap_pyfunction!(stream::published_angle, module)?)?;
     module.add_function(wrap_pyfunction!(host::main, module)?)?;
@@ -35,5 +37,6 @@ fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(pictures::report, module)?)?;
     module.add_function(wrap_pyfunction!(pictures::figures, module)?)?;
     module.add_function(wrap_pyfunction!(pictures::diagram, module)?)?;
+
     Ok(())
 }

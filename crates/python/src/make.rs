@@ -43,6 +43,7 @@ impl Makers {
         let Some(maker) = self.makers.get(name.as_str()) else {
             return robots::make(class);
         };
+
         let made = Python::attach(|py| {
             let object = maker.bind(py).call0()?;
             PythonRobot::new(&object, &self.failure)

@@ -51,6 +51,7 @@ pub(crate) fn diagram(
         from: from.map(str::parse::<Moment>).transpose().map_err(plain)?,
         to: to.map(str::parse::<Moment>).transpose().map_err(plain)?,
     };
+
     let drawn = py.detach(|| -> miette::Result<_> {
         let folder = RunFolder::at(run);
         let files = recorded_epoch(&folder, None)?;
@@ -58,6 +59,7 @@ pub(crate) fn diagram(
         if recorded_epochs(&folder)?.len() > 1 {
             title += &format!(", epoch {}", files.epoch);
         }
+
         let options = Options {
             title,
             queries,
@@ -66,6 +68,7 @@ pub(crate) fn diagram(
         };
         draw(&files, window, options)
     });
+
     let drawn = drawn.map_err(reported)?;
     Ok((drawn.svg, drawn.notes))
 }

@@ -57,6 +57,7 @@ pub(crate) fn run(
         out,
         set: overrides(&set)?,
     };
+
     let failure = Failure::default();
     let makers = Makers::new(robots, &failure);
     py.detach(|| play(&file, &options, &makers, &failure))

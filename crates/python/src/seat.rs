@@ -79,6 +79,7 @@ impl PythonRobot {
                 }
             }
         }
+
         None
     }
 

@@ -109,6 +109,7 @@ fn read_variable(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Variable> {
     if let Ok(text) = value.cast::<PyString>() {
         return Ok(Variable::Text(text.to_string()));
     }
+
     match value.extract() {
         Ok(number) => Ok(Variable::Number(number)),
         // Not finite, which the seat leaves out and logs.

@@ -275,6 +275,7 @@ impl Frame {
                 }
             }
         }
+
         standings
     }
 }

@@ -111,6 +111,7 @@ impl Encoder {
         for event in tick.events {
             self.add_event(number, event, chunk);
         }
+
         // A robot outside the scenario cannot report.
         for (robot, report) in &tick.reports {
             if let Some(ids) = self.robots.get(*robot) {
@@ -122,6 +123,7 @@ impl Encoder {
                 self.add(chunk, ids.panel, number, panel);
             }
         }
+
         self.add(chunk, self.ids.wall, number, tick.wall);
         self.add_views(tick, chunk);
     }

@@ -363,6 +363,7 @@ impl Index {
         let (first_ns, last_ns) = self.times_ns.unwrap_or((0, 0));
         let mut bytes = Vec::new();
         let mut record = Record::begin(&mut bytes, op::STATISTICS);
+
         record.u64(self.messages.values().sum());
         record.u16(self.channels.schema_ids.len() as u16);
         record.u32(u32::from(self.channels.channel_count));
@@ -371,11 +372,13 @@ impl Index {
         record.u32(self.chunk_count);
         record.u64(first_ns);
         record.u64(last_ns);
+
         record.u32(self.messages.len() as u32 * (2 + 8));
         for (channel, count) in &self.messages {
             record.u16(*channel);
             record.u64(*count);
         }
+
         record.end();
         bytes
     }

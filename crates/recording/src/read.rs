@@ -246,6 +246,7 @@ impl Recording {
             self.events(next, end)?.into_iter().for_each(&mut each);
             next = end;
         }
+
         Ok(())
     }
 
@@ -362,6 +363,7 @@ impl Recording {
         for chunk in chunks {
             let first = self.header.tick_at(chunk.start_ns);
             let last = self.header.tick_at(chunk.end_ns);
+
             let before = self.chunks.last().map(|chunk| chunk.last);
             let due = before.map_or(0, |tick| tick.saturating_add(1));
             let goes_on = before == Some(first);
@@ -369,8 +371,10 @@ impl Recording {
                 let reason = format!("ticks {first} to {last} where tick {due} is due");
                 return Err(self.bytes.name.damaged(chunk.offset, &reason));
             }
+
             self.chunks.push(TickChunk { chunk, first, last });
         }
+
         Ok(())
     }
 
@@ -393,6 +397,7 @@ impl Partial {
                 self.panels.insert(robot.clone(), Json::unchecked(json));
             }
         }
+
         Ok(())
     }
 }

@@ -76,6 +76,7 @@ pub(crate) fn robots(to: &mut Protobuf<'_>, header: &Header, tick: &TickView<'_>
         let at = robot.location;
         let direction_rad = direction_rad(tick, robot);
         let color_of = ROBOT_COLORS[index % ROBOT_COLORS.len()];
+
         to.message(2, |to| {
             entity(to, time_ns, robot.name.as_str());
             to.message(8, |to| {
@@ -108,11 +109,13 @@ pub(crate) fn guests(to: &mut Protobuf<'_>, guests_mm: &[i64], time_ns: u64) {
         .text(2, FIELD)
         .message(3, |to| pose(to, 0.0, 0.0, 0.0, 0.0))
         .fixed32(4, 3 * 4);
+
     for (name, offset) in [("x", 0), ("y", 4), ("z", 8)] {
         to.message(5, |to| {
             to.text(1, name).fixed32(2, offset).integer(3, FLOAT32);
         });
     }
+
     to.bytes(6, |bytes| {
         for place in guests_mm.chunks_exact(2) {
             for coordinate in [place[0], place[1], 0] {

@@ -251,6 +251,7 @@ impl OpenChunk {
 /// Writes until there is nothing more to come.
 fn write(mut file: McapFile, queue: &Queue) -> io::Result<()> {
     let _over = Over(queue);
+
     loop {
         match queue.next() {
             Task::Write(mut chunk) => {
@@ -264,6 +265,7 @@ fn write(mut file: McapFile, queue: &Queue) -> io::Result<()> {
             }
             Task::Finish => return file.finish(),
         }
+
         queue.done.notify_one();
     }
 }

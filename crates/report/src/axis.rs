@@ -8,6 +8,7 @@ use crate::scale::Scale;
 pub(crate) fn draw_below(chart: &mut Chart, scale: &Scale, top: f64, bottom: f64, title: &str) {
     let width_px = (scale.to_px - scale.from_px).abs();
     let (ticks, decimals) = scale.ticks((width_px / 50.0).round().max(3.0) as usize);
+
     for value in ticks {
         let x = scale.at(value);
         chart.line("grid", (x, top), (x, bottom));
@@ -19,6 +20,7 @@ pub(crate) fn draw_below(chart: &mut Chart, scale: &Scale, top: f64, bottom: f64
             &typeset(value, decimals),
         );
     }
+
     chart.line("axis", (scale.from_px, bottom), (scale.to_px, bottom));
     if !title.is_empty() {
         let middle = f64::midpoint(scale.from_px, scale.to_px);
@@ -30,6 +32,7 @@ pub(crate) fn draw_below(chart: &mut Chart, scale: &Scale, top: f64, bottom: f64
 pub(crate) fn draw_left(chart: &mut Chart, scale: &Scale, left: f64, right: f64) {
     let height_px = (scale.to_px - scale.from_px).abs();
     let (ticks, decimals) = scale.ticks((height_px / 40.0).round().max(2.0) as usize);
+
     for value in ticks {
         let y = scale.at(value);
         chart.line("grid", (left, y), (right, y));

@@ -181,6 +181,7 @@ impl Bands {
         let total: f64 = names.iter().map(|(_, time_s)| time_s).sum();
         let mut x = left;
         let mut y = top + 10.0;
+
         for (name, time_s) in names {
             let text = key_text(name, time_s / total.max(f64::MIN_POSITIVE));
             let width = 16.0 + width_px(&text, LABEL_PX) + 12.0;
@@ -188,6 +189,7 @@ impl Bands {
                 x = left;
                 y += 18.0;
             }
+
             chart.rect(&self.state.class(name), x, y - 9.0, 11.0, 11.0);
             chart.text("", x + 16.0, y, "start", &text);
             x += width;

@@ -39,8 +39,10 @@ impl Chart {
             .at("height", height)
             .with("role", "img")
             .open();
+
         svg.title(title);
         svg.tag("desc").content(description);
+
         Self { svg }
     }
 

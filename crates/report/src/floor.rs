@@ -76,11 +76,13 @@ impl Floor {
     fn draw_times(&self, chart: &mut Chart, x: &Scale, y: &Scale) {
         let most_s = self.most_s().max(f64::MIN_POSITIVE);
         let mut paths: BTreeMap<usize, String> = BTreeMap::new();
+
         for ((column, row), time_s) in &self.times_s {
             let from_x = x.at(f64::from(*column) * self.part_m);
             let to_x = x.at(f64::from(*column + 1) * self.part_m);
             let from_y = y.at(f64::from(*row) * self.part_m);
             let to_y = y.at(f64::from(*row + 1) * self.part_m);
+
             let path = paths.entry(level((time_s / most_s).sqrt())).or_default();
             *path += &format!(
                 "M{} {}H{}V{}H{}z",
@@ -91,6 +93,7 @@ impl Floor {
                 number(from_x)
             );
         }
+
         for (level, path) in paths {
             chart.path(&format!("h{level}"), &path);
         }
@@ -103,6 +106,7 @@ impl Floor {
             let top = y.at(center_y + half);
             let width = x.at(center_x + half) - left;
             let height = y.at(center_y - half) - top;
+
             chart.group(
                 "obstacle",
                 &format!("obstacle at {center_x:.2} m, {center_y:.2} m"),

@@ -90,6 +90,7 @@ impl Intervals {
         chart.group("row", &self.row_title(row));
         let label = shortened(&row.label, LABEL_LETTERS);
         chart.text("", scale.from_px - 12.0, middle + 4.0, "end", &label);
+
         if let Some(estimate) = row.estimate {
             if let Some((low, high)) = estimate.interval {
                 let class = format!("curve solid a{}", row.arm % ARMS);
@@ -98,6 +99,7 @@ impl Intervals {
             let place = (scale.at(estimate.value), middle);
             chart.marker(row.arm, place, row.is_filled);
         }
+
         chart.text(
             "tick",
             PANEL_PX - 1.0,

@@ -186,11 +186,13 @@ impl Page {
     pub fn table(&mut self, caption: &[Part], table: &Table) -> usize {
         self.tables += 1;
         let number = self.tables;
+
         let body = &mut self.body;
         body.tag("figure")
             .with("class", "table")
             .with("id", &format!("table-{number}"))
             .open();
+
         body.tag("figcaption").open();
         body.tag("b").content(&format!("Table {number}."));
         body.text(" ");
@@ -198,6 +200,7 @@ impl Page {
         body.close("figcaption");
         table.write(body);
         body.close("figure");
+
         number
     }
 

@@ -173,6 +173,7 @@ impl Curve {
                 _ => visible.push(*step),
             }
         }
+
         visible
     }
 

@@ -55,6 +55,7 @@ fn variables(choose: impl Fn(&'static str, &'static str, &'static str) -> &'stat
         // Infallible: it is written to memory.
         let _ = write!(rules, "--{name}:{color};");
     }
+
     for (prefix, shades) in palettes() {
         for (index, Shade { light, dark }) in shades.iter().enumerate() {
             let color = choose(prefix, light, dark);
@@ -65,6 +66,7 @@ fn variables(choose: impl Fn(&'static str, &'static str, &'static str) -> &'stat
             );
         }
     }
+
     rules
 }
 
@@ -81,6 +83,7 @@ fn classes() -> String {
             );
         }
     }
+
     for index in 0..ARM_SHADES.len() {
         let color = format!("var(--a{index})");
         let _ = writeln!(
@@ -88,5 +91,6 @@ fn classes() -> String {
             ".chart .curve.a{index}{{fill:none;stroke:{color}}}.chart .mark.a{index}{{stroke:{color}}}.chart .mark.hollow.a{index}{{fill:var(--paper)}}"
         );
     }
+
     rules
 }

@@ -124,6 +124,7 @@ fn write_cell(markup: &mut Markup, name: &'static str, is_number: bool, cell: &C
     if is_number {
         tag = tag.with("class", "number");
     }
+
     match cell {
         Cell::Text(text) => tag.content(text),
         Cell::Count(count) => tag.content(&count.to_string()),

@@ -119,16 +119,19 @@ impl Trend {
 
     fn draw_levels(&self, chart: &mut Chart, x: &Scale, (left, right): (f64, f64), bottom: f64) {
         chart.line("axis", (left, bottom), (right, bottom));
+
         let mut free_from = f64::NEG_INFINITY;
         for (value, name) in &self.levels {
             let at = x.at(*value);
             chart.line("axis", (at, bottom), (at, bottom + 4.0));
+
             let half_px = width_px(name, LABEL_PX) / 2.0;
             if at - half_px >= free_from {
                 chart.text("tick", at, bottom + 16.0, "middle", name);
                 free_from = at + half_px + 4.0;
             }
         }
+
         let middle = f64::midpoint(left, right);
         chart.text("muted", middle, bottom + 31.0, "middle", &self.x_axis);
     }
@@ -184,6 +187,7 @@ impl Trend {
             let high = typeset(high, self.decimals);
             text += &format!(" [{low}, {high}]");
         }
+
         text + &format!(", n = {}", estimate.n)
     }
 

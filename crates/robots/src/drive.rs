@@ -177,6 +177,7 @@ impl Drive {
         if is_free(cars, bodies, stepped(here, straight, step_m)) {
             return Some(straight);
         }
+
         for (cos, sin) in OFFSETS {
             for side in [self.side, -self.side] {
                 let heading = turned(straight, cos, side * sin);
@@ -186,6 +187,7 @@ impl Drive {
                 }
             }
         }
+
         None
     }
 }

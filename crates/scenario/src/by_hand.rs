@@ -58,6 +58,7 @@ impl Scenario {
                 });
             }
         };
+
         Ok(vec![words])
     }
 

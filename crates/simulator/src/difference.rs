@@ -138,6 +138,7 @@ fn of_events(tick: Tick, pair: [Option<&Event>; 2]) -> Difference {
 fn first_report(a: &Entry, b: &Entry) -> Option<Difference> {
     let one = a.reports.as_ref()?;
     let other = b.reports.as_ref()?;
+
     let names: BTreeSet<&RobotName> = one.keys().chain(other.keys()).collect();
     for name in names {
         let jsons = [one.get(name), other.get(name)]
@@ -158,6 +159,7 @@ fn first_report(a: &Entry, b: &Entry) -> Option<Difference> {
             });
         }
     }
+
     None
 }
 

@@ -170,6 +170,7 @@ impl Medium {
             cut: BTreeMap::new(),
             counts: BTreeMap::new(),
         };
+
         medium.count_for(&network);
         medium.network = network;
         medium
@@ -259,6 +260,7 @@ impl Medium {
             if !partition.lasts_at(tick) {
                 continue;
             }
+
             for (from, to) in pairs(&self.roster) {
                 if partition.separates(&from, &to) {
                     let scope = cuts.entry((from, to)).or_default();
@@ -267,6 +269,7 @@ impl Medium {
                 }
             }
         }
+
         cuts
     }
 

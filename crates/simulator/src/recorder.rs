@@ -191,6 +191,7 @@ impl RunFolder {
                 files.push(entry.path());
             }
         }
+
         files
     }
 

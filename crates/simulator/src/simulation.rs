@@ -237,6 +237,7 @@ impl Simulation {
                 });
             }
         }
+
         if let Some(network) = network {
             self.medium.set_network(network);
         }
@@ -322,6 +323,7 @@ impl Simulation {
     pub fn held_processes(&self, late: &[RobotName]) -> Vec<HeldProcess> {
         let is_complete = self.now == self.tick;
         let mut held = Vec::new();
+
         for fault in self.scenario.faults_at(self.now) {
             if fault.holds(self.now, is_complete) {
                 held.push(HeldProcess {
@@ -330,6 +332,7 @@ impl Simulation {
                 });
             }
         }
+
         for robot in late {
             let is_told = held.iter().any(|held| held.robot == *robot);
             if let Some(kind) = self.held_by_wall_clock(robot).filter(|_| !is_told) {
@@ -339,6 +342,7 @@ impl Simulation {
                 });
             }
         }
+
         held
     }
 
@@ -398,6 +402,7 @@ impl Simulation {
 
     fn note_reports(&mut self, mut reports: ReportsByName, digest: &mut TickDigest) {
         self.silent.clear();
+
         for name in self.names.clone() {
             if let Some((report, commands)) = reports.remove(&name) {
                 let sent = self.number_commands(&name, commands);
@@ -648,6 +653,7 @@ impl Simulation {
     ) -> Vec<SentCommand> {
         let count = self.sent.entry(from.clone()).or_default();
         let mut numbered = Vec::with_capacity(commands.len());
+
         for Sent { to, command } in commands {
             *count += 1;
             numbered.push(SentCommand {
@@ -657,6 +663,7 @@ impl Simulation {
                 text: command,
             });
         }
+
         numbered
     }
 
@@ -735,11 +742,13 @@ impl Simulation {
                 });
             }
         }
+
         for order in orders {
             let is_stopped = matches!(order.lasting(), Some(FaultKind::Crash | FaultKind::Hang));
             if is_stopped && on_late(&order.robot) == OnLate::Continue {
                 self.stop(&order.robot);
             }
+
             self.between.push(Event::Fault {
                 robot: order.robot.clone(),
                 kind: order.kind,

@@ -297,6 +297,7 @@ fn weighted_mean_s(sorted: &[(usize, TimeTo)], weights: &[usize], n: usize, unti
     let mut area = 0.0;
     let mut since_s = 0.0;
     let mut share = 1.0;
+
     for (index, time) in sorted {
         let weight = weights[*index];
         if weight == 0 {
@@ -305,6 +306,7 @@ fn weighted_mean_s(sorted: &[(usize, TimeTo)], weights: &[usize], n: usize, unti
         if time.time_s >= until_s {
             break;
         }
+
         if time.is_event {
             area += share * (time.time_s - since_s);
             since_s = time.time_s;
@@ -313,6 +315,7 @@ fn weighted_mean_s(sorted: &[(usize, TimeTo)], weights: &[usize], n: usize, unti
         }
         at_risk -= weight;
     }
+
     area + share * (until_s - since_s)
 }
 

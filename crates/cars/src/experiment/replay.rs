@@ -116,14 +116,17 @@ fn launch(
         Robots::InProcess | Robots::Programs => None,
     };
     let file = write_launch(scenario, launch, files.path())?;
+
     let mut command = launcher();
     command.arg("launch").arg(file).args(options.to_args(run));
     command.args(["--speed", "max", "--no-console", "--quiet"]);
     let status = command.status().into_diagnostic()?;
+
     let folder = RunFolder::new(&options.out, run);
     let summary = read_summary(&folder)?;
     // Verdicts are exit statuses, too: the run is there.
     let summary = summary.filter(|summary| summary.end.is_some());
     let summary = summary.ok_or_else(|| miette!("the launch failed: {status}"))?;
+
     Ok((summary, folder))
 }

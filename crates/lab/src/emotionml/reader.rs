@@ -328,6 +328,7 @@ fn parameters(folder: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<RobotName
             notes.push(format!("{reason}: goals are not known"));
         }
     }
+
     parameters
 }
 

@@ -160,9 +160,11 @@ fn paired<T: Copy>(
             others.push(*other);
         }
     }
+
     if runs.is_empty() {
         return None;
     }
+
     Some((runs.len(), compare(&runs, &others)))
 }
 

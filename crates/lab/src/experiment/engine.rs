@@ -74,6 +74,7 @@ impl Queue {
                 units.push(number);
             }
         }
+
         Self {
             units,
             next: AtomicUsize::new(0),

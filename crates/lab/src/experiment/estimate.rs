@@ -58,6 +58,7 @@ impl Experiment {
                 }
             }
         }
+
         cells
     }
 }
@@ -101,6 +102,7 @@ pub(super) fn times(
         };
         times.insert(run.seed, time);
     }
+
     times
 }
 

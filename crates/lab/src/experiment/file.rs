@@ -282,6 +282,7 @@ impl Experiment {
                 }
             }
         }
+
         Ok(())
     }
 

@@ -667,6 +667,7 @@ fn check_overlaps(sources: &[(String, Vec<Override>)]) -> miette::Result<()> {
             }
         }
     }
+
     Ok(())
 }
 

@@ -118,21 +118,25 @@ fn programs_of(scenario: &Scenario) -> Table {
 /// A launch file whose relative paths hold in another folder.
 fn relocated(launch: &LaunchText) -> miette::Result<Table> {
     let mut table: Table = toml::from_str(&launch.text).into_diagnostic()?;
+
     if let Some(Value::String(secure)) = table.get_mut("secure") {
         *secure = launch.folder.join(&*secure).display().to_string();
     }
+
     if let Some(command) = table
         .get_mut("simulator")
         .and_then(|part| part.get_mut("command"))
     {
         relocate(command, &launch.folder);
     }
+
     let processes = table.get_mut("process").and_then(Value::as_array_mut);
     for process in processes.into_iter().flatten() {
         if let Some(command) = process.get_mut("command") {
             relocate(command, &launch.folder);
         }
     }
+
     Ok(table)
 }
 

@@ -85,11 +85,13 @@ impl Provenance {
 impl Machine {
     fn this() -> Self {
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+
         let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let model = processors
             .lines()
             .find(|line| line.starts_with("model name"));
         let model = model.and_then(|line| line.split_once(':'));
+
         Self {
             host: host.map(|host| host.trim().to_owned()),
             os: std::env::consts::OS.to_owned(),

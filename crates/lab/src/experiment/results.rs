@@ -158,8 +158,10 @@ impl Results {
                     _ => {}
                 }
             }
+
             all.push(judged);
         }
+
         all
     }
 
@@ -195,6 +197,7 @@ impl Results {
         let columns = Columns::of(self);
         let formats = [Format::Csv, Format::Parquet];
         let mut sheet = Sheet::create(folder, RUNS, &formats, columns.all.clone())?;
+
         let mut outcomes = self.outcomes.iter().peekable();
         let mut failures = self.failures.iter().peekable();
         for number in 0..self.plan.units() {
@@ -210,6 +213,7 @@ impl Results {
                 sheet.add(row)?;
             }
         }
+
         sheet.finish()
     }
 }
@@ -302,6 +306,7 @@ impl Columns {
         row.push(("seed", outcome.seed.into()));
         row.push(("yoked_to_seed", outcome.yoked_to_seed.into()));
         row.push(("digest", outcome.digest.as_str().into()));
+
         for (name, measured) in &outcome.measures {
             let (number, censored) = &self.measures[name];
             row.push((number, measured.value.into()));
@@ -309,9 +314,11 @@ impl Columns {
                 row.push((censored, measured.is_censored.into()));
             }
         }
+
         for (name, verdict) in &outcome.verdicts {
             row.push((&self.verdicts[name], verdict.as_str().into()));
         }
+
         row
     }
 }

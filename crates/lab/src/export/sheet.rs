@@ -193,6 +193,7 @@ impl Sheet {
                 Format::Parquet => SheetFile::Parquet(Box::new(ParquetFile::new(draft, &columns)?)),
             });
         }
+
         Ok(Self { columns, files })
     }
 
@@ -308,6 +309,7 @@ impl ParquetFile {
         let writer = schema(columns)
             .and_then(|schema| SerializedFileWriter::new(draft, schema, Arc::new(properties)))
             .map_err(|error| unwritable(&path, &error))?;
+
         Ok(Self {
             writer,
             columns: columns.iter().map(|column| Cells::of(column.of)).collect(),
@@ -418,9 +420,11 @@ fn write_cells(
         let Some(mut column) = group.next_column()? else {
             unreachable!("the schema has a column for each column");
         };
+
         cells.write(&mut column)?;
         column.close()?;
     }
+
     group.close()?;
     Ok(())
 }

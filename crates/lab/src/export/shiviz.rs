@@ -32,6 +32,7 @@ pub(super) fn write(epochs: &[EpochFiles], path: &Path) -> Result<Draft, FileErr
     let mut draft = Draft::create(path)?;
     write_line(&mut draft, EVENT)?;
     write_line(&mut draft, EPOCH)?;
+
     for files in epochs {
         write_line(&mut draft, &format!("=== epoch {} ===", files.epoch))?;
         let mut record = Record::of_events(&files.events)?;
@@ -42,6 +43,7 @@ pub(super) fn write(epochs: &[EpochFiles], path: &Path) -> Result<Draft, FileErr
             }
         }
     }
+
     Ok(draft)
 }
 

@@ -319,6 +319,7 @@ fn state_cells<'a>(robot: &'a PlacedRobot, report: Option<&'a Report>) -> Vec<Ce
             ("proposal_y_m", report.proposal.y.into()),
         ]);
     }
+
     cells
 }
 
@@ -364,6 +365,7 @@ fn event_cells(event: &Event) -> Vec<Cell<'_>> {
         | Event::Tick { .. }
         | Event::End { .. } => run_cells(event),
     });
+
     cells
 }
 

@@ -50,6 +50,7 @@ impl Cause {
                 }
             }
         }
+
         Self(signs)
     }
 

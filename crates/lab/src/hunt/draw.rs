@@ -170,6 +170,7 @@ impl Ground {
                 to: self.roster[to].clone(),
             });
         }
+
         PlannedFault::Channel {
             link,
             of,
@@ -230,6 +231,7 @@ impl Ground {
             let body_m = self.scenario.body_m;
             let begin_x = unit(chance) * width_m;
             let begin_y = unit(chance) * height_m;
+
             for index in 0..length {
                 let along_m = index as f64 * body_m;
                 let (x, y) = if is_upright {
@@ -237,16 +239,19 @@ impl Ground {
                 } else {
                     (begin_x + along_m, begin_y)
                 };
+
                 // Centimeters, so that the file is readable.
                 let place = Point::new((x * 100.0).round() / 100.0, (y * 100.0).round() / 100.0);
                 if self.is_free(place) {
                     at.push(place);
                 }
             }
+
             if !at.is_empty() {
                 break;
             }
         }
+
         PlannedFault::Wall { at }
     }
 

@@ -285,6 +285,7 @@ impl PlannedFault {
                 let span = span.in_words(tick_s);
                 let one = names(one);
                 let other = names(other);
+
                 if *one_way {
                     format!("no {cuts} pass from {one} to {other}, {span}")
                 } else {
@@ -303,6 +304,7 @@ impl PlannedFault {
                 for at in at {
                     places.push(format!("{:.2} m, {:.2} m", at.x, at.y));
                 }
+
                 format!("further obstacles stand at {}", places.join("; "))
             }
             Self::Crowd { guests } => format!("there are {guests} guests"),

@@ -106,6 +106,7 @@ fn described(fault: &PlannedFault, played: &Played, tick_s: f64) -> String {
     let PlannedFault::Lose { link, number } = fault else {
         return words;
     };
+
     let mut sent = played.sent.iter();
     match sent.find(|message| message.link == *link && message.number == *number) {
         Some(message) => format!(
@@ -127,15 +128,18 @@ fn rename_parameter_files(content: &mut toml::Table, from: &Path, to: &Path) -> 
         let Some(name) = file.as_str() else {
             continue;
         };
+
         let path = from.join(name);
         if shipped::contains(&path) {
             *file = path.display().to_string().into();
             continue;
         }
+
         let path = path.canonicalize().into_diagnostic()?;
         let folder = to.canonicalize().into_diagnostic()?;
         *file = relative(&path, &folder).display().to_string().into();
     }
+
     Ok(())
 }
 

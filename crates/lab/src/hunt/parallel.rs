@@ -59,5 +59,6 @@ pub(super) fn first<T: Sync, R: Send>(
             }
         }
     }
+
     None
 }

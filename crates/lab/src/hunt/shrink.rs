@@ -62,6 +62,7 @@ pub fn shrink(
         runs: 0,
     };
     let is_minimal = shrinker.shrink();
+
     Shrunk {
         case: shrinker.best,
         played: shrinker.played,
@@ -96,6 +97,7 @@ impl Shrinker<'_> {
     /// Shrinks until no step makes the case smaller; returns whether that was reached.
     fn shrink(&mut self) -> bool {
         self.shorten();
+
         loop {
             let before = self.best.clone();
             self.make_concrete();
@@ -104,6 +106,7 @@ impl Shrinker<'_> {
             self.remove_robots();
             self.remove_guests();
             self.shorten();
+
             if self.is_over() {
                 return false;
             }
@@ -253,12 +256,14 @@ impl Shrinker<'_> {
             if self.best.without.contains(robot) || self.is_over() {
                 continue;
             }
+
             let mut case = self.best.clone();
             case.without.insert(robot.clone());
             case.faults = Vec::new();
             for fault in &self.best.faults {
                 case.faults.extend(fault.without(robot));
             }
+
             if !case.faults.is_empty() {
                 self.take_first(vec![case]);
             }
@@ -305,6 +310,7 @@ fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
                 effect,
                 span,
             };
+
             for span in shorter(*span) {
                 all.push(with(*effect, span));
             }
@@ -340,6 +346,7 @@ fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
             }
         }
     }
+
     all
 }
 
@@ -406,6 +413,7 @@ fn shorter(span: Span) -> Vec<Span> {
         if part == 0 || lasting.saturating_sub(part) < LEAST_TICKS {
             continue;
         }
+
         all.push(Span {
             from: span.from + part,
             until: span.until,
@@ -415,6 +423,7 @@ fn shorter(span: Span) -> Vec<Span> {
             until: span.until - part,
         });
     }
+
     all
 }
 

@@ -101,11 +101,14 @@ impl Subject {
     pub fn load_by(file: &Path, changes: &Changes, maker: Maker) -> miette::Result<Self> {
         // Errors show the lines of the file.
         Scenario::load(file, changes)?;
+
         let source = changes.apply(&Source::read(file)?)?;
         let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
         let scenario = Scenario::parse(&source, &folder)?;
+
         check_faults(&scenario, 0)?;
         make_robots_with(&scenario, file, &|_, class| maker(class))?;
+
         Ok(Self {
             file: file.to_owned(),
             content: source.parse()?,
@@ -243,6 +246,7 @@ impl Notes {
                 let link = link(from, to);
                 let count = self.counts.entry(link.clone()).or_default();
                 *count += 1;
+
                 let place = self.played.sent.len();
                 self.places.insert((from.clone(), *seq), place);
                 self.played.sent.push(SentMessage {

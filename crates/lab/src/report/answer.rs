@@ -98,6 +98,7 @@ fn sentence(
     let Some(first) = contrasts.first() else {
         return Vec::new();
     };
+
     let how = match (measure.is_time(), is_more) {
         (false, true) => "is higher than with",
         (false, false) => "is lower than with",
@@ -111,6 +112,7 @@ fn sentence(
         Part::strong(&first.baseline),
         Part::text(": "),
     ];
+
     let mut named = Vec::new();
     for contrast in contrasts.iter().take(MOST_NAMED) {
         let heading = study.heading_of(&contrast.condition);
@@ -121,6 +123,7 @@ fn sentence(
         };
         named.push(format!("{under}({})", numbers(measure, contrast)));
     }
+
     let mut text = named.join("; ");
     if contrasts.len() > MOST_NAMED {
         text += &format!(
@@ -128,6 +131,7 @@ fn sentence(
             contrasts.len() - MOST_NAMED
         );
     }
+
     parts.push(Part::text(text + "."));
     parts
 }
@@ -228,11 +232,13 @@ fn with_zero(contrasts: &[&Contrast]) -> String {
                 restricted_mean_s, ..
             } => restricted_mean_s,
         };
+
         all += 1;
         let bounds = difference.interval.bounds();
         let bounds = bounds.unwrap_or((difference.value, difference.value));
         count += usize::from(bounds.0 <= 0.0 && bounds.1 >= 0.0);
     }
+
     if count == all {
         ", and every interval includes zero".to_owned()
     } else {

@@ -46,6 +46,7 @@ pub(super) fn state_panel(
         end_s,
         rows,
     };
+
     (bands > 0).then(|| Panel {
         heading: heading.to_owned(),
         svg: chart.draw(),

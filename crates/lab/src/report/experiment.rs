@@ -372,12 +372,14 @@ fn write_example(
             outcome.unit
         )),
     ]);
+
     if *study.results.plan.robots() != Robots::InProcess {
         page.remark(&[Part::text(
             "Its robots are processes, which a report does not start: record it by the command above and report the run.",
         )]);
         return;
     }
+
     if let Err(error) = write_course(page, study, outcome) {
         page.remark(&[Part::text(format!("It cannot be shown: {error}."))]);
     }
@@ -435,6 +437,7 @@ fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> miette::Re
     panels.extend(run_panel(facts, State::Emotion, "Emotions"));
     let diagram = diagram_lines(&format!("unit {}", outcome.unit), facts, files)?;
     panels.extend(diagram.lines);
+
     let mut caption = "Emotions over time, and the space-time diagram, to be read line by line: robots are lanes, with emotion above \
          behavior; a slanted line is a command, from the tick it was sent to the tick it arrived; a cross is where one was lost. n = 1 run."
         .to_owned();
@@ -444,6 +447,7 @@ fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> miette::Re
             diagram.last, facts.last_tick
         );
     }
+
     Ok(Figure {
         panels,
         caption: vec![Part::text(caption)],
@@ -502,6 +506,7 @@ fn write_failures(page: &mut Page, study: &Study<'_>) {
     if failures.is_empty() {
         return;
     }
+
     let mut table = Table::new(vec![
         Column::number("Unit"),
         Column::text("condition"),
@@ -518,6 +523,7 @@ fn write_failures(page: &mut Page, study: &Study<'_>) {
             Cell::text(&failure.reason),
         ]);
     }
+
     let caption = format!(
         "Runs that could not be played to their end: {} of {}.",
         table.rows.len(),

@@ -206,6 +206,7 @@ impl RunFacts {
                     _ => "queries cut",
                 };
                 let whom = format!("{from} → {to}");
+
                 self.heal(tick, &whom);
                 self.disturb(tick, what, &whom, true);
             }
@@ -237,6 +238,7 @@ impl RunFacts {
                     facts.behaviors.resume(tick);
                     self.disturb(tick, "takes no part", robot.as_str(), false);
                 }
+
                 let facts = self.robots.entry(robot.clone()).or_default();
                 facts.returns += u64::from(generation.is_some());
             }

@@ -94,6 +94,7 @@ fn estimated(measure: &Measure) -> String {
 fn differences_in_words(study: &Study<'_>, measure: &Measure) -> String {
     let contrasts = study.contrasts_of(measure);
     let baseline = contrasts.first().map_or("", |one| &one.baseline);
+
     format!(
         " Differences to {baseline} are paired by seed{}, with 95 % intervals (BCa bootstrap), and filled where p < 0.05 after Holm's \
          correction of {} comparisons ({}).",
@@ -223,6 +224,7 @@ fn widened(values: &[f64], is_of_amounts: bool) -> (f64, f64) {
     if !from.is_finite() || !to.is_finite() {
         return (0.0, 1.0);
     }
+
     if is_of_amounts && from >= 0.0 && from < 0.6 * to {
         from = 0.0;
     }
@@ -230,6 +232,7 @@ fn widened(values: &[f64], is_of_amounts: bool) -> (f64, f64) {
         from = from.min(0.0);
         to = to.max(0.0);
     }
+
     round_range(from, to, 6)
 }
 
@@ -388,6 +391,7 @@ fn interval_panels(study: &Study<'_>, measure: &Measure, range: (f64, f64)) -> V
                 is_filled: true,
             });
         }
+
         let heading = study.heading(of);
         let chart = Intervals {
             title: format!("{} {heading}", axis(measure)),
@@ -403,6 +407,7 @@ fn interval_panels(study: &Study<'_>, measure: &Measure, range: (f64, f64)) -> V
             is_wide: false,
         });
     }
+
     panels
 }
 
@@ -592,6 +597,7 @@ fn difference(contrast: &Contrast, what: Of) -> Estimate {
             restricted_mean_s, ..
         } => restricted_mean_s,
     };
+
     let bounds = interval.bounds();
     Estimate {
         value: value * factor,
@@ -618,6 +624,7 @@ fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], what: Of) -> Ta
             Difference::Number { dominance, .. } => Cell::Number(*dominance, 2),
             Difference::Time { .. } => Cell::Empty,
         };
+
         let mut row = vec![
             Cell::text(study.heading_of(&contrast.condition)),
             Cell::text(&contrast.arm),
@@ -630,6 +637,7 @@ fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], what: Of) -> Ta
         row.push(Cell::Number(contrast.p_holm, 4));
         table.rows.push(row);
     }
+
     table
 }
 
@@ -639,6 +647,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
     let times: Vec<f64> = (0..4)
         .map(|third| duration_s * f64::from(third) / 3.0)
         .collect();
+
     let mut panels = Vec::new();
     for (condition, of) in study.conditions.iter().enumerate().take(MOST_PANELS) {
         let mut curves = Vec::new();
@@ -647,6 +656,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
             if sample.is_empty() {
                 continue;
             }
+
             let survival = Survival::of(&sample);
             let mut steps = Vec::new();
             let mut censored = Vec::new();
@@ -662,6 +672,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
                     censored.push(step.time_s);
                 }
             }
+
             let at_risk = times
                 .iter()
                 .map(|time_s| sample.iter().filter(|time| time.time_s >= *time_s).count());
@@ -675,6 +686,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
                 at_risk: at_risk.collect(),
             });
         }
+
         let heading = study.heading(of);
         let chart = Steps {
             title: format!("Runs without {} {heading}", label(measure)),
@@ -690,6 +702,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
             is_wide: false,
         });
     }
+
     let mut caption = format!(
         "Share of runs without {} over time (Kaplan-Meier) with 95 % bands (Greenwood, log(-log)). Ticks on a curve are runs that \
          ended without it. Below, the number of runs at risk. {}.",
@@ -698,6 +711,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
     );
     let (panels, sentence) = limited(panels, study.conditions.len(), "conditions");
     caption += &sentence;
+
     Figure {
         panels,
         caption: vec![Part::text(caption)],

@@ -77,6 +77,7 @@ fn add_row(table: &mut Table, name: &RobotName, floor: &Floor) {
             place = *part;
         }
     }
+
     table.rows.push(vec![
         Cell::text(name.as_str()),
         Cell::Count(floor.times_s.len() as u64),

@@ -137,10 +137,12 @@ fn write_lead(page: &mut Page, runs: &[Run]) {
         for run in runs {
             *ends.entry(ending(run.facts.end)).or_insert(0) += 1;
         }
+
         let mut parts = Vec::new();
         for (end, count) in ends {
             parts.push(format!("{count} {end}"));
         }
+
         let text = format!("Of these runs {}.", parts.join(", "));
         page.lead(&[Part::text(text)]);
     }
@@ -213,6 +215,7 @@ fn robots_table(run: &Run) -> Table {
                 dropped += link.dropped;
             }
         }
+
         table.rows.push(vec![
             Cell::text(name.as_str()),
             Cell::Count(sent),
@@ -223,6 +226,7 @@ fn robots_table(run: &Run) -> Table {
             Cell::Count(robot.returns),
         ]);
     }
+
     table
 }
 
@@ -248,6 +252,7 @@ fn runs_table(runs: &[Run]) -> Table {
             Some(End::Aborted) => "aborted",
             None => "none",
         };
+
         table.rows.push(vec![
             Cell::text(&run.name),
             Cell::Count(facts.seed),
@@ -260,6 +265,7 @@ fn runs_table(runs: &[Run]) -> Table {
             Cell::Code(facts.digest.chars().take(12).collect()),
         ]);
     }
+
     table
 }
 
@@ -327,17 +333,20 @@ fn decimals(values: &[f64]) -> usize {
 
 fn write_states(page: &mut Page, runs: &[Run]) {
     page.section("Emotions and behaviors");
+
     for (state, what) in [(State::Emotion, "Emotions"), (State::Behavior, "Behaviors")] {
         let panels = state_panels(runs, state, what);
         if panels.is_empty() {
             continue;
         }
+
         let all = if runs.len() == 1 {
             1
         } else {
             all_robots(runs).len()
         };
         let (panels, sentence) = limited(panels, all, "robots");
+
         let rows = if runs.len() == 1 { "robot" } else { "run" };
         let caption = format!(
             "{what} over time, a row for each {rows}. The key has the share of the time in each. Time in which a robot took no part \
@@ -403,11 +412,13 @@ fn states_table(runs: &[Run], state: State) -> Table {
                 times.entry(name).or_default().0 += time_s;
                 total_s += time_s;
             }
+
             // A state that was entered in the last tick has lasted for no time.
             for (name, count) in &states.entered {
                 times.entry(name.clone()).or_default().1 += count;
             }
         }
+
         for (of, (time_s, entered)) in times {
             table.rows.push(vec![
                 Cell::text(name.as_str()),
@@ -418,6 +429,7 @@ fn states_table(runs: &[Run], state: State) -> Table {
             ]);
         }
     }
+
     table
 }
 

@@ -17,6 +17,7 @@ pub(super) fn capitalized(text: &str) -> String {
 pub(super) fn utc(unix_s: u64) -> String {
     let days = unix_s / 86_400;
     let second = unix_s % 86_400;
+
     // Years that begin in March, so that a leap day is the last day of its year, in cycles of 400 years.
     let day = days + 719_468;
     let cycle = day / 146_097;
@@ -27,6 +28,7 @@ pub(super) fn utc(unix_s: u64) -> String {
     let day = day - (153 * month + 2) / 5 + 1;
     let is_next_year = month >= 10;
     let month = if is_next_year { month - 9 } else { month + 3 };
+
     format!(
         "{}-{month:02}-{day:02} {:02}:{:02}:{:02} UTC",
         400 * cycle + year + u64::from(is_next_year),

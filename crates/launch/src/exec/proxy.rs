@@ -139,6 +139,7 @@ impl Proxy {
             FromProgram::Panel(panel) => self.panel = panel,
             FromProgram::Done(done) => return Ok(Some(done)),
         }
+
         Ok(None)
     }
 

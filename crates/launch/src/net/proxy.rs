@@ -251,12 +251,14 @@ fn write_piece(
 ) -> std::io::Result<()> {
     let bps = gate.shape().bandwidth_bps.unwrap_or(u64::MAX);
     let slice_bytes = usize::try_from(bps / 8 / SLICES_PER_S).unwrap_or(usize::MAX);
+
     for slice in piece.chunks(slice_bytes.max(1)) {
         gate.pass();
         sleep_until(pace.sent(Instant::now(), gate.shape(), slice.len()));
         gate.pass();
         to.write_all(slice)?;
     }
+
     Ok(())
 }
 

@@ -44,6 +44,7 @@ impl Graph {
         let number = self.reached.len() as u32;
         self.reached.push(reached);
         self.before.push(Vec::new());
+
         let ticks_to_return = if star.on_late == OnLate::Continue {
             2
         } else {
@@ -51,6 +52,7 @@ impl Graph {
         };
         let has_time = state.simulation.tick + ticks_to_return <= star.last_tick;
         self.is_early.push(has_time);
+
         let is_full = state.simulation.is_full && !state.has_replaced_process();
         // A violation is the other search's business.
         let is_violated = state.violation.is_some();

@@ -208,6 +208,7 @@ impl Process {
                 Action::DeclareToken => {
                     self.has_token = true;
                     self.send(Up::Token(true));
+
                     // The rule is broken on purpose to see what follows.
                     let is_early = self.robot.admission().is_none()
                         && around.rules.hold(Rule::TokenAfterWelcome);
@@ -218,6 +219,7 @@ impl Process {
                     let stamp = Stamp::from(answer.as_ref());
                     // How many were sent; a broken rule may repeat fewer.
                     let count = simulation::commands(&self.name, 0, answer.tick, 0).len();
+
                     for (number, command) in (1..).zip(answer.commands) {
                         self.send(Up::Command(stamp, number, command));
                     }
@@ -235,8 +237,10 @@ impl Process {
                 }
                 _ => None,
             };
+
             violation = violation.or(wrong);
         }
+
         violation
     }
 

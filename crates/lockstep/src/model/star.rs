@@ -277,6 +277,7 @@ impl Star {
                     let accident = self
                         .lost_by_accident(state, &outcome.membership)
                         .or_else(|| self.remembers_hang(&outcome));
+
                     let barrier = &state.barrier;
                     let is_stopped = self.has_fault(state.simulation.tick);
                     let violation = state.simulation.record(outcome, |name| {
@@ -285,6 +286,7 @@ impl Star {
                         let is_out = !barrier.is_present(name) && !is_hang || is_stopped;
                         is_out && barrier.lateness().of(name) == OnLate::Continue
                     });
+
                     state.note(accident);
                     state.note(violation);
                     self.go_on(state);
@@ -331,10 +333,12 @@ impl Star {
                 tick: clock.tick,
                 orders: simulation.news.get(&name).cloned().unwrap_or_default(),
             };
+
             if let (Some(generation), Some(part)) = (naming.joined, simulation.parts.get_mut(&name))
             {
                 part.named = Some((clock.epoch, clock.tick, generation));
             }
+
             for process in state.processes.iter_mut().flatten() {
                 if process.name == name && process.is_alive && process.is_connected {
                     process.down.push_back(Down::News(
@@ -346,6 +350,7 @@ impl Star {
                 }
             }
         }
+
         for process in state.processes.iter_mut().flatten() {
             if process.is_alive && process.is_connected {
                 process.down.push_back(Down::Clock(clock));
@@ -437,6 +442,7 @@ impl Star {
                 self.feed_barrier(state, |barrier, out| {
                     answer = Some(barrier.join(&name, &number.to_string(), out));
                 });
+
                 let process = state.process(number);
                 if let Some(answer) = answer
                     && process.is_connected
@@ -492,6 +498,7 @@ impl Star {
 
     fn steps_of(&self, state: &State, number: usize, process: &Process, steps: &mut Vec<Step>) {
         let left = &state.left;
+
         if let Some(message) = process.up.front() {
             steps.push(Step::Deliver(number, Way::Up));
             let is_token = matches!(message, Up::Token(_));
@@ -502,9 +509,11 @@ impl Star {
                 steps.push(Step::Duplicate(number, Way::Up));
             }
         }
+
         if !process.is_alive {
             return;
         }
+
         if process.is_connected && self.may_strike(&process.name) {
             if left.cuts > 0 {
                 steps.push(Step::Cut(number));
@@ -519,12 +528,14 @@ impl Star {
         if process.is_unnoticed {
             steps.push(Step::Notice(number));
         }
+
         if process.is_stopped {
             if left.lapses > 0 && process.is_connected {
                 steps.push(Step::Lapse(number));
             }
             return;
         }
+
         if !process.is_connected {
             steps.push(Step::Heal(number));
         }
@@ -537,6 +548,7 @@ impl Star {
                 steps.push(Step::Duplicate(number, Way::Down));
             }
         }
+
         if process.running.is_some() {
             steps.push(Step::Done(number));
         }
@@ -554,6 +566,7 @@ impl Star {
     fn steps_of_simulator(&self, state: &State, steps: &mut Vec<Step>) {
         let left = &state.left;
         let may_fire = state.is_quiet() || left.early > 0;
+
         if state.barrier.is_open() && may_fire {
             steps.push(Step::Fire(Timer::Repeat));
             if self.on_late != OnLate::Wait {
@@ -567,9 +580,11 @@ impl Star {
             let timers = state.reserved.iter().cloned().map(Timer::Token);
             steps.extend(timers.map(Step::Fire));
         }
+
         if left.inits > 0 {
             steps.push(Step::Init);
         }
+
         let tick = state.simulation.next.unwrap_or(state.simulation.tick);
         for name in state.simulation.parts.keys() {
             let kin = state.kin(name);
@@ -688,6 +703,7 @@ impl Star {
                     Kin::CutOff => state.left.successors -= 1,
                     Kin::Connected => state.left.rivals -= 1,
                 }
+
                 self.start(state, name);
             }
             Step::Fire(timer) => {
@@ -698,6 +714,7 @@ impl Star {
                     state.reserved.remove(name);
                 }
                 state.simulation.is_late |= timer == Timer::Deadline;
+
                 self.feed_barrier(state, |barrier, out| barrier.timer(&timer, out));
             }
             Step::RepeatBetween => {
@@ -713,6 +730,7 @@ impl Star {
                 for process in state.processes.iter_mut().flatten() {
                     process.is_stopped = false;
                 }
+
                 self.feed_barrier(state, |barrier, out| {
                     barrier.gather(epoch, self.lateness(), out);
                 });

@@ -367,6 +367,7 @@ impl Alternative {
                 });
             }
         }
+
         serde_json::to_value(table)
             .unwrap_or_else(|error| unreachable!("a condition is always JSON: {error}"))
     }
@@ -413,6 +414,7 @@ impl Condition {
                 }
             }
         }
+
         robots
     }
 }
@@ -454,6 +456,7 @@ impl Evaluation {
                 unknown: None,
             });
         }
+
         Self {
             alternatives,
             tick_s,
@@ -478,6 +481,7 @@ impl Evaluation {
             };
             reason = reason.or(held);
         }
+
         reason
     }
 

@@ -335,6 +335,7 @@ impl Expectation {
                 condition
             }
         };
+
         robots.extend(condition.robots());
         robots
     }

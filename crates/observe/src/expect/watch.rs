@@ -61,6 +61,7 @@ impl Watch {
             Rule::Never(condition) | Rule::Always(condition) => condition,
             Rule::Eventually { condition, .. } | Rule::After { condition, .. } => condition,
         };
+
         Self {
             condition: Evaluation::new(condition, tick_s, body_m, roster),
             rule,
@@ -254,6 +255,7 @@ impl Watches {
                 judgment: None,
             });
         }
+
         Self(watches)
     }
 

@@ -274,6 +274,7 @@ impl Setup {
         self.field_m
             .iter()
             .try_for_each(|size| finite(*size, "setup.field_m"))?;
+
         for (range, name) in [
             (self.guest_speed_mps, "setup.guest_speed_mps"),
             (self.guest_duration_s, "setup.guest_duration_s"),
@@ -282,6 +283,7 @@ impl Setup {
                 .iter()
                 .try_for_each(|value| finite(*value, name))?;
         }
+
         self.obstacles
             .iter()
             .try_for_each(|at| at.check("setup.obstacles"))?;

@@ -218,11 +218,13 @@ impl Message for Panel {
             );
             return Err(FieldError::new("widgets", reason));
         }
+
         for (i, widget) in self.widgets.iter().enumerate() {
             widget.check().map_err(|error| {
                 FieldError::new(format!("widgets[{i}].{}", error.field), error.reason)
             })?;
         }
+
         Ok(())
     }
 }

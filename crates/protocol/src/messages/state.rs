@@ -90,6 +90,7 @@ impl PublicState {
             "behavior_state" => self.behavior_state.clone().into(),
             _ => return None,
         };
+
         Some(Answer {
             performative: Performative::Tell,
             epoch: self.epoch,

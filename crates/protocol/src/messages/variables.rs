@@ -318,6 +318,7 @@ impl JsonSchema for StateVariables {
 
 pub(super) fn check_variables(variables: &StateVariables) -> Result<(), FieldError> {
     few(variables.len(), "state_variables")?;
+
     for (name, value) in variables {
         short(name, "state_variables")?;
         match value {
@@ -331,6 +332,7 @@ pub(super) fn check_variables(variables: &StateVariables) -> Result<(), FieldErr
             _ => {}
         }
     }
+
     Ok(())
 }
 

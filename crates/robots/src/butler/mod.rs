@@ -145,6 +145,7 @@ impl Robot for Butler {
             values: self.state.valences.iter().copied().collect(),
         });
         widgets.push(self.progress_table());
+
         Panel { widgets }
     }
 }
@@ -156,6 +157,7 @@ impl Butler {
     /// What is wrong with the parameters.
     pub fn new(parameters: Parameters) -> Result<Self, String> {
         parameters.check()?;
+
         let state = State::new(&parameters).map_err(|error| error.to_string())?;
         let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution)
             .map_err(|error| error.to_string())?;
@@ -166,6 +168,7 @@ impl Butler {
             parameters.dynamics.rho_max,
         )?;
         let esg = DynamicGenerator::new(dynamics, appraise);
+
         Ok(Self {
             emotion: Emotion::new(parameters.affect, parameters.script.clone(), esg),
             bsg: BehaviorGenerator::new(TABLE, Behavior::Serve),
@@ -652,6 +655,7 @@ impl Butler {
         let measures = &state.measures;
         let called = panel::yes(state.called);
         let hurried = panel::yes(state.hurried);
+
         panel::table([
             ("time to empty", panel::seconds(measures.time_to_empty_s)),
             ("time to refill", panel::seconds(measures.time_to_refill_s)),

@@ -193,6 +193,7 @@ impl Parameters {
                 self.treat_mean_s
             ));
         }
+
         positive("exchange_radius_m", self.exchange_radius_m)?;
         positive("v_refill_mps", self.v_refill_mps)?;
         positive("turn_mean_s", self.turn_mean_s)?;
@@ -212,10 +213,12 @@ impl Parameters {
         not_negative("intercept_after_s", self.intercept_after_s)?;
         not_negative("query_stale_s", self.query_stale_s)?;
         not_negative("look_s", self.look_s)?;
+
         self.script.check()?;
         if self.treat_capacity == 0 {
             return Err("treat_capacity must be at least 1".to_owned());
         }
+
         Ok(())
     }
 

@@ -193,6 +193,7 @@ impl State {
             ("start_y_m", self.start.y.into()),
         ]
         .into();
+
         if let Some(table) = self.table.or(self.refiller.first_location()) {
             variables.insert("table_x_m", table.x.into());
             variables.insert("table_y_m", table.y.into());
@@ -203,6 +204,7 @@ impl State {
         if let Some(plan) = self.mind.plan() {
             variables.insert("plan", plan.name().into());
         }
+
         variables
     }
 

@@ -160,6 +160,7 @@ pub fn appraise(measures: &Measures, behavior: &Behavior) -> Stimulus {
     let event = measures
         .exchange_is_over
         .then_some(ProgressEvent::GoalAchieved);
+
     // He blames the refiller for an empty tray [D: FRUSTRATED at the assistant].
     let stimulus = Stimulus::new(drive).with_event(event).with_blame(true);
     Stimulus {

@@ -306,6 +306,7 @@ impl Leguin {
         let state = &self.state;
         let parameters = &self.parameters;
         let waiter_is_here = state.waiter.is_within(parameters.exchange_radius_m, cars);
+
         Context {
             gives_up: self.gives_up(),
             is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
@@ -437,6 +438,7 @@ impl Leguin {
             goal: Some(&goal),
             ..Circumstances::default()
         };
+
         panel::affect(
             self.frame().as_ref(),
             &self.parameters.dynamics.label_cuts,
@@ -450,6 +452,7 @@ impl Leguin {
             Some(goal) => format!("{:.1} m", state.at.distance_m(goal)),
             None => "-".to_owned(),
         };
+
         panel::table([
             ("waiter", self.parameters.waiter.clone()),
             ("way to go", distance),

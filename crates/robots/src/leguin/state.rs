@@ -95,6 +95,7 @@ impl State {
             Some(Errand::Hurry) => HURRY,
             None => "",
         };
+
         [
             ("hurried", self.hurried.into()),
             ("blocked_s", self.way.stalled_s().into()),

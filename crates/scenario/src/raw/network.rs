@@ -385,6 +385,7 @@ impl From<Channel> for ChannelTable {
             mode: Time(delay.mode()),
             max: Time(delay.max()),
         });
+
         Self {
             loss: Some(channel.loss).filter(|loss| *loss > 0.0),
             duplication: Some(channel.duplication).filter(|duplication| *duplication > 0.0),

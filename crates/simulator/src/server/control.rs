@@ -35,6 +35,7 @@ impl Server {
                 return Ok(());
             }
         };
+
         match control {
             Control::Step { n } => {
                 self.on_step(n, query, simulation);
@@ -77,9 +78,11 @@ impl Server {
                 Err(explanation) => refuse(&query, &explanation),
             },
         }
+
         if self.observers.has_subscribers() {
             self.observers.frame(simulation, &self.status(simulation));
         }
+
         Ok(())
     }
 
@@ -108,6 +111,7 @@ impl Server {
                 unreachable!("handled by on_control")
             }
         }
+
         Ok(())
     }
 
@@ -216,6 +220,7 @@ impl Server {
                 return Ok(());
             }
         };
+
         match self.pace.phase {
             Phase::Gathering => {
                 refuse(query, &format!("the run is {}", self.pace.phase));
@@ -238,6 +243,7 @@ impl Server {
         if self.barrier.is_announced() {
             return self.answer_status(&query, simulation);
         }
+
         // Only the last client that steps is kept waiting; the one before gets the status as it is.
         let until = simulation.tick() + self.pace.pending_steps + u64::from(self.barrier.is_open());
         if let Some((earlier, _)) = self

@@ -137,6 +137,7 @@ impl Server {
             }
             return Ok(Some(LOOK));
         }
+
         if self.orders.has_complained {
             return Ok(None);
         }
@@ -146,6 +147,7 @@ impl Server {
                 "the scenario has faults of processes, and there is no launcher to carry them out"
             );
         }
+
         Ok(Some(LOOK))
     }
 }

@@ -133,6 +133,7 @@ impl Observers {
 
     fn late(&mut self, simulation: &Simulation, text: &str) -> LogRecord {
         tracing::warn!("{text}");
+
         let (epoch, tick) = (simulation.epoch(), simulation.tick());
         let (source, kind) = ("simulator".to_owned(), LogKind::Late);
         let line = LogRecord {
@@ -143,6 +144,7 @@ impl Observers {
             kind,
             text: text.to_owned(),
         };
+
         self.log(std::slice::from_ref(&line));
         line
     }
@@ -187,6 +189,7 @@ fn name_all(awaiting: &[Awaited]) -> String {
 /// The field now, without flights.
 fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
     let (world, scenario) = (simulation.world(), simulation.scenario());
+
     let robot = |name: &RobotName| {
         let report = simulation.report(name);
         let process = status.robots.iter().find(|robot| robot.name == *name);
@@ -209,9 +212,11 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
             presence: process.map_or(Presence::Gone, |process| process.presence),
         }
     };
+
     let late = status.awaiting.iter();
     let late = late.filter(|awaited| awaited.since_s > LATE_S);
     let late: Vec<RobotName> = late.map(|awaited| awaited.name.clone()).collect();
+
     WorldFrame {
         run: status.run.clone(),
         epoch: status.epoch,

@@ -135,16 +135,19 @@ impl Pace {
             self.pending_steps -= 1;
             return Ok(());
         }
+
         if self.phase != Phase::Running {
             return Err(None);
         }
         let Some(speed) = self.speed else {
             return Ok(());
         };
+
         let now = Instant::now();
         if self.due > now {
             return Err(Some(self.due - now));
         }
+
         // A speed is finite and positive, but a very slow one asks for a very long tick.
         let tick = Duration::try_from_secs_f64(tick_s / speed).unwrap_or(Duration::MAX);
         let from = if now - self.due > MAX_BEHIND {
@@ -155,6 +158,7 @@ impl Pace {
         self.due = from
             .checked_add(tick)
             .unwrap_or(now + Duration::from_secs(86_400));
+
         Ok(())
     }
 }

@@ -51,12 +51,14 @@ impl Past {
         let mut record = None;
         let mut next = None;
         let mut done_late = BTreeMap::new();
+
         if files.events.exists() {
             done_late = read_done_late(&files.events)?;
             let mut events = Record::of_events(&files.events)?;
             next = next_tick(&mut events)?;
             record = Some(events);
         }
+
         Ok(Self {
             epoch: files.epoch,
             record,

@@ -249,6 +249,7 @@ impl Observing {
                 reports.insert(robot.clone(), *arrived);
             }
         }
+
         Observed {
             opened,
             reports,
@@ -1010,6 +1011,7 @@ impl Server {
             return self.on_operator(to, command.command);
         }
         let Some(from) = self.known(from) else { return };
+
         let stamp = Stamp::from(&command);
         let number = command.number;
         let sent = Sent::new(to, command);

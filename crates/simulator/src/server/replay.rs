@@ -334,6 +334,7 @@ impl Replay {
             let state = self.player.state(robot, asked);
             state.map_err(|reason| reason.to_string())
         });
+
         match state {
             Ok(state) => {
                 if let Some(reply) = state.reply(Keys::last_chunk(query.key())) {
@@ -352,6 +353,7 @@ impl Replay {
                 return Ok(());
             }
         };
+
         match control {
             Control::Step { n } => self.on_step(n, query),
             Control::Setup => self.answer_setup(&query),
@@ -368,6 +370,7 @@ impl Replay {
                 Err(explanation) => refuse(&query, &explanation),
             },
         }
+
         Ok(())
     }
 
@@ -386,6 +389,7 @@ impl Replay {
                 if self.pace.phase == Phase::Ready {
                     self.pace.phase = Phase::Paused;
                 }
+
                 self.log_seek();
                 self.put_tick();
             }
@@ -409,6 +413,7 @@ impl Replay {
                 unreachable!("handled by on_control")
             }
         }
+
         Ok(())
     }
 

@@ -47,12 +47,14 @@ impl Server {
             None => self.barrier.roster().cloned().collect(),
         };
         robots.retain(|robot| !self.barrier.is_stopped(robot));
+
         if self.is_repeating() {
             // One that is here, and was killed and replaced between two ticks then, has not been asked yet.
             for robot in &robots {
                 self.barrier.ask_to_rejoin(robot);
             }
         }
+
         self.stage = Stage::Returns(Returning {
             robots,
             begun: Instant::now(),

@@ -50,12 +50,14 @@ impl Slurm {
              #SBATCH --job-name={name}\n\
              #SBATCH --output={output}\n"
         );
+
         if let Some(partition) = &self.partition {
             head += &format!("#SBATCH --partition={partition}\n");
         }
         if let Some(limit_min) = self.limit_min {
             head += &format!("#SBATCH --time={limit_min}\n");
         }
+
         head
     }
 }
