@@ -1,5 +1,5 @@
 //! `cars bench`: ticks per second of the lock-step, and of two floors on the same machine in the same sitting: a bare zenoh
-//! star and a raw TCP barrier.
+//! star, with and without the messages of the protocol, and a raw TCP barrier.
 
 mod lockstep;
 mod programs;
@@ -113,6 +113,7 @@ fn measure_once(
 ) -> miette::Result<()> {
     let subject = results.subject;
     let there = there.filter(|_| subject.runs_the_project());
+
     if let Some(there) = there.filter(|_| is_other_first) {
         results.there.push(measure(subject, workload, there)?);
     }
@@ -120,6 +121,7 @@ fn measure_once(
     if let Some(there) = there.filter(|_| !is_other_first) {
         results.there.push(measure(subject, workload, there)?);
     }
+
     Ok(())
 }
 
@@ -127,7 +129,9 @@ fn measure_once(
 fn measure(subject: Subject, workload: &Workload<'_>, programs: &Programs) -> miette::Result<f64> {
     match subject {
         Subject::Tcp { processes } => tcp::measure(processes, workload.ticks_with(processes)),
-        Subject::Star { clients } => star::measure(clients, workload.ticks_with(clients)),
+        Subject::Star { clients, content } => {
+            star::measure(clients, content, workload.ticks_with(clients))
+        }
         Subject::Lockstep { robots } => lockstep::bare(workload, programs, robots),
         Subject::Crowd { robots } => lockstep::crowd(workload, programs, robots),
         Subject::Hall { place, .. } => match place {
@@ -152,7 +156,12 @@ fn plan(args: &BenchArgs, robots_of_hall: usize) -> miette::Result<Vec<Subject>>
 
     let mut plan = Vec::new();
     for subject in wanted {
-        for step in [subject.second_floor(), subject.floor(), Some(subject)] {
+        let floors = [
+            subject.second_floor(),
+            subject.floor(),
+            subject.message_floor(),
+        ];
+        for step in floors.into_iter().chain([Some(subject)]) {
             plan.extend(step.filter(|step| !plan.contains(step)));
         }
     }
@@ -198,13 +207,20 @@ mod tests {
     #[test]
     fn every_subject_comes_once_and_after_its_floors() {
         let names = names(&[]);
-        assert_eq!(names.len(), 1 + 4 + 4 + 1 + 2, "{names:?}");
+        assert_eq!(names.len(), 1 + 4 + 4 + 4 + 1 + 2, "{names:?}");
 
         let place = |name: &str| names.iter().position(|other| other == name).unwrap();
 
         for (floor, subject) in [
             ("raw TCP barrier, 2 processes", "zenoh star, 2 clients"),
-            ("zenoh star, 2 clients", "bare lock-step, 2 robots"),
+            (
+                "zenoh star, 2 clients",
+                "zenoh star with messages, 2 clients",
+            ),
+            (
+                "zenoh star with messages, 2 clients",
+                "bare lock-step, 2 robots",
+            ),
             ("zenoh star, 64 clients", "bare lock-step, 64 robots"),
             ("zenoh star, 64 clients", "Butlers and Leguins, 64 robots"),
             ("zenoh star, 2 clients", "the hall, as processes"),
@@ -220,7 +236,11 @@ mod tests {
     fn only_the_subjects_asked_for_and_their_floors_are_measured() {
         assert_eq!(
             names(&["--only", "16 robots"]),
-            ["zenoh star, 16 clients", "bare lock-step, 16 robots"]
+            [
+                "zenoh star, 16 clients",
+                "zenoh star with messages, 16 clients",
+                "bare lock-step, 16 robots"
+            ]
         );
     }
 }

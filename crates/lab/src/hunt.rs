@@ -251,7 +251,8 @@ impl Hunt<'_> {
             }
 
             let cases = self.draw(first, count);
-            let (subject, wanted) = (self.subject, &self.wanted);
+            let subject = self.subject;
+            let wanted = &self.wanted;
             let played = parallel::all(&cases, self.options.jobs, self.options.stop, |case| {
                 subject.play(case, wanted)
             });
@@ -370,7 +371,8 @@ impl Hunt<'_> {
             jobs: self.options.jobs,
             stop: self.options.stop,
         };
-        let (case, played) = (case.clone(), played.clone());
+        let case = case.clone();
+        let played = played.clone();
         let shrunk = shrink(self.subject, name, case, played, &world, bounds);
 
         let mut finding = self.finding(name, plan, &shrunk.case, &shrunk.played);

@@ -50,7 +50,9 @@ fn placeholder(name: &'static str) -> RobotName {
 /// The keys of a run, with placeholders for what is open.
 fn channels() -> Vec<Channel> {
     let run = RunName::new("RUN-").unwrap_or_else(|error| unreachable!("a legal name: {error}"));
-    let (keys, robot, from) = (Keys::new(&run), placeholder("NAME-"), placeholder("FROM-"));
+    let keys = Keys::new(&run);
+    let robot = placeholder("NAME-");
+    let from = placeholder("FROM-");
 
     let channel = |name, key, what, messages, operations| Channel {
         name,

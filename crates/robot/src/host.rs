@@ -380,18 +380,17 @@ impl Host {
 
     /// Runs one tick of a robot.
     fn run_tick(&mut self, name: &RobotName, turn: &Turn<News>) -> Result<(), HostError> {
-        let Some(mut member) = self.members.remove(name) else {
+        let Some(member) = self.members.get_mut(name) else {
             return Ok(());
         };
         if turn.begin != Begin::GoOn {
             member.take_seat();
         }
+        // While the robot waits for an answer, the host goes on carrying things out.
         let Some(mut seat) = member.seat.take() else {
             unreachable!("a robot runs after its welcome");
         };
 
-        // The member is put back first: while the robot waits for an answer, the host goes on carrying things out.
-        self.members.insert(name.clone(), member);
         let mut network = HostNetwork::new(self, name, turn);
         let outcome = seat.run(turn, &mut network);
         if let Some(failed) = network.failed.take() {

@@ -11,13 +11,31 @@ pub(super) enum Subject {
     /// One write and one read over TCP for each process and tick.
     Tcp { processes: usize },
     /// One put in each direction over zenoh for each client and tick.
-    Star { clients: usize },
+    Star { clients: usize, content: Content },
     /// The lock-step with idle robots, a process each.
     Lockstep { robots: usize },
     /// Butlers and Leguins in pairs, a process each.
     Crowd { robots: usize },
     /// The hall of the paper.
     Hall { robots: usize, place: HallPlace },
+}
+
+/// What a star exchanges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Content {
+    /// Bytes that are not looked at.
+    Bytes,
+    /// Clocks and reports of the protocol.
+    Messages,
+}
+
+impl std::fmt::Display for Content {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Bytes => "bytes",
+            Self::Messages => "messages",
+        })
+    }
 }
 
 /// Where the robots of the hall run.
@@ -31,7 +49,14 @@ impl std::fmt::Display for Subject {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Tcp { processes } => write!(f, "raw TCP barrier, {processes} processes"),
-            Self::Star { clients } => write!(f, "zenoh star, {clients} clients"),
+            Self::Star {
+                clients,
+                content: Content::Bytes,
+            } => write!(f, "zenoh star, {clients} clients"),
+            Self::Star {
+                clients,
+                content: Content::Messages,
+            } => write!(f, "zenoh star with messages, {clients} clients"),
             Self::Lockstep { robots } => write!(f, "bare lock-step, {robots} robots"),
             Self::Crowd { robots } => write!(f, "Butlers and Leguins, {robots} robots"),
             Self::Hall { place, .. } => match place {
@@ -52,15 +77,32 @@ impl Subject {
             | Self::Hall {
                 robots,
                 place: HallPlace::Processes,
-            } => Some(Self::Star { clients: robots }),
+            } => Some(Self::star(robots, Content::Bytes)),
+            Self::Star {
+                clients,
+                content: Content::Messages,
+            } => Some(Self::star(clients, Content::Bytes)),
             Self::Tcp { .. } | Self::Star { .. } | Self::Hall { .. } => None,
         }
+    }
+
+    /// The zenoh star that encodes and decodes as many messages of the protocol, for the bare lock-step: what is missing to it is
+    /// what the simulator and the robots do.
+    pub(super) fn message_floor(self) -> Option<Self> {
+        match self {
+            Self::Lockstep { robots } => Some(Self::star(robots, Content::Messages)),
+            Self::Tcp { .. } | Self::Star { .. } | Self::Crowd { .. } | Self::Hall { .. } => None,
+        }
+    }
+
+    fn star(clients: usize, content: Content) -> Self {
+        Self::Star { clients, content }
     }
 
     /// The raw TCP barrier, for subjects with two processes.
     pub(super) fn second_floor(self) -> Option<Self> {
         let has_two = match self {
-            Self::Star { clients } => clients == TCP_PROCESSES,
+            Self::Star { clients, .. } => clients == TCP_PROCESSES,
             Self::Tcp { .. } => false,
             Self::Lockstep { .. } | Self::Crowd { .. } | Self::Hall { .. } => {
                 let star = self.floor();

@@ -33,6 +33,7 @@ fn head(is_compared: bool) -> Vec<&'static str> {
         "best",
         "worst",
         "of its star",
+        "with messages",
         "of raw TCP",
     ];
     if is_compared {
@@ -49,11 +50,13 @@ fn row(results: &Results, all: &[Results], is_compared: bool) -> Vec<String> {
         format!("{:.0}", results.best()),
         format!("{:.0}", results.worst()),
         ratio_to(subject.floor(), results, all),
+        ratio_to(subject.message_floor(), results, all),
         ratio_to(subject.second_floor(), results, all),
     ];
     if is_compared {
         row.extend(comparison(results));
     }
+
     row
 }
 

@@ -134,14 +134,13 @@ impl Observers {
     fn late(&mut self, simulation: &Simulation, text: &str) -> LogRecord {
         tracing::warn!("{text}");
 
-        let (epoch, tick) = (simulation.epoch(), simulation.tick());
-        let (source, kind) = ("simulator".to_owned(), LogKind::Late);
+        let tick = simulation.tick();
         let line = LogRecord {
-            epoch,
+            epoch: simulation.epoch(),
             tick,
             time_s: simulation.time_s(tick),
-            source,
-            kind,
+            source: "simulator".to_owned(),
+            kind: LogKind::Late,
             text: text.to_owned(),
         };
 
@@ -188,34 +187,20 @@ fn name_all(awaiting: &[Awaited]) -> String {
 
 /// The field now, without flights.
 fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
-    let (world, scenario) = (simulation.world(), simulation.scenario());
+    let world = simulation.world();
+    let scenario = simulation.scenario();
 
-    let robot = |name: &RobotName| {
-        let report = simulation.report(name);
-        let process = status.robots.iter().find(|robot| robot.name == *name);
-        RobotFrame {
-            name: name.clone(),
-            location: simulation.location(name).unwrap_or_default(),
-            speed_mps: report.map_or(0.0, |report| report.speed_mps),
-            direction_rad: report.map_or(0.0, |report| report.direction_rad),
-            blocked: simulation.is_blocked(name),
-            emotion_state: report
-                .map(|report| report.emotion_state.clone())
-                .unwrap_or_default(),
-            behavior_state: report
-                .map(|report| report.behavior_state.clone())
-                .unwrap_or_default(),
-            state_variables: report
-                .map(|report| report.state_variables.clone())
-                .unwrap_or_default(),
-            generation: process.map_or(0, |process| process.generation),
-            presence: process.map_or(Presence::Gone, |process| process.presence),
+    let mut late = Vec::new();
+    for awaited in &status.awaiting {
+        if awaited.since_s > LATE_S {
+            late.push(awaited.name.clone());
         }
-    };
+    }
 
-    let late = status.awaiting.iter();
-    let late = late.filter(|awaited| awaited.since_s > LATE_S);
-    let late: Vec<RobotName> = late.map(|awaited| awaited.name.clone()).collect();
+    let mut robots = Vec::with_capacity(simulation.names().len());
+    for name in simulation.names() {
+        robots.push(robot_frame(simulation, status, name));
+    }
 
     WorldFrame {
         run: status.run.clone(),
@@ -231,7 +216,7 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
         awaiting: status.awaiting.clone(),
         field_m: scenario.field_m,
         body_m: scenario.body_m,
-        robots: simulation.names().iter().map(robot).collect(),
+        robots,
         // In whole millimeters, as in the recording: a tick looks the same live and recorded.
         guests: world
             .guests()
@@ -247,6 +232,31 @@ fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
         cuts: simulation.cuts(),
         faults: simulation.held_processes(&late),
         expectations: simulation.standings(),
+    }
+}
+
+/// A robot now.
+fn robot_frame(simulation: &Simulation, status: &Status, name: &RobotName) -> RobotFrame {
+    let report = simulation.report(name);
+    let process = status.robots.iter().find(|robot| robot.name == *name);
+
+    RobotFrame {
+        name: name.clone(),
+        location: simulation.location(name).unwrap_or_default(),
+        speed_mps: report.map_or(0.0, |report| report.speed_mps),
+        direction_rad: report.map_or(0.0, |report| report.direction_rad),
+        blocked: simulation.is_blocked(name),
+        emotion_state: report
+            .map(|report| report.emotion_state.clone())
+            .unwrap_or_default(),
+        behavior_state: report
+            .map(|report| report.behavior_state.clone())
+            .unwrap_or_default(),
+        state_variables: report
+            .map(|report| report.state_variables.clone())
+            .unwrap_or_default(),
+        generation: process.map_or(0, |process| process.generation),
+        presence: process.map_or(Presence::Gone, |process| process.presence),
     }
 }
 
