@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use config::{Changes, FileError};
+use config::Changes;
 use lab::experiment::{Experiment, Plan, Request, Robots, is_experiment_file};
-use lab::folder::recorded_epochs;
-use launch::{LaunchFile, is_launch_file, scenario_file};
+use lab::inspect::inspect;
+use launch::{LaunchFile, default_run_name, is_launch_file, scenario_file};
+use miette::miette;
 use scenario::Scenario;
 use simulator::RunFolder;
-use simulator::seal::{self, Checked};
+use simulator::seal::Checked;
 use terminal::OutputError;
 
 use crate::named;
@@ -51,12 +52,14 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
 /// The content of a file in one line.
 fn describe(path: &Path) -> miette::Result<String> {
     if path.is_dir() {
-        return Ok(describe_run(path)?);
+        return describe_run(path);
     }
     if is_experiment_file(path)? {
         return describe_experiment(path);
     }
 
+    // As `cars run` and `cars launch` name it.
+    default_run_name(path)?;
     let changes = Changes::default();
     if !is_launch_file(path)? {
         let scenario = Scenario::load(path, &changes)?;
@@ -98,13 +101,25 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
     Ok(text)
 }
 
-/// The record of a run: its events, those of earlier epochs, too.
-fn describe_run(folder: &Path) -> Result<String, FileError> {
-    let epochs = recorded_epochs(&RunFolder::at(folder.to_owned()))?;
+/// The record of a run, read whole: all that is damaged is the error.
+fn describe_run(folder: &Path) -> miette::Result<String> {
+    let mut inspection = inspect(&RunFolder::at(folder.to_owned()))?;
+    if inspection.damages.len() == 1
+        && let Some(damage) = inspection.damages.pop()
+    {
+        return Err(damage);
+    }
+    if !inspection.damages.is_empty() {
+        let mut damages = Vec::new();
+        for damage in &inspection.damages {
+            damages.push(damage.to_string());
+        }
+        return Err(miette!("{}", damages.join("\n")));
+    }
+
     let mut described = Vec::new();
-    for files in epochs {
-        let checked = seal::check(&files.events)?;
-        let ticks = count_ticks(&checked);
+    for checked in &inspection.epochs {
+        let ticks = count_ticks(checked);
         let lines = count(checked.lines, "line", "lines");
         described.push(format!("{ticks}, {lines} as written"));
     }

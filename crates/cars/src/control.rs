@@ -4,6 +4,7 @@ use bus::{Bus, Reply, Role};
 use clap::{Args, Subcommand, ValueEnum};
 use config::units::Time;
 use config::{Changes, Speed};
+use lab::folder::find;
 use miette::{IntoDiagnostic, miette};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
@@ -27,7 +28,7 @@ const STEP_PATIENCE: Duration = Duration::from_secs(3600);
 const TAIL: usize = 10;
 
 /// Options that name the run and how to reach it.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct RunRef {
     /// Name of the run; without it the latest run.
     #[arg(long, global = true, env = "CARS_RUN")]
@@ -546,6 +547,9 @@ fn put_command(args: &CommandArgs, bus: &Bus, keys: &Keys) -> miette::Result<()>
 /// `cars log`.
 #[derive(Debug, Args)]
 pub(crate) struct LogArgs {
+    /// Name or folder of a run; without it that of `--run`, or the latest run.
+    #[arg(value_name = "RUN")]
+    of: Option<PathBuf>,
     /// Follow a run in progress until it ends.
     #[arg(short, long)]
     follow: bool,
@@ -553,14 +557,34 @@ pub(crate) struct LogArgs {
     run: RunRef,
 }
 
+impl LogArgs {
+    /// The folder of the run, and how to reach the run.
+    fn subject(&self) -> miette::Result<(RunFolder, RunRef)> {
+        let mut run = self.run.clone();
+        let Some(of) = &self.of else {
+            return Ok((run.folder()?, run));
+        };
+
+        let folder = find(&run.out, of)?;
+        if self.follow {
+            // A run in progress is known by the name of its folder.
+            let folder = folder.resolved()?;
+            run.run = Some(folder.name()?);
+            run.out = folder.path().parent().unwrap_or(&run.out).to_owned();
+        }
+        Ok((folder, run))
+    }
+}
+
 /// Shows the log of a run.
 pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
-    let file = args.run.folder()?.log();
+    let (folder, run) = args.subject()?;
+    let file = folder.log();
     let past = std::fs::read_to_string(&file)
         .map_err(|error| miette!("cannot read {}: {error}", file.display()));
 
     if args.follow {
-        follow(&args.run, &past.unwrap_or_default())?;
+        follow(&run, &past.unwrap_or_default())?;
     } else {
         terminal::print(past?)?;
     }

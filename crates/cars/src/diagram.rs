@@ -1,19 +1,16 @@
 //! `cars diagram`: draws the space-time diagram of a run.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 use lab::diagram::{Options, Window, draw};
 use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
-use miette::miette;
 use protocol::Epoch;
-use simulator::EpochFiles;
 use simulator::recorder::LATEST;
-use terminal::OutputError;
 
-use crate::output::check_not_record;
+use crate::output::{self, check_not_record};
 
 /// `cars diagram`.
 #[derive(Debug, Args)]
@@ -48,7 +45,7 @@ pub(crate) struct DiagramArgs {
 pub(crate) fn diagram(args: &DiagramArgs) -> miette::Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
     let files = recorded_epoch(&folder, args.epoch)?;
-    let mut title = folder.name()?.to_string();
+    let mut title = folder.title();
     if recorded_epochs(&folder)?.len() > 1 {
         title += &format!(", epoch {}", files.epoch);
     }
@@ -64,19 +61,13 @@ pub(crate) fn diagram(args: &DiagramArgs) -> miette::Result<ExitCode> {
     };
 
     let drawn = draw(&files, window, options)?;
-    match &args.output {
-        Some(output) => write(output, &files, &drawn.svg)?,
-        None => OutputError::unless_closed(terminal::data(&drawn.svg))?,
+    if let Some(output) = &args.output {
+        check_not_record(output, &files)?;
     }
+    output::write(args.output.as_deref(), &drawn.svg)?;
     // The picture may be on its way to another program, so the notes go to the standard error.
     for note in drawn.notes {
         terminal::note(format_args!("note: {note}"));
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn write(output: &Path, files: &EpochFiles, svg: &str) -> miette::Result<()> {
-    check_not_record(output, files)?;
-    std::fs::write(output, svg)
-        .map_err(|error| miette!("cannot write {}: {error}", output.display()))
 }

@@ -1,7 +1,6 @@
 //! `cars emotionml`: exports the emotions of a run's robots as EmotionML 1.0.
 
-use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -11,6 +10,8 @@ use lab::folder::find;
 use miette::miette;
 use protocol::RobotName;
 use simulator::recorder::LATEST;
+
+use crate::output::{Output, cannot_write};
 
 /// `cars emotionml`.
 #[derive(Debug, Args)]
@@ -42,9 +43,12 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
     };
 
     let export = Export::open(&folder, args.robot)?;
-    let mut out = open_output(args.output.as_deref(), export.path())?;
+    let path = args.output.as_deref();
+    check_not_source(path, export.path())?;
+    let mut out = Output::create(path)?;
     match export.write(&mut out, view) {
         Ok(notes) => {
+            out.finish()?;
             // The document may be on its way to another program, so the notes go to the standard error.
             for note in notes {
                 terminal::note(format_args!("note: {note}"));
@@ -55,14 +59,14 @@ pub(crate) fn emotionml(args: EmotionmlArgs) -> miette::Result<ExitCode> {
         Err(ExportError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => {
             Ok(ExitCode::SUCCESS)
         }
-        Err(ExportError::Write(error)) => Err(miette!("the document cannot be written: {error}")),
+        Err(ExportError::Write(error)) => Err(cannot_write(path, &error)),
         Err(ExportError::Read(report)) => Err(report),
     }
 }
 
-fn open_output(output: Option<&Path>, source: &Path) -> miette::Result<Box<dyn Write>> {
+fn check_not_source(output: Option<&Path>, source: &Path) -> miette::Result<()> {
     let Some(output) = output else {
-        return Ok(Box::new(BufWriter::new(std::io::stdout())));
+        return Ok(());
     };
 
     let is_source = output
@@ -74,9 +78,5 @@ fn open_output(output: Option<&Path>, source: &Path) -> miette::Result<Box<dyn W
             output.display()
         ));
     }
-
-    let file = File::create(output)
-        .map_err(|error| miette!("cannot write {}: {error}", output.display()))?;
-
-    Ok(Box::new(BufWriter::new(file)))
+    Ok(())
 }

@@ -8,13 +8,20 @@ use config::{Override, Speed, seed};
 use launch::RunOptions;
 use protocol::RunName;
 use protocol::random::MAX_SEED;
+use simulator::IfTaken;
 
 /// Options of one execution.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ExecutionArgs {
-    /// Name of the run, and of its folder; without it the file's name.
+    /// Name of the run, and of its folder; without it that in the launch file, or the file's name.
     #[arg(long, value_name = "NAME")]
     pub(crate) run: Option<RunName>,
+    /// Replace the run with this name, if it is over. Without it, a new run takes the next free name, as in `hall-2`.
+    #[arg(long)]
+    pub(crate) replace: bool,
+    /// The folder of the run was made for it, by another process.
+    #[arg(long, hide = true, conflicts_with = "replace")]
+    pub(crate) reserved: bool,
     /// Seed, or `random` to draw one; the record contains it either way.
     #[arg(long, value_name = "N|random", value_parser = parse_seed)]
     pub(crate) seed: Option<u64>,
@@ -51,10 +58,24 @@ fn draw_seed() -> Result<u64, String> {
     Ok(u64::from_le_bytes(bytes) & MAX_SEED)
 }
 
+/// What is done where the name of a new run is taken.
+pub(crate) fn if_taken(replaces: bool) -> IfTaken {
+    if replaces {
+        IfTaken::Replace
+    } else {
+        IfTaken::Number
+    }
+}
+
 impl ExecutionArgs {
     /// The options as the `launch` crate takes them.
     pub(crate) fn options(self) -> RunOptions {
         RunOptions {
+            if_taken: if self.reserved {
+                IfTaken::Reserved
+            } else {
+                if_taken(self.replace)
+            },
             run: self.run,
             seed: self.seed,
             duration: self.duration,

@@ -7,16 +7,17 @@ use std::str::FromStr;
 use clap::Args;
 use config::units::Time;
 use config::{Changes, Override};
-use lab::folder::{find, recorded_epoch};
+use lab::folder::{find, recorded_epoch, run_name};
 use lab::fork::Fork;
 use lab::moment::Moment;
 use launch::RunOptions;
-use miette::{IntoDiagnostic, miette};
+use miette::miette;
 use protocol::{Epoch, RunName};
 use scenario::Scenario;
-use scenario::files::{EVENTS, LATEST, LOCK, LOGS, RECORDING, SCENARIO};
-use simulator::RunFolder;
+use scenario::files::LATEST;
+use simulator::NewRun;
 
+use crate::execution::if_taken;
 use crate::table;
 
 /// `cars fork`.
@@ -31,6 +32,9 @@ pub(crate) struct ForkArgs {
     /// Name of the fork; without it RUN-fork-TICK.
     #[arg(long, value_name = "NAME")]
     run: Option<RunName>,
+    /// Replace the run with this name, if it is over. Without it, the fork takes the next free name.
+    #[arg(long)]
+    replace: bool,
     /// Another end, in simulated time from the beginning of the run, for example "900 s".
     #[arg(long, value_name = "TIME")]
     duration: Option<Time>,
@@ -70,7 +74,7 @@ impl FromStr for Place {
 pub(crate) fn fork(args: ForkArgs) -> miette::Result<ExitCode> {
     // A link such as `latest` will lead to the fork.
     let parent_folder = find(&args.out, &args.at.run)?.resolved()?;
-    let parent = parent_folder.name()?;
+    let parent = run_name(&parent_folder);
     let files = recorded_epoch(&parent_folder, args.epoch)?;
     let recorded = Scenario::load(&files.scenario, &Changes::default())?;
     let tick = args.at.moment.tick(recorded.tick_s);
@@ -83,12 +87,11 @@ pub(crate) fn fork(args: ForkArgs) -> miette::Result<ExitCode> {
     };
     let scenario = fork.scenario()?;
 
-    let run = match args.run {
-        Some(run) => run,
-        None => RunName::new(&format!("{parent}-fork-{tick}")).into_diagnostic()?,
-    };
+    let run = args
+        .run
+        .unwrap_or_else(|| parent.with_suffix(&format!("-fork-{tick}")));
     let place = args.out.join(run.as_str());
-    if is_same_place(&place, parent_folder.path()) {
+    if args.replace && is_same_place(&place, parent_folder.path()) {
         return Err(miette!(
             help = "give it another name by --run",
             "the fork would overwrite the run {parent}"
@@ -96,95 +99,52 @@ pub(crate) fn fork(args: ForkArgs) -> miette::Result<ExitCode> {
     }
     let options = RunOptions {
         run: Some(run.clone()),
+        if_taken: if_taken(args.replace),
         seed: None,
         duration: args.duration,
         speed: None,
         out: args.out,
         set: Vec::new(),
     };
-    let before = Before::of(&options.out, &place);
-    let (folder, _lock) = options.folder(&run, &scenario)?;
-    let executed = fork.execute(scenario, &run, &folder);
-    let summary = executed.inspect_err(|_| before.restore(&folder))?;
+    let latest = std::fs::read_link(options.out.join(LATEST)).ok();
+    let made = options.folder(&run, &scenario)?;
+    if let Some(notice) = &made.notice {
+        terminal::note(notice);
+    }
+    let executed = fork.execute(scenario, &made.run, &made.folder);
+    let summary = executed.inspect_err(|_| undo(&made, latest.as_deref()))?;
     if !args.quiet {
-        table::print(&summary, folder.path())?;
+        table::print(&summary, made.folder.path())?;
     }
     Ok(ExitCode::from(summary.verdict().exit_status()))
 }
 
-/// What was there before a fork made its folder.
-struct Before {
-    has_folder: bool,
-    /// The link to the latest run.
-    link: PathBuf,
-    /// Where it led.
-    latest: Option<PathBuf>,
-}
-
-impl Before {
-    fn of(out: &Path, place: &Path) -> Self {
-        let link = out.join(LATEST);
-        Self {
-            has_folder: place.exists(),
-            latest: std::fs::read_link(&link).ok(),
-            link,
-        }
+/// Removes what a fork that failed has made, and points the link to the latest run where it was.
+fn undo(made: &NewRun, latest: Option<&Path>) {
+    let folder = &made.folder;
+    let removed = if made.is_new {
+        std::fs::remove_dir_all(folder.path()).map_err(miette::Report::msg)
+    } else {
+        folder.clear().map_err(miette::Report::from)
+    };
+    if let Err(error) = removed {
+        let place = folder.path().display();
+        terminal::note(format_args!("note: {place} could not be removed: {error}"));
     }
 
-    /// Removes what a fork that failed has made. Files of others stay in a folder that was there before.
-    fn restore(&self, folder: &RunFolder) {
-        if let Err(error) = self.remove(folder) {
-            let place = folder.path().display();
-            terminal::note(format_args!("note: {place} could not be removed: {error}"));
-        }
-        // Without the link, runs have to be named.
-        let _unlinked = self.restore_link(folder);
+    let link = folder.path().with_file_name(LATEST);
+    let is_own = std::fs::read_link(&link)
+        .is_ok_and(|target| Some(target.as_os_str()) == folder.path().file_name());
+    if !is_own {
+        return; // Another run has begun since.
     }
-
-    fn remove(&self, folder: &RunFolder) -> std::io::Result<()> {
-        if !self.has_folder {
-            return std::fs::remove_dir_all(folder.path());
-        }
-
-        // The scenario has the name of the log. It stays beside files of others, so that the folder is still that of a run.
-        for file in [folder.log(), folder.file(EVENTS), folder.file(RECORDING)] {
-            if file.exists() {
-                std::fs::remove_file(file)?;
-            }
-        }
-        if has_others(folder)? {
-            return Ok(());
-        }
-        std::fs::remove_dir_all(folder.path())
-    }
-
-    fn restore_link(&self, folder: &RunFolder) -> std::io::Result<()> {
-        let latest = std::fs::read_link(&self.link)?;
-        if latest.file_name() != folder.path().file_name() {
-            return Ok(()); // Another run has begun since.
-        }
-
-        std::fs::remove_file(&self.link)?;
-        match &self.latest {
-            Some(latest) if self.link.with_file_name(latest).exists() => {
-                std::os::unix::fs::symlink(latest, &self.link)
-            }
-            _ => Ok(()),
+    match latest {
+        Some(latest) if link.with_file_name(latest).exists() => folder.point_latest_to(latest),
+        _ => {
+            // Without the link, runs have to be named.
+            let _unlinked = std::fs::remove_file(&link);
         }
     }
-}
-
-/// Whether a folder has more than what every run's folder has from the beginning.
-fn has_others(folder: &RunFolder) -> std::io::Result<bool> {
-    for entry in std::fs::read_dir(folder.path())? {
-        let name = entry?.file_name();
-        let is_own = [SCENARIO, LOCK, LOGS].iter().any(|own| name == *own);
-        if !is_own {
-            return Ok(true);
-        }
-    }
-    let mut logs = std::fs::read_dir(folder.file(LOGS))?;
-    Ok(logs.next().is_some())
 }
 
 fn is_same_place(one: &Path, other: &Path) -> bool {

@@ -27,7 +27,7 @@ pub(crate) struct LaunchArgs {
     file: Option<PathBuf>,
     /// A run, or its folder, to go on with where its simulator was killed. It is executed again up to the last tick of its
     /// record, and compared with it.
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "roster", "run", "seed", "duration", "set", "export"])]
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "roster", "run", "replace", "seed", "duration", "set", "export"])]
     resume: Option<PathBuf>,
     /// A list of robots instead of a launch file, one class a line, as in CARSConfig.txt of the first CARS.
     #[arg(long, value_name = "FILE", conflicts_with = "file")]
@@ -119,7 +119,7 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
     let is_dry_run = args.dry_run;
     let export = args.export;
     let is_quiet = args.quiet;
-    let launch = args.load()?;
+    let mut launch = args.load()?;
     match export {
         Some(Format::Compose) => {
             terminal::data(launch.export()?)?;

@@ -1,10 +1,11 @@
 //! `cars man`: writes the manual pages of all programs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Command, CommandFactory};
-use miette::miette;
+use clap_mangen::Man;
+use lab::export::draft::{Draft, unwritable};
 use robot::RobotArgs;
 
 /// The programs of the robots.
@@ -24,13 +25,29 @@ pub(crate) struct ManArgs {
 /// Writes a page for each program, and for each subcommand of `cars`, whose command line is given.
 pub(crate) fn man(args: &ManArgs, cars: Command) -> miette::Result<ExitCode> {
     let folder = &args.folder;
-    let failed = |error: std::io::Error| miette!("cannot write {}: {error}", folder.display());
-
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    for program in programs(cars) {
-        clap_mangen::generate_to(program, folder).map_err(failed)?;
+    std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+    for mut program in programs(cars) {
+        program.build();
+        write_pages(&program, folder)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the page of a command and those of its subcommands.
+fn write_pages(command: &Command, folder: &Path) -> miette::Result<()> {
+    for subcommand in command.get_subcommands() {
+        if !subcommand.is_hide_set() {
+            write_pages(subcommand, folder)?;
+        }
+    }
+
+    let page = Man::new(command.clone());
+    let path = folder.join(page.get_filename());
+    let mut draft = Draft::create(&path)?;
+    page.render(&mut draft)
+        .map_err(|error| unwritable(&path, &error))?;
+    draft.publish()?;
+    Ok(())
 }
 
 /// The command lines of all programs.

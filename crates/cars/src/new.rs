@@ -6,8 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
+use config::{FileError, Source};
+use launch::LaunchFile;
 use miette::{IntoDiagnostic, WrapErr, miette};
-use protocol::RobotName;
+use protocol::{RobotName, RunName};
+use scenario::Scenario;
 
 /// `cars new`.
 #[derive(Debug, Args)]
@@ -70,10 +73,14 @@ struct Skeleton {
     hint: &'static str,
 }
 
+/// The launch file of every skeleton.
+const LAUNCH: (&str, &str) = ("launch.toml", include_str!("new/launch.toml"));
+/// The scenario of every skeleton.
+const SCENARIO: (&str, &str) = ("scenario.toml", include_str!("new/scenario.toml"));
 /// Files of every skeleton: name and text.
 const COMMON: [(&str, &str); 3] = [
-    ("launch.toml", include_str!("new/launch.toml")),
-    ("scenario.toml", include_str!("new/scenario.toml")),
+    LAUNCH,
+    SCENARIO,
     ("README.md", include_str!("new/README.md")),
 ];
 /// Where to go on with a robot over standard input and output.
@@ -155,6 +162,8 @@ impl Language {
 pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
     let What::Robot(args) = &args.what;
     let folder = args.out.join(args.name.as_str());
+    let skeleton = args.lang.skeleton();
+    check_launch(&skeleton, &args.name)?;
     let cars = if args.lang.needs_sdk() {
         project(args.cars.as_deref())?
     } else {
@@ -162,7 +171,6 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
     };
     make_folder(&args.out, &folder)?;
 
-    let skeleton = args.lang.skeleton();
     let template = Template {
         skeleton: &skeleton,
         name: args.name.as_str(),
@@ -190,6 +198,33 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
         readme.display()
     ))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Checks that the robot can be launched: some names are reserved.
+fn check_launch(skeleton: &Skeleton, name: &RobotName) -> miette::Result<()> {
+    RunName::new(name.as_str()).map_err(|error| miette!("{error}"))?;
+
+    let template = Template {
+        skeleton,
+        name: name.as_str(),
+        folder: String::new(),
+        cars: Path::new(""),
+    };
+    let [launch, scenario] = [LAUNCH, SCENARIO].map(|(file, text)| Source {
+        name: file.to_owned(),
+        text: template.fill(text),
+    });
+    let wrong = |error: FileError| {
+        miette!(
+            help = "choose another name",
+            "no robot can be called {name}: {}",
+            error.in_words()
+        )
+    };
+    let scenario = Scenario::parse(&scenario, Path::new("")).map_err(wrong)?;
+    let launch = LaunchFile::parse(launch, Path::new("")).map_err(wrong)?;
+    launch.check_robots(&scenario).map_err(wrong)?;
+    Ok(())
 }
 
 /// Makes the folder of the robot, which must not exist.

@@ -1,9 +1,107 @@
-//! Files that commands write.
+//! Files that commands write: they get their names when they are complete.
 
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind, Stdout, Write};
 use std::path::Path;
 
+use lab::export::draft::{Draft, unwritable};
 use miette::miette;
 use simulator::EpochFiles;
+
+/// Paths of the standard output.
+const STANDARD: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+/// What paths of files begin with that this process has open.
+const OPEN: [&str; 3] = ["/dev/stderr", "/dev/fd/", "/proc/"];
+
+/// Where a command writes. [`Output::finish`] completes it; a file that is not completed is as it was before, or not there.
+#[derive(Debug)]
+pub(crate) enum Output {
+    /// A file, which is replaced as a whole.
+    File(Draft),
+    /// A pipe or a device.
+    Stream(BufWriter<File>),
+    /// The standard output.
+    Standard(BufWriter<Stdout>),
+}
+
+impl Output {
+    /// Begins to write to a path; without one to the standard output.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(crate) fn create(path: Option<&Path>) -> miette::Result<Self> {
+        let Some(path) = path.filter(|path| !STANDARD.iter().any(|name| *path == Path::new(name)))
+        else {
+            return Ok(Self::Standard(BufWriter::new(std::io::stdout())));
+        };
+
+        let is_special = path
+            .metadata()
+            .is_ok_and(|found| !found.is_file() && !found.is_dir());
+        let is_open = OPEN.iter().any(|open| path.starts_with(open));
+        if is_special || is_open {
+            // What others have written before stays.
+            let file = File::options().append(true).open(path);
+            let file = file.map_err(|error| unwritable(path, &error))?;
+            return Ok(Self::Stream(BufWriter::new(file)));
+        }
+        Ok(Self::File(Draft::follow(path)?))
+    }
+
+    /// Completes it. Returns whether everything was written: a reader may have seen enough.
+    ///
+    /// # Errors
+    /// The reason why it cannot be written.
+    pub(crate) fn finish(mut self) -> miette::Result<()> {
+        match self.flush() {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+            flushed => flushed.map_err(|error| miette!("cannot write: {error}"))?,
+        }
+        if let Self::File(draft) = self {
+            draft.publish()?;
+        }
+        Ok(())
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::File(draft) => draft.write(bytes),
+            Self::Stream(stream) => stream.write(bytes),
+            Self::Standard(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::File(draft) => draft.flush(),
+            Self::Stream(stream) => stream.flush(),
+            Self::Standard(out) => out.flush(),
+        }
+    }
+}
+
+/// Writes a text to a path; without one to the standard output.
+///
+/// # Errors
+/// If it cannot be written. A file is then as it was before, or not there.
+pub(crate) fn write(path: Option<&Path>, text: &str) -> miette::Result<()> {
+    let mut output = Output::create(path)?;
+    match output.write_all(text.as_bytes()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        Err(error) => Err(cannot_write(path, &error)),
+        Ok(()) => output.finish(),
+    }
+}
+
+/// The error of an output that cannot be written.
+pub(crate) fn cannot_write(path: Option<&Path>, error: &std::io::Error) -> miette::Report {
+    match path {
+        Some(path) => unwritable(path, error).into(),
+        None => miette!("cannot write to the standard output: {error}"),
+    }
+}
 
 /// Checks that a file to be written is no part of the record of a run.
 ///

@@ -71,6 +71,8 @@ pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
     ctrlc::set_handler(stop).into_diagnostic()?;
 
     let endpoint = connectable(&args.listen);
+    // Nothing is written through a link.
+    let folder = folder.resolved_to_write().unwrap_or(folder);
     let note = note_endpoint(&folder, &run, &endpoint);
     let printed = terminal::print_line(format_args!(
         "replaying {recorded}, epoch {}, ticks 0 to {last}, as run {run} at {endpoint}",
@@ -106,7 +108,8 @@ fn note_endpoint(folder: &RunFolder, run: &RunName, endpoint: &str) -> Option<Ru
         return None;
     }
 
-    let noted = folder.lock().and_then(|lock| {
+    let noted = folder.lock_of_launcher().and_then(|_| {
+        let lock = folder.lock()?;
         folder.write_line(ENDPOINT, endpoint)?;
         Ok(lock)
     });

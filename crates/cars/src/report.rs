@@ -10,9 +10,8 @@ use lab::report::{of_experiment, of_runs};
 use miette::miette;
 use simulator::RunFolder;
 use simulator::recorder::LATEST;
-use terminal::OutputError;
 
-use crate::output::check_not_record;
+use crate::output::{self, check_not_record};
 
 /// `cars report`.
 #[derive(Debug, Args)]
@@ -43,10 +42,14 @@ pub(crate) fn report(args: &ReportArgs) -> miette::Result<ExitCode> {
         }
     };
 
-    match &args.output {
-        Some(output) => write(output, &folders, &html)?,
-        None => OutputError::unless_closed(terminal::data(&html))?,
+    if let Some(output) = &args.output {
+        for folder in &folders {
+            for files in folder.epochs() {
+                check_not_record(output, &files)?;
+            }
+        }
     }
+    output::write(args.output.as_deref(), &html)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -74,14 +77,4 @@ fn find_run(out: &Path, subject: &Path) -> miette::Result<RunFolder> {
     }
 
     find(out, subject)
-}
-
-fn write(output: &Path, folders: &[RunFolder], html: &str) -> miette::Result<()> {
-    for folder in folders {
-        for files in folder.epochs() {
-            check_not_record(output, &files)?;
-        }
-    }
-    std::fs::write(output, html)
-        .map_err(|error| miette!("cannot write {}: {error}", output.display()))
 }

@@ -5,7 +5,6 @@ use std::process::ExitCode;
 
 use clap::Args;
 use lab::run::check_faults;
-use miette::IntoDiagnostic;
 use scenario::Scenario;
 
 use crate::execution::ExecutionArgs;
@@ -34,12 +33,15 @@ pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
     let scenario = Scenario::load(&file, &options.changes())?;
     check_faults(&scenario, 0)?;
 
-    let run = options.run_name(&args.file).into_diagnostic()?;
-    let (folder, _lock) = options.folder(&run, &scenario)?;
+    let run = options.run_name(&args.file)?;
+    let made = options.folder(&run, &scenario)?;
+    if let Some(notice) = &made.notice {
+        terminal::note(notice);
+    }
     let speed = options.speed.and_then(|speed| speed.0);
-    let summary = execute(scenario, &run, &folder, speed)?;
+    let summary = execute(scenario, &made.run, &made.folder, speed)?;
     if !args.quiet {
-        table::print(&summary, folder.path())?;
+        table::print(&summary, made.folder.path())?;
     }
     Ok(ExitCode::from(summary.verdict().exit_status()))
 }

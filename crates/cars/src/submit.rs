@@ -7,8 +7,12 @@ use std::process::{Command, Stdio};
 use clap::{Args, ValueEnum};
 use config::units::Time;
 use lab::experiment::Plan;
+use lab::export::draft::unwritable;
 use lab::experiment::submit::{Kubernetes, Parallel, Slurm, Tasks};
 use miette::{IntoDiagnostic, WrapErr, miette};
+use simulator::folder::check_no_links;
+
+use crate::output;
 
 /// Folder of the scripts and of what they print, in that of the experiment.
 const SCRIPTS: &str = "slurm";
@@ -195,11 +199,11 @@ impl EngineArgs {
         }
 
         let scripts = folder.join(SCRIPTS);
-        std::fs::create_dir_all(&scripts)
-            .and_then(|()| std::fs::write(scripts.join(UNITS), units))
-            .and_then(|()| std::fs::write(scripts.join(MERGE), merge))
-            .into_diagnostic()
-            .wrap_err_with(|| format!("{} cannot be written", scripts.display()))?;
+        check_no_links(&scripts)?;
+        std::fs::create_dir_all(&scripts).map_err(|error| unwritable(&scripts, &error))?;
+        for (name, script) in [(UNITS, units), (MERGE, merge)] {
+            output::write(Some(&scripts.join(name)), &script)?;
+        }
         let units = sbatch(&scripts, &[UNITS])?;
         // Also if a task failed: the others have results.
         let after = format!("--dependency=afterany:{units}");

@@ -1,19 +1,16 @@
 //! `cars trace`: exports where the wall-clock time of a run went.
 
-use std::io::{BufWriter, ErrorKind};
-use std::path::{Path, PathBuf};
+use std::io::ErrorKind;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use lab::export::draft::Draft;
 use lab::folder::{find, recorded_epoch};
 use lab::trace::{Trace, TraceError};
-use miette::miette;
 use protocol::{Epoch, Tick};
-use simulator::EpochFiles;
 use simulator::recorder::LATEST;
 
-use crate::output::check_not_record;
+use crate::output::{Output, cannot_write, check_not_record};
 
 /// `cars trace`.
 #[derive(Debug, Args)]
@@ -44,33 +41,23 @@ pub(crate) fn trace(args: &TraceArgs) -> miette::Result<ExitCode> {
     let files = recorded_epoch(&folder, args.epoch)?;
     let trace = Trace::open(&files, args.from, args.to)?;
 
-    let notes = match &args.output {
-        Some(path) => write_file(&trace, &files, path)?,
-        None => write_output(&trace)?,
+    let path = args.output.as_deref();
+    if let Some(path) = path {
+        check_not_record(path, &files)?;
+    }
+    let mut output = Output::create(path)?;
+    let notes = match trace.write(&mut output) {
+        // The reader has closed its end of the pipe, as `head` does.
+        Err(TraceError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => Vec::new(),
+        Err(TraceError::Write(error)) => return Err(cannot_write(path, &error)),
+        written => {
+            let notes = written?;
+            output.finish()?;
+            notes
+        }
     };
     for note in notes {
         terminal::note(format_args!("note: {note}"));
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn write_file(trace: &Trace, files: &EpochFiles, path: &Path) -> miette::Result<Vec<String>> {
-    check_not_record(path, files)?;
-
-    let mut draft = Draft::create(path)?;
-    let notes = trace.write(&mut draft).map_err(|error| match error {
-        TraceError::Write(error) => miette!("cannot write {}: {error}", path.display()),
-        error @ TraceError::Read(_) => error.into(),
-    })?;
-    draft.publish()?;
-    Ok(notes)
-}
-
-fn write_output(trace: &Trace) -> miette::Result<Vec<String>> {
-    let mut out = BufWriter::new(std::io::stdout());
-    match trace.write(&mut out) {
-        // The reader has closed its end of the pipe, as `head` does.
-        Err(TraceError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(Vec::new()),
-        written => Ok(written?),
-    }
 }

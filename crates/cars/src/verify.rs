@@ -9,13 +9,14 @@ use config::units::Time;
 use config::{FileError, Speed};
 use lab::diff::{Comparison, compare};
 use lab::folder::{find, recorded_epoch, recorded_epochs};
+use lab::scratch::Scratch;
 use lab::verify::{Verification, verify as verify_epoch};
 use launch::{Launch, LaunchOptions, RunOptions};
 use miette::{IntoDiagnostic, miette};
 use protocol::{Event, RobotName};
 use simulator::difference::Difference;
 use simulator::record::Record;
-use simulator::{EpochFiles, RunFolder};
+use simulator::{EpochFiles, IfTaken, RunFolder};
 use terminal::OutputError;
 
 /// How long a process may take to exit before it is killed, seconds.
@@ -88,8 +89,8 @@ fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result
         ));
     }
 
-    let scratch = tempfile::tempdir().into_diagnostic()?;
-    let launch = Launch::again(folder.path(), quiet_options(scratch.path()))?;
+    let scratch = Scratch::new().into_diagnostic()?;
+    let mut launch = Launch::again(folder.path(), quiet_options(scratch.path()))?;
     let (outcome, again) = launch.play(|_| {})?;
     if let Some(failure) = &outcome.failure {
         terminal::note(failure);
@@ -159,6 +160,7 @@ fn quiet_options(out: &Path) -> LaunchOptions {
     LaunchOptions {
         run: RunOptions {
             run: None,
+            if_taken: IfTaken::Number,
             seed: None,
             duration: None,
             speed: Some(Speed(None)),

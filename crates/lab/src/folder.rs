@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use config::FileError;
 use miette::{IntoDiagnostic, WrapErr, miette};
-use protocol::Epoch;
+use protocol::{Epoch, RunName};
 use recording::Recording;
 use simulator::recorder::{LATEST, SUMMARY};
 use simulator::{EpochFiles, RunFolder, Summary};
@@ -70,6 +70,23 @@ pub fn recorded_epoch(folder: &RunFolder, number: Option<Epoch>) -> Result<Epoch
             number.unwrap_or_default()
         ))
     })
+}
+
+/// The name of a recorded run: that of its folder, or, where the folder was copied or renamed to what is not the name of a run, the
+/// one that is recorded.
+#[must_use]
+pub fn run_name(folder: &RunFolder) -> RunName {
+    if let Ok(name) = folder.name() {
+        return name;
+    }
+
+    let last = folder.epochs().pop();
+    let recording = last.and_then(|files| Recording::open(&files.recording).ok());
+    let recorded = recording.map(|recording| recording.header().run.clone());
+    let summed_up = || read_summary(folder).ok().flatten();
+    recorded
+        .or_else(|| summed_up().map(|summary| summary.run))
+        .unwrap_or_else(RunName::unknown)
 }
 
 /// The recording of an epoch.

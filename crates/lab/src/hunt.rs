@@ -170,6 +170,13 @@ pub fn hunt(
             subject.file.display()
         ));
     }
+    if options.out.is_symlink() {
+        let place = options.out.display();
+        return Err(miette!(
+            help = "name the folder to which it leads",
+            "{place} is a link, and nothing is written through one"
+        ));
+    }
     std::fs::create_dir_all(&options.out)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot make the folder {}", options.out.display()))?;
@@ -359,7 +366,8 @@ impl Hunt<'_> {
         played: &Played,
         progress: &mut dyn FnMut(Progress<'_>),
     ) -> miette::Result<()> {
-        let drawn = self.finding(name, plan, case, played);
+        let mut drawn = self.finding(name, plan, case, played);
+        drawn.file = file::reserve(&drawn.file)?;
         self.write(&drawn, played, "It is not shrunk.")?;
         progress(Progress::Found(&drawn));
         let world = World {
@@ -380,6 +388,7 @@ impl Hunt<'_> {
             known.plans += 1;
             return std::fs::remove_file(&drawn.file).into_diagnostic();
         }
+        let named = std::mem::replace(&mut finding.file, drawn.file);
         finding.drawn = drawn.drawn;
         finding.shrink_runs = shrunk.runs;
         finding.is_minimal = shrunk.is_minimal;
@@ -390,6 +399,7 @@ impl Hunt<'_> {
             format!("It was shrunk by {runs} runs; more may make it smaller.")
         };
         self.write(&finding, &shrunk.played, &sentence)?;
+        finding.file = file::keep_one(finding.file, &named)?;
         self.check_file(&finding)?;
         progress(Progress::Shrunk(&finding));
         self.report.findings.push(finding);

@@ -3,7 +3,7 @@
 //! judging recorded runs ([`judge`]), presenting results ([`table`], [`mod@diagram`], [`report`]), exporting runs
 //! ([`export`], [`trace`], [`emotionml`]), letting them go on otherwise ([`fork`]), hunting for faults under which
 //! expectations fail ([`hunt`]), playing single robots from their records ([`replayed`]),
-//! and writing commands that can be typed ([`shell`]).
+//! reading records to find damage ([`inspect`]), and writing commands that can be typed ([`shell`]).
 
 pub mod diagram;
 pub mod diff;
@@ -13,6 +13,7 @@ pub mod export;
 pub mod folder;
 pub mod fork;
 pub mod hunt;
+pub mod inspect;
 pub mod judge;
 pub mod moment;
 mod performance;
@@ -20,6 +21,7 @@ mod reexecution;
 pub mod replayed;
 pub mod report;
 pub mod run;
+pub mod scratch;
 pub mod shell;
 mod states;
 pub mod table;

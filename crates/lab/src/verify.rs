@@ -1,15 +1,20 @@
 //! Verification: a recorded epoch is executed again from its scenario and compared with its record, tick by tick.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use config::{Changes, FileError};
-use miette::{IntoDiagnostic, miette};
-use protocol::{RobotName, Tick};
+use miette::{IntoDiagnostic, WrapErr, miette};
+use protocol::{RobotName, RunName, Tick};
+use recording::Recording;
 use scenario::Scenario;
-use simulator::difference::{Difference, between, between_headers, in_recording};
+use serde_json::Value;
+use simulator::difference::{
+    Difference, between, between_headers, between_summaries, in_recording,
+};
 use simulator::record::Record;
 use simulator::recorder::{self, EVENTS, SUMMARY};
-use simulator::{EpochFiles, Simulation, seal};
+use simulator::{EpochFiles, Simulation, Summary, seal};
 
 use crate::reexecution::Reexecution;
 
@@ -39,7 +44,9 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
     let mut record = Record::open(files)?;
     let scenario = Scenario::load(&files.scenario, &Changes::default())?;
     let has_recording = scenario.record.frames;
-    check_scenario(files, &record)?;
+    if let Some(recording) = record.recording() {
+        check_scenario(files, recording)?;
+    }
     let mut again = Reexecution::new(scenario, files.epoch)?;
     let mut verification = Verification {
         ticks: 0,
@@ -53,13 +60,20 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         return Ok(verification);
     }
 
+    let run = recorded_run(&record);
+    let mut summary = Summary::begin(&run, &again.local.simulation);
     let mut next = record.next_entry()?;
     if next.is_none() {
         let events = files.events.display();
         return Err(miette!("{events} has no complete tick"));
     }
     while let Some(recorded) = next {
-        let executed = again.play(&recorded)?.into_entry();
+        let executed = again.play(&recorded)?;
+        let simulation = &again.local.simulation;
+        for event in executed.record.events.iter() {
+            summary.count(simulation, executed.record.tick, event);
+        }
+        let executed = executed.into_entry();
         verification.difference =
             between(&recorded, &executed).or_else(|| in_recording(&recorded, &executed));
         if verification.difference.is_some() {
@@ -82,8 +96,78 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
             recording.check().into_diagnostic()?;
         }
         check_end(files, &record, &verification, has_recording)?;
+        if verification.has_end && is_last(files) {
+            summary.finish(&again.local.simulation);
+            check_run(files, &record)?;
+            verification.difference = summary_difference(files, &record, &summary)?;
+        }
     }
     Ok(verification)
+}
+
+/// The name of the run, which a copy of its folder need not have.
+fn recorded_run(record: &Record) -> RunName {
+    let recording = record.recording();
+    recording.map_or_else(RunName::unknown, |recording| recording.header().run.clone())
+}
+
+/// Whether an epoch is the last one of its run, of which the summary is.
+fn is_last(files: &EpochFiles) -> bool {
+    files.events.file_name().is_some_and(|name| name == EVENTS)
+}
+
+/// The first field of the summary of a run that does not follow from its record. There may be no summary: the simulator was killed
+/// before it wrote one.
+fn summary_difference(
+    files: &EpochFiles,
+    record: &Record,
+    executed: &Summary,
+) -> miette::Result<Option<Difference>> {
+    let Some((path, written)) = read_summary(files)? else {
+        return Ok(None);
+    };
+    if written.get("wall").is_none_or(|wall| !wall.is_object()) {
+        return Err(miette!("{} is not a summary", path.display()));
+    }
+    // Another version counts other things.
+    let version = match record.recording() {
+        Some(recording) => recording.header().version.clone(),
+        None => written["version"].as_str().unwrap_or_default().to_owned(),
+    };
+    if version != executed.version {
+        return Ok(None);
+    }
+    Ok(between_summaries(&written, executed))
+}
+
+/// Checks that a summary names the run and the version of the recording beside it.
+fn check_run(files: &EpochFiles, record: &Record) -> miette::Result<()> {
+    let (Some((path, written)), Some(recording)) = (read_summary(files)?, record.recording())
+    else {
+        return Ok(());
+    };
+
+    let header = recording.header();
+    if written["run"] != header.run.as_str() || written["version"] != header.version.as_str() {
+        let place = path.display();
+        return Err(miette!("{place} is that of another run than the recording"));
+    }
+    Ok(())
+}
+
+/// The summary beside the record of an epoch, if there is one.
+fn read_summary(files: &EpochFiles) -> miette::Result<Option<(PathBuf, Value)>> {
+    let path = files.events.with_file_name(SUMMARY);
+    if !path.exists() {
+        return Ok(None);
+    }
+
+    let text =
+        std::fs::read_to_string(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+    let written = serde_json::from_str(&text)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{} is not a summary", path.display()))?;
+    Ok(Some((path, written)))
 }
 
 /// The first field of the recording's header that is not that of the scenario.
@@ -93,11 +177,7 @@ fn header_difference(record: &Record, simulation: &Simulation) -> Option<Differe
 }
 
 /// Checks that the scenario beside the record is the one that the recording contains.
-fn check_scenario(files: &EpochFiles, record: &Record) -> miette::Result<()> {
-    let Some(recording) = record.recording() else {
-        return Ok(());
-    };
-
+pub(crate) fn check_scenario(files: &EpochFiles, recording: &Recording) -> miette::Result<()> {
     let recorded = recording.scenario().into_diagnostic()?;
     let scenario = std::fs::read_to_string(&files.scenario)
         .map_err(|error| FileError::unreadable(&files.scenario, &error))?;
@@ -124,8 +204,7 @@ fn check_end(
     let last = verification.ticks;
 
     let summary = files.events.with_file_name(SUMMARY);
-    let is_last_epoch = files.events.file_name().is_some_and(|name| name == EVENTS);
-    if !verification.has_end && is_last_epoch && summary.exists() {
+    if !verification.has_end && is_last(files) && summary.exists() {
         return Err(miette!(
             "{events} ends at tick {last} without an end of the run, and the run has ended: it has a summary"
         ));

@@ -6,6 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use config::FileError;
 use protocol::RunName;
+use simulator::IfTaken;
 
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
 use super::plan::{name_args, with_own_args};
@@ -31,12 +32,17 @@ const HEAD: &str = "\
 #
 # The image has the binaries that are built here, see docker/Dockerfile. Then
 #     docker-compose up --exit-code-from simulator
-# plays the run and leaves its folder in ./runs. The network of the services is private; only the console can be reached,
-# by a browser on this machine at the address in the console's log.
+# plays the run and leaves its folder in ./runs, where it replaces an earlier run of this file that is over. The network of the
+# services is private; only the console can be reached, by a browser on this machine at the address in the console's log.
 ";
 
 /// The compose file of a launch file. Its paths are relative to the current folder, where it has to be written.
-pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<String, FileError> {
+pub(super) fn export(
+    file: &LaunchFile,
+    run: &RunName,
+    if_taken: IfTaken,
+    speed: Speed,
+) -> Result<String, FileError> {
     if file.processes.len() > MAX_SERVICES {
         return Err(FileError::new(format!(
             "more than {MAX_SERVICES} processes do not fit into one network"
@@ -44,7 +50,7 @@ pub(super) fn export(file: &LaunchFile, run: &RunName, speed: Speed) -> Result<S
     }
 
     let mut text = format!("{HEAD}\nservices:\n");
-    simulator_service(&mut text, file, run, speed)?;
+    simulator_service(&mut text, file, run, if_taken, speed)?;
 
     for (index, process) in file.processes.iter().enumerate() {
         robot_service(&mut text, process, run, FIRST_HOST + 1 + index);
@@ -70,6 +76,7 @@ fn simulator_service(
     text: &mut String,
     file: &LaunchFile,
     run: &RunName,
+    if_taken: IfTaken,
     speed: Speed,
 ) -> Result<(), FileError> {
     let path = &file.scenario;
@@ -81,6 +88,11 @@ fn simulator_service(
     command.extend([
         format!("/configs/{scenario}"),
         format!("--run={run}"),
+        // All services know the run by its name.
+        match if_taken {
+            IfTaken::Reserved => "--prepared".to_owned(),
+            IfTaken::Number | IfTaken::Replace | IfTaken::Refuse => "--replace".to_owned(),
+        },
         format!("--listen=tcp/0.0.0.0:{PORT}"),
         // Only the services of this file are in the private network.
         "--insecure".to_owned(),
@@ -227,7 +239,7 @@ mod tests {
         let source = config::Source::read(&path).unwrap();
         let file = LaunchFile::parse(source, Path::new("launch")).unwrap();
         let run = RunName::new("hors_doeuvres").unwrap();
-        let text = export(&file, &run, file.speed.unwrap()).unwrap();
+        let text = export(&file, &run, IfTaken::Number, file.speed.unwrap()).unwrap();
         let kept = include_str!("compose.yml");
         let how = "cars launch launch/hors_doeuvres.toml --export compose > crates/launch/src/compose.yml";
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use config::speed::SpeedError;
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
-use protocol::RobotName;
+use protocol::{RobotName, RunName};
 use scenario::Scenario;
 use serde::Deserialize;
 use toml::Spanned;
@@ -39,6 +39,8 @@ pub struct LaunchFile {
     /// The scenario file, relative to the current directory.
     pub scenario: PathBuf,
     scenario_span: Option<Range<usize>>,
+    /// Name of its runs, unless another one is given; without it the name of the file.
+    pub run: Option<RunName>,
     /// Speed of the clock.
     pub speed: Option<Speed>,
     /// The folder of certificates of a secured run, relative to the current directory.
@@ -100,6 +102,7 @@ pub struct Process {
 #[serde(deny_unknown_fields)]
 struct RawFile {
     scenario: Spanned<PathBuf>,
+    run: Option<Spanned<String>>,
     speed: Option<Spanned<RawSpeed>>,
     secure: Option<PathBuf>,
     #[serde(default)]
@@ -178,11 +181,21 @@ impl LaunchFile {
     }
 
     /// Reads the text of a launch file; `folder` is where its relative paths begin.
-    pub(crate) fn parse(source: Source, folder: &Path) -> Result<Self, FileError> {
+    ///
+    /// # Errors
+    /// [`FileError`] with line and caret.
+    pub fn parse(source: Source, folder: &Path) -> Result<Self, FileError> {
         let raw: RawFile = source.parse()?;
         let mut speed = None;
         if let Some(raw) = raw.speed {
             speed = Some(check_speed(&source, &raw)?);
+        }
+        let mut run = None;
+        if let Some(raw) = raw.run {
+            let name = RunName::new(raw.get_ref());
+            let name = name
+                .map_err(|error| FileError::at(&source, Some(raw.span()), &error.to_string()))?;
+            run = Some(name);
         }
         let simulator = check_simulator(&source, raw.simulator)?;
         let console = raw.console.enabled.then(|| console(raw.console));
@@ -193,6 +206,7 @@ impl LaunchFile {
             folder: folder.to_owned(),
             scenario_span: Some(raw.scenario.span()),
             scenario: tidy(&folder.join(raw.scenario.into_inner())),
+            run,
             speed,
             secure: raw.secure.map(|secure| tidy(&folder.join(secure))),
             simulator,
@@ -217,6 +231,7 @@ impl LaunchFile {
             folder: roster.parent().unwrap_or(Path::new("")).to_owned(),
             scenario: roster.to_owned(),
             scenario_span: None,
+            run: None,
             speed: None,
             secure: None,
             simulator: Process::new(SIMULATOR, vec![SIMULATOR_PROGRAM.to_owned()]),

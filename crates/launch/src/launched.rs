@@ -1,7 +1,6 @@
 //! How a run was launched, in the run's folder, so that it can be resumed after its simulator or the machine was killed.
 
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use config::{FileError, Source};
@@ -9,6 +8,7 @@ use protocol::RobotName;
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use simulator::RunFolder;
+use simulator::seal;
 use simulator::recorder::LAUNCHED;
 
 use super::file::LaunchFile;
@@ -38,26 +38,9 @@ impl Launched {
     /// # Errors
     /// [`FileError`] if it cannot be written.
     pub(super) fn write(&self, folder: &RunFolder) -> Result<(), FileError> {
-        let text = serde_json::to_string_pretty(self)
-            .unwrap_or_else(|error| unreachable!("it is always JSON: {error}"));
-        let path = folder.file(LAUNCHED);
-        std::fs::write(&path, text)
-            .map_err(|error| FileError::new(format!("cannot write {}: {error}", path.display())))
-    }
-
-    /// Removes that of an earlier run from the folder. The simulator, which clears the folder when it begins, leaves it.
-    ///
-    /// # Errors
-    /// [`FileError`] if it cannot be removed.
-    pub(super) fn clear(folder: &RunFolder) -> Result<(), FileError> {
-        let path = folder.file(LAUNCHED);
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::new(format!(
-                "cannot remove {}: {error}",
-                path.display()
-            ))),
-            _ => Ok(()),
-        }
+        let text = seal::sealed_text(self)
+            .map_err(|error| FileError::new(format!("{LAUNCHED} cannot be written: {error}")))?;
+        folder.write_line(LAUNCHED, &text)
     }
 
     /// Reads it from the folder of a run.

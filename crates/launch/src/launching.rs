@@ -11,8 +11,8 @@ use config::{Changes, FileError, Source, Speed};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName};
 use scenario::{Scenario, roster};
-use simulator::RunFolder;
 use simulator::recorder::{LOGS, SCENARIO};
+use simulator::{IfTaken, RunFolder, RunLock};
 
 use super::compose;
 use super::endpoint;
@@ -29,6 +29,8 @@ use super::supervise::{Outcome, Supervisor};
 
 /// Number of ports to try: another process may bind a free port before the simulator does.
 const PORTS: usize = 3;
+/// Name of a run that is launched again from a folder that is not named like a run.
+const AGAIN: &str = "again";
 
 /// Where the processes of a launch are listed.
 #[derive(Debug, Clone)]
@@ -115,9 +117,11 @@ impl Launch {
     pub fn load(what: What, options: LaunchOptions) -> miette::Result<Self> {
         let (mut file, mut scenario) = what.load(&options.run.changes())?;
         file.check_robots(&scenario)?;
-        let run = options.run.run_name(what.path()).into_diagnostic()?;
+        let run = options.run.run_name(what.path())?;
         file.replay(&options.replayed, &mut scenario)?;
-        check_not_overwritten(&options.run.out.join(run.as_str()), &options.replayed)?;
+        if options.run.if_taken == IfTaken::Replace {
+            check_not_overwritten(&options.run.out.join(run.as_str()), &options.replayed)?;
+        }
         Self::of(what, file, scenario, run, options)
     }
 
@@ -129,6 +133,7 @@ impl Launch {
         run: RunName,
         options: LaunchOptions,
     ) -> miette::Result<Self> {
+        check_texts(what.path(), &options)?;
         let secured = secured(&options, &file)?;
 
         Ok(Self {
@@ -149,9 +154,11 @@ impl Launch {
     /// [`FileError`] if it is not the folder of a run that was launched, or the run is in progress or has ended; a missing
     /// certificate of a secured run.
     pub fn resume(folder: &Path, mut options: LaunchOptions) -> miette::Result<Self> {
-        let folder = RunFolder::at(folder.to_owned()).resolved()?;
+        let folder = RunFolder::at(folder.to_owned()).resolved_to_write()?;
         // The simulator takes the lock and reads the record.
-        drop(folder.reopen()?);
+        folder.lock_of_launcher()?;
+        folder.reopen()?;
+        folder.name()?;
         let out = folder.path().parent().unwrap_or(Path::new(""));
         options.run.out = out.to_owned();
 
@@ -173,7 +180,8 @@ impl Launch {
         file.replay(&launched.replayed, &mut scenario)?;
         options.replayed = launched.replayed;
 
-        let run = folder.name()?;
+        // A copy may have any name.
+        let run = folder.name().or_else(|_| RunName::new(AGAIN).into_diagnostic())?;
         if options.run.speed.is_none() {
             options.run.speed = Some(Speed(launched.speed));
         }
@@ -187,15 +195,28 @@ impl Launch {
         Self::of(what, file, scenario, run, options)
     }
 
-    /// Makes the folder of a new run and notes how it is launched, or takes that of the run to resume.
-    fn folder(&self) -> Result<RunFolder, FileError> {
+    /// Makes the folder of a new run and notes how it is launched, or takes that of the run to resume. From then on the run has
+    /// the name of the folder. While the lock is held, no other launch takes the folder.
+    fn take_folder(
+        &mut self,
+        notice: &mut impl FnMut(&str),
+    ) -> miette::Result<(RunFolder, Option<RunLock>)> {
         if self.is_resumed {
-            return Ok(RunFolder::new(&self.options.run.out, &self.run));
+            let folder = RunFolder::new(&self.options.run.out, &self.run);
+            let lock = folder.lock_of_launcher()?;
+            return Ok((folder, lock));
         }
 
-        let (folder, lock) = self.options.run.folder(&self.run, &self.scenario)?;
-        drop(lock); // The simulator takes it.
-        clear_logs(&folder);
+        let mut options = self.options.run.clone();
+        if options.if_taken == IfTaken::Number && self.is_bound_to_run() {
+            options.if_taken = IfTaken::Refuse;
+        }
+        let made = options.folder(&self.run, &self.scenario)?;
+        if let Some(text) = &made.notice {
+            notice(text);
+        }
+        self.run = made.run;
+
         let secure = self.options.secure.as_deref();
         let launched = Launched {
             file: absolute(self.what.path())?,
@@ -206,8 +227,16 @@ impl Launch {
             is_insecure: self.options.is_insecure,
             replayed: self.options.replayed.clone(),
         };
-        launched.write(&folder)?;
-        Ok(folder)
+        launched.write(&made.folder)?;
+        let lock = made.folder.lock_of_launcher()?;
+        drop(made.lock); // The simulator takes it.
+        Ok((made.folder, lock))
+    }
+
+    /// Whether the certificates admit no run with another name.
+    fn is_bound_to_run(&self) -> bool {
+        let secured = self.secured.as_ref();
+        secured.is_some_and(|secured| secured.is_bound_to(&self.run))
     }
 
     /// The launch as a compose file.
@@ -229,14 +258,21 @@ impl Launch {
             return Err(miette!(help = help, "a secured launch cannot be exported"));
         }
 
-        Ok(compose::export(&self.file, &self.run, self.speed())?)
+        Ok(compose::export(
+            &self.file,
+            &self.run,
+            self.options.run.if_taken,
+            self.speed(),
+        )?)
     }
 
     /// The processes with their command lines.
     ///
     /// # Errors
     /// If there is no endpoint for the simulator, or a program is not found.
-    pub fn planned(&self) -> miette::Result<Vec<Planned>> {
+    pub fn planned(&mut self) -> miette::Result<Vec<Planned>> {
+        let options = &self.options.run;
+        self.run = RunFolder::next_name(&options.out, &self.run, options.if_taken);
         Ok(self.plan(&self.endpoint()?)?)
     }
 
@@ -309,14 +345,16 @@ impl Launch {
     /// # Errors
     /// If the run's folder cannot be made, or the processes cannot be supervised. The failure of a process is part of the
     /// outcome.
-    pub fn play(&self, mut notice: impl FnMut(&str)) -> miette::Result<(Outcome, RunFolder)> {
+    pub fn play(&mut self, mut notice: impl FnMut(&str)) -> miette::Result<(Outcome, RunFolder)> {
         // A free port may be taken before the simulator binds it, if only by a connection that has ended since.
         let may_choose = self.options.listen.is_none() && self.options.connect_port.is_none();
         let mut ports_left = if may_choose { PORTS } else { 1 };
+        let mut endpoint = self.endpoint()?;
+        // What cannot be launched leaves no folder.
+        self.plan(&endpoint)?;
+        let (folder, _in_use) = self.take_folder(&mut notice)?;
         loop {
-            let endpoint = self.endpoint()?;
             let planned = self.plan(&endpoint)?;
-            let folder = self.folder()?;
             if !self.options.is_quiet {
                 self.announce(&endpoint, &folder, &mut notice);
             }
@@ -327,6 +365,7 @@ impl Launch {
                 return Ok((outcome, folder));
             }
             notice(&format!("{endpoint} is taken: trying another port"));
+            endpoint = self.endpoint()?;
         }
     }
 
@@ -448,13 +487,20 @@ fn inherited_config() -> Option<PathBuf> {
     std::env::var_os(plan::ZENOH_CONFIG).map(PathBuf::from)
 }
 
-/// Removes the logs of an earlier run with this name. The new logs are appended to those that cannot be removed.
-fn clear_logs(folder: &RunFolder) {
-    let Ok(logs) = std::fs::read_dir(folder.file(LOGS)) else {
-        return;
-    };
-    for log in logs.flatten() {
-        let _is_appended_to = std::fs::remove_file(log.path());
+/// Checks that the paths with which processes are launched are texts.
+fn check_texts(file: &Path, options: &LaunchOptions) -> Result<(), FileError> {
+    let mut paths = vec![absolute(file)?, options.run.out.clone()];
+    if let Some(secure) = &options.secure {
+        paths.push(absolute(secure)?);
+    }
+    paths.extend(options.replayed.values().cloned());
+    match paths.iter().find(|path| path.to_str().is_none()) {
+        None => Ok(()),
+        Some(path) => {
+            let place = path.display();
+            let error = FileError::new(format!("{place}: this path is not UTF-8"));
+            Err(error.with_help("rename it; `cars run` takes such paths, too"))
+        }
     }
 }
 

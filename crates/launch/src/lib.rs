@@ -29,7 +29,7 @@ pub use ending::{Failure, code_of};
 pub use file::{LaunchFile, Process, is_launch_file, scenario_file};
 pub use launching::{Launch, LaunchOptions, What};
 pub use link::{LinkError, ProcessLink};
-pub use options::RunOptions;
+pub use options::{RunOptions, default_run_name};
 pub use plan::{CommandLine, Part, Planned};
 pub use restart::Restart;
 pub use secure::Certificates;

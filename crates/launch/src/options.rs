@@ -1,22 +1,23 @@
 //! Options of one execution, shared by `cars launch`, `cars run` and `cars net play`.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use config::units::Time;
-use config::{Changes, Override, Speed};
+use config::{Changes, FileError, Override, Speed};
 use protocol::RunName;
-use protocol::name::BadName;
 use scenario::Scenario;
-use simulator::RunFolder;
-use simulator::recorder::RunLock;
+use simulator::{IfTaken, NewRun, RunFolder};
 
-use super::launched::Launched;
+use super::file::{LaunchFile, is_launch_file};
 
 /// Options of one execution of a scenario.
 #[derive(Debug, Clone)]
 pub struct RunOptions {
-    /// Name of the run and of its folder; without it the name of the file.
+    /// Name of the run and of its folder; without it that of the launch file, or the name of the file.
     pub run: Option<RunName>,
+    /// What is done where the name is taken.
+    pub if_taken: IfTaken,
     /// Seed, instead of the scenario's.
     pub seed: Option<u64>,
     /// Simulated duration, instead of the scenario's.
@@ -40,49 +41,67 @@ impl RunOptions {
         }
     }
 
-    /// The options as arguments of another `cars launch`.
+    /// The options as arguments of another `cars launch`, for a run whose folder [`RunFolder::make`] has made.
     #[must_use]
-    pub fn to_args(&self, run: &RunName) -> Vec<String> {
-        let mut args = vec![
-            format!("--run={run}"),
-            format!("--out={}", self.out.display()),
-        ];
-        args.extend(self.seed.map(|seed| format!("--seed={seed}")));
-        if let Some(Time(duration_s)) = self.duration {
-            args.push(format!("--duration={duration_s} s"));
+    pub fn to_args(&self, run: &RunName) -> Vec<OsString> {
+        let mut out = OsString::from("--out=");
+        out.push(&self.out);
+        let mut args = vec![format!("--run={run}").into(), out];
+        if self.if_taken == IfTaken::Reserved {
+            args.push("--reserved".into());
         }
-        args.extend(self.speed.map(|speed| format!("--speed={speed}")));
-        args.extend(self.set.iter().map(|change| format!("--set={change}")));
 
+        let mut more = Vec::new();
+        more.extend(self.seed.map(|seed| format!("--seed={seed}")));
+        if let Some(Time(duration_s)) = self.duration {
+            more.push(format!("--duration={duration_s} s"));
+        }
+        more.extend(self.speed.map(|speed| format!("--speed={speed}")));
+        more.extend(self.set.iter().map(|change| format!("--set={change}")));
+        args.extend(more.into_iter().map(OsString::from));
         args
     }
 
-    /// Name of the run: as given, or the stem of the file.
+    /// Name of the run: as given, or that in a launch file, or the stem of the file.
     ///
     /// # Errors
-    /// [`BadName`] if the name of the file cannot be that of a run.
-    pub fn run_name(&self, file: &Path) -> Result<RunName, BadName> {
-        if let Some(run) = &self.run {
-            return Ok(run.clone());
+    /// [`FileError`] if the file cannot be read, or its name cannot be that of a run.
+    pub fn run_name(&self, file: &Path) -> Result<RunName, FileError> {
+        match &self.run {
+            Some(run) => Ok(run.clone()),
+            None => default_run_name(file),
         }
-        let stem = file.file_stem().and_then(|stem| stem.to_str());
-        RunName::new(stem.unwrap_or("run"))
     }
 
     /// Makes the folder of the run with the resolved scenario, and points the link `latest` to it. The process that writes
     /// the record must keep the lock.
     ///
     /// # Errors
-    /// [`config::FileError`] as [`RunFolder::create`].
-    pub fn folder(
-        &self,
-        run: &RunName,
-        scenario: &Scenario,
-    ) -> Result<(RunFolder, RunLock), config::FileError> {
-        let folder = RunFolder::new(&self.out, run);
-        let lock = folder.create(scenario)?;
-        Launched::clear(&folder)?;
-        folder.point_latest();
-        Ok((folder, lock))
+    /// [`FileError`] as [`RunFolder::make`].
+    pub fn folder(&self, run: &RunName, scenario: &Scenario) -> Result<NewRun, FileError> {
+        let made = RunFolder::make(&self.out, run, self.if_taken)?;
+        made.folder.fill(scenario)?;
+        made.folder.point_latest();
+        Ok(made)
     }
+}
+
+/// Name of a run of a file: that in a launch file, or the stem of the file.
+///
+/// # Errors
+/// [`FileError`] if the file cannot be read, or its name cannot be that of a run.
+pub fn default_run_name(file: &Path) -> Result<RunName, FileError> {
+    // A roster is no TOML.
+    if is_launch_file(file).unwrap_or(false)
+        && let Some(run) = LaunchFile::load(file)?.run
+    {
+        return Ok(run);
+    }
+
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    RunName::new(&stem).map_err(|error| {
+        let place = file.display();
+        FileError::new(format!("{place}: the name of the file cannot be that of a run: {error}"))
+            .with_help("give the run a name with --run, or rename the file")
+    })
 }

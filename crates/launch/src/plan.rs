@@ -8,6 +8,7 @@ use bus::endpoint::connectable;
 use config::FileError;
 use protocol::{RobotName, RunName};
 use simulator::RunFolder;
+use simulator::folder::CONSOLE_KEPT;
 use simulator::recorder::{LOGS, SCENARIO};
 
 use super::child::{self, AtExit};
@@ -23,8 +24,6 @@ pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
 /// Environment variable with the file in which the console keeps its address and its token, so that browsers find it again when
 /// it was killed and is started again.
 const KEEP_VARIABLE: &str = "CARS_CONSOLE_KEEP";
-/// Name of that file, among the logs.
-const CONSOLE_KEPT: &str = "console.kept";
 
 /// A command line with its environment.
 #[derive(Debug, Clone, PartialEq)]
@@ -233,7 +232,12 @@ fn simulator(
     ]);
 
     args.extend(execution.is_paused.then(|| "--paused".to_owned()));
-    args.extend(execution.is_resumed.then(|| "--resume".to_owned()));
+    let taking = if execution.is_resumed {
+        "--resume"
+    } else {
+        "--prepared"
+    };
+    args.push(taking.to_owned());
     if execution.stays {
         args.push("--stay=always".to_owned());
     } else if execution.has_console && file.console.is_some() {

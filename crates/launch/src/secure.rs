@@ -309,6 +309,12 @@ impl Secured {
         config_of(&self.folder, name)
     }
 
+    /// Whether the access control admits a run with this name only.
+    pub(crate) fn is_bound_to(&self, run: &RunName) -> bool {
+        let config = std::fs::read_to_string(self.config_of(SIMULATOR)).unwrap_or_default();
+        config.contains(&Keys::new(run).control())
+    }
+
     /// The configuration file of the operator.
     pub(crate) fn operator(&self) -> PathBuf {
         self.config_of(OPERATOR)

@@ -11,6 +11,24 @@ pub const MAX_NAME_LEN: usize = 64;
 /// Sender of commands that come from outside the roster (a shell, a button on the console).
 pub const OPERATOR: &str = "operator";
 
+/// Names that no run can have: other entries of the folder of runs have them.
+const RESERVED_RUNS: [(&str, &str); 2] = [
+    (
+        LATEST,
+        "the link to the latest run has it; choose another name",
+    ),
+    (
+        EXPERIMENTS,
+        "the folder of the experiments has it; choose another name",
+    ),
+];
+
+/// The symbolic link to the latest run, beside the folders of runs.
+pub const LATEST: &str = "latest";
+
+/// The folder of experiments, beside the folders of runs.
+pub const EXPERIMENTS: &str = "experiments";
+
 /// A name that cannot be used, and why.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{name:?} is not a usable name: {reason}")]
@@ -46,8 +64,22 @@ fn checked(name: &str) -> Result<String, BadName> {
     Ok(name.to_owned())
 }
 
+/// Checks the name of a new run, or of one that is asked for.
+fn checked_run(name: &str) -> Result<String, BadName> {
+    for (reserved, reason) in RESERVED_RUNS {
+        // Some file systems ignore case.
+        if name.eq_ignore_ascii_case(reserved) {
+            return Err(BadName {
+                name: name.to_owned(),
+                reason,
+            });
+        }
+    }
+    checked(name)
+}
+
 macro_rules! name_type {
-    ($(#[$doc:meta])* $type:ident) => {
+    ($(#[$doc:meta])* $type:ident, $check:path) => {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
         #[serde(try_from = "String", into = "String")]
@@ -55,12 +87,12 @@ macro_rules! name_type {
         pub struct $type(std::sync::Arc<str>);
 
         impl $type {
-            /// Checks a name: 1 to 64 letters, digits, `_`, `-` or `.`, not beginning with `.`.
+            /// Checks a name: 1 to 64 letters, digits, `_`, `-` or `.`, not beginning with `.`, and not reserved.
             ///
             /// # Errors
             /// [`BadName`] says what is wrong with it.
             pub fn new(name: &str) -> Result<Self, BadName> {
-                checked(name).map(|name| Self(name.into()))
+                $check(name).map(|name| Self(name.into()))
             }
 
             /// The name as text.
@@ -70,10 +102,11 @@ macro_rules! name_type {
             }
         }
 
+        // Of messages and records, which may be those of a version that reserved fewer names.
         impl TryFrom<String> for $type {
             type Error = BadName;
             fn try_from(name: String) -> Result<Self, BadName> {
-                Self::new(&name)
+                checked(&name).map(|name| Self(name.into()))
             }
         }
 
@@ -106,11 +139,33 @@ macro_rules! name_type {
 
 name_type! {
     /// Name of a robot of the roster; robots are addressed by it (seed, "Inter-Robot Communication").
-    RobotName
+    RobotName, checked
 }
 name_type! {
     /// Name of a run; several runs can share a network.
-    RunName
+    RunName, checked_run
+}
+
+impl RunName {
+    /// The name of a run whose name is not known.
+    #[must_use]
+    pub fn unknown() -> Self {
+        Self("run".into())
+    }
+
+    /// The name with a number behind it, as in `hall-2`. A long name is cut, so that it stays one.
+    #[must_use]
+    pub fn numbered(&self, number: u64) -> Self {
+        self.with_suffix(&format!("-{number}"))
+    }
+
+    /// The name with a suffix of characters that names have. A long name is cut, so that it stays one.
+    #[must_use]
+    pub fn with_suffix(&self, suffix: &str) -> Self {
+        let kept = MAX_NAME_LEN.saturating_sub(suffix.len());
+        let name: String = self.as_str().chars().take(kept).collect();
+        Self(format!("{name}{suffix}").into())
+    }
 }
 
 impl RobotName {
@@ -130,6 +185,27 @@ impl RobotName {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_run_has_the_name_of_another_entry_of_the_folder_of_runs() {
+        for reserved in ["latest", "Latest", "experiments"] {
+            let refused = RunName::new(reserved).unwrap_err().to_string();
+            assert!(refused.contains("choose another name"), "{refused}");
+            assert!(reserved.parse::<RunName>().is_err());
+            assert!(RobotName::new(reserved).is_ok());
+            // A record of an earlier version can be read.
+            assert!(RunName::try_from(reserved.to_owned()).is_ok());
+        }
+        assert!(RunName::new("latest-2").is_ok());
+    }
+
+    #[test]
+    fn a_long_name_with_a_number_is_a_name() {
+        let long = RunName::new(&"x".repeat(64)).unwrap().numbered(12);
+        assert_eq!(RunName::new(long.as_str()).unwrap(), long);
+        assert!(long.as_str().ends_with("x-12"));
+        assert_eq!(RunName::new("hall").unwrap().numbered(2).as_str(), "hall-2");
+    }
 
     #[test]
     fn names_that_would_break_a_key_or_a_path_are_refused() {

@@ -55,7 +55,7 @@ pub(crate) fn diagram(
     let drawn = py.detach(|| -> miette::Result<_> {
         let folder = RunFolder::at(run);
         let files = recorded_epoch(&folder, None)?;
-        let mut title = folder.name()?.to_string();
+        let mut title = folder.title();
         if recorded_epochs(&folder)?.len() > 1 {
             title += &format!(", epoch {}", files.epoch);
         }

@@ -15,7 +15,7 @@ use launch::{RunOptions, scenario_file};
 use miette::{IntoDiagnostic, miette};
 use pyo3::prelude::*;
 use scenario::Scenario;
-use simulator::RunFolder;
+use simulator::{IfTaken, RunFolder};
 
 use crate::error::{plain, reported};
 use crate::interrupt::Watch;
@@ -33,7 +33,7 @@ pub(crate) fn overrides(set: &[String]) -> PyResult<Vec<Override>> {
 
 /// Runs a scenario in this process. Returns the folder of the run and its summary as JSON.
 #[pyfunction]
-#[pyo3(signature = (file, *, seed, set, duration, speed, name, out, robots))]
+#[pyo3(signature = (file, *, seed, set, duration, speed, name, replace, out, robots))]
 #[expect(clippy::too_many_arguments, reason = "they are named in Python")]
 pub(crate) fn run(
     py: Python<'_>,
@@ -43,11 +43,17 @@ pub(crate) fn run(
     duration: Option<&str>,
     speed: Option<&str>,
     name: Option<&str>,
+    replace: bool,
     out: PathBuf,
     robots: BTreeMap<String, Py<PyAny>>,
 ) -> PyResult<(PathBuf, String)> {
     let options = RunOptions {
         run: name.map(str::parse).transpose().map_err(plain)?,
+        if_taken: if replace {
+            IfTaken::Replace
+        } else {
+            IfTaken::Number
+        },
         seed: seed.map(seed::check).transpose().map_err(plain)?,
         duration: duration
             .map(str::parse::<Time>)
@@ -73,8 +79,9 @@ fn play(
     let scenario = Scenario::load(&scenario, &options.changes()).map_err(reported)?;
     makers.check(&scenario)?;
     check_faults(&scenario, 0).map_err(reported)?;
-    let run = options.run_name(file).map_err(plain)?;
-    let (folder, _lock) = options.folder(&run, &scenario).map_err(reported)?;
+    let run = options.run_name(file).map_err(reported)?;
+    let made = options.folder(&run, &scenario).map_err(reported)?;
+    let folder = &made.folder;
     let speed = options.speed.and_then(|speed| speed.0);
 
     let watch = RefCell::new(Watch::begin());
@@ -85,7 +92,7 @@ fn play(
         })
     };
     let make = |name: &_, class: &_| makers.make(name, class);
-    let played = execute_with(scenario, &run, &folder, speed, &make, goes_on);
+    let played = execute_with(scenario, &made.run, folder, speed, &make, goes_on);
     // What Python raised is the reason, whatever became of it on its way.
     if let Some(error) = failure.take() {
         return Err(error);

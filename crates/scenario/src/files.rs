@@ -20,8 +20,10 @@ pub const LOGS: &str = "logs";
 pub const ENDPOINT: &str = "endpoint";
 /// Path of the operator's configuration file, during a secured run.
 pub const OPERATOR_CONFIG: &str = "operator_config";
-/// Symbolic link to the latest run, beside the run folders.
-pub const LATEST: &str = "latest";
+/// The changes of real links that `cars net play` made.
+pub const LINKS: &str = "links.jsonl";
+pub use protocol::name::LATEST;
+
 /// Why a name cannot be that of the log.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LogNameError {
@@ -62,6 +64,7 @@ fn is_taken(name: &str) -> bool {
         OPERATOR_CONFIG,
         LAUNCHED,
         RECORDING,
+        LINKS,
     ];
     let prefixes = ["scenario", "events", "run-epoch"];
     names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))

@@ -9,11 +9,15 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::record::Entry;
+use crate::summary::Summary;
 
 /// Fields of a report that count epochs and processes, which the record does not compare.
 const REPORT_NOT_COMPARED: [&str; 2] = ["epoch", "generation"];
 /// Fields of a header that name the run and the program.
 const HEADER_NOT_COMPARED: [&str; 4] = ["run", "version", "commit", "protocol"];
+
+/// Fields of a summary that name the run and the program, and those that are wall clock.
+const SUMMARY_NOT_COMPARED: [&str; 3] = ["run", "version", "wall"];
 
 /// Where two runs differ first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -90,6 +94,21 @@ pub fn between_headers(a: &Header, b: &Header) -> Option<Difference> {
         tick: 0,
         robot: None,
         field: format!("header.{field}"),
+        values,
+    })
+}
+
+/// The first field in which two summaries differ that follows from a record; `None` if there is none. The first one is given as it
+/// is in its file.
+#[must_use]
+pub fn between_summaries(a: &Value, b: &Summary) -> Option<Difference> {
+    let [one, other] =
+        [a, &to_json(b)].map(|summary| without(summary, &SUMMARY_NOT_COMPARED));
+    let (field, values) = first_field(&one, &other)?;
+    Some(Difference {
+        tick: b.ticks,
+        robot: None,
+        field: format!("summary.{field}"),
         values,
     })
 }

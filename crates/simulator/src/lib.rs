@@ -8,6 +8,7 @@
 pub mod difference;
 pub mod digest;
 mod files;
+pub mod folder;
 pub mod medium;
 pub mod program;
 pub mod record;
@@ -19,6 +20,7 @@ pub mod summary;
 
 pub use files::EpochFiles;
 pub use protocol::{Event, Line};
-pub use recorder::{Recorder, RunFolder};
+pub use folder::{IfTaken, NewRun, Reserved, RunFolder, RunLock};
+pub use recorder::Recorder;
 pub use simulation::{Reports, Simulation, TickRecord};
 pub use summary::Summary;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::recorder::{ENDPOINT, OPERATOR_CONFIG, RunLock};
+use crate::recorder::{ENDPOINT, OPERATOR_CONFIG};
 use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
-use crate::{RunFolder, Summary};
+use crate::{IfTaken, RunFolder, RunLock, Summary};
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
 use clap::{Command, CommandFactory, Parser, ValueEnum};
@@ -63,6 +63,12 @@ struct Args {
     /// and compared with it, and goes on from there.
     #[arg(long, conflicts_with_all = ["seed", "duration", "set"])]
     resume: bool,
+    /// Replace the run with this name, if it is over. Without it, a name that is taken is an error: robots know the run by it.
+    #[arg(long, conflicts_with_all = ["resume", "prepared"])]
+    replace: bool,
+    /// The launcher has made the folder of the run.
+    #[arg(long, hide = true, conflicts_with = "resume")]
+    prepared: bool,
     /// Stay when the run ends without being stopped, so that `init` begins the next one with the same processes: always,
     /// or while a browser shows the run in a console.
     #[arg(long, value_name = "WHEN", num_args = 0..=1, default_missing_value = "always")]
@@ -133,8 +139,6 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
 
     // Before anything is made: a refusal leaves nothing behind.
     check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
-    let folder = RunFolder::new(&args.out, &args.run);
-    let (_lock, past) = open_folder(&folder, &scenario, args.resume)?;
     let role = Role::Router {
         listen: args.listen.clone(),
         trusts_network: args.insecure,
@@ -146,6 +150,8 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
         }
         bus => bus.into_diagnostic()?,
     };
+    let folder = RunFolder::new(&args.out, &args.run);
+    let (_lock, past) = open_folder(&folder, &scenario, args)?;
     let options = Options {
         run: args.run.clone(),
         speed: args.speed.0,
@@ -178,16 +184,23 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
     Ok(exit_code(&summary?, args.no_verdict))
 }
 
-/// Makes the folder of a new run, or opens that of a run to resume, with its record.
+/// Makes the folder of a new run, or takes the one that the launcher made, or opens that of a run to resume, with its record.
 fn open_folder(
     folder: &RunFolder,
     scenario: &Scenario,
-    is_resumed: bool,
+    args: &Args,
 ) -> miette::Result<(RunLock, Option<Past>)> {
-    if !is_resumed {
-        return Ok((folder.create(scenario)?, None));
+    if args.resume {
+        let (lock, files) = folder.reopen()?;
+        return Ok((lock, Some(Past::open(&files)?)));
     }
 
-    let (lock, files) = folder.reopen()?;
-    Ok((lock, Some(Past::open(&files)?)))
+    let if_taken = match (args.prepared, args.replace) {
+        (true, _) => IfTaken::Reserved,
+        (false, true) => IfTaken::Replace,
+        (false, false) => IfTaken::Refuse,
+    };
+    let made = RunFolder::make(&args.out, &args.run, if_taken)?;
+    folder.fill(scenario)?;
+    Ok((made.lock, None))
 }

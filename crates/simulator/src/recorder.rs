@@ -1,4 +1,4 @@
-//! The folder of a run and its record. The events of every tick are written at once, so a crash of the simulator loses at most
+//! The record of a run. The events of every tick are written at once, so a crash of the simulator loses at most
 //! the current one, and of the recording the current chunk; `record.sync` in the scenario says when they also survive a crash
 //! of the machine.
 
@@ -11,315 +11,23 @@ use std::time::{Duration, Instant};
 
 use config::FileError;
 use protocol::event::log_line;
-use protocol::messages::{Awaited, End, LogRecord, Panel, Report};
-use protocol::{Epoch, Line, PROTOCOL_VERSION, RobotName, RunName};
+use protocol::messages::{Awaited, LogRecord, Panel, Report};
+use protocol::{Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
 
-use crate::files::EpochFiles;
+use crate::folder::DRAFT;
 use crate::record::Record;
-use crate::seal::{self, Seal};
+use crate::seal::Seal;
 use crate::simulation::{Simulation, TickRecord};
 use crate::summary::Summary;
-use scenario::{Scenario, SyncPoint};
+use scenario::SyncPoint;
 
+pub use crate::folder::{RunFolder, RunLock};
 pub use scenario::files::{
     ENDPOINT, EVENTS, LATEST, LAUNCHED, LOCK, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO,
     SUMMARY,
 };
-
-/// The folder of a run: `OUT/NAME`.
-#[derive(Debug, Clone)]
-pub struct RunFolder {
-    path: PathBuf,
-}
-
-impl RunFolder {
-    /// The folder of run `run` under `out`.
-    #[must_use]
-    pub fn new(out: &Path, run: &RunName) -> Self {
-        Self {
-            path: out.join(run.as_str()),
-        }
-    }
-
-    /// The folder at a path.
-    #[must_use]
-    pub fn at(path: PathBuf) -> Self {
-        Self { path }
-    }
-
-    /// The folder itself, where the path is a link such as `latest`.
-    ///
-    /// # Errors
-    /// [`FileError`] if there is none.
-    pub fn resolved(&self) -> Result<Self, FileError> {
-        let path = self.path.canonicalize();
-        let path = path.map_err(|error| self.failed("find", &error))?;
-        Ok(Self { path })
-    }
-
-    /// The name of the run: that of its folder, also where the path is a link.
-    ///
-    /// # Errors
-    /// [`FileError`] if there is no folder, or it is not named like a run.
-    pub fn name(&self) -> Result<RunName, FileError> {
-        let path = self.resolved()?.path;
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        RunName::new(&name).map_err(|error| {
-            FileError::new(format!(
-                "{} is not named like a run: {error}",
-                path.display()
-            ))
-        })
-    }
-
-    /// Makes the folder, removes the files of an earlier run with this name, and writes the resolved scenario.
-    ///
-    /// No other process can overwrite the run while the returned lock is held.
-    ///
-    /// # Errors
-    /// [`FileError`] if a file cannot be written or removed, or the folder has other content or a run in progress.
-    pub fn create(&self, scenario: &Scenario) -> Result<RunLock, FileError> {
-        if self.path.exists() && !self.file(SCENARIO).exists() && has_entries(&self.path) {
-            let path = self.path.display();
-            let error = FileError::new(format!("{path} is there and is not the folder of a run"));
-            return Err(error.with_help("choose another --run or --out, or move it away"));
-        }
-
-        std::fs::create_dir_all(self.file(LOGS)).map_err(|error| self.failed("make", &error))?;
-        let lock = self.lock()?;
-        self.clear()?;
-        self.write_scenario(scenario)?;
-        Ok(lock)
-    }
-
-    /// Removes the files of an earlier run.
-    fn clear(&self) -> Result<(), FileError> {
-        let log = self.log();
-        let mut files = self.superseded();
-        for name in [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG] {
-            files.push(self.file(name));
-        }
-        files.push(log);
-        for file in files.clone() {
-            let mut draft = file.into_os_string();
-            draft.push(DRAFT);
-            files.push(draft.into());
-        }
-
-        for file in files {
-            if file.exists() {
-                std::fs::remove_file(&file).map_err(|error| self.failed("clear", &error))?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Writes [`SCENARIO`], once for each epoch.
-    fn write_scenario(&self, scenario: &Scenario) -> Result<(), FileError> {
-        std::fs::write(self.file(SCENARIO), scenario.to_toml()?)
-            .map_err(|error| self.failed("write to", &error))
-    }
-
-    /// Points the symbolic link [`LATEST`] to the folder. If links cannot be made, runs have to be named.
-    pub fn point_latest(&self) {
-        let link = self.path.with_file_name(LATEST);
-        if link.is_symlink() {
-            let _ = std::fs::remove_file(&link);
-        }
-
-        let Some(name) = self.path.file_name() else {
-            return;
-        };
-
-        if let Err(error) = std::os::unix::fs::symlink(name, &link) {
-            tracing::debug!(%error, "no link to the latest run");
-        }
-    }
-
-    /// Takes the folder of a run that was killed or stopped, to resume it, with the record of its last epoch, the files of which
-    /// may not be there yet. The record is checked first.
-    ///
-    /// # Errors
-    /// [`FileError`] if it is not the folder of a run, the run is in progress or has ended, or the record is damaged.
-    pub fn reopen(&self) -> Result<(RunLock, EpochFiles), FileError> {
-        let place = self.path.display();
-        if !self.file(SCENARIO).exists() {
-            let error = FileError::new(format!("{place} is not the folder of a run"));
-            return Err(error.with_help("name a run under --out, or its folder"));
-        }
-
-        let lock = self.lock()?;
-        let files = self.last_epoch();
-        if files.events.exists() {
-            let end = seal::check(&files.events)?.end;
-            if end.is_some_and(|end| end != End::Stopped) {
-                let error = FileError::new(format!("the run in {place} has ended"));
-                return Err(error.with_help("start it again without --resume"));
-            }
-        }
-        Ok((lock, files))
-    }
-
-    /// Takes the folder: while the lock is held, no other process writes a record into it.
-    ///
-    /// # Errors
-    /// [`FileError`] if another process has it.
-    pub fn lock(&self) -> Result<RunLock, FileError> {
-        let file = File::create(self.file(LOCK)).map_err(|error| self.failed("lock", &error))?;
-        file.try_lock().map_err(|_| {
-            let path = self.path.display();
-            FileError::new(format!("the run in {path} is in progress"))
-                .with_help("choose another --run, or end it with `cars ctl stop`")
-        })?;
-        Ok(RunLock { _file: file })
-    }
-
-    /// Files of epochs that `init` has ended.
-    fn superseded(&self) -> Vec<PathBuf> {
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(&self.path)
-            .into_iter()
-            .flatten()
-            .flatten()
-        {
-            let name = entry.file_name();
-            let name = name.to_str().unwrap_or_default();
-            let mut prefixes = PER_EPOCH.iter().map(|file| superseded_prefix(file));
-            if prefixes.any(|prefix| name.starts_with(&prefix)) {
-                files.push(entry.path());
-            }
-        }
-
-        files
-    }
-
-    /// Renames the files of the epoch before this one, so that their names contain its number.
-    fn supersede(&self, epoch: Epoch) -> Result<(), FileError> {
-        let before = epoch.saturating_sub(1);
-        for name in PER_EPOCH {
-            let file = self.file(name);
-            if !file.exists() {
-                continue;
-            }
-
-            let renamed = self.file(&superseded_name(name, before));
-            std::fs::rename(&file, renamed)
-                .map_err(|error| self.failed("keep files in", &error))?;
-        }
-
-        // That of an epoch that has ended would say that the new one has.
-        match std::fs::remove_file(self.file(SUMMARY)) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(self.failed("clear", &error)),
-            _ => Ok(()),
-        }
-    }
-
-    /// The log, the name of which is in the scenario of the run.
-    #[must_use]
-    pub fn log(&self) -> PathBuf {
-        let scenario = std::fs::read_to_string(self.file(SCENARIO)).unwrap_or_default();
-        let scenario: toml::Table = toml::from_str(&scenario).unwrap_or_default();
-        let record = scenario.get("record");
-        let name = record.and_then(|record| record.get("log_name")?.as_str());
-        let name = name.filter(|name| scenario::files::check_log_name(name).is_ok());
-        self.file(name.unwrap_or(LOG))
-    }
-
-    /// Copies the lines of the log that are of epochs before the last one: a line for each event that people read.
-    fn copy_log_of_earlier_epochs(&self, log: &str, to: &mut Lines) -> Result<(), FileError> {
-        let mut epochs = self.epochs();
-        epochs.pop();
-        let mut count = 0;
-        for files in epochs {
-            let mut record = Record::of_events(&files.events)?;
-            while let Some(entry) = record.next_entry()? {
-                let lines = entry.events.iter();
-                let lines =
-                    lines.filter_map(|event| event.log_record(files.epoch, entry.tick, 0.0));
-                count += lines.count();
-            }
-        }
-        if count == 0 {
-            return Ok(());
-        }
-
-        let path = self.file(log);
-        let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error))?;
-        for line in BufReader::new(file).lines().take(count) {
-            to.add(&line.map_err(|error| FileError::unreadable(&path, &error))?)?;
-        }
-        Ok(())
-    }
-
-    /// Writes a file of one line that others wait for: they see it whole or not at all.
-    ///
-    /// # Errors
-    /// [`FileError`] if it cannot be written.
-    pub fn write_line(&self, name: &str, line: &str) -> Result<(), FileError> {
-        let file = self.file(name);
-        let unfinished = file.with_extension("new");
-        let written = std::fs::write(&unfinished, format!("{line}\n"));
-        let written = written.and_then(|()| std::fs::rename(&unfinished, &file));
-        written.map_err(|error| FileError::new(format!("cannot write {}: {error}", file.display())))
-    }
-
-    /// A file of the folder.
-    #[must_use]
-    pub fn file(&self, name: &str) -> PathBuf {
-        self.path.join(name)
-    }
-
-    /// The folder itself.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The records of all epochs of the run, the first epoch first. The files of the last one may be missing.
-    #[must_use]
-    pub fn epochs(&self) -> Vec<EpochFiles> {
-        let last = self.last_epoch();
-        let mut epochs = Vec::new();
-        for epoch in 1..last.epoch {
-            epochs.push(EpochFiles {
-                epoch,
-                scenario: self.file(&superseded_name(SCENARIO, epoch)),
-                events: self.file(&superseded_name(EVENTS, epoch)),
-                recording: self.file(&superseded_name(RECORDING, epoch)),
-            });
-        }
-        epochs.push(last);
-        epochs
-    }
-
-    /// The record of the last epoch.
-    fn last_epoch(&self) -> EpochFiles {
-        let is_superseded = |epoch: &Epoch| self.file(&superseded_name(EVENTS, *epoch)).exists();
-        let superseded = (1..).take_while(is_superseded).count();
-        EpochFiles {
-            epoch: superseded as Epoch + 1,
-            scenario: self.file(SCENARIO),
-            events: self.file(EVENTS),
-            recording: self.file(RECORDING),
-        }
-    }
-
-    fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
-        FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
-    }
-}
-
-/// The lock of a run's folder. The operating system releases it when the process ends, also by a crash.
-#[derive(Debug)]
-pub struct RunLock {
-    _file: File,
-}
-
-fn has_entries(path: &Path) -> bool {
-    std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some())
-}
 
 /// How often [`SyncPoint::Second`] synchronizes.
 const SYNC_INTERVAL: Duration = Duration::from_secs(1);
@@ -341,12 +49,17 @@ impl Lines {
         }
     }
 
-    /// A new file.
+    /// A new file: one that is there belongs to another record, or is a link.
     fn create(path: PathBuf) -> Result<Self, FileError> {
-        Self::open(
-            path,
-            File::options().create(true).write(true).truncate(true),
-        )
+        Self::open(path, File::options().create_new(true).write(true))
+    }
+
+    /// A file that grows from epoch to epoch.
+    fn append(path: PathBuf) -> Result<Self, FileError> {
+        if path.is_symlink() {
+            return Err(unwritable(&path, &"it is a link"));
+        }
+        Self::open(path, File::options().create(true).append(true))
     }
 
     fn add(&mut self, line: &str) -> Result<(), FileError> {
@@ -416,7 +129,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins an epoch in a folder that [`RunFolder::create`] made. The files of an earlier epoch are renamed, as in
+    /// Begins an epoch in a folder that [`RunFolder::make`] made. The files of an earlier epoch are renamed, as in
     /// `events-epoch1.jsonl`.
     ///
     /// # Errors
@@ -435,9 +148,7 @@ impl Recorder {
 
         let record = &scenario.record;
         let path = folder.file(&record.log_name);
-        let log = record
-            .log
-            .then(|| Lines::open(path, File::options().create(true).append(true)));
+        let log = record.log.then(|| Lines::append(path));
         Self::open(folder, run, simulation, log.transpose()?, "")
     }
 
@@ -453,10 +164,14 @@ impl Recorder {
     ) -> Result<Self, FileError> {
         let record = &simulation.scenario().record;
         let log_name = format!("{}{DRAFT}", record.log_name);
+        for name in [EVENTS, RECORDING, &record.log_name] {
+            remove_draft(&folder.file(&format!("{name}{DRAFT}")))?;
+        }
+
         let mut log = None;
         if record.log {
             let mut draft = Lines::create(folder.file(&log_name))?;
-            folder.copy_log_of_earlier_epochs(&record.log_name, &mut draft)?;
+            copy_log_of_earlier_epochs(folder, &record.log_name, &mut draft)?;
             log = Some(draft);
         }
         let mut recorder = Self::open(folder, run, simulation, log, DRAFT)?;
@@ -714,31 +429,50 @@ impl Recorder {
             return Ok(self.summary.clone());
         }
 
-        let text = serde_json::to_string_pretty(&self.summary)
+        let text = self
+            .summary
+            .to_text()
             .map_err(|error| FileError::new(error.to_string()))?;
-        let mut file = Lines::create(self.folder.file(SUMMARY))?;
-        file.add(&text)?;
-        file.flush()?;
-        file.sync()?;
+        self.folder.write_line(SUMMARY, &text)?;
         Ok(self.summary.clone())
     }
 }
 
-/// With this their names end while a run that is resumed is executed again.
-const DRAFT: &str = ".draft";
-
-/// Files that every epoch has.
-const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];
-
-/// The name that a file has after the end of its epoch, as in `events-epoch1.jsonl`.
-fn superseded_name(file: &str, epoch: Epoch) -> String {
-    let prefix = superseded_prefix(file);
-    let suffix = file.rsplit('.').next().unwrap_or_default();
-    format!("{prefix}{epoch}.{suffix}")
+/// Removes a draft that a process left which was killed.
+fn remove_draft(path: &Path) -> Result<(), FileError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(unwritable(path, &error)),
+        _ => Ok(()),
+    }
 }
 
-fn superseded_prefix(file: &str) -> String {
-    format!("{}-epoch", file.split('.').next().unwrap_or(file))
+/// Copies the lines of the log that are of epochs before the last one: a line for each event that people read.
+fn copy_log_of_earlier_epochs(
+    folder: &RunFolder,
+    log: &str,
+    to: &mut Lines,
+) -> Result<(), FileError> {
+    let mut epochs = folder.epochs();
+    epochs.pop();
+    let mut count = 0;
+    for files in epochs {
+        let mut record = Record::of_events(&files.events)?;
+        while let Some(entry) = record.next_entry()? {
+            let lines = entry.events.iter();
+            let lines = lines.filter_map(|event| event.log_record(files.epoch, entry.tick, 0.0));
+            count += lines.count();
+        }
+    }
+    if count == 0 {
+        return Ok(());
+    }
+
+    let path = folder.file(log);
+    let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+    for line in BufReader::new(file).lines().take(count) {
+        to.add(&line.map_err(|error| FileError::unreadable(&path, &error))?)?;
+    }
+    Ok(())
 }
 
 /// Ends a recording with the events of the end of the run.

@@ -56,6 +56,40 @@ impl Seal {
     }
 }
 
+/// Name of the field with the seal of a JSON text.
+const SEAL: &str = "seal";
+
+/// The seal of a JSON text that has no seal yet: that of its values, however they are laid out.
+pub(crate) fn of_json(value: &serde_json::Value) -> String {
+    let mut hash = Xxh3::new();
+    hash.update(value.to_string().as_bytes());
+    format!("{:0DIGITS$x}", hash.digest())
+}
+
+/// A JSON object as a text with a seal.
+///
+/// # Errors
+/// If it cannot be JSON.
+pub fn sealed_text(object: &impl serde::Serialize) -> Result<String, serde_json::Error> {
+    let mut value = serde_json::to_value(object)?;
+    let seal = of_json(&value);
+    if let Some(fields) = value.as_object_mut() {
+        fields.insert(SEAL.to_owned(), seal.into());
+    }
+    serde_json::to_string_pretty(&value)
+}
+
+/// Whether a text of [`sealed_text`] is as it was written; `None` if it has no seal.
+#[must_use]
+pub fn is_sealed_text_right(text: &str) -> Option<bool> {
+    let Ok(mut value) = serde_json::from_str::<serde_json::Value>(text) else {
+        return Some(false);
+    };
+    let laid_out = serde_json::to_string_pretty(&value).ok()?;
+    let stated = value.as_object_mut()?.remove(SEAL)?;
+    Some(stated == of_json(&value) && laid_out == text.trim_end_matches('\n'))
+}
+
 /// What a file of events is, as far as it is undamaged.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Checked {

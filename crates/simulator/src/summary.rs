@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub use network::{CutSummary, LinkSummary, NetworkSummary};
 
+use crate::seal;
 use crate::simulation::Simulation;
 
 /// `summary.json`.
@@ -93,6 +94,9 @@ pub struct Wall {
     pub held_up_by: BTreeMap<RobotName, HeldUp>,
     /// Messages that were ignored, by reason.
     pub ignored: BTreeMap<String, u64>,
+    /// Seal of the whole summary, which has no other field that differs between runs that are the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seal: Option<String>,
 }
 
 /// How long the clock was held for a robot.
@@ -203,6 +207,28 @@ impl Summary {
     pub fn verdict(&self) -> Verdict {
         let verdicts = self.expectations.values().map(|judged| judged.verdict);
         verdicts.max().unwrap_or(Verdict::Pass)
+    }
+
+    /// The summary as a file, sealed.
+    ///
+    /// # Errors
+    /// If it cannot be JSON.
+    pub(crate) fn to_text(&self) -> Result<String, serde_json::Error> {
+        let mut sealed = self.clone();
+        sealed.wall.seal = None;
+        sealed.wall.seal = Some(seal::of_json(&serde_json::to_value(&sealed)?));
+        serde_json::to_string_pretty(&sealed)
+    }
+
+    /// Whether the text from which the summary was read is as it was written; `None` if it has no seal.
+    #[must_use]
+    pub fn is_as_written(&self, text: &str) -> Option<bool> {
+        let stated = self.wall.seal.as_ref()?;
+        let mut value: serde_json::Value = serde_json::from_str(text).ok()?;
+        value.get_mut("wall")?.as_object_mut()?.remove("seal");
+        let is_right = *stated == seal::of_json(&value);
+        let laid_out = serde_json::to_string_pretty(self).ok()?;
+        Some(is_right && laid_out == text.trim_end_matches('\n'))
     }
 
     /// Completes the summary at the end of the epoch.

@@ -27,6 +27,7 @@ mod experiments;
 mod exports;
 mod faults;
 mod files;
+mod folders;
 mod forks;
 mod hunt;
 mod killed;

@@ -42,6 +42,89 @@ fn damage_anywhere_in_a_record_is_found_and_named() {
     println!("{} damaged records", places.len());
 }
 
+#[test]
+fn damage_in_any_file_of_a_run_is_found_and_the_file_named() {
+    let lab = Lab::new();
+    let launch = ["launch", HALL, "--no-console", "--speed", "max", "--quiet"];
+    lab.ok(&[&launch[..], &["--duration", "10 s", "--run", "whole"]].concat());
+    let folder = lab.out().join("whole");
+    let path = folder.display().to_string();
+    let (code, said) = check(&lab, &path);
+    assert_eq!(code, 0, "{said}");
+
+    let files = [
+        "run.mcap",
+        "summary.json",
+        "launched.json",
+        "cars.log",
+        "scenario.toml",
+    ];
+    for name in files {
+        let file = folder.join(name);
+        let whole = std::fs::read(&file).unwrap();
+        let mut step = whole.len() / 40;
+        step += usize::from(step.is_multiple_of(2)); // Not always at the same column.
+        for place in (0..whole.len()).step_by(step) {
+            let mut damaged = whole.clone();
+            damaged[place] ^= 1;
+            std::fs::write(&file, &damaged).unwrap();
+            let (code, text) = check(&lab, &path);
+            // The scenario is compared with the one in the recording.
+            assert_eq!(code, 1, "{name}, byte {place}: {text}");
+            let text: String = text.split_whitespace().filter(|word| *word != "│").collect();
+            assert!(text.contains(name), "{name}, byte {place}: {text}");
+            assert!(!text.contains("panicked"), "{name}, byte {place}: {text}");
+        }
+        for kept in [0, whole.len() / 2, whole.len() - 1] {
+            std::fs::write(&file, &whole[..kept]).unwrap();
+            let (code, text) = check(&lab, &path);
+            assert_eq!(code, 1, "{name}, {kept} bytes: {text}");
+        }
+        std::fs::write(&file, &whole).unwrap();
+    }
+    assert_eq!(check(&lab, &path).0, 0);
+}
+
+#[test]
+fn a_summary_that_does_not_follow_from_its_record_is_found() {
+    let lab = Lab::new();
+    lab.ok(&["run", HALL, "--duration", "60 s", "-q", "--run", "whole"]);
+    let file = lab.file("whole", "summary.json");
+    let whole = std::fs::read_to_string(&file).unwrap();
+    let change = |pointer: &str, value: serde_json::Value| {
+        let mut summary: serde_json::Value = serde_json::from_str(&whole).unwrap();
+        *summary.pointer_mut(pointer).unwrap() = value;
+        std::fs::write(&file, summary.to_string()).unwrap();
+    };
+
+    for (pointer, value) in [
+        ("/ticks", 7.into()),
+        ("/seed", 7.into()),
+        ("/time_s", 7.5.into()),
+        ("/end", "stopped".into()),
+        ("/digest", "0123456789abcdef".into()),
+        ("/robots/Butler/blocked", 70.into()),
+        ("/robots/Butler/emotions_s", serde_json::json!({"HAPPY": 1.0})),
+        ("/robots/Butler/state_variables", serde_json::json!({})),
+        ("/network/links", serde_json::json!({})),
+        ("/expectations", serde_json::json!({})),
+        ("/run", "other".into()),
+    ] {
+        change(pointer, value);
+        let (code, text) = lab.fails(&["verify", "whole"]);
+        assert_eq!(code, 1, "{pointer}: {text}");
+        let named = pointer.replace('/', ".");
+        let is_named = text.contains(&format!("summary{named}")) || text.contains("summary.json");
+        assert!(is_named, "{pointer}: {text}");
+    }
+
+    // Wall clock follows from nothing.
+    change("/wall/elapsed_s", 12345.0.into());
+    lab.ok(&["verify", "whole"]);
+    std::fs::write(&file, &whole).unwrap();
+    lab.ok(&["verify", "whole"]);
+}
+
 /// The lines that an error names: `lines 3 to 9 are damaged`.
 pub(crate) fn lines_of(text: &str) -> (usize, usize) {
     let words: Vec<&str> = text

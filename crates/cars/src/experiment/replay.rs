@@ -6,13 +6,15 @@ use std::process::ExitCode;
 use clap::Args;
 use lab::experiment::{Plan, Robots, Store, write_launch};
 use lab::folder::read_summary;
+use lab::scratch::Scratch;
 use launch::RunOptions;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
 use scenario::Scenario;
-use simulator::{RunFolder, Summary};
+use simulator::{IfTaken, RunFolder, Summary};
 
 use super::launcher::launcher;
+use crate::execution::if_taken;
 use crate::run::execute;
 use crate::table;
 
@@ -26,6 +28,9 @@ pub(super) struct ReplayArgs {
     /// Name of the run, and of its folder; without it the experiment's name and the number of the unit.
     #[arg(long, value_name = "NAME")]
     run: Option<RunName>,
+    /// Replace the run with this name, if it is over. Without it, the run takes the next free name.
+    #[arg(long)]
+    replace: bool,
     /// Where run folders are made.
     #[arg(long, default_value = "runs", value_name = "DIR")]
     out: PathBuf,
@@ -57,6 +62,7 @@ pub(super) fn replay(args: ReplayArgs) -> miette::Result<ExitCode> {
     };
     let options = RunOptions {
         run: Some(run.clone()),
+        if_taken: if_taken(args.replace),
         seed: None,
         duration: None,
         speed: None,
@@ -98,9 +104,12 @@ fn record(
     run: &RunName,
     options: &RunOptions,
 ) -> miette::Result<(Summary, RunFolder)> {
-    let (folder, _lock) = options.folder(run, &scenario)?;
-    let summary = execute(scenario, run, &folder, None)?;
-    Ok((summary, folder))
+    let made = options.folder(run, &scenario)?;
+    if let Some(notice) = &made.notice {
+        terminal::note(notice);
+    }
+    let summary = execute(scenario, &made.run, &made.folder, None)?;
+    Ok((summary, made.folder))
 }
 
 /// Records a run of processes.
@@ -110,19 +119,32 @@ fn launch(
     run: &RunName,
     options: &RunOptions,
 ) -> miette::Result<(Summary, RunFolder)> {
-    let files = tempfile::tempdir().into_diagnostic()?;
+    let files = Scratch::new().into_diagnostic()?;
     let launch = match plan.robots() {
         Robots::Launched(launch) => Some(launch),
         Robots::InProcess | Robots::Programs => None,
     };
     let file = write_launch(scenario, launch, files.path())?;
 
+    // The launch takes this folder, and this process has to know it.
+    let made = RunFolder::make(&options.out, run, options.if_taken)?;
+    if let Some(notice) = &made.notice {
+        terminal::note(notice);
+    }
+    let reserved = made.reserve();
+    let options = RunOptions {
+        if_taken: IfTaken::Reserved,
+        ..options.clone()
+    };
     let mut command = launcher();
-    command.arg("launch").arg(file).args(options.to_args(run));
+    command
+        .arg("launch")
+        .arg(file)
+        .args(options.to_args(&reserved.run));
     command.args(["--speed", "max", "--no-console", "--quiet"]);
     let status = command.status().into_diagnostic()?;
 
-    let folder = RunFolder::new(&options.out, run);
+    let folder = reserved.folder;
     let summary = read_summary(&folder)?;
     // Verdicts are exit statuses, too: the run is there.
     let summary = summary.filter(|summary| summary.end.is_some());

@@ -15,6 +15,7 @@ use simulator::RunFolder;
 use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
 
 use super::episode::RobotState;
+use crate::folder::run_name;
 
 /// Longest line of a record, bytes; a tick of a thousand robots that publish much takes a hundredth of it.
 const MAX_LINE_BYTES: u64 = 1 << 28;
@@ -135,7 +136,7 @@ impl Reader {
             folder.path().display()
         )];
         let facts = Facts {
-            run: folder.name()?,
+            run: run_name(folder),
             epoch: None,
             seed,
             tick_s,

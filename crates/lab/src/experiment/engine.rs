@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use config::FileError;
 use miette::miette;
+use simulator::folder::check_no_links;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::plan::{Plan, Unit};
@@ -173,7 +174,9 @@ fn first(folder: &Path, queue: &mut Queue) -> Result<Option<File>, FileError> {
     }
 
     let path = folder.join(LOCK);
-    let file = File::create(&path).map_err(|error| unwritable(&path, &error))?;
+    check_no_links(folder)?;
+    let file = File::options().create(true).append(true).open(&path);
+    let file = file.map_err(|error| unwritable(&path, &error))?;
     if file.try_lock().is_ok() {
         return Ok(Some(file));
     }

@@ -11,6 +11,7 @@ use config::{Changes, FileError, Override, Source};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
+use simulator::folder::check_no_links;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::case::Case;
@@ -73,6 +74,9 @@ struct Written {
     measures: String,
     /// Text of the experiment file.
     file: String,
+    /// Where the experiment file was: another one may have its name.
+    #[serde(default)]
+    origin: Option<String>,
     robots: Robots,
     /// Conditions and arms in the order of the units: the units of a cell are its seeds.
     cells: Vec<WrittenCell>,
@@ -137,6 +141,41 @@ pub struct Unit<'a> {
     /// The cell and the seed of the run whose emotions its robots show.
     pub(super) yoke: Option<(usize, u64)>,
     pub(super) cell: usize,
+}
+
+impl Written {
+    /// Whether another plan is the same, wherever its experiment file was.
+    fn is_same(&self, other: &Self) -> bool {
+        let other = Self {
+            origin: self.origin.clone(),
+            ..other.clone()
+        };
+        *self == other
+    }
+
+    /// Checks that a new plan is one of the same experiment file: the file may have been edited, or moved, but not both.
+    fn check_same_file(&self, new: &Self, folder: &Path) -> miette::Result<()> {
+        let (Some(before), Some(now)) = (&self.origin, &new.origin) else {
+            return Ok(());
+        };
+        let has_same_content = self.file == new.file
+            && self.measures == new.measures
+            && self.cells == new.cells;
+        if before == now || has_same_content {
+            return Ok(());
+        }
+        Err(miette!(
+            help = "choose another folder with -o",
+            "{} is the folder of another experiment, that of {before}",
+            folder.display()
+        ))
+    }
+}
+
+/// The absolute path of an experiment file.
+fn origin_of(source: &Source) -> Option<String> {
+    let path = std::path::absolute(&source.name).ok()?;
+    Some(path.display().to_string())
 }
 
 impl Program {
@@ -226,6 +265,7 @@ impl Plan {
             set,
             measures: digest_of_measures(experiment),
             file: experiment.source().text.clone(),
+            origin: origin_of(experiment.source()),
             robots: request.robots.clone(),
             cells,
         };
@@ -331,6 +371,11 @@ impl Plan {
             ));
         }
 
+        check_no_links(folder)?;
+        if let Some(before) = read(folder)? {
+            before.check_same_file(&self.written, folder)?;
+        }
+
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
         let mut text = serde_json::to_string_pretty(&self.written).into_diagnostic()?;
         text.push('\n');
@@ -344,7 +389,7 @@ impl Plan {
     /// # Errors
     /// If the plan that is there cannot be read.
     pub fn is_in(&self, folder: &Path) -> miette::Result<bool> {
-        Ok(read(folder)?.is_some_and(|there| there == self.written))
+        Ok(read(folder)?.is_some_and(|there| there.is_same(&self.written)))
     }
 
     /// What of the plan that was in the folder before has changed, so that its units are played again: a sentence each.

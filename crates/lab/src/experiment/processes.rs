@@ -18,6 +18,7 @@ use super::follow::{Ended, Follow};
 use super::plan::LaunchText;
 use crate::export::draft::unwritable;
 use crate::folder::read_summary;
+use crate::scratch::Scratch;
 use crate::states::LastStates;
 
 /// Name of the run of a unit, and of its folder.
@@ -38,7 +39,7 @@ pub(super) fn follow(
     launcher: Launcher<'_>,
     follower: &mut impl Follow,
 ) -> miette::Result<Ended> {
-    let folder = tempfile::tempdir().into_diagnostic()?;
+    let folder = Scratch::new().into_diagnostic()?;
     scenario.record.frames = true;
     scenario.record.panels = false;
     scenario.record.log = false;

@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use config::FileError;
 use tempfile::{Builder, NamedTempFile};
 
+/// Permissions of a new file.
+const NEW_FILE: u32 = 0o666;
+
 /// A file under a temporary name beside its final one. [`Draft::publish`] renames it; one that is dropped is removed.
 #[derive(Debug)]
 pub struct Draft {
@@ -16,13 +19,23 @@ pub struct Draft {
 }
 
 impl Draft {
+    /// Begins the file that a person has named. Where the path is a symbolic link, its target is replaced, and not the link.
+    ///
+    /// # Errors
+    /// [`FileError`] as [`Self::create`].
+    pub fn follow(path: &Path) -> Result<Self, FileError> {
+        Self::create(&path.canonicalize().unwrap_or_else(|_| path.to_owned()))
+    }
+
     /// Begins a file, which replaces an earlier one with its name when it is published.
     ///
     /// # Errors
     /// [`FileError`] if no file can be made in its folder, or something else than a file has its name.
     pub fn create(path: &Path) -> Result<Self, FileError> {
-        // The target of a symbolic link is replaced, not the link.
-        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if path.is_symlink() {
+            return Err(unwritable(path, &"it is a link"));
+        }
+        let path = path.to_owned();
         if path.exists() && !path.is_file() {
             return Err(unwritable(&path, &"something else than a file is there"));
         }
@@ -41,7 +54,7 @@ impl Draft {
             .prefix(&prefix)
             .suffix(".draft")
             // Those of any other file: the user's mask applies.
-            .permissions(Permissions::from_mode(0o666))
+            .permissions(Permissions::from_mode(NEW_FILE))
             .tempfile_in(folder)
             .map_err(|error| unwritable(&path, &error))?;
         Ok(Self {
@@ -65,6 +78,11 @@ impl Draft {
             .file
             .into_inner()
             .map_err(|error| unwritable(&self.path, &error.error()))?;
+        if let Ok(replaced) = self.path.metadata() {
+            file.as_file()
+                .set_permissions(replaced.permissions())
+                .map_err(|error| unwritable(&self.path, &error))?;
+        }
         file.persist(&self.path)
             .map_err(|error| unwritable(&self.path, &error.error))?;
         Ok(self.path)
@@ -82,6 +100,6 @@ impl Write for Draft {
 }
 
 /// The error of a file that cannot be written.
-pub(crate) fn unwritable(path: &Path, reason: &dyn std::fmt::Display) -> FileError {
+pub fn unwritable(path: &Path, reason: &dyn std::fmt::Display) -> FileError {
     FileError::new(format!("cannot write {}: {reason}", path.display()))
 }

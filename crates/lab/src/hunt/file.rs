@@ -1,10 +1,11 @@
 //! The scenario file of a finding.
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
 use config::shipped;
-use miette::IntoDiagnostic;
+use miette::{IntoDiagnostic, miette};
 use protocol::name::MAX_NAME_LEN;
 use protocol::plain::escape_line;
 use toml::Value;
@@ -48,6 +49,54 @@ pub(super) fn write(
         .map_err(|error| unwritable(path, &error))?;
     draft.publish()?;
     Ok(())
+}
+
+/// Makes an empty file with this name, or with a number behind it where there is one already: findings of other hunts stay.
+pub(super) fn reserve(path: &Path) -> miette::Result<PathBuf> {
+    for candidate in candidates(path) {
+        match File::create_new(&candidate) {
+            Ok(_) => return Ok(candidate),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(unwritable(&candidate, &error).into()),
+        }
+    }
+    Err(miette!("{}: all names are taken", path.display()))
+}
+
+/// Removes a file where an earlier hunt has written the same one, but for its name; returns the one that stays.
+pub(super) fn keep_one(path: PathBuf, named: &Path) -> miette::Result<PathBuf> {
+    let own = text_without_names(&path)?;
+    for candidate in candidates(named) {
+        if candidate == path {
+            break;
+        }
+        if text_without_names(&candidate).is_ok_and(|text| text == own) {
+            std::fs::remove_file(&path).into_diagnostic()?;
+            return Ok(candidate);
+        }
+    }
+    Ok(path)
+}
+
+/// The text of a finding without the lines that have its name.
+fn text_without_names(path: &Path) -> miette::Result<String> {
+    let text = std::fs::read_to_string(path).into_diagnostic()?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let lines = text.lines().filter(|line| !line.contains(&*stem));
+    Ok(lines.collect::<Vec<_>>().join("\n"))
+}
+
+/// The path of a finding, then with numbers; each can be the name of a run.
+fn candidates(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = stem.into_owned();
+    let numbered = (2u64..).map(move |number| {
+        let number = format!("-{number}");
+        let kept = stem.len().min(MAX_NAME_LEN.saturating_sub(number.len()));
+        format!("{}{number}.toml", &stem[..kept])
+    });
+    let folder = path.with_file_name("");
+    std::iter::once(path.to_owned()).chain(numbered.map(move |name| folder.join(name)))
 }
 
 fn comment(

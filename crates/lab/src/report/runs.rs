@@ -104,7 +104,7 @@ impl Run {
         let summary = read_summary(folder)?.filter(|summary| summary.digest == facts.digest);
         let scenario = std::fs::read_to_string(&files.scenario).unwrap_or_default();
         Ok(Self {
-            name: folder.name()?.to_string(),
+            name: folder.title(),
             path: folder.path().to_owned(),
             files,
             facts,

@@ -1,5 +1,6 @@
 //! The interface of all kinds of links.
 
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::Command;
 
@@ -21,11 +22,11 @@ pub(super) struct Start<'a> {
 
 impl Start<'_> {
     /// Arguments of `cars` for a launch over these links.
-    pub(super) fn args(&self, links: &[ProcessLink]) -> Vec<String> {
-        let mut args = vec!["launch".to_owned(), self.file.display().to_string()];
+    pub(super) fn args(&self, links: &[ProcessLink]) -> Vec<OsString> {
+        let mut args = vec!["launch".into(), self.file.as_os_str().to_owned()];
         args.extend(self.options.to_args(self.run));
-        args.extend(links.iter().map(|link| format!("--link={link}")));
-        args.extend(self.more.iter().cloned());
+        args.extend(links.iter().map(|link| format!("--link={link}").into()));
+        args.extend(self.more.iter().map(OsString::from));
         args
     }
 }

@@ -6,8 +6,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use protocol::RobotName;
 use serde::Serialize;
-use simulator::RunFolder;
-use simulator::recorder::EVENTS;
+use scenario::files::{EVENTS, LINKS};
+use simulator::{IfTaken, RunFolder};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use super::compose::Compose;
 use super::links::{Links, Start};
@@ -30,8 +30,6 @@ use crate::file::LaunchFile;
 use crate::link::ProcessLink;
 use crate::options::RunOptions;
 
-/// The record of all changes of links, in the folder of the run.
-const LINKS: &str = "links.jsonl";
 /// Number of bytes at the end of a record in which its last line is searched.
 const TAIL_BYTES: u64 = 16 * 1024;
 /// How often to check for the first tick.
@@ -118,7 +116,7 @@ impl Links for Proxies {
 /// If a file cannot be used, the links cannot be made, or a fault cannot be played.
 pub fn play(play: &Play, mut report: impl FnMut(String)) -> miette::Result<u8> {
     let file = LaunchFile::load(&play.file)?;
-    let run = play.options.run_name(&play.file).into_diagnostic()?;
+    let run = play.options.run_name(&play.file)?;
     let process_of = process_of(&file);
 
     let mut options = play.options.clone();
@@ -134,24 +132,31 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> miette::Result<u8> {
             .push(change.map_err(|error| miette!("{error}"))?);
     }
 
+    // The launch takes this folder, and this process has to know it.
+    let made = RunFolder::make(&play.options.out, &run, play.options.if_taken)?;
+    if let Some(text) = &made.notice {
+        report(text.clone());
+    }
+    let reserved = made.reserve();
+    options.if_taken = IfTaken::Reserved;
+    let folder = &reserved.folder;
     let start = Start {
         file: &play.file,
-        run: &run,
+        run: &reserved.run,
         options: &options,
         more: &play.launch_args,
     };
     let signals = Signals::forward()?;
-    let mut links = make_links(play.via, &file, &plan, &start, &mut report)?;
+    let links = make_links(play.via, &file, &plan, &start, &mut report);
+    let mut links = links.inspect_err(|_| reserved.discard())?;
 
-    let folder = RunFolder::new(&play.options.out, &run);
-    let begun = SystemTime::now();
     let mut launch = signals.spawn(links.command(&start)?)?;
     let player = Player {
         plan: &plan,
         process_of: &process_of,
-        folder: &folder,
+        folder,
     };
-    let played = match wait_for_clock(&mut launch, &folder.file(EVENTS), begun) {
+    let played = match wait_for_clock(&mut launch, &folder.file(EVENTS)) {
         Ok(true) => player.play(links.as_mut(), &mut launch, report),
         Ok(false) => Ok(()),
         Err(error) => Err(error),
@@ -227,12 +232,9 @@ fn partitions(file: &LaunchFile, options: &RunOptions) -> miette::Result<Plan> {
 }
 
 /// Waits until the first tick is in the record. Returns `false` if the launch ends before.
-fn wait_for_clock(launch: &mut Child, events: &Path, begun: SystemTime) -> miette::Result<bool> {
+fn wait_for_clock(launch: &mut Child, events: &Path) -> miette::Result<bool> {
     loop {
-        // Until the simulator replaces it, the record is that of an earlier run.
-        let modified = events.metadata().and_then(|file| file.modified());
-        let is_new = modified.is_ok_and(|at| at >= begun);
-        if is_new && last_tick(events).is_some_and(|tick| tick > 0) {
+        if last_tick(events).is_some_and(|tick| tick > 0) {
             return Ok(true);
         }
 
@@ -286,7 +288,7 @@ impl Player<'_> {
     ) -> miette::Result<()> {
         let begun = Instant::now();
         let path = self.folder.file(LINKS);
-        let mut record = File::create(&path)
+        let mut record = File::create_new(&path)
             .into_diagnostic()
             .wrap_err_with(|| path.display().to_string())?;
 

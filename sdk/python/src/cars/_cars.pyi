@@ -61,6 +61,7 @@ def run(
     duration: str | None,
     speed: str | None,
     name: str | None,
+    replace: bool,
     out: Path,
     robots: Mapping[str, Callable[[], Robot]],
 ) -> tuple[Path, str]: ...

@@ -128,6 +128,7 @@ def run(
     duration: Union[float, str, None] = None,
     speed: Union[float, str, None] = None,
     name: Optional[str] = None,
+    replace: bool = False,
     out: Optional[Name] = None,
     robots: Optional[Mapping[str, Callable[[], Robot]]] = None,
 ) -> Run:
@@ -140,7 +141,9 @@ def run(
         ``--set`` on the command line.
     :param duration: simulated time, instead of the scenario's: seconds, or a text such as ``"600 s"``.
     :param speed: simulated seconds per second; without it as fast as possible.
-    :param name: name of the run and of its folder; without it the file's name.
+    :param name: name of the run and of its folder; without it the file's name. A run whose name is taken gets the next free one,
+        such as ``hall-2``: see :attr:`Run.folder`.
+    :param replace: replace the run with this name, if it is over.
     :param out: where its folder is made, such as ``"runs"``. Without it in a temporary folder, which goes with the returned object.
     :param robots: classes of robots of Python, or functions that make one, by the names of the scenario's robots. All others are
         made by their classes in the scenario. A robot of Python computes under Python's lock; with those of Rust
@@ -162,6 +165,7 @@ def run(
         duration=_settings.time(duration),
         speed=None if speed is None else str(speed),
         name=name,
+        replace=replace,
         out=Path(out),
         robots={of: maker(make) for of, make in (robots or {}).items()},
     )

@@ -1,0 +1,262 @@
+//! Reads all that a run has left, and says what of it is damaged. Nothing is executed.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use config::{Changes, FileError};
+use miette::{IntoDiagnostic, WrapErr, miette};
+use protocol::event::log_line;
+use protocol::messages::LogRecord;
+use recording::Recording;
+use scenario::Scenario;
+use simulator::difference::{between_headers, in_recording};
+use simulator::record::Record;
+use simulator::recorder::{self, LAUNCHED, LOGS, SUMMARY};
+use simulator::seal::{self, Checked};
+use simulator::{EpochFiles, RunFolder, Simulation, Summary};
+
+use crate::folder::recorded_epochs;
+use crate::verify::check_scenario;
+
+/// Ticks of a recording that are read at a time.
+const PART: u64 = 256;
+/// Half of the last digit of a time in the log, and a little, seconds.
+const ROUNDED_S: f64 = 0.051;
+/// What follows the time in a line of the log.
+const UNIT: &str = " s  ";
+
+/// What a run has left.
+#[derive(Debug, Default)]
+pub struct Inspection {
+    /// The events of each epoch that are not damaged.
+    pub epochs: Vec<Checked>,
+    /// What is damaged, part by part.
+    pub damages: Vec<miette::Report>,
+}
+
+/// Reads everything in the folder of a run.
+///
+/// # Errors
+/// If it is not the folder of a run. Damage is part of what is returned.
+pub fn inspect(folder: &RunFolder) -> Result<Inspection, FileError> {
+    let mut inspection = Inspection::default();
+    let epochs = recorded_epochs(folder)?;
+    let mut end = None;
+    for files in &epochs {
+        end = None;
+        match seal::check(&files.events) {
+            Ok(checked) => {
+                end = Some(checked.clone());
+                inspection.epochs.push(checked);
+            }
+            Err(error) => inspection.damages.push(error.into()),
+        }
+        inspection.note(inspect_recording(files, end.as_ref()));
+    }
+
+    let are_events_good = inspection.epochs.len() == epochs.len();
+    inspection.note(inspect_summary(folder, end.as_ref()));
+    inspection.note(inspect_launched(folder));
+    if are_events_good {
+        inspection.note(inspect_log(folder, &epochs, end.as_ref()));
+    }
+    inspection.note(read_all(folder.path()));
+    inspection.note(read_all(&folder.file(LOGS)));
+    Ok(inspection)
+}
+
+impl Inspection {
+    fn note(&mut self, found: miette::Result<()>) {
+        self.damages.extend(found.err());
+    }
+}
+
+/// Reads the scenario and the whole recording of an epoch, and compares them with each other and with the events.
+fn inspect_recording(files: &EpochFiles, events: Option<&Checked>) -> miette::Result<()> {
+    let scenario = Scenario::load(&files.scenario, &Changes::default())?;
+    if !files.recording.exists() {
+        let has_ended = events.is_some_and(|events| events.end.is_some());
+        if scenario.record.frames && has_ended {
+            let place = files.recording.display();
+            return Err(miette!("the run was recorded, and {place} is not there"));
+        }
+        return Ok(());
+    }
+
+    let recording = Recording::open(&files.recording).into_diagnostic()?;
+    recording.check().into_diagnostic()?;
+    for from in (0..recording.len()).step_by(PART as usize) {
+        recording.read(from, from + PART).into_diagnostic()?;
+    }
+    check_scenario(files, &recording)?;
+    let header = recording.header();
+    let simulation = Simulation::new(scenario, files.epoch).into_diagnostic()?;
+    if let Some(difference) = between_headers(header, &recorder::header(&header.run, &simulation)) {
+        let place = files.recording.display();
+        return Err(miette!("{place} is not of its scenario: {difference}"));
+    }
+    match events {
+        Some(events) => compare_events(files, &recording, events),
+        None => Ok(()),
+    }
+}
+
+/// Compares the events of a recording with the file of the events.
+fn compare_events(
+    files: &EpochFiles,
+    recording: &Recording,
+    events: &Checked,
+) -> miette::Result<()> {
+    let mut record = Record::open(files)?;
+    while let Some(entry) = record.next_entry()? {
+        if let Some(difference) = in_recording(&entry, &entry) {
+            return Err(miette!(
+                "{} differs from {}: {difference}",
+                files.recording.display(),
+                files.events.display()
+            ));
+        }
+    }
+
+    let ticks = recording.len();
+    let is_short = events.end.is_some() && (!recording.is_finished() || ticks != events.tick + 1);
+    if is_short || ticks > events.tick + 1 {
+        return Err(miette!(
+            "{} has {ticks} complete ticks, and {} goes to tick {}",
+            files.recording.display(),
+            files.events.display(),
+            events.tick
+        ));
+    }
+    Ok(())
+}
+
+/// Compares the summary with its seal, and with the end of the run. What it counts is compared by [`crate::verify`].
+fn inspect_summary(folder: &RunFolder, events: Option<&Checked>) -> miette::Result<()> {
+    let path = folder.file(SUMMARY);
+    if !path.exists() {
+        return Ok(());
+    }
+
+    let text = read(&path)?;
+    let summary: Summary = serde_json::from_str(&text)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{} is not a summary", path.display()))?;
+    if summary.is_as_written(&text) == Some(false) {
+        return Err(damaged(&path, &"it is not what was written"));
+    }
+    match events {
+        Some(events) if summary.end != events.end || summary.ticks != events.tick => Err(miette!(
+            "{} is not that of the run: it goes to tick {}, and the events go to tick {}",
+            path.display(),
+            summary.ticks,
+            events.tick
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Compares how the run was launched with its seal.
+fn inspect_launched(folder: &RunFolder) -> miette::Result<()> {
+    let path = folder.file(LAUNCHED);
+    if !path.exists() {
+        return Ok(());
+    }
+
+    match seal::is_sealed_text_right(&read(&path)?) {
+        Some(false) => Err(damaged(&path, &"it is not what was written")),
+        _ => Ok(()),
+    }
+}
+
+/// Compares the log with the events that people read.
+fn inspect_log(
+    folder: &RunFolder,
+    epochs: &[EpochFiles],
+    events: Option<&Checked>,
+) -> miette::Result<()> {
+    let path = folder.log();
+    if !path.exists() {
+        return Ok(());
+    }
+
+    let text = read(&path)?;
+    let all: Vec<&str> = text.lines().collect();
+    let mut lines = all.iter().enumerate();
+    let is_cut = !text.is_empty() && !text.ends_with('\n');
+    for files in epochs {
+        let scenario = Scenario::load(&files.scenario, &Changes::default())?;
+        if !scenario.record.log {
+            return Ok(());
+        }
+        let mut record = Record::of_events(&files.events)?;
+        while let Some(entry) = record.next_entry()? {
+            let time_s = entry.tick as f64 * scenario.tick_s;
+            for event in &entry.events {
+                let Some(expected) = event.log_record(files.epoch, entry.tick, time_s) else {
+                    continue;
+                };
+                let Some((number, line)) = lines.next() else {
+                    let has_ended = events.is_some_and(|events| events.end.is_some());
+                    return if has_ended {
+                        Err(damaged(&path, &"its end is missing"))
+                    } else {
+                        Ok(())
+                    };
+                };
+                let is_last = is_cut && lines.len() == 0;
+                if !is_line_of(line, &expected) && !is_last {
+                    let reason = format!("line {} is not what was written", number + 1);
+                    return Err(damaged(&path, &reason));
+                }
+            }
+        }
+    }
+    match lines.next() {
+        Some((number, _)) if !is_cut => {
+            let reason = format!("line {} follows the end of the record", number + 1);
+            Err(damaged(&path, &reason))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether a line of the log is that of an event. How many digits a time has is a matter of the version.
+fn is_line_of(line: &str, expected: &LogRecord) -> bool {
+    let written = log_line(expected);
+    let (Some((time, rest)), Some((_, expected_rest))) =
+        (line.split_once(UNIT), written.split_once(UNIT))
+    else {
+        return false;
+    };
+
+    let time: Option<f64> = time.trim().parse().ok();
+    rest == expected_rest && time.is_some_and(|time| (time - expected.time_s).abs() < ROUNDED_S)
+}
+
+/// Reads every file of a folder to its end.
+fn read_all(folder: &Path) -> miette::Result<()> {
+    let unreadable = |error: io::Error| FileError::unreadable(folder, &error);
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(unreadable)?,
+    };
+    for entry in entries {
+        let path: PathBuf = entry.map_err(unreadable)?.path();
+        if path.is_file() {
+            let read =
+                std::fs::File::open(&path).and_then(|mut file| io::copy(&mut file, &mut io::sink()));
+            read.map_err(|error| FileError::unreadable(&path, &error))?;
+        }
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> miette::Result<String> {
+    let bytes = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
+    String::from_utf8(bytes).map_err(|_| damaged(path, &"it is not UTF-8"))
+}
+
+fn damaged(path: &Path, reason: &dyn std::fmt::Display) -> miette::Report {
+    miette!("{} is damaged: {reason}", path.display())
+}

@@ -1,0 +1,684 @@
+//! The folder of a run: one function makes it. It never follows or replaces a link, and never takes what another command made.
+//!
+//! A folder is made by one call of the system, so two processes never get the same one. It is in use while one of its two locks is
+//! held: that of the process that writes the record, and that of the launcher, which outlives it.
+
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use config::FileError;
+use protocol::messages::End;
+use protocol::{Epoch, RunName};
+use scenario::Scenario;
+use scenario::files::{
+    ENDPOINT, EVENTS, LATEST, LAUNCHED, LINKS, LOCK, LOG, LOGS, OPERATOR_CONFIG, RECORDING,
+    SCENARIO, SUMMARY, check_log_name,
+};
+
+use crate::files::EpochFiles;
+use crate::seal;
+
+/// With this their names end while a run that is resumed is executed again.
+pub(crate) const DRAFT: &str = ".draft";
+/// With this the name of a file ends while it is written.
+const NEW: &str = ".new";
+/// Files that every epoch has.
+const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];
+/// How the names of the logs of processes end.
+const LOG_ENDING: &str = ".log";
+/// Name of the file in which the console keeps its address and its token, among the logs.
+pub const CONSOLE_KEPT: &str = "console.kept";
+
+/// What a new run does where an entry with its name exists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum IfTaken {
+    /// It takes the next free name, as in `hall-2`.
+    #[default]
+    Number,
+    /// It replaces the record of a run that is over. Anything else is an error.
+    Replace,
+    /// It is an error: other processes know the run by its name.
+    Refuse,
+    /// The folder was made for it by [`RunFolder::make`], in another process.
+    Reserved,
+}
+
+/// The folder of a new run.
+#[derive(Debug)]
+pub struct NewRun {
+    /// The name of the run, which may be another one than was asked for.
+    pub run: RunName,
+    /// Its folder.
+    pub folder: RunFolder,
+    /// While it is held, no other process writes a record into the folder.
+    pub lock: RunLock,
+    /// Whether the folder was made, and did not exist before.
+    pub is_new: bool,
+    /// A sentence for people, if the name is another one than was asked for.
+    pub notice: Option<String>,
+}
+
+/// The folder of a new run that another process is to take.
+#[derive(Debug)]
+pub struct Reserved {
+    /// The name of the run.
+    pub run: RunName,
+    /// Its folder.
+    pub folder: RunFolder,
+    is_new: bool,
+}
+
+/// The folder of a run: `OUT/NAME`.
+#[derive(Debug, Clone)]
+pub struct RunFolder {
+    path: PathBuf,
+}
+
+impl RunFolder {
+    /// The folder of run `run` under `out`.
+    #[must_use]
+    pub fn new(out: &Path, run: &RunName) -> Self {
+        Self {
+            path: out.join(run.as_str()),
+        }
+    }
+
+    /// The folder at a path.
+    #[must_use]
+    pub fn at(path: PathBuf) -> Self {
+        Self { path }
+    }
+
+    /// The folder itself, where the path is a link such as `latest`.
+    ///
+    /// # Errors
+    /// [`FileError`] if there is none.
+    pub fn resolved(&self) -> Result<Self, FileError> {
+        let path = self.path.canonicalize();
+        let path = path.map_err(|error| self.failed("find", &error))?;
+        Ok(Self { path })
+    }
+
+    /// The folder itself, to write into it. The link `latest` is followed to the folder beside it, and no other link.
+    ///
+    /// # Errors
+    /// [`FileError`] if there is none, or it is reached by a link.
+    pub fn resolved_to_write(&self) -> Result<Self, FileError> {
+        let mut path = self.path.clone();
+        if self.path.file_name() == Some(OsStr::new(LATEST))
+            && let Ok(target) = std::fs::read_link(&self.path)
+            && target.file_name() == Some(target.as_os_str())
+        {
+            path = self.path.with_file_name(target);
+        }
+        if path.is_symlink() {
+            let place = path.display();
+            return Err(
+                FileError::new(format!("{place} is a link, and no record is written through one"))
+                    .with_help("name the folder to which it leads"),
+            );
+        }
+        Self { path }.resolved()
+    }
+
+    /// The name of the folder itself, for people, also where the path is a link.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let path = self.path.canonicalize();
+        let path = path.as_ref().unwrap_or(&self.path);
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        name.to_string_lossy().into_owned()
+    }
+
+    /// The name of the run by which its processes know it: that of its folder, also where the path is a link.
+    ///
+    /// # Errors
+    /// [`FileError`] if there is no folder, or it is not named like a run: it was copied or renamed.
+    pub fn name(&self) -> Result<RunName, FileError> {
+        let path = self.resolved()?.path;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        RunName::new(&name).map_err(|error| {
+            FileError::new(format!(
+                "{} is not named like a run: {error}",
+                path.display()
+            ))
+            .with_help("rename the folder")
+        })
+    }
+
+    /// Makes the folder of a new run under `out`, without content. The folder of a run that is over is cleared where it is to be
+    /// replaced.
+    ///
+    /// # Errors
+    /// [`FileError`] if the folder cannot be made, or the name is taken and `if_taken` does not help.
+    pub fn make(out: &Path, run: &RunName, if_taken: IfTaken) -> Result<NewRun, FileError> {
+        std::fs::create_dir_all(out).map_err(|error| {
+            FileError::new(format!("cannot make the folder {}: {error}", out.display()))
+        })?;
+
+        let folder = Self::new(out, run);
+        match if_taken {
+            IfTaken::Reserved => {
+                let lock = folder.take_reserved()?;
+                return Ok(NewRun::named(run, folder, lock, false));
+            }
+            IfTaken::Replace if folder.is_taken() => {
+                let lock = folder.take_over()?;
+                return Ok(NewRun::named(run, folder, lock, false));
+            }
+            IfTaken::Replace | IfTaken::Refuse | IfTaken::Number => {}
+        }
+
+        if let Some(lock) = folder.try_make()? {
+            return Ok(NewRun::named(run, folder, lock, true));
+        }
+        if if_taken != IfTaken::Number {
+            let place = folder.path.display();
+            return Err(FileError::new(format!("{place} exists already"))
+                .with_help("choose another --run or --out; --replace replaces a run that is over"));
+        }
+        Self::make_numbered(out, run)
+    }
+
+    fn make_numbered(out: &Path, asked: &RunName) -> Result<NewRun, FileError> {
+        let mut number = 2;
+        loop {
+            let run = asked.numbered(number);
+            let folder = Self::new(out, &run);
+            if let Some(lock) = folder.try_make()? {
+                let taken = out.join(asked.as_str());
+                return Ok(NewRun {
+                    notice: Some(format!(
+                        "the run is {run}: {} exists already, and only --replace replaces a run that is over",
+                        taken.display()
+                    )),
+                    ..NewRun::named(&run, folder, lock, true)
+                });
+            }
+            number += 1;
+        }
+    }
+
+    /// The name that a new run would get now.
+    #[must_use]
+    pub fn next_name(out: &Path, run: &RunName, if_taken: IfTaken) -> RunName {
+        let is_free = |run: &RunName| !Self::new(out, run).is_taken();
+        if if_taken != IfTaken::Number || is_free(run) {
+            return run.clone();
+        }
+        let mut names = (2..).map(|number| run.numbered(number));
+        names.find(is_free).unwrap_or_else(|| run.clone())
+    }
+
+    /// Whether there is anything at the path, also a link that leads nowhere.
+    #[must_use]
+    pub fn is_taken(&self) -> bool {
+        self.path.symlink_metadata().is_ok()
+    }
+
+    /// Makes the folder and locks it; `None` if there is anything at the path.
+    fn try_make(&self) -> Result<Option<RunLock>, FileError> {
+        match std::fs::create_dir(&self.path) {
+            Ok(()) => {}
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => return Ok(None),
+            Err(error) => return Err(self.failed("make", &error)),
+        }
+        self.lock().map(Some)
+    }
+
+    /// Takes a folder that another process made for this one: it has no record.
+    fn take_reserved(&self) -> Result<RunLock, FileError> {
+        self.check_itself()?;
+        self.check_links()?;
+        let lock = self.lock()?;
+        if self.file(EVENTS).exists() {
+            let place = self.path.display();
+            return Err(FileError::new(format!("{place} has a run already")));
+        }
+        Ok(lock)
+    }
+
+    /// Takes the folder of a run that is over, and removes its record. Files that no run makes stay.
+    fn take_over(&self) -> Result<RunLock, FileError> {
+        let place = self.path.display();
+        let is_folder = self.path.symlink_metadata().is_ok_and(|at| at.is_dir());
+        // A robot's folder has a scenario.toml, too.
+        let has_record = self.file(LOCK).exists() || self.file(EVENTS).exists();
+        if !is_folder || !has_record || !self.file(SCENARIO).exists() {
+            let error = FileError::new(format!("{place} is there and is not the folder of a run"));
+            return Err(error.with_help("choose another --run or --out, or move it away"));
+        }
+        self.check_links()?;
+
+        // First that of the launcher: its simulator may be about to take the other one.
+        let _launcher = self.lock_of_launcher()?;
+        let lock = self.lock()?;
+        self.clear()?;
+        Ok(lock)
+    }
+
+    /// Checks that the path is that of a folder, and not of a link.
+    fn check_itself(&self) -> Result<(), FileError> {
+        let found = self.path.symlink_metadata();
+        let found = found.map_err(|error| self.failed("find", &error))?;
+        if found.is_dir() {
+            return Ok(());
+        }
+        let place = self.path.display();
+        Err(FileError::new(format!("{place} is not a folder")))
+    }
+
+    /// Checks that no entry of the folder, and of that with the logs, is a link: what is written to one would be written elsewhere.
+    fn check_links(&self) -> Result<(), FileError> {
+        check_no_links(&self.path)?;
+        check_no_links(&self.file(LOGS))
+    }
+
+    /// Makes the folder of the logs and writes the scenario: from then on it is the folder of a run.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be written.
+    pub fn fill(&self, scenario: &Scenario) -> Result<(), FileError> {
+        let logs = self.file(LOGS);
+        match std::fs::create_dir(&logs) {
+            Err(error) if error.kind() != ErrorKind::AlreadyExists => {
+                return Err(self.failed("make", &error));
+            }
+            _ => {}
+        }
+        self.write_scenario(scenario)
+    }
+
+    /// Makes the folder, which must not exist, with the scenario.
+    ///
+    /// # Errors
+    /// [`FileError`] as [`Self::make`] and [`Self::fill`].
+    pub fn create(&self, scenario: &Scenario) -> Result<RunLock, FileError> {
+        let out = self.path.parent().unwrap_or(Path::new(""));
+        let made = Self::make(out, &self.named()?, IfTaken::Refuse)?;
+        self.fill(scenario)?;
+        Ok(made.lock)
+    }
+
+    /// The name of a folder that may not exist yet.
+    fn named(&self) -> Result<RunName, FileError> {
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        RunName::new(&name).map_err(|error| FileError::new(error.to_string()))
+    }
+
+    /// Removes the record of a run.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be removed.
+    pub fn clear(&self) -> Result<(), FileError> {
+        // The scenario has the name of the log, and makes the folder that of a run: it goes last.
+        let mut files = self.superseded();
+        for name in [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG] {
+            files.push(self.file(name));
+        }
+        files.extend([LAUNCHED, LINKS].map(|name| self.file(name)));
+        files.push(self.log());
+        for file in files.clone() {
+            for ending in [DRAFT, NEW] {
+                files.push(with_ending(&file, ending));
+            }
+        }
+        files.extend(self.logs_of_processes());
+        files.push(self.file(SCENARIO));
+
+        for file in files {
+            remove_if_there(&file).map_err(|error| self.failed("clear", &error))?;
+        }
+        Ok(())
+    }
+
+    /// The logs that a launch has written.
+    fn logs_of_processes(&self) -> Vec<PathBuf> {
+        let mut logs = Vec::new();
+        let entries = std::fs::read_dir(self.file(LOGS)).into_iter().flatten();
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let name = name.to_str().unwrap_or_default();
+            if name.ends_with(LOG_ENDING) || name == CONSOLE_KEPT {
+                logs.push(entry.path());
+            }
+        }
+        logs
+    }
+
+    /// Writes [`SCENARIO`], once for each epoch.
+    pub(crate) fn write_scenario(&self, scenario: &Scenario) -> Result<(), FileError> {
+        self.write(SCENARIO, &scenario.to_toml()?)
+    }
+
+    /// Points the symbolic link [`LATEST`] to the folder, in one step. If links cannot be made, or something else has its name, runs
+    /// have to be named.
+    pub fn point_latest(&self) {
+        if let Some(name) = self.path.file_name() {
+            self.point_latest_to(Path::new(name));
+        }
+    }
+
+    /// Points the link to another run beside this one, as [`Self::point_latest`] does.
+    pub fn point_latest_to(&self, target: &Path) {
+        if let Err(error) = self.try_point_latest(target) {
+            tracing::debug!(%error, "no link to the latest run");
+        }
+    }
+
+    fn try_point_latest(&self, target: &Path) -> std::io::Result<()> {
+        let link = self.path.with_file_name(LATEST);
+        let is_ours = link
+            .symlink_metadata()
+            .map_or(true, |found| found.is_symlink());
+        if !is_ours {
+            return Err(ErrorKind::AlreadyExists.into());
+        }
+
+        // Only the process that has the folder uses this name.
+        let own = self.path.file_name().unwrap_or_default();
+        let mut new = std::ffi::OsString::from(format!(".{LATEST}-"));
+        new.push(own);
+        let new = self.path.with_file_name(new);
+        if new.is_symlink() {
+            std::fs::remove_file(&new)?;
+        }
+        std::os::unix::fs::symlink(target, &new)?;
+        std::fs::rename(&new, &link).inspect_err(|_| {
+            let _stays = std::fs::remove_file(&new);
+        })
+    }
+
+    /// Takes the folder of a run that was killed or stopped, to resume it, with the record of its last epoch, the files of which
+    /// may not be there yet. The record is checked first.
+    ///
+    /// # Errors
+    /// [`FileError`] if it is not the folder of a run, the run is in progress or has ended, the record is damaged, or a link is
+    /// in the place of a file.
+    pub fn reopen(&self) -> Result<(RunLock, EpochFiles), FileError> {
+        let place = self.path.display();
+        if !self.file(SCENARIO).exists() {
+            let error = FileError::new(format!("{place} is not the folder of a run"));
+            return Err(error.with_help("name a run under --out, or its folder"));
+        }
+        self.check_itself()?;
+        self.check_links()?;
+
+        let lock = self.lock()?;
+        let files = self.last_epoch();
+        if files.events.exists() {
+            let end = seal::check(&files.events)?.end;
+            if end.is_some_and(|end| end != End::Stopped) {
+                let error = FileError::new(format!("the run in {place} has ended"));
+                return Err(error.with_help("start it again without --resume"));
+            }
+        }
+        Ok((lock, files))
+    }
+
+    /// Takes the folder: while the lock is held, no other process writes a record into it.
+    ///
+    /// # Errors
+    /// [`FileError`] if another process has it.
+    pub fn lock(&self) -> Result<RunLock, FileError> {
+        let path = self.file(LOCK);
+        if path.is_symlink() {
+            return Err(is_link(&path));
+        }
+        let file = File::options().create(true).append(true).open(&path);
+        let file = file.map_err(|error| self.failed("lock", &error))?;
+        self.try_lock(file)
+    }
+
+    /// Takes the lock of the launcher, if the run was launched: it is held for the whole launch, and the processes of the launch
+    /// take the folder one after the other.
+    ///
+    /// # Errors
+    /// [`FileError`] if a launcher has it.
+    pub fn lock_of_launcher(&self) -> Result<Option<RunLock>, FileError> {
+        match File::open(self.file(LAUNCHED)) {
+            Ok(file) => self.try_lock(file).map(Some),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(self.failed("lock", &error)),
+        }
+    }
+
+    fn try_lock(&self, file: File) -> Result<RunLock, FileError> {
+        file.try_lock().map_err(|_| {
+            let path = self.path.display();
+            FileError::new(format!("the run in {path} is in progress"))
+                .with_help("choose another --run, or end it with `cars ctl stop`")
+        })?;
+        Ok(RunLock { _file: file })
+    }
+
+    /// Files of epochs that `init` has ended.
+    fn superseded(&self) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(&self.path)
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
+            let name = entry.file_name();
+            let name = name.to_str().unwrap_or_default();
+            let mut prefixes = PER_EPOCH.iter().map(|file| superseded_prefix(file));
+            if prefixes.any(|prefix| name.starts_with(&prefix)) {
+                files.push(entry.path());
+            }
+        }
+
+        files
+    }
+
+    /// Renames the files of the epoch before this one, so that their names contain its number.
+    pub(crate) fn supersede(&self, epoch: Epoch) -> Result<(), FileError> {
+        let before = epoch.saturating_sub(1);
+        for name in PER_EPOCH {
+            let file = self.file(name);
+            if !file.exists() {
+                continue;
+            }
+
+            let renamed = self.file(&superseded_name(name, before));
+            if renamed.symlink_metadata().is_ok() {
+                let error = ErrorKind::AlreadyExists.into();
+                return Err(self.failed("keep files in", &error));
+            }
+            std::fs::rename(&file, renamed)
+                .map_err(|error| self.failed("keep files in", &error))?;
+        }
+
+        // That of an epoch that has ended would say that the new one has.
+        remove_if_there(&self.file(SUMMARY)).map_err(|error| self.failed("clear", &error))
+    }
+
+    /// The log, the name of which is in the scenario of the run.
+    #[must_use]
+    pub fn log(&self) -> PathBuf {
+        let scenario = std::fs::read_to_string(self.file(SCENARIO)).unwrap_or_default();
+        let scenario: toml::Table = toml::from_str(&scenario).unwrap_or_default();
+        let record = scenario.get("record");
+        let name = record.and_then(|record| record.get("log_name")?.as_str());
+        let name = name.filter(|name| check_log_name(name).is_ok());
+        self.file(name.unwrap_or(LOG))
+    }
+
+    /// Writes a file of one line that others wait for: they see it whole or not at all.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be written.
+    pub fn write_line(&self, name: &str, line: &str) -> Result<(), FileError> {
+        self.write(name, &format!("{line}\n"))
+    }
+
+    /// Writes a file, which appears under its name when it is complete.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be written, or a link has its name.
+    pub fn write(&self, name: &str, text: &str) -> Result<(), FileError> {
+        let path = self.file(name);
+        if path.is_symlink() {
+            return Err(is_link(&path));
+        }
+
+        let new = with_ending(&path, NEW);
+        // A process that was killed may have left it.
+        let written = remove_if_there(&new)
+            .and_then(|()| write_new(&new, text))
+            .and_then(|()| std::fs::rename(&new, &path));
+        written.map_err(|error| {
+            let _is_not_there = std::fs::remove_file(&new);
+            FileError::new(format!("cannot write {}: {error}", path.display()))
+        })
+    }
+
+    /// A file of the folder.
+    #[must_use]
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// The folder itself.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The records of all epochs of the run, the first epoch first. The files of the last one may be missing.
+    #[must_use]
+    pub fn epochs(&self) -> Vec<EpochFiles> {
+        let last = self.last_epoch();
+        let mut epochs = Vec::new();
+        for epoch in 1..last.epoch {
+            epochs.push(EpochFiles {
+                epoch,
+                scenario: self.file(&superseded_name(SCENARIO, epoch)),
+                events: self.file(&superseded_name(EVENTS, epoch)),
+                recording: self.file(&superseded_name(RECORDING, epoch)),
+            });
+        }
+        epochs.push(last);
+        epochs
+    }
+
+    /// The record of the last epoch.
+    fn last_epoch(&self) -> EpochFiles {
+        let is_superseded = |epoch: &Epoch| self.file(&superseded_name(EVENTS, *epoch)).exists();
+        let superseded = (1..).take_while(is_superseded).count();
+        EpochFiles {
+            epoch: superseded as Epoch + 1,
+            scenario: self.file(SCENARIO),
+            events: self.file(EVENTS),
+            recording: self.file(RECORDING),
+        }
+    }
+
+    fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
+        FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
+    }
+}
+
+impl NewRun {
+    /// A run whose name is the one that was asked for.
+    fn named(run: &RunName, folder: RunFolder, lock: RunLock, is_new: bool) -> Self {
+        Self {
+            run: run.clone(),
+            folder,
+            lock,
+            is_new,
+            notice: None,
+        }
+    }
+
+    /// Leaves the folder to another process, which takes it with [`IfTaken::Reserved`].
+    #[must_use]
+    pub fn reserve(self) -> Reserved {
+        Reserved {
+            run: self.run,
+            folder: self.folder,
+            is_new: self.is_new,
+        }
+    }
+}
+
+impl Reserved {
+    /// Removes the folder if it was made for the run, which does not begin.
+    pub fn discard(&self) {
+        if !self.is_new {
+            return;
+        }
+        if let Err(error) = std::fs::remove_dir_all(self.folder.path()) {
+            let place = self.folder.path().display();
+            tracing::warn!("{place} could not be removed: {error}");
+        }
+    }
+}
+
+/// The lock of a run's folder. The operating system releases it when the process ends, also by a crash.
+#[derive(Debug)]
+pub struct RunLock {
+    _file: File,
+}
+
+/// Checks that no entry of a folder is a link: what is written to one would be written elsewhere. There may be no such folder.
+///
+/// # Errors
+/// [`FileError`] if the folder is a link, or has one.
+pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
+    if folder.is_symlink() {
+        return Err(is_link(folder));
+    }
+
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(FileError::unreadable(folder, &error)),
+    };
+    for entry in entries {
+        let entry = entry.map_err(|error| FileError::unreadable(folder, &error))?;
+        if entry.path().is_symlink() {
+            return Err(is_link(&entry.path()));
+        }
+    }
+    Ok(())
+}
+
+fn is_link(path: &Path) -> FileError {
+    let place = path.display();
+    FileError::new(format!("{place} is a link, and nothing is written through one"))
+        .with_help("put what it leads to in its place, or choose another folder")
+}
+
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut path = path.as_os_str().to_owned();
+    path.push(ending);
+    path.into()
+}
+
+/// Writes a file that must not exist, to the disk.
+fn write_new(path: &Path, text: &str) -> std::io::Result<()> {
+    let mut file = File::create_new(path)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_data()
+}
+
+fn remove_if_there(path: &Path) -> std::io::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        removed => removed,
+    }
+}
+
+/// The name that a file has after the end of its epoch, as in `events-epoch1.jsonl`.
+fn superseded_name(file: &str, epoch: Epoch) -> String {
+    let prefix = superseded_prefix(file);
+    let suffix = file.rsplit('.').next().unwrap_or_default();
+    format!("{prefix}{epoch}.{suffix}")
+}
+
+fn superseded_prefix(file: &str) -> String {
+    format!("{}-epoch", file.split('.').next().unwrap_or(file))
+}
