@@ -128,9 +128,16 @@ impl Lab {
     #[must_use]
     pub fn cars(&self, args: &[&str]) -> Command {
         let mut command = Command::new(programs().join("cars"));
+        // Tests find files by the names of runs: a run that is played again has the name that it had.
+        let is_new = !args.contains(&"--resume");
+        let own: &[&str] = match args {
+            ["run" | "launch" | "fork", ..] if is_new => &["--replace"],
+            _ => &[],
+        };
         command
             .current_dir(root())
             .args(args)
+            .args(own)
             .args(["--out".as_ref(), self.out().as_os_str()]);
         command
             .stdin(Stdio::null())

@@ -122,12 +122,7 @@ pub(crate) fn fork(args: ForkArgs) -> miette::Result<ExitCode> {
 /// Removes what a fork that failed has made, and points the link to the latest run where it was.
 fn undo(made: &NewRun, latest: Option<&Path>) {
     let folder = &made.folder;
-    let removed = if made.is_new {
-        std::fs::remove_dir_all(folder.path()).map_err(miette::Report::msg)
-    } else {
-        folder.clear().map_err(miette::Report::from)
-    };
-    if let Err(error) = removed {
+    if let Err(error) = folder.remove() {
         let place = folder.path().display();
         terminal::note(format_args!("note: {place} could not be removed: {error}"));
     }

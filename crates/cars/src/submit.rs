@@ -7,8 +7,8 @@ use std::process::{Command, Stdio};
 use clap::{Args, ValueEnum};
 use config::units::Time;
 use lab::experiment::Plan;
-use lab::export::draft::unwritable;
 use lab::experiment::submit::{Kubernetes, Parallel, Slurm, Tasks};
+use lab::export::draft::unwritable;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use simulator::folder::check_no_links;
 

@@ -244,8 +244,8 @@ fn read_all(folder: &Path) -> miette::Result<()> {
     for entry in entries {
         let path: PathBuf = entry.map_err(unreadable)?.path();
         if path.is_file() {
-            let read =
-                std::fs::File::open(&path).and_then(|mut file| io::copy(&mut file, &mut io::sink()));
+            let read = std::fs::File::open(&path)
+                .and_then(|mut file| io::copy(&mut file, &mut io::sink()));
             read.map_err(|error| FileError::unreadable(&path, &error))?;
         }
     }

@@ -193,8 +193,8 @@ impl LaunchFile {
         let mut run = None;
         if let Some(raw) = raw.run {
             let name = RunName::new(raw.get_ref());
-            let name = name
-                .map_err(|error| FileError::at(&source, Some(raw.span()), &error.to_string()))?;
+            let name =
+                name.map_err(|error| FileError::at(&source, Some(raw.span()), &error.to_string()))?;
             run = Some(name);
         }
         let simulator = check_simulator(&source, raw.simulator)?;

@@ -8,8 +8,8 @@ use protocol::RobotName;
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use simulator::RunFolder;
-use simulator::seal;
 use simulator::recorder::LAUNCHED;
+use simulator::seal;
 
 use super::file::LaunchFile;
 

@@ -181,7 +181,9 @@ impl Launch {
         options.replayed = launched.replayed;
 
         // A copy may have any name.
-        let run = folder.name().or_else(|_| RunName::new(AGAIN).into_diagnostic())?;
+        let run = folder
+            .name()
+            .or_else(|_| RunName::new(AGAIN).into_diagnostic())?;
         if options.run.speed.is_none() {
             options.run.speed = Some(Speed(launched.speed));
         }

@@ -101,7 +101,9 @@ pub fn default_run_name(file: &Path) -> Result<RunName, FileError> {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     RunName::new(&stem).map_err(|error| {
         let place = file.display();
-        FileError::new(format!("{place}: the name of the file cannot be that of a run: {error}"))
-            .with_help("give the run a name with --run, or rename the file")
+        FileError::new(format!(
+            "{place}: the name of the file cannot be that of a run: {error}"
+        ))
+        .with_help("give the run a name with --run, or rename the file")
     })
 }

@@ -282,7 +282,7 @@ impl Drop for Over<'_> {
 
 /// Writes what does not change: metadata, the scenario, and all channels with the header in a chunk of their own.
 fn begin(path: &Path, header: &Header, scenario: &str, encoder: &Encoder) -> io::Result<McapFile> {
-    let mut file = McapFile::begin(File::create_new(path)?, "cars", encoder.channels().clone())?;
+    let mut file = McapFile::begin(File::create(path)?, "cars", encoder.channels().clone())?;
     file.add_metadata(METADATA, &header.metadata())?;
     file.attach(SCENARIO, "application/toml", scenario.as_bytes())?;
     file.add_chunk(&encoder.preamble())?;

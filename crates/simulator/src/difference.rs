@@ -102,8 +102,7 @@ pub fn between_headers(a: &Header, b: &Header) -> Option<Difference> {
 /// is in its file.
 #[must_use]
 pub fn between_summaries(a: &Value, b: &Summary) -> Option<Difference> {
-    let [one, other] =
-        [a, &to_json(b)].map(|summary| without(summary, &SUMMARY_NOT_COMPARED));
+    let [one, other] = [a, &to_json(b)].map(|summary| without(summary, &SUMMARY_NOT_COMPARED));
     let (field, values) = first_field(&one, &other)?;
     Some(Difference {
         tick: b.ticks,

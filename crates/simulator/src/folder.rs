@@ -54,8 +54,6 @@ pub struct NewRun {
     pub folder: RunFolder,
     /// While it is held, no other process writes a record into the folder.
     pub lock: RunLock,
-    /// Whether the folder was made, and did not exist before.
-    pub is_new: bool,
     /// A sentence for people, if the name is another one than was asked for.
     pub notice: Option<String>,
 }
@@ -67,7 +65,6 @@ pub struct Reserved {
     pub run: RunName,
     /// Its folder.
     pub folder: RunFolder,
-    is_new: bool,
 }
 
 /// The folder of a run: `OUT/NAME`.
@@ -115,10 +112,10 @@ impl RunFolder {
         }
         if path.is_symlink() {
             let place = path.display();
-            return Err(
-                FileError::new(format!("{place} is a link, and no record is written through one"))
-                    .with_help("name the folder to which it leads"),
-            );
+            return Err(FileError::new(format!(
+                "{place} is a link, and no record is written through one"
+            ))
+            .with_help("name the folder to which it leads"));
         }
         Self { path }.resolved()
     }
@@ -162,22 +159,23 @@ impl RunFolder {
         match if_taken {
             IfTaken::Reserved => {
                 let lock = folder.take_reserved()?;
-                return Ok(NewRun::named(run, folder, lock, false));
+                return Ok(NewRun::named(run, folder, lock));
             }
             IfTaken::Replace if folder.is_taken() => {
                 let lock = folder.take_over()?;
-                return Ok(NewRun::named(run, folder, lock, false));
+                return Ok(NewRun::named(run, folder, lock));
             }
             IfTaken::Replace | IfTaken::Refuse | IfTaken::Number => {}
         }
 
         if let Some(lock) = folder.try_make()? {
-            return Ok(NewRun::named(run, folder, lock, true));
+            return Ok(NewRun::named(run, folder, lock));
         }
         if if_taken != IfTaken::Number {
             let place = folder.path.display();
-            return Err(FileError::new(format!("{place} exists already"))
-                .with_help("choose another --run or --out; --replace replaces a run that is over"));
+            return Err(FileError::new(format!("{place} exists already")).with_help(
+                "choose another --run or --out; --replace replaces a run that is over",
+            ));
         }
         Self::make_numbered(out, run)
     }
@@ -194,7 +192,7 @@ impl RunFolder {
                         "the run is {run}: {} exists already, and only --replace replaces a run that is over",
                         taken.display()
                     )),
-                    ..NewRun::named(&run, folder, lock, true)
+                    ..NewRun::named(&run, folder, lock)
                 });
             }
             number += 1;
@@ -330,6 +328,29 @@ impl RunFolder {
 
         for file in files {
             remove_if_there(&file).map_err(|error| self.failed("clear", &error))?;
+        }
+        Ok(())
+    }
+
+    /// Removes the record of a run that has failed, and the folder unless there is something else in it.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be removed.
+    pub fn remove(&self) -> Result<(), FileError> {
+        self.clear()?;
+        remove_if_there(&self.file(LOCK)).map_err(|error| self.failed("remove", &error))?;
+        for folder in [&self.file(LOGS), &self.path] {
+            match std::fs::remove_dir(folder) {
+                Err(error)
+                    if !matches!(
+                        error.kind(),
+                        ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty
+                    ) =>
+                {
+                    return Err(self.failed("remove", &error));
+                }
+                _ => {}
+            }
         }
         Ok(())
     }
@@ -583,12 +604,11 @@ impl RunFolder {
 
 impl NewRun {
     /// A run whose name is the one that was asked for.
-    fn named(run: &RunName, folder: RunFolder, lock: RunLock, is_new: bool) -> Self {
+    fn named(run: &RunName, folder: RunFolder, lock: RunLock) -> Self {
         Self {
             run: run.clone(),
             folder,
             lock,
-            is_new,
             notice: None,
         }
     }
@@ -599,18 +619,14 @@ impl NewRun {
         Reserved {
             run: self.run,
             folder: self.folder,
-            is_new: self.is_new,
         }
     }
 }
 
 impl Reserved {
-    /// Removes the folder if it was made for the run, which does not begin.
+    /// Removes the folder of a run that does not begin.
     pub fn discard(&self) {
-        if !self.is_new {
-            return;
-        }
-        if let Err(error) = std::fs::remove_dir_all(self.folder.path()) {
+        if let Err(error) = self.folder.remove() {
             let place = self.folder.path().display();
             tracing::warn!("{place} could not be removed: {error}");
         }
@@ -648,8 +664,10 @@ pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
 
 fn is_link(path: &Path) -> FileError {
     let place = path.display();
-    FileError::new(format!("{place} is a link, and nothing is written through one"))
-        .with_help("put what it leads to in its place, or choose another folder")
+    FileError::new(format!(
+        "{place} is a link, and nothing is written through one"
+    ))
+    .with_help("put what it leads to in its place, or choose another folder")
 }
 
 fn with_ending(path: &Path, ending: &str) -> PathBuf {

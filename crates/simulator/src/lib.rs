@@ -19,8 +19,8 @@ pub mod simulation;
 pub mod summary;
 
 pub use files::EpochFiles;
-pub use protocol::{Event, Line};
 pub use folder::{IfTaken, NewRun, Reserved, RunFolder, RunLock};
+pub use protocol::{Event, Line};
 pub use recorder::Recorder;
 pub use simulation::{Reports, Simulation, TickRecord};
 pub use summary::Summary;

@@ -198,6 +198,9 @@ impl Recorder {
         let mut recording = None;
         if record.frames {
             let path = folder.file(&format!("{RECORDING}{suffix}"));
+            if path.symlink_metadata().is_ok() {
+                return Err(unwritable(&path, &"it exists already"));
+            }
             let scenario = simulation.scenario().to_toml()?;
             let writer = Writer::create(&path, &header(run, simulation), &scenario);
             recording = Some(writer.map_err(|error| unrecordable(&error))?);
@@ -431,7 +434,7 @@ impl Recorder {
 
         let text = self
             .summary
-            .to_text()
+            .seal()
             .map_err(|error| FileError::new(error.to_string()))?;
         self.folder.write_line(SUMMARY, &text)?;
         Ok(self.summary.clone())

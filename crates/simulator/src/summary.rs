@@ -209,15 +209,15 @@ impl Summary {
         verdicts.max().unwrap_or(Verdict::Pass)
     }
 
-    /// The summary as a file, sealed.
+    /// Seals the summary, and returns it as a file.
     ///
     /// # Errors
     /// If it cannot be JSON.
-    pub(crate) fn to_text(&self) -> Result<String, serde_json::Error> {
-        let mut sealed = self.clone();
-        sealed.wall.seal = None;
-        sealed.wall.seal = Some(seal::of_json(&serde_json::to_value(&sealed)?));
-        serde_json::to_string_pretty(&sealed)
+    pub(crate) fn seal(&mut self) -> Result<String, serde_json::Error> {
+        self.wall.seal = None;
+        let content = serde_json::to_value(&*self)?;
+        self.wall.seal = Some(seal::of_json(&content));
+        serde_json::to_string_pretty(self)
     }
 
     /// Whether the text from which the summary was read is as it was written; `None` if it has no seal.

@@ -118,7 +118,12 @@ def test_pictures_are_those_of_the_command_line(run: cars.Run, lab: Lab) -> None
 def test_a_folder_that_another_run_has_taken_is_not_read(tmp_path: Path) -> None:
     first = cars.run(PAPER, seed=1, out=tmp_path, duration=5)
     second = cars.run(PAPER, seed=2, out=tmp_path, duration=5)
-    assert len(second.states) > 0
+    assert second.folder.name == f"{first.folder.name}-2"
+    assert len(first.states) == len(second.states) > 0
+
+    first = cars.run(PAPER, seed=1, out=tmp_path, duration=5)
+    third = cars.run(PAPER, seed=2, out=tmp_path, duration=5, name=first.folder.name, replace=True)
+    assert third.folder == first.folder
     with pytest.raises(cars.Error, match="holds another run now"):
         first.frames()
 

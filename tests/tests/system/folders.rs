@@ -171,9 +171,15 @@ struct Place {
 impl Place {
     fn of(master: &Lab) -> Self {
         let lab = Lab::new();
-        copy(&master.out().join(PRECIOUS), &lab.out().join("runs").join(PRECIOUS));
+        copy(
+            &master.out().join(PRECIOUS),
+            &lab.out().join("runs").join(PRECIOUS),
+        );
         copy(&master.out().join(PRECIOUS), &lab.out().join("outside"));
-        copy(&master.out().join("study"), &lab.out().join("runs/experiments/study"));
+        copy(
+            &master.out().join("study"),
+            &lab.out().join("runs/experiments/study"),
+        );
         symlink(PRECIOUS, lab.out().join("runs/latest")).unwrap();
         Self { lab }
     }
@@ -194,7 +200,16 @@ fn master() -> Lab {
     lab.ok(&[&launch[..], &["--duration", "4 s", "--run", PRECIOUS]].concat());
     let study = lab.out().join("study");
     let output = program("cars")
-        .args(["experiment", "run", "deadlock", "--seeds", "2", "--duration", "2 s", "-o"])
+        .args([
+            "experiment",
+            "run",
+            "deadlock",
+            "--seeds",
+            "2",
+            "--duration",
+            "2 s",
+            "-o",
+        ])
         .arg(&study)
         .output()
         .unwrap();
@@ -236,14 +251,32 @@ const MAKING: [Making; 9] = [
     Making {
         name: "run --replace",
         program: "cars",
-        args: &["run", HALL, "--duration", "2 s", "-q", "--run", TAKEN, "--replace"],
+        args: &[
+            "run",
+            HALL,
+            "--duration",
+            "2 s",
+            "-q",
+            "--run",
+            TAKEN,
+            "--replace",
+        ],
         numbers: false,
     },
     Making {
         name: "launch",
         program: "cars",
         args: &[
-            "launch", HALL, "--duration", "2 s", "--speed", "max", "--no-console", "-q", "--run", TAKEN,
+            "launch",
+            HALL,
+            "--duration",
+            "2 s",
+            "--speed",
+            "max",
+            "--no-console",
+            "-q",
+            "--run",
+            TAKEN,
         ],
         numbers: true,
     },
@@ -251,7 +284,16 @@ const MAKING: [Making; 9] = [
         name: "launch --replace",
         program: "cars",
         args: &[
-            "launch", HALL, "--duration", "2 s", "--speed", "max", "--no-console", "-q", "--run", TAKEN,
+            "launch",
+            HALL,
+            "--duration",
+            "2 s",
+            "--speed",
+            "max",
+            "--no-console",
+            "-q",
+            "--run",
+            TAKEN,
             "--replace",
         ],
         numbers: false,
@@ -259,32 +301,71 @@ const MAKING: [Making; 9] = [
     Making {
         name: "fork",
         program: "cars",
-        args: &["fork", "precious@2", "--set", "network.commands.loss=0.5", "-q", "--run", TAKEN],
+        args: &[
+            "fork",
+            "precious@2",
+            "--set",
+            "network.commands.loss=0.5",
+            "-q",
+            "--run",
+            TAKEN,
+        ],
         numbers: true,
     },
     Making {
         name: "fork --replace",
         program: "cars",
-        args: &["fork", "precious@2", "--set", "network.commands.loss=0.5", "-q", "--run", TAKEN, "--replace"],
+        args: &[
+            "fork",
+            "precious@2",
+            "--set",
+            "network.commands.loss=0.5",
+            "-q",
+            "--run",
+            TAKEN,
+            "--replace",
+        ],
         numbers: false,
     },
     Making {
         name: "experiment replay",
         program: "cars",
-        args: &["experiment", "replay", "EXPERIMENT", "0", "-q", "--run", TAKEN],
+        args: &[
+            "experiment",
+            "replay",
+            "EXPERIMENT",
+            "0",
+            "-q",
+            "--run",
+            TAKEN,
+        ],
         numbers: true,
     },
     Making {
         name: "resume",
         program: "cars",
-        args: &["launch", "--resume", TAKEN, "--speed", "max", "--no-console", "-q"],
+        args: &[
+            "launch",
+            "--resume",
+            TAKEN,
+            "--speed",
+            "max",
+            "--no-console",
+            "-q",
+        ],
         numbers: false,
     },
     // It has no robots, and ends by itself: the folder is made when it listens.
     Making {
         name: "simulator",
         program: "cars-sim",
-        args: &["configs/hors_doeuvres.toml", "--run", TAKEN, "--listen", "ENDPOINT"],
+        args: &[
+            "configs/hors_doeuvres.toml",
+            "--run",
+            TAKEN,
+            "--listen",
+            "ENDPOINT",
+        ],
         numbers: false,
     },
 ];
@@ -403,7 +484,19 @@ fn processes_that_begin_at_the_same_moment_get_folders_of_their_own() {
     let lab = Lab::new();
     let mut running = Vec::new();
     for _ in 0..COUNT {
-        let mut command = lab.cars(&["run", HALL, "--duration", "5 s", "-q", "--run", "same"]);
+        let mut command = program("cars");
+        command
+            .args([
+                "run",
+                HALL,
+                "--duration",
+                "5 s",
+                "-q",
+                "--run",
+                "same",
+                "--out",
+            ])
+            .arg(lab.out());
         running.push(command.stderr(Stdio::null()).spawn().unwrap());
     }
     for mut one in running {
@@ -416,7 +509,9 @@ fn processes_that_begin_at_the_same_moment_get_folders_of_their_own() {
             number => format!("same-{number}"),
         };
         assert_eq!(lab.bytes(&name), lab.bytes("same"), "{name}");
-        lab.cars_without_out(&["check", lab.out().join(name).to_str().unwrap()]);
+        let folder = lab.out().join(&name);
+        let (code, text) = lab.cars_without_out(&["check", folder.to_str().unwrap()]);
+        assert_eq!(code, 0, "{name}: {text}");
     }
     let latest = std::fs::read_link(lab.out().join("latest")).unwrap();
     assert!(latest.to_str().unwrap().starts_with("same"));
@@ -429,9 +524,15 @@ fn processes_that_begin_at_the_same_moment_get_folders_of_their_own() {
 fn reserved_names_are_refused_everywhere_with_what_to_do() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--duration", "2 s", "-q", "--run", PRECIOUS]);
-    let file = lab.write("latest.toml", "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n");
+    let file = lab.write(
+        "latest.toml",
+        "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n",
+    );
     let launch = lab.write("experiments.toml", "scenario = \"latest.toml\"\n");
-    let named = lab.write("named.toml", "scenario = \"latest.toml\"\nrun = \"latest\"\n");
+    let named = lab.write(
+        "named.toml",
+        "scenario = \"latest.toml\"\nrun = \"latest\"\n",
+    );
     let before = tree(lab.out());
     let path = |path: &Path| path.to_str().unwrap().to_owned();
     let [file, launch, named] = [&file, &launch, &named].map(|file| path(file));
@@ -450,7 +551,11 @@ fn reserved_names_are_refused_everywhere_with_what_to_do() {
         let (_, text) = lab.fails(args);
         assert!(text.contains("choose another name"), "{args:?}: {text}");
     }
-    for args in [&["check", &file][..], &["check", &launch], &["check", &named]] {
+    for args in [
+        &["check", &file][..],
+        &["check", &launch],
+        &["check", &named],
+    ] {
         let (code, text) = lab.cars_without_out(args);
         assert_eq!(code, 1, "{args:?}: {text}");
         assert!(text.contains("choose another name"), "{args:?}: {text}");
@@ -468,7 +573,12 @@ fn every_reader_takes_a_copy_with_any_name() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--duration", "4 s", "-q", "--run", "one"]);
     let elsewhere = tempfile::tempdir().unwrap();
-    let names: [&[u8]; 4] = ["a copy (1)".as_bytes(), "latest".as_bytes(), "ä".as_bytes(), b"\xff"];
+    let names: [&[u8]; 4] = [
+        "a copy (1)".as_bytes(),
+        "latest".as_bytes(),
+        "ä".as_bytes(),
+        b"\xff",
+    ];
     for name in names {
         let folder = elsewhere.path().join(OsStr::from_bytes(name));
         copy(&lab.out().join("one"), &folder);
@@ -507,10 +617,20 @@ fn every_reader_takes_a_copy_with_any_name() {
         let mut at = folder.clone().into_os_string();
         at.push("@2");
         let out = elsewhere.path().join("out");
-        let forked = program("cars").arg("fork").arg(at).arg("-q").arg("--out").arg(&out).output();
+        let forked = program("cars")
+            .arg("fork")
+            .arg(at)
+            .arg("-q")
+            .arg("--out")
+            .arg(&out)
+            .output();
         let forked = forked.unwrap();
         if folder.to_str().is_some() {
-            assert!(out.join("latest/events.jsonl").exists(), "{}", said(&forked));
+            assert!(
+                out.join("latest/events.jsonl").exists(),
+                "{}",
+                said(&forked)
+            );
         }
         assert!(!said(&forked).contains("panicked"), "{}", said(&forked));
         assert_eq!(tree(&folder), before, "{folder:?}");
@@ -528,36 +648,103 @@ fn no_command_panics_where_a_path_is_not_utf8() {
 
     let odd = odd.as_os_str();
     let commands: &[&[&OsStr]] = &[
-        &["run".as_ref(), HALL.as_ref(), "--duration".as_ref(), "1 s".as_ref(), "--out".as_ref(), odd],
+        &[
+            "run".as_ref(),
+            HALL.as_ref(),
+            "--duration".as_ref(),
+            "1 s".as_ref(),
+            "--out".as_ref(),
+            odd,
+        ],
         &["run".as_ref(), scenario.as_ref()],
-        &["launch".as_ref(), HALL.as_ref(), "--no-console".as_ref(), "--speed".as_ref(), "max".as_ref(), "--duration".as_ref(), "1 s".as_ref(), "--out".as_ref(), odd],
+        &[
+            "launch".as_ref(),
+            HALL.as_ref(),
+            "--no-console".as_ref(),
+            "--speed".as_ref(),
+            "max".as_ref(),
+            "--duration".as_ref(),
+            "1 s".as_ref(),
+            "--out".as_ref(),
+            odd,
+        ],
         &["launch".as_ref(), scenario.as_ref()],
         &["launch".as_ref(), "--roster".as_ref(), scenario.as_ref()],
         &["launch".as_ref(), "--resume".as_ref(), odd],
         &["launch".as_ref(), HALL.as_ref(), "--secure".as_ref(), odd],
         &["check".as_ref(), scenario.as_ref(), odd],
         &["init".as_ref(), odd],
-        &["new".as_ref(), "robot".as_ref(), "Rosie".as_ref(), "--lang".as_ref(), "bash".as_ref(), "--out".as_ref(), odd],
-        &["hunt".as_ref(), HALL.as_ref(), "--plans".as_ref(), "1".as_ref(), "--json".as_ref(), "--out".as_ref(), odd],
-        &["experiment".as_ref(), "run".as_ref(), "deadlock".as_ref(), "--plan-only".as_ref(), "-o".as_ref(), odd],
+        &[
+            "new".as_ref(),
+            "robot".as_ref(),
+            "Rosie".as_ref(),
+            "--lang".as_ref(),
+            "bash".as_ref(),
+            "--out".as_ref(),
+            odd,
+        ],
+        &[
+            "hunt".as_ref(),
+            HALL.as_ref(),
+            "--plans".as_ref(),
+            "1".as_ref(),
+            "--json".as_ref(),
+            "--out".as_ref(),
+            odd,
+        ],
+        &[
+            "experiment".as_ref(),
+            "run".as_ref(),
+            "deadlock".as_ref(),
+            "--plan-only".as_ref(),
+            "-o".as_ref(),
+            odd,
+        ],
         &["experiment".as_ref(), "run".as_ref(), scenario.as_ref()],
         &["man".as_ref(), odd],
         &["verify".as_ref(), odd],
         &["log".as_ref(), odd],
-        &["report".as_ref(), "one".as_ref(), "--out".as_ref(), lab.out().as_ref(), "-o".as_ref(), scenario.as_ref()],
-        &["secure".as_ref(), "init".as_ref(), odd, "--robots".as_ref(), "Butler".as_ref()],
-        &["net".as_ref(), "play".as_ref(), scenario.as_ref(), "--via".as_ref(), "proxy".as_ref()],
+        &[
+            "report".as_ref(),
+            "one".as_ref(),
+            "--out".as_ref(),
+            lab.out().as_ref(),
+            "-o".as_ref(),
+            scenario.as_ref(),
+        ],
+        &[
+            "secure".as_ref(),
+            "init".as_ref(),
+            odd,
+            "--robots".as_ref(),
+            "Butler".as_ref(),
+        ],
+        &[
+            "net".as_ref(),
+            "play".as_ref(),
+            scenario.as_ref(),
+            "--via".as_ref(),
+            "proxy".as_ref(),
+        ],
         &["ctl".as_ref(), "status".as_ref(), "--out".as_ref(), odd],
         &["replay".as_ref(), odd],
     ];
     for args in commands {
         let mut command = Command::new("timeout");
         command.arg("60").arg(programs().join("cars")).args(*args);
-        let output = command.current_dir(lab.out()).stdin(Stdio::null()).output().unwrap();
+        let output = command
+            .current_dir(lab.out())
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
         let text = said(&output);
         assert!(!text.contains("panicked"), "{args:?}: {text}");
         assert_ne!(output.status.code(), Some(101), "{args:?}: {text}");
-        assert_ne!(output.status.code(), Some(124), "{args:?} does not end: {text}");
+        assert_ne!(
+            output.status.code(),
+            Some(124),
+            "{args:?} does not end: {text}"
+        );
     }
 }
 
@@ -581,22 +768,40 @@ fn a_file_that_cannot_be_written_to_its_end_is_as_it_was() {
         let text = said(&output);
         assert_eq!(output.status.code(), Some(1), "{command}: {text}");
         assert!(text.contains("cannot write"), "{command}: {text}");
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), "earlier", "{command}");
+        assert_eq!(
+            std::fs::read_to_string(&file).unwrap(),
+            "earlier",
+            "{command}"
+        );
         assert_eq!(tree(&into).len(), 1, "{command} leaves a draft");
 
         let output = program("cars")
             .args([command, run.to_str().unwrap(), "-o", "/dev/full"])
             .output()
             .unwrap();
-        assert_eq!(output.status.code(), Some(1), "{command}: {}", said(&output));
+        assert_eq!(
+            output.status.code(),
+            Some(1),
+            "{command}: {}",
+            said(&output)
+        );
         let piped = program("cars")
             .args([command, run.to_str().unwrap(), "-o", "/dev/stdout"])
             .output()
             .unwrap();
-        let plain = program("cars").args([command, run.to_str().unwrap()]).output().unwrap();
-        assert!(piped.status.success() && !plain.stdout.is_empty(), "{command}");
+        let plain = program("cars")
+            .args([command, run.to_str().unwrap()])
+            .output()
+            .unwrap();
+        assert!(
+            piped.status.success() && !plain.stdout.is_empty(),
+            "{command}"
+        );
         assert_eq!(piped.stdout, plain.stdout, "{command}");
-        let output = program("cars").args([command, run.to_str().unwrap(), "-o"]).arg(&file).output();
+        let output = program("cars")
+            .args([command, run.to_str().unwrap(), "-o"])
+            .arg(&file)
+            .output();
         assert!(output.unwrap().status.success());
         assert_eq!(std::fs::read(&file).unwrap(), plain.stdout, "{command}");
     }
@@ -637,7 +842,15 @@ fn an_experiment_keeps_the_folder_of_another_one_with_its_name() {
     let plan = |file: &Path| {
         let mut command = program("cars");
         command
-            .args(["experiment", "run", "--plan-only", "--seeds", "2", "--duration", "2 s"])
+            .args([
+                "experiment",
+                "run",
+                "--plan-only",
+                "--seeds",
+                "2",
+                "--duration",
+                "2 s",
+            ])
             .arg(file)
             .current_dir(lab.out());
         command.output().unwrap()
@@ -649,7 +862,10 @@ fn an_experiment_keeps_the_folder_of_another_one_with_its_name() {
     let output = plan(&files[1]);
     let text = said(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
-    assert!(text.contains("another experiment") && text.contains("-o"), "{text}");
+    assert!(
+        text.contains("another experiment") && text.contains("-o"),
+        "{text}"
+    );
     assert_eq!(tree(&lab.out().join("runs")), before);
 
     // The file itself may be edited, and a copy of it may be anywhere.
@@ -668,7 +884,14 @@ fn what_a_killed_experiment_leaves_in_the_temporary_folder_is_removed() {
     let command = |seeds: &str| {
         let mut command = program("cars");
         command
-            .args(["experiment", "run", "deadlock", "--processes", "--jobs", "1"])
+            .args([
+                "experiment",
+                "run",
+                "deadlock",
+                "--processes",
+                "--jobs",
+                "1",
+            ])
             .args(["--seeds", seeds, "--duration", "30 s", "-o"])
             .arg(lab.out().join("study"))
             .env("TMPDIR", &temporary);
@@ -676,7 +899,11 @@ fn what_a_killed_experiment_leaves_in_the_temporary_folder_is_removed() {
     };
     let count = || std::fs::read_dir(&temporary).unwrap().count();
 
-    let mut killed = command("50").stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let mut killed = command("50")
+        .stderr(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
     eventually("a unit", || (count() > 0).then_some(()));
     killed.kill().unwrap();
     killed.wait().unwrap();
@@ -704,13 +931,26 @@ fn a_new_robot_has_runs_of_its_own_name_and_no_reserved_one() {
     let runs = lab.out().join("runs");
     for name in ["Rosie", "Rosie-2"] {
         let output = program("cars")
-            .args(["launch", launch, "--no-console", "--speed", "max", "--duration", "2 s", "--out"])
+            .args([
+                "launch",
+                launch,
+                "--no-console",
+                "--speed",
+                "max",
+                "--duration",
+                "2 s",
+                "--out",
+            ])
             .arg(&runs)
             .output()
             .unwrap();
         let first = said(&output);
         let first = first.lines().next().unwrap_or_default();
-        assert!(runs.join(name).join("summary.json").exists(), "{}", said(&output));
+        assert!(
+            runs.join(name).join("summary.json").exists(),
+            "{}",
+            said(&output)
+        );
         assert!(first.contains(name), "{first}");
     }
 }
@@ -719,8 +959,11 @@ fn a_new_robot_has_runs_of_its_own_name_and_no_reserved_one() {
 fn a_run_in_progress_is_found_by_the_name_that_it_got() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--duration", "2 s", "-q", "--run", "hall"]);
-    let mut command = lab.cars(&["launch", HALL, "--paused", "--speed", "max", "--no-console"]);
-    command.args(["--run", "hall"]);
+    let mut command = program("cars");
+    command
+        .args(["launch", HALL, "--paused", "--speed", "max", "--no-console"])
+        .args(["--run", "hall", "--out"])
+        .arg(lab.out());
     let launch = Running::start(command, "hall-2", lab.out().join("hall-2"));
     lab.until_ready("hall-2");
 

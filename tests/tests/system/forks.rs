@@ -249,7 +249,9 @@ fn a_fork_that_cannot_be_made_is_refused_and_the_run_is_kept() {
     refused(&args, reason);
     assert!(!lab.file("place", "events.jsonl").exists());
     assert!(!lab.file("place", "run.mcap").exists());
-    std::fs::remove_file(lab.file("place", "notes.txt")).unwrap();
+    assert!(lab.file("place", "notes.txt").exists());
+    std::fs::remove_dir_all(lab.out().join("place")).unwrap();
+    lab.ok(&["run", SCENARIO, "--run", "place", "--duration", "5 s"]);
     refused(&args, reason);
     assert!(!lab.out().join("place").exists());
 }

@@ -71,7 +71,10 @@ fn damage_in_any_file_of_a_run_is_found_and_the_file_named() {
             let (code, text) = check(&lab, &path);
             // The scenario is compared with the one in the recording.
             assert_eq!(code, 1, "{name}, byte {place}: {text}");
-            let text: String = text.split_whitespace().filter(|word| *word != "│").collect();
+            let text: String = text
+                .split_whitespace()
+                .filter(|word| *word != "│")
+                .collect();
             assert!(text.contains(name), "{name}, byte {place}: {text}");
             assert!(!text.contains("panicked"), "{name}, byte {place}: {text}");
         }
@@ -104,7 +107,10 @@ fn a_summary_that_does_not_follow_from_its_record_is_found() {
         ("/end", "stopped".into()),
         ("/digest", "0123456789abcdef".into()),
         ("/robots/Butler/blocked", 70.into()),
-        ("/robots/Butler/emotions_s", serde_json::json!({"HAPPY": 1.0})),
+        (
+            "/robots/Butler/emotions_s",
+            serde_json::json!({"HAPPY": 1.0}),
+        ),
         ("/robots/Butler/state_variables", serde_json::json!({})),
         ("/network/links", serde_json::json!({})),
         ("/expectations", serde_json::json!({})),

@@ -158,9 +158,8 @@ impl Written {
         let (Some(before), Some(now)) = (&self.origin, &new.origin) else {
             return Ok(());
         };
-        let has_same_content = self.file == new.file
-            && self.measures == new.measures
-            && self.cells == new.cells;
+        let has_same_content =
+            self.file == new.file && self.measures == new.measures && self.cells == new.cells;
         if before == now || has_same_content {
             return Ok(());
         }

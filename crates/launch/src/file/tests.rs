@@ -54,6 +54,19 @@ fn check(text: &str, words: &[&str]) {
     }
 }
 
+#[test]
+fn a_file_can_name_its_runs() {
+    let named = |name: &str| format!("run = \"{name}\"\n{BOTH}");
+    let file = load(&named("Rosie")).unwrap();
+    assert_eq!(file.run.unwrap().as_str(), "Rosie");
+    assert_eq!(load(BOTH).unwrap().run, None);
+    check(
+        &named("latest"),
+        &["launch/x.toml:2:7", "choose another name"],
+    );
+    check(&named("a/b"), &["launch/x.toml:2:7", "only letters"]);
+}
+
 const BOTH: &str = r#"
 [[process]]
 name = "Butler"
