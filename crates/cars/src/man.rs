@@ -26,7 +26,8 @@ pub(crate) struct ManArgs {
 pub(crate) fn man(args: &ManArgs, cars: Command) -> miette::Result<ExitCode> {
     let folder = &args.folder;
     std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
-    for mut program in programs(cars) {
+    for program in programs(cars) {
+        let mut program = program.disable_help_subcommand(true);
         program.build();
         write_pages(&program, folder)?;
     }

@@ -87,7 +87,7 @@ pub fn is_sealed_text_right(text: &str) -> Option<bool> {
     };
     let laid_out = serde_json::to_string_pretty(&value).ok()?;
     let stated = value.as_object_mut()?.remove(SEAL)?;
-    Some(stated == of_json(&value) && laid_out == text.trim_end_matches('\n'))
+    Some(stated == of_json(&value) && text.strip_suffix('\n') == Some(laid_out.as_str()))
 }
 
 /// What a file of events is, as far as it is undamaged.
