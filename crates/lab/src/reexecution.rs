@@ -92,8 +92,12 @@ impl Reexecution {
     /// # Errors
     /// If a robot ends the run, or is to be taken from the record and the record has no reports.
     pub(crate) fn play(&mut self, recorded: &Entry) -> miette::Result<Executed> {
-        if let Some(Event::End { reason, .. }) = recorded.events.last() {
-            let record = self.local.simulation.end(*reason);
+        if let Some(Event::End {
+            reason, waited_for, ..
+        }) = recorded.events.last()
+        {
+            let simulation = &mut self.local.simulation;
+            let record = simulation.end_waiting(*reason, waited_for.clone());
             return Ok(Executed {
                 record,
                 reports: None,

@@ -552,6 +552,13 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             .is_some_and(|member| member.is_present)
     }
 
+    /// Whether a process was admitted as this robot and its token is still awaited.
+    #[must_use]
+    pub fn is_reserved(&self, robot: &RobotName) -> bool {
+        let member = self.members.get(robot);
+        member.is_some_and(|member| member.is_reserved)
+    }
+
     /// Whether this incarnation of a robot has missed the last ticks.
     #[must_use]
     pub fn is_behind(&self, robot: &RobotName, generation: Generation) -> bool {

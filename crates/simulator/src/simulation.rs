@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lockstep::{Exchange, Membership, Naming, Outcome, Sent};
 use observe::{Observation, RobotState, Watches};
-use protocol::event::{Blocker, Cause};
+use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, HeldProcess, Intervention, NEWS_FLAGS,
     News, OnLate, Performative, Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind,
@@ -782,9 +782,16 @@ impl Simulation {
     /// The record of the end of the run, in which the expectations that are open are judged.
     #[must_use]
     pub fn end(&mut self, reason: End) -> TickRecord {
+        self.end_waiting(reason, Vec::new())
+    }
+
+    /// The record of the end of a run, as [`Self::end`]; `waited_for` are the robots for which the clock waited, if it was aborted.
+    #[must_use]
+    pub fn end_waiting(&mut self, reason: End, waited_for: Vec<WaitedFor>) -> TickRecord {
         let mut events = self.watches.end(reason);
         events.push(Event::End {
             reason,
+            waited_for,
             digest: self.digest.to_string(),
             seal: None,
         });

@@ -20,6 +20,7 @@ use crate::summary::{Summary, Wall};
 use config::diagnostic::FileError;
 use scenario::Scenario;
 
+use super::departed::{Departed, Wait};
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
 use super::orders::{Orders, Underway};
@@ -186,6 +187,7 @@ pub struct Server {
     news: BTreeMap<RobotName, Publisher>,
     pub(super) observers: Observers,
     viewers: Viewers,
+    pub(super) departed: Departed,
     pub(super) orders: Orders,
     pub(super) pace: Pace,
     pub(super) barrier: Barrier<Arc<Report>, CommandText>,
@@ -288,6 +290,7 @@ impl Server {
             news,
             observers: Observers::new(&bus, &keys)?,
             viewers: Viewers::default(),
+            departed: Departed::default(),
             orders: Orders::new(bus.publisher(&keys.faults())?),
             pace: Pace::new(options.speed, options.is_paused),
             barrier,
@@ -500,6 +503,11 @@ impl Server {
                 self.barrier.timer(&timer, &mut self.outputs);
             }
             self.carry_out(simulation, recorder)?;
+            let standby = match self.endless_wait() {
+                Wait::Sound => None,
+                Wait::Standby(left) => Some(left),
+                Wait::Endless => return Err(Interrupt::End(End::Aborted)),
+            };
             if simulation.tick() >= simulation.scenario().ticks && !self.is_waiting_for_robots() {
                 return Err(Interrupt::End(End::Finished));
             }
@@ -510,7 +518,7 @@ impl Server {
 
             match self.advance(simulation)? {
                 Next::Opened => {}
-                Next::Wait(patience) => return Ok(patience),
+                Next::Wait(patience) => return Ok(patience.into_iter().chain(standby).min()),
             }
         }
     }
@@ -863,7 +871,15 @@ impl Server {
         simulation: &mut Simulation,
         recorder: &mut Recorder,
     ) -> Result<Summary, FileError> {
-        let record = simulation.end(end);
+        let mut waited_for = Vec::new();
+        if end == End::Aborted {
+            waited_for = self.waited_for();
+            for robot in &waited_for {
+                let tick = simulation.tick();
+                tracing::error!("the run is aborted after tick {tick}, because {robot}");
+            }
+        }
+        let record = simulation.end_waiting(end, waited_for);
         let lines = recorder.write(simulation, &record)?;
         self.observers.log(&lines);
         self.observers.frame(simulation, &self.status(simulation));
@@ -1049,6 +1065,9 @@ impl Server {
             return;
         };
 
+        if is_present {
+            self.departed.is_here(&name);
+        }
         self.barrier.token(&name, is_present, &mut self.outputs);
     }
 
