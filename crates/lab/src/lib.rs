@@ -27,3 +27,4 @@ pub mod trace;
 pub mod verify;
 
 pub use performance::{Performance, performances};
+pub use reexecution::{digest_from, first_difference};

@@ -10,6 +10,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+mod again;
 mod chance;
 mod hall;
 mod plan;
@@ -128,6 +129,7 @@ fn every_schedule_is_a_run_that_the_rules_allow() {
         counts.lost,
         counts.missed,
         counts.aborted,
+        counts.forks,
     ];
     assert!(
         count < 1_000 || !happened.contains(&0),

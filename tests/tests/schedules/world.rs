@@ -80,6 +80,8 @@ pub(crate) struct Counts {
     pub(crate) lost: u64,
     pub(crate) missed: u64,
     pub(crate) aborted: u64,
+    /// Forks of records that came to the end of the record.
+    pub(crate) forks: u64,
 }
 
 impl Counts {
@@ -102,6 +104,7 @@ impl Counts {
         self.lost += other.lost;
         self.missed += other.missed;
         self.aborted += other.aborted;
+        self.forks += other.forks;
     }
 }
 
@@ -142,7 +145,7 @@ pub(crate) struct World {
 impl World {
     /// Executes a schedule to its end.
     pub(crate) fn execute(plan: Plan, halls: &Arc<Halls>) -> Came {
-        let scenario = halls.scenario(plan.hall, 1);
+        let scenario = &plan.scenario(halls, 1);
         let mut world = Self {
             simulator: Simulator::new(&plan, scenario),
             chance: Chance::new(plan.seed, "schedule"),
@@ -182,6 +185,7 @@ impl World {
             world.check_liveness();
         }
         world.judge();
+        world.check_again();
         world.came()
     }
 

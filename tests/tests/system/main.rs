@@ -42,6 +42,7 @@ mod recordings;
 mod replay;
 mod replayed;
 mod report;
+mod returns;
 mod secure;
 mod shell;
 mod statistics;

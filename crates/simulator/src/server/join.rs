@@ -61,6 +61,7 @@ impl Server {
             self.departed.refused(name);
         }
         let admission = admission.map_err(|refused| self.explain(refused, name))?;
+        self.orders.joined(name);
         if request.bodies {
             self.with_bodies.insert(name.clone());
         } else {

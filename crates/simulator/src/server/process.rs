@@ -20,6 +20,7 @@ use crate::summary::{Summary, Wall};
 use config::diagnostic::FileError;
 use scenario::Scenario;
 
+use super::control::refuse;
 use super::departed::{Departed, Wait};
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
@@ -480,7 +481,22 @@ impl Server {
             simulation.list_bodies(name, true);
         }
 
+        for query in std::mem::take(&mut self.deferred) {
+            refuse(
+                &query,
+                "the epoch is over, and another one begins from the scenario as it is",
+            );
+        }
+
         self.pace.gather();
+        self.gather(simulation);
+        if let Some(underway) = self.order_end_of_faults(simulation.epoch()) {
+            self.stage = Stage::Faults(underway);
+        }
+    }
+
+    /// Begins to wait for the robots of the roster.
+    fn gather(&mut self, simulation: &Simulation) {
         self.stage = Stage::Robots;
         self.waiting_since = Instant::now();
         let lateness = simulation.scenario().lateness.to_lockstep();
@@ -551,9 +567,14 @@ impl Server {
                     return Ok(Next::Opened);
                 }
             }
-            Stage::Faults(_) => {
-                if let Some(patience) = self.await_faults(simulation)? {
+            Stage::Faults(underway) => {
+                let is_before_tick_zero = underway.order.tick == 0;
+                if let Some(patience) = self.await_faults()? {
                     return Ok(Next::Wait(Some(patience)));
+                }
+                if is_before_tick_zero {
+                    self.gather(simulation);
+                    return Ok(Next::Opened);
                 }
             }
         }
@@ -611,6 +632,8 @@ impl Server {
         while !self.outputs.is_empty() {
             for output in std::mem::take(&mut self.outputs) {
                 match output {
+                    // The faults of the epoch before are ended first, and then robots are gathered once more.
+                    Output::Gathered if matches!(self.stage, Stage::Faults(_)) => {}
                     Output::Gathered => self.begin(simulation),
                     Output::Grant { news, clock } => self.put(simulation, &news, clock)?,
                     Output::Complete(outcome) => self.complete(outcome, simulation, recorder)?,
