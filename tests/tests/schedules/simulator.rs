@@ -341,6 +341,8 @@ impl World {
                     let joined = (epoch, tick, robot.clone(), *generation);
                     self.simulator.joined.push(joined);
                     self.counts.joined += 1;
+                    let has_missed = !outcome.reports.contains_key(robot);
+                    self.counts.joined_and_missed += u64::from(has_missed);
                 }
                 Membership::Lost(_) => self.counts.lost += 1,
             }
@@ -354,6 +356,8 @@ impl World {
             .filter(|name| !outcome.reports.contains_key(*name))
             .cloned()
             .collect();
+        let is_plain = missing.is_empty() && outcome.membership.is_empty();
+        self.counts.first_ticks += u64::from(tick == 0 && !is_plain);
         if missing.is_empty() {
             return;
         }

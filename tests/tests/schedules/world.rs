@@ -80,6 +80,10 @@ pub(crate) struct Counts {
     pub(crate) lost: u64,
     pub(crate) missed: u64,
     pub(crate) aborted: u64,
+    /// Ticks 0 that a robot missed, or in which one was replaced.
+    pub(crate) first_ticks: u64,
+    /// Robots that joined and missed the same tick.
+    pub(crate) joined_and_missed: u64,
     /// Forks of records that came to the end of the record.
     pub(crate) forks: u64,
 }
@@ -104,6 +108,8 @@ impl Counts {
         self.lost += other.lost;
         self.missed += other.missed;
         self.aborted += other.aborted;
+        self.first_ticks += other.first_ticks;
+        self.joined_and_missed += other.joined_and_missed;
         self.forks += other.forks;
     }
 }

@@ -7,6 +7,7 @@ use bus::{Bus, Role};
 use nix::sys::signal::Signal;
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer};
+use protocol::random::{stream, unit};
 use protocol::{RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
 use system_tests::processes::{Running, nobody_is_left, send};
@@ -78,29 +79,8 @@ fn a_crash_for_a_time_is_executed_again_where_the_robot_moves() {
     }
 }
 
-#[test]
-fn a_robot_that_is_killed_by_hand_or_from_outside_is_executed_again() {
-    let lab = Lab::new();
-    let run = "by-hand";
-    let mut launch = lab.paused(run, FILE, &["--no-console", "--duration", "120 s"]);
-    lab.step(run, LEGUIN_MOVES);
-    eventually("the launcher", || {
-        let crash = lab.cars(&["ctl", "crash", "Leguin", "--run", run]).output();
-        crash.unwrap().status.success().then_some(())
-    });
-    lab.ctl(run, &["start"]);
-    let is_held = || {
-        let status = lab.ctl(run, &["status"]);
-        let awaited = status["awaiting"].as_array().unwrap().clone();
-        (!awaited.is_empty()).then_some(())
-    };
-    eventually("the clock to be held", is_held);
-    lab.ctl(run, &["recover", "Leguin"]);
-    let back = joined_in(&mut launch, &lab, run, "Leguin");
-    assert_eq!(back, [LEGUIN_MOVES + 1]);
-    assert_again(&lab, run, [back[0], back[0] + 1]);
-
-    let run = "from-outside";
+/// A launch of Butler and Leguin whose processes are restarted.
+fn restarting(lab: &Lab) -> String {
     let scenario = root().join("configs/hors_doeuvres.toml");
     let mut file = format!("scenario = {:?}\n", scenario.display().to_string());
     for name in ["Butler", "Leguin"] {
@@ -110,13 +90,117 @@ fn a_robot_that_is_killed_by_hand_or_from_outside_is_executed_again() {
         );
     }
     let file = lab.write("restarting.toml", &file);
-    let args = ["--no-console", "--duration", "120 s"];
-    let mut launch = lab.paused(run, file.to_str().unwrap(), &args);
-    lab.step(run, LEGUIN_MOVES);
-    send(launch.process("cars-leguin"), Signal::SIGKILL);
+    file.to_str().unwrap().to_owned()
+}
+
+/// Something that happens to the process of a robot before a tick, and how it comes back.
+#[derive(Debug, Clone, Copy)]
+enum Way {
+    /// A fault of the scenario, under a rule for late robots; its end is added to the time at which it begins.
+    Scenario(&'static str, &'static str, End),
+    /// By hand, and back by hand while the clock waits.
+    ByHand(&'static str),
+    /// Killed from outside, and restarted by the launcher.
+    Outside,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum End {
+    None,
+    For,
+    After(u64),
+}
+
+const WAYS: [Way; 8] = [
+    Way::Scenario("crash", "wait", End::For),
+    Way::Scenario("hang", "wait", End::For),
+    Way::Scenario("restart", "wait", End::None),
+    Way::Scenario("crash", "continue", End::After(4)),
+    Way::Scenario("hang", "continue", End::After(4)),
+    Way::ByHand("crash"),
+    Way::ByHand("hang"),
+    Way::Outside,
+];
+
+/// Plays a launch in which that happens, to its end.
+fn play(lab: &Lab, run: &str, robot: &str, tick: u64, way: Way) {
+    let seconds = |tick: u64| format!("{} s", tick as f64 / 2.0);
+    let mut set = vec!["deadline=60 s".to_owned()];
+    if let Way::Scenario(kind, on_late, end) = way {
+        let end = match end {
+            End::None => String::new(),
+            End::For => ",for=\"0.1 s\"".to_owned(),
+            End::After(ticks) => format!(",until=\"{}\"", seconds(tick + ticks)),
+        };
+        let at = seconds(tick);
+        set.push(format!("on_late={on_late}"));
+        set.push(format!(
+            "fault=[{{robot=\"{robot}\",do=\"{kind}\",at=\"{at}\"{end}}}]"
+        ));
+    }
+    let file = restarting(lab);
+    let mut args = vec!["--no-console", "--duration", "120 s"];
+    for set in &set {
+        args.extend(["--set", set]);
+    }
+    let mut launch = lab.paused(run, &file, &args);
+    if !matches!(way, Way::Scenario(..)) && tick > 1 {
+        lab.step(run, tick - 1);
+    }
+
+    if let Way::ByHand(kind) = way {
+        eventually("the launcher", || {
+            let fault = lab.cars(&["ctl", kind, robot, "--run", run]).output();
+            fault.unwrap().status.success().then_some(())
+        });
+    } else if let Way::Outside = way {
+        let program = format!("cars-{}", robot.to_lowercase());
+        send(launch.process(&program), Signal::SIGKILL);
+    }
     lab.ctl(run, &["start"]);
-    let back = joined_in(&mut launch, &lab, run, "Leguin");
-    assert_again(&lab, run, [back[0], back[0] + 1]);
+    if matches!(way, Way::ByHand(_)) {
+        eventually("the clock to be held", || {
+            let status = lab.ctl(run, &["status"]);
+            let awaited = status["awaiting"].as_array().unwrap();
+            (!awaited.is_empty()).then_some(())
+        });
+        lab.ctl(run, &["recover", robot]);
+    }
+    launch.finish();
+    nobody_is_left(run);
+}
+
+#[test]
+fn a_robot_that_is_killed_by_hand_or_from_outside_is_executed_again() {
+    let lab = Lab::new();
+    for (run, way) in [("by-hand", Way::ByHand("crash")), ("outside", Way::Outside)] {
+        play(&lab, run, "Leguin", LEGUIN_MOVES, way);
+        let back = joined(&lab, run, "Leguin");
+        assert_eq!(back.len(), 1, "{run}: {back:?}");
+        assert_again(&lab, run, [back[0] - 1, back[0], back[0] + 1]);
+    }
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`; CARS_RETURNS=100 for more of them"]
+fn whatever_happens_to_a_process_is_executed_again() {
+    let count = std::env::var("CARS_RETURNS").map_or(16, |count| count.parse().unwrap());
+    let mut random = stream(7, "returns");
+    for index in 0..count {
+        let way = WAYS[index % WAYS.len()];
+        let robot = ["Butler", "Leguin"][index / WAYS.len() % 2];
+        let tick = 1 + (unit(&mut random) * 230.0) as u64;
+        let what = format!("{way:?} of {robot} before tick {tick}");
+        println!("{what}");
+
+        let lab = Lab::new();
+        play(&lab, "drawn", robot, tick, way);
+        let back = joined(&lab, "drawn", robot);
+        let around = back.first().copied().unwrap_or(tick);
+        let is_stopped = matches!(way, Way::Scenario("hang", "wait", _) | Way::ByHand("hang"));
+        assert_eq!(back.is_empty(), is_stopped, "{what}: {back:?}");
+        assert_again(&lab, "drawn", [around - 1, around, around + 1]);
+    }
 }
 
 /// Waits until an epoch has begun and waits for `start`.
