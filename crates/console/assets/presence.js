@@ -28,5 +28,6 @@ export function because(because) {
   if (because === "not_joined") return "has not joined yet";
   if (because === "gone") return "its process or its link is down";
   if (because === "silent") return "is connected but has not reported";
+  if ("ended" in because) return `${because.ended}, and no further process is started for it`;
   return `waits for ${because.waits_for}`;
 }

@@ -200,8 +200,11 @@ impl Live {
     /// # Errors
     /// The request is malformed or no person's, or there is no answer.
     pub(crate) fn control(&self, control: &Control) -> Result<ControlAnswer, String> {
-        if matches!(control, Control::FaultsDone { .. }) {
-            return Err("only the launcher says that faults are done".to_owned());
+        if matches!(
+            control,
+            Control::FaultsDone { .. } | Control::ProcessEnded { .. }
+        ) {
+            return Err("only the launcher reports what it did with processes".to_owned());
         }
 
         let timeout = if matches!(control, Control::Step { .. }) {

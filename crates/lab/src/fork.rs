@@ -4,14 +4,14 @@ use std::time::Instant;
 
 use config::{Changes, FileError, Override, Source};
 use miette::{IntoDiagnostic, miette};
-use protocol::{Event, RobotName, RunName, Tick};
+use protocol::{Event, RunName, Tick};
 use scenario::Parent;
 use scenario::Scenario;
 use simulator::difference::between;
 use simulator::record::{Entry, Record};
 use simulator::{EpochFiles, Recorder, RunFolder, Summary};
 
-use crate::reexecution::Reexecution;
+use crate::reexecution::{Reexecution, cannot_go_on};
 use crate::run::{check_faults, go_on, observed};
 
 /// Tables of a scenario that hold for the whole run and can be other ones in a fork.
@@ -130,10 +130,7 @@ impl Fork<'_> {
             }
         }
 
-        if let Some(robot) = again.scripted.first() {
-            return Err(cannot_go_on(robot));
-        }
-        let mut local = again.local;
+        let mut local = again.end().map_err(|robot| cannot_go_on(&robot))?;
         go_on(&mut local, run, |local, record, opened| {
             recorder.observe(observed(local, record, opened));
             recorder.write(&local.simulation, record)?;
@@ -176,12 +173,4 @@ fn check_same(recorded: &Entry, executed: &Entry) -> Result<(), FileError> {
         difference.value(1)
     ))
     .with_help("`cars verify` compares the whole run with its record"))
-}
-
-fn cannot_go_on(robot: &RobotName) -> miette::Report {
-    miette!(
-        help = "a run is forked in one process; robots in other languages, and robots that went on after a tick that they had \
-                missed, have a state that only their processes knew",
-        "{robot} cannot go on: it cannot be executed in this process"
-    )
 }

@@ -29,3 +29,4 @@ pub mod trace;
 pub mod verify;
 
 pub use performance::{Performance, performances};
+pub use reexecution::{digest_from, first_difference};

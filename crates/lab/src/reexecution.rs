@@ -7,18 +7,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lockstep::{Exchange, Membership, Outcome};
+use lockstep::{Bulletin, Exchange, Outcome};
 use miette::{IntoDiagnostic, miette};
-use protocol::messages::{CommandText, News, Report};
+use protocol::messages::{CommandText, FaultKind, News, Report};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use recording::Frame;
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
 use scenario::Scenario;
 use simulator::TickRecord;
+use simulator::difference::{Difference, between};
 use simulator::record::Entry;
 
 use crate::replayed::action;
-use crate::run::Local;
+use crate::run::{Local, go_on};
 
 /// An epoch that is executed again.
 pub(crate) struct Reexecution {
@@ -28,7 +29,7 @@ pub(crate) struct Reexecution {
     script: Script,
     /// Robots that are taken from the record.
     pub(crate) scripted: BTreeSet<RobotName>,
-    /// Robots that do not take part.
+    /// Robots that missed the last tick.
     absent: BTreeSet<RobotName>,
     /// Robots that were taken from the record in some ticks, and the first of these.
     pub(crate) from_record: BTreeMap<RobotName, Tick>,
@@ -92,8 +93,12 @@ impl Reexecution {
     /// # Errors
     /// If a robot ends the run, or is to be taken from the record and the record has no reports.
     pub(crate) fn play(&mut self, recorded: &Entry) -> miette::Result<Executed> {
-        if let Some(Event::End { reason, .. }) = recorded.events.last() {
-            let record = self.local.simulation.end(*reason);
+        if let Some(Event::End {
+            reason, waited_for, ..
+        }) = recorded.events.last()
+        {
+            let simulation = &mut self.local.simulation;
+            let record = simulation.end_waiting(*reason, waited_for.clone());
             return Ok(Executed {
                 record,
                 reports: None,
@@ -159,37 +164,78 @@ impl Reexecution {
     fn repeat_membership(&mut self, recorded: &Entry) {
         self.script.set(recorded);
 
-        let names = self.local.simulation.names().to_vec();
-        for name in &names {
-            let is_missing = recorded.has_missed(name);
-            let has_joined = recorded.has_joined(name);
+        for name in self.local.simulation.names().to_vec() {
+            // Before tick 0 every robot is here, and the first incarnation.
+            if recorded.tick > 0 && recorded.has_joined(&name) {
+                self.absent.remove(&name);
+                self.join(&name, recorded.tick);
+            }
+            if recorded.has_missed(&name) {
+                self.absent.insert(name);
+            } else if self.absent.remove(&name) {
+                self.play_from_record(&name, recorded.tick);
+            }
+        }
+        self.local.robots.recall(recorded.attendance());
+    }
 
-            if is_missing || has_joined {
-                self.local.robots.crash(name);
-                self.absent.insert(name.clone());
+    /// Lets a robot take part as a further incarnation.
+    fn join(&mut self, name: &RobotName, tick: Tick) {
+        let simulation = &self.local.simulation;
+        let class = &simulation.scenario().robots[name].class;
+        let robot = match robots::make(class) {
+            Some(robot) => {
+                self.scripted.remove(name);
+                robot
             }
-            if !is_missing && self.absent.remove(name) {
-                self.bring_back(name, has_joined, recorded.tick);
+            None => {
+                self.scripted.insert(name.clone());
+                self.from_record.entry(name.clone()).or_insert(tick);
+                self.script.robot()
             }
+        };
+        self.local.robots.join(name, robot, |generation| {
+            simulation.welcome(&self.run, name, generation, None)
+        });
+    }
+
+    /// A robot goes on after ticks that it has missed, from a state that the record does not have.
+    fn play_from_record(&mut self, name: &RobotName, tick: Tick) {
+        if self.scripted.insert(name.clone()) {
+            self.from_record.entry(name.clone()).or_insert(tick);
+            self.local.robots.reseat(name, self.script.robot());
         }
     }
 
-    /// Lets a robot take part again. Without having joined again it goes on from a state that the record does not have.
-    fn bring_back(&mut self, name: &RobotName, has_joined: bool, tick: Tick) {
-        let simulation = &self.local.simulation;
-        let class = &simulation.scenario().robots[name].class;
-        let robot = robots::make(class).filter(|_| has_joined);
-        if robot.is_some() {
-            self.scripted.remove(name);
-        } else {
-            self.scripted.insert(name.clone());
-            self.from_record.entry(name.clone()).or_insert(tick);
+    /// Ends the repetition after a tick: the run goes on from there with what the scenario has in store for it.
+    ///
+    /// # Errors
+    /// The first robot that cannot go on, because only its process knew its state.
+    pub(crate) fn end(self) -> Result<Local, RobotName> {
+        let mut local = self.local;
+        local.robots.end_recall();
+        if let Some(robot) = self.scripted.into_iter().next() {
+            return Err(robot);
         }
 
-        let robot = robot.unwrap_or_else(|| self.script.robot());
-        self.local.robots.bring_back(name, robot, |generation| {
-            simulation.welcome(&self.run, name, generation, None)
-        });
+        let tick = local.simulation.tick();
+        for robot in self.absent {
+            let faults = local.simulation.scenario().faults_at(tick);
+            let mut lasting = faults.iter().filter(|fault| fault.holds(tick, true));
+            let kind = lasting
+                .find(|fault| fault.robot == robot)
+                .map(|fault| fault.kind);
+            match kind {
+                Some(FaultKind::Hang) => {
+                    let lose_after = local.simulation.scenario().lateness_at(tick).lose_after;
+                    local.robots.hang(&robot, lose_after);
+                }
+                Some(FaultKind::Crash) => local.robots.crash(&robot),
+                _ if local.robots.is_lost(&robot) => local.robots.crash(&robot),
+                _ => return Err(robot),
+            }
+        }
+        Ok(local)
     }
 
     /// Checks that the record has what robots that are not executed have reported.
@@ -212,6 +258,51 @@ impl Reexecution {
     }
 }
 
+/// Executes recorded ticks again, from tick 0 on. Returns the first difference, if there is one.
+///
+/// # Errors
+/// If the scenario cannot be set up, or a robot is to be taken from the record and the record has no reports.
+pub fn first_difference(
+    scenario: Scenario,
+    epoch: Epoch,
+    recorded: &[Entry],
+) -> miette::Result<Option<Difference>> {
+    let mut again = Reexecution::new(scenario, epoch)?;
+    for entry in recorded {
+        let executed = again.play(entry)?.into_entry();
+        let difference = between(entry, &executed);
+        if difference.is_some() {
+            return Ok(difference);
+        }
+    }
+    Ok(None)
+}
+
+/// Executes recorded ticks again, from tick 0 on, and then the rest of the scenario. Returns the digest of the run at its end.
+///
+/// # Errors
+/// As [`first_difference`], and if a robot cannot go on.
+pub fn digest_from(scenario: Scenario, epoch: Epoch, recorded: &[Entry]) -> miette::Result<String> {
+    let mut again = Reexecution::new(scenario, epoch)?;
+    for entry in recorded {
+        again.play(entry)?;
+    }
+
+    let run = again.run.clone();
+    let mut local = again.end().map_err(|robot| cannot_go_on(&robot))?;
+    go_on(&mut local, &run, |_, _, _| Ok(()))?;
+    Ok(local.simulation.digest())
+}
+
+/// Why a run cannot go on from its record.
+pub(crate) fn cannot_go_on(robot: &RobotName) -> miette::Report {
+    miette!(
+        help = "a run is forked in one process; robots in other languages, and robots that went on after a tick that they had \
+                missed, have a state that only their processes knew",
+        "{robot} cannot go on: it cannot be executed in this process"
+    )
+}
+
 /// The robots of this process, in the place of those that were recorded.
 struct Repeated<'a> {
     robots: &'a mut LocalHost,
@@ -227,44 +318,26 @@ impl Exchange<News, Arc<Report>, CommandText> for Repeated<'_> {
     fn exchange(
         &mut self,
         tick: Tick,
-        news: BTreeMap<RobotName, News>,
+        news: &dyn Bulletin<News>,
     ) -> Result<Outcome<Arc<Report>, CommandText>, RobotError> {
         let mut outcome = self.robots.exchange(tick, news)?;
-        outcome.membership = self.membership(&outcome.membership);
-
         for (name, report) in self.recorded.reports.iter().flatten() {
             if self.scripted.contains(name) {
                 let commands = self.recorded.commands_of(name);
-                let report = Arc::new(report.clone());
-                outcome.reports.insert(name.clone(), (report, commands));
+                let mut report = report.clone();
+                // Generations count processes: those of this process are others than those that were recorded.
+                if let Some((executed, _)) = outcome.reports.get(name) {
+                    report.generation = executed.generation;
+                }
+                outcome
+                    .reports
+                    .insert(name.clone(), (Arc::new(report), commands));
             }
         }
         for (name, (report, _)) in &outcome.reports {
             self.reports.insert(name.clone(), report.as_ref().clone());
         }
         Ok(outcome)
-    }
-}
-
-impl Repeated<'_> {
-    /// The changes of membership that were recorded, with the generations of this process.
-    fn membership(&self, executed: &[Membership]) -> Vec<Membership> {
-        let mut membership = Vec::new();
-        for event in &self.recorded.events {
-            match event {
-                Event::Lost { robot } => membership.push(Membership::Lost(robot.clone())),
-                Event::Joined {
-                    robot,
-                    generation: Some(_),
-                    ..
-                } => membership.extend(executed.iter().find(|change| {
-                    matches!(change, Membership::Joined(joined, _) if joined == robot)
-                }).cloned()),
-                _ => {}
-            }
-        }
-
-        membership
     }
 }
 

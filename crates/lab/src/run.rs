@@ -241,7 +241,15 @@ impl Local {
             .note_faults(&orders, |robot| lateness.of(robot));
 
         for order in orders {
+            let goes_on = lateness.of(&order.robot) == OnLate::Continue;
             match (order.begins, order.kind) {
+                // The clock waits until the wall clock ends the fault: a process that was killed is back in the same tick, and
+                // one that was stopped has missed nothing.
+                (true, FaultKind::Crash) if !goes_on => {
+                    self.robots.crash(&order.robot);
+                    self.start(&order.robot, run, make)?;
+                }
+                (true, _) if !goes_on => {}
                 (true, FaultKind::Hang) => self.robots.hang(&order.robot, lateness.lose_after),
                 (true, _) => self.robots.crash(&order.robot),
                 (false, _) => self.start(&order.robot, run, make)?,
@@ -268,8 +276,8 @@ impl Local {
     }
 }
 
-/// Checks that the faults of a scenario that begin after a tick can be played without processes: crashes and hangs
-/// without which the clock goes on, and that end by simulated time or not at all.
+/// Checks that the faults of a scenario that begin after a tick can be played without processes: crashes and hangs that end by
+/// simulated time or not at all, where the clock goes on without the robot, and faults whose end the clock waits for.
 ///
 /// # Errors
 /// If there is another fault.
@@ -278,14 +286,17 @@ pub fn check_faults(scenario: &Scenario, after: Tick) -> miette::Result<()> {
     for fault in scenario.faults.iter().chain(changed) {
         let is_simulated = !matches!(fault.end, FaultEnd::After(_));
         let lateness = scenario.lateness_at(fault.at);
-        let goes_on = lateness.of(&fault.robot) == OnLate::Continue;
         let is_absence = matches!(fault.kind, FaultKind::Crash | FaultKind::Hang);
-        let is_restart = fault.kind == FaultKind::Restart;
-        let is_played = is_restart || (is_absence && is_simulated && goes_on);
+        let is_played = match lateness.of(&fault.robot) {
+            _ if fault.is_restart() => true,
+            OnLate::Continue => is_absence && is_simulated,
+            OnLate::Wait => fault.kind == FaultKind::Slow || !is_simulated,
+            OnLate::Abort => false,
+        };
         if fault.at > after && !is_played {
             return Err(miette!(
-                help = "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash or hang with `until`, under \
-                        on_late = \"continue\", can be played without a process",
+                help = "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash or hang can be played without a \
+                        process with `until` under on_late = \"continue\", and with `for` under on_late = \"wait\"",
                 "the fault of {} at tick {} needs a process of its own",
                 fault.robot,
                 fault.at

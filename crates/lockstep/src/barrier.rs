@@ -229,12 +229,17 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         self.is_announced = false;
         for (name, member) in &mut self.members {
             member.turn = Turn::default();
+            let attendance = self.attendance.as_ref();
             if tick == 0 {
                 member.begin_epoch();
+                // Then a process took the place of another one while tick 0 was open. Here it is the first.
+                if attendance.is_some_and(|recorded| recorded.joined.contains(name)) {
+                    let joined = Membership::Joined(name.clone(), member.seated);
+                    self.membership.push(joined);
+                }
                 continue;
             }
             // Where the tick is executed again, a successor waits until its predecessor's absence is over.
-            let attendance = self.attendance.as_ref();
             let is_admitted = attendance.is_none_or(|recorded| recorded.joined.contains(name));
             if is_admitted && let Some(generation) = member.take_in() {
                 self.membership
@@ -550,6 +555,13 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         self.members
             .get(robot)
             .is_some_and(|member| member.is_present)
+    }
+
+    /// Whether a process was admitted as this robot and its token is still awaited.
+    #[must_use]
+    pub fn is_reserved(&self, robot: &RobotName) -> bool {
+        let member = self.members.get(robot);
+        member.is_some_and(|member| member.is_reserved)
     }
 
     /// Whether this incarnation of a robot has missed the last ticks.

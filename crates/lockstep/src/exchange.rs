@@ -1,8 +1,10 @@
 //! What a tick comes to, and the seam between a simulation and its robots.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::{Generation, RobotName, Tick};
+
+use crate::member::Naming;
 
 /// A tick as the simulation sees it: news go out, reports come back.
 ///
@@ -11,15 +13,34 @@ pub trait Exchange<N, R, C> {
     /// Why a tick was given up.
     type Error;
 
-    /// Grants a tick: news by robot (only where there is something new), and the time when every robot has answered.
+    /// Grants a tick with its news, and returns what it came to when every robot has answered.
     ///
     /// # Errors
     /// The reason, if the tick cannot be completed.
     fn exchange(
         &mut self,
         tick: Tick,
-        news: BTreeMap<RobotName, N>,
+        news: &dyn Bulletin<N>,
     ) -> Result<Outcome<R, C>, Self::Error>;
+}
+
+/// The news of a tick. Those of a robot are composed when it is known which incarnations they name.
+pub trait Bulletin<N> {
+    /// The robots for which something is new, whatever their incarnations.
+    fn robots(&self) -> BTreeSet<RobotName>;
+
+    /// The news of a robot, with the incarnations that they name.
+    fn compose(&self, robot: &RobotName, naming: Naming) -> N;
+}
+
+impl<N: Clone + Default> Bulletin<N> for BTreeMap<RobotName, N> {
+    fn robots(&self) -> BTreeSet<RobotName> {
+        self.keys().cloned().collect()
+    }
+
+    fn compose(&self, robot: &RobotName, _: Naming) -> N {
+        self.get(robot).cloned().unwrap_or_default()
+    }
 }
 
 /// What a complete tick came to.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::messages::is_false;
 use crate::messages::{
-    End, Fate, FaultKind, Flight, LogKind, LogRecord, Performative, Point, Verdict,
+    End, Fate, FaultKind, Flight, LogKind, LogRecord, Performative, Point, Reason, Verdict,
 };
 use crate::name::RobotName;
 use crate::plain::escape_line;
@@ -220,12 +220,30 @@ pub enum Event {
     End {
         /// How.
         reason: End,
+        /// If it was aborted, the robots for which the clock waited then.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        waited_for: Vec<WaitedFor>,
         /// Digest of the run: that of its last complete tick.
         digest: String,
         /// In a file: XXH3-64 of all its bytes before this field, and a closing brace.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         seal: Option<String>,
     },
+}
+
+/// A robot for which the clock waited when a run was aborted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WaitedFor {
+    /// Who.
+    pub robot: RobotName,
+    /// What was known of it.
+    pub because: Reason,
+}
+
+impl std::fmt::Display for WaitedFor {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}", self.robot, self.because)
+    }
 }
 
 /// What refused a move.
@@ -517,13 +535,19 @@ impl Event {
                 LogKind::Verdict,
                 format!("{verdict}: {expectation} ({because})"),
             ),
-            Self::End { reason, digest, .. } => {
+            Self::End {
+                reason,
+                waited_for,
+                digest,
+                ..
+            } => {
                 let how = match reason {
                     End::Finished => "finished",
                     End::Stopped => "stopped",
                     End::Aborted => "aborted",
                 };
-                simulator(LogKind::Run, format!("{how}, digest {digest}"))
+                let why = in_words(waited_for);
+                simulator(LogKind::Run, format!("{how}{why}, digest {digest}"))
             }
             // A blocked robot tries again every tick; the log would be nothing else. So with a lossy network.
             Self::DoneLate { .. }
@@ -532,6 +556,16 @@ impl Event {
             | Self::Tick { .. } => None,
         }
     }
+}
+
+/// The robots for which the clock waited when the run was aborted, as the middle of a sentence.
+fn in_words(waited_for: &[WaitedFor]) -> String {
+    if waited_for.is_empty() {
+        return String::new();
+    }
+
+    let robots: Vec<String> = waited_for.iter().map(WaitedFor::to_string).collect();
+    shorten(format!(" because {}", robots.join(", and ")))
 }
 
 /// Cuts a line that is longer than the log has use for: lists of robots can be any length.

@@ -151,6 +151,7 @@ fn tick(tick: Tick) -> RecordedTick {
 fn end() -> Event {
     Event::End {
         reason: End::Finished,
+        waited_for: Vec::new(),
         digest: "0".repeat(32),
         seal: None,
     }

@@ -65,7 +65,7 @@ impl<'a> Cars<'a> {
         &self.welcome.name
     }
 
-    /// What the simulator sent when the robot joined: field, roster, ranges, start.
+    /// What the simulator sent when the robot joined: field, roster, ranges, and where it stood in its first tick.
     #[must_use]
     pub fn welcome(&self) -> &'a Welcome {
         self.welcome

@@ -1,6 +1,6 @@
 //! Why a robot cannot take part, or cannot go on.
 
-use protocol::RobotName;
+use protocol::{RobotName, Tick};
 
 /// Parameters that a robot cannot work with.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -35,5 +35,13 @@ pub enum RobotError {
         field: String,
         /// Which limit the field exceeds.
         reason: String,
+    },
+    /// Robots of this process do not report a tick: a record that is executed again lets robots take part that cannot.
+    #[error("no report of {robots} for tick {tick}, in which the record lets it take part")]
+    NoReport {
+        /// The robots, as a list.
+        robots: String,
+        /// The tick.
+        tick: Tick,
     },
 }

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use lockstep::{
-    Action, Barrier, Exchange, Lateness, Outcome, Output, Participant, Patience, Stamp, StateQuery,
-    Timing, Turn,
+    Action, Attendance, Barrier, Bulletin, Exchange, Lateness, Outcome, Output, Participant,
+    Patience, Stamp, StateQuery, Timing, Turn,
 };
 use protocol::messages::{
-    CommandText, FaultKind, MAX_ENTRIES, News, OnLate, Panel, PublicState, Report, Welcome,
+    CommandText, FaultKind, MAX_ENTRIES, News, OnLate, Panel, Presence, PublicState, Report,
+    Welcome,
 };
 use protocol::{Generation, RobotName, Tick};
 
@@ -149,12 +150,54 @@ impl LocalHost {
         robot: Box<dyn Robot>,
         welcome: impl FnOnce(Generation) -> Option<Welcome>,
     ) {
+        if self
+            .index(name)
+            .is_some_and(|index| self.stopped.remove(&index))
+        {
+            self.join(name, robot, welcome);
+        }
+    }
+
+    /// Says who takes part in the next tick, because it is executed again. Robots that are not absent run it.
+    pub fn recall(&mut self, attendance: Attendance) {
+        self.stopped.clear();
+        for name in &attendance.absent {
+            self.stopped.extend(self.index(name));
+        }
+
+        self.barrier.recall(Some(attendance));
+    }
+
+    /// From the next tick on nothing is executed again: all robots take part in it that are not stopped until then.
+    pub fn end_recall(&mut self) {
+        self.stopped.clear();
+        self.barrier.recall(None);
+    }
+
+    /// Whether the clock goes on without a robot.
+    #[must_use]
+    pub fn is_lost(&self, name: &RobotName) -> bool {
+        self.barrier.presence(name).1 == Presence::Lost
+    }
+
+    /// Seats another robot in the place of one that goes on as the same incarnation.
+    pub fn reseat(&mut self, name: &RobotName, robot: Box<dyn Robot>) {
+        if let Some(index) = self.index(name) {
+            let welcome = self.seats[index].welcome().clone();
+            self.seats[index] = Seat::new(robot, welcome);
+        }
+    }
+
+    /// Lets a robot take part from the next tick on as a further incarnation. `welcome` is as in [`Self::bring_back`].
+    pub fn join(
+        &mut self,
+        name: &RobotName,
+        robot: Box<dyn Robot>,
+        welcome: impl FnOnce(Generation) -> Option<Welcome>,
+    ) {
         let Some(index) = self.index(name) else {
             return;
         };
-        if !self.stopped.contains(&index) {
-            return;
-        }
 
         let next = self.barrier.presence(name).0 + 1;
         let instance = format!("local {next}");
@@ -176,7 +219,6 @@ impl LocalHost {
         self.outputs.clear();
         self.participants[index] = participant;
         self.seats[index] = Seat::new(robot, welcome);
-        self.stopped.remove(&index);
     }
 
     /// The panels of the robots that are chosen and not stopped.
@@ -196,7 +238,7 @@ impl LocalHost {
     }
 
     /// Hands news and clock of a tick to every robot, and collects the ticks that they are to run.
-    fn grant(&mut self, mut news: BTreeMap<RobotName, News>) -> Vec<(usize, Turn<News>)> {
+    fn grant(&mut self, news: &dyn Bulletin<News>) -> Vec<(usize, Turn<News>)> {
         let mut turns = Vec::new();
         for output in std::mem::take(&mut self.outputs) {
             let Output::Grant { news: to, clock } = output else {
@@ -208,7 +250,7 @@ impl LocalHost {
                 let index = index.filter(|index| !self.stopped.contains(index));
                 if let Some(index) = index {
                     // Robots that share a flag all get news, also those for which nothing is new.
-                    let news = news.remove(&name).unwrap_or_default();
+                    let news = news.compose(&name, naming);
                     let participant = &mut self.participants[index];
                     participant.news(clock.epoch, clock.tick, naming, news, &mut actions);
                 }
@@ -271,10 +313,9 @@ impl Exchange<News, Arc<Report>, CommandText> for LocalHost {
     fn exchange(
         &mut self,
         tick: Tick,
-        news: BTreeMap<RobotName, News>,
+        news: &dyn Bulletin<News>,
     ) -> Result<Outcome<Arc<Report>, CommandText>, RobotError> {
-        let with_news = news.keys().cloned().collect();
-        self.barrier.open(tick, with_news, &mut self.outputs);
+        self.barrier.open(tick, news.robots(), &mut self.outputs);
         let complete_at_once = self.take_outcome();
         if let Some(outcome) = complete_at_once {
             // A run without robots, or all of them are stopped.
@@ -285,12 +326,20 @@ impl Exchange<News, Arc<Report>, CommandText> for LocalHost {
         for (index, turn) in self.grant(news) {
             self.run(index, &turn)?;
         }
-        let outcome = self.take_outcome();
-        Ok(outcome.unwrap_or_else(|| unreachable!("every robot has reported tick {tick}")))
+        self.take_outcome().ok_or_else(|| self.no_report(tick))
     }
 }
 
 impl LocalHost {
+    fn no_report(&self, tick: Tick) -> RobotError {
+        let awaited = self.barrier.awaited();
+        let names: Vec<&str> = awaited.iter().map(|(name, _)| name.as_str()).collect();
+        RobotError::NoReport {
+            robots: names.join(", "),
+            tick,
+        }
+    }
+
     fn take_outcome(&mut self) -> Option<Outcome<Arc<Report>, CommandText>> {
         let index = self
             .outputs

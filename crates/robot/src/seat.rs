@@ -78,15 +78,21 @@ impl Seat {
         turn: &Turn<News>,
         network: &mut dyn Network,
     ) -> Result<Done, RobotError> {
-        let welcome = self.welcome.clone();
         let quiet = News::default();
         let news = turn.news.as_ref().unwrap_or(&quiet);
         if turn.begin == Begin::Init {
-            self.proposal = welcome.location;
+            self.proposal = self.welcome.location;
         }
         let location = news
             .correction
             .map_or(self.proposal, |correction| correction.location);
+        if turn.begin == Begin::TakeOver {
+            // When its process asked to join, before or after the moves of this tick or of an earlier one, is wall clock.
+            let welcome = Arc::make_mut(&mut self.welcome);
+            welcome.location = location;
+            welcome.tick = turn.tick.saturating_sub(1);
+        }
+        let welcome = self.welcome.clone();
         let commands = received(news);
 
         let mut log = Vec::new();

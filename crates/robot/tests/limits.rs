@@ -65,9 +65,9 @@ fn chatterbox(is_endless: bool) -> LocalHost {
 fn a_robot_that_gives_up_says_why_and_reports_nothing() {
     let mut host = chatterbox(false);
     for tick in 0..SILENT_AT {
-        host.exchange(tick, BTreeMap::new()).unwrap();
+        host.exchange(tick, &BTreeMap::new()).unwrap();
     }
-    let error = host.exchange(SILENT_AT, BTreeMap::new()).unwrap_err();
+    let error = host.exchange(SILENT_AT, &BTreeMap::new()).unwrap_err();
     assert_eq!(
         error.to_string(),
         "A gives up: there is nothing left to say"
@@ -77,7 +77,7 @@ fn a_robot_that_gives_up_says_why_and_reports_nothing() {
 #[test]
 fn reports_stay_within_the_limits_of_a_message() {
     let mut host = chatterbox(false);
-    let outcome = host.exchange(0, BTreeMap::new()).unwrap();
+    let outcome = host.exchange(0, &BTreeMap::new()).unwrap();
     let (report, _) = outcome.reports.values().next().unwrap();
     assert_eq!(report.check(), Ok(()));
     assert!(protocol::encode(report.as_ref()).len() < protocol::codec::MAX_MESSAGE_BYTES / 2);
@@ -93,7 +93,7 @@ fn reports_stay_within_the_limits_of_a_message() {
 
 #[test]
 fn what_cannot_be_sent_ends_the_robot_with_the_reason() {
-    let error = chatterbox(true).exchange(0, BTreeMap::new()).unwrap_err();
+    let error = chatterbox(true).exchange(0, &BTreeMap::new()).unwrap_err();
     assert_eq!(
         error.to_string(),
         "A says too much: state_variables.secret: 5000 bytes of text, more than the 4096 allowed"
@@ -132,7 +132,7 @@ fn commands_beyond_the_limits_end_the_robot_with_the_reason() {
     ] {
         let commander = Commander { count, bytes };
         let mut host = LocalHost::new(vec![(Box::new(commander), welcome("A"))]);
-        let outcome = host.exchange(0, BTreeMap::new());
+        let outcome = host.exchange(0, &BTreeMap::new());
         match reason {
             Some(reason) => {
                 let error = outcome.unwrap_err().to_string();
@@ -166,7 +166,7 @@ fn robots_that_share_a_news_flag_all_run_also_if_only_one_has_news() {
         .iter()
         .map(|name| (Box::new(Idle) as Box<dyn Robot>, welcome(name)));
     let mut host = LocalHost::new(robots.collect());
-    host.exchange(0, BTreeMap::new()).unwrap();
+    host.exchange(0, &BTreeMap::new()).unwrap();
 
     let moved = RobotName::new("R33").unwrap();
     let place = Point::new(5.0, 6.0);
@@ -180,7 +180,7 @@ fn robots_that_share_a_news_flag_all_run_also_if_only_one_has_news() {
         ..News::default()
     };
     let outcome = host
-        .exchange(1, BTreeMap::from([(moved.clone(), news)]))
+        .exchange(1, &BTreeMap::from([(moved.clone(), news)]))
         .unwrap();
     let proposals: Vec<(String, Point)> = outcome
         .reports

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use config::FileError;
-use lockstep::Sent;
+use lockstep::{Attendance, Sent};
 use protocol::messages::{CommandText, Report};
 use protocol::{Event, Line, RobotName, Tick};
 use recording::{Frame, Recording, RecordingError, Ticks};
@@ -77,6 +77,16 @@ impl Entry {
             } => Some(robot),
             _ => None,
         })
+    }
+
+    /// Who takes part in the tick.
+    #[must_use]
+    pub fn attendance(&self) -> Attendance {
+        Attendance {
+            joined: self.joined().cloned().collect(),
+            absent: self.missed().cloned().collect(),
+            lost: self.lost().cloned().collect(),
+        }
     }
 
     /// Robots that are lost from this tick on.

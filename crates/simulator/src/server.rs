@@ -8,6 +8,7 @@
 //! A [`Replay`] is in the simulator's place, too, with a recording instead of a simulation.
 
 mod control;
+mod departed;
 mod faults;
 mod inbox;
 mod join;

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use lockstep::{Exchange, Membership, Naming, Outcome, Sent};
+use lockstep::{Bulletin, Exchange, Membership, Naming, Outcome, Sent};
 use observe::{Observation, RobotState, Watches};
-use protocol::event::{Blocker, Cause};
+use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, HeldProcess, Intervention, NEWS_FLAGS,
     News, OnLate, Performative, Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind,
@@ -164,8 +164,7 @@ impl Simulation {
         E: Exchange<News, Arc<Report>, CommandText>,
     {
         self.begin_init();
-        let news = std::mem::take(&mut self.news);
-        let outcome = robots.exchange(0, news)?;
+        let outcome = robots.exchange(0, self)?;
 
         Ok(self.end_tick(outcome))
     }
@@ -179,8 +178,7 @@ impl Simulation {
         E: Exchange<News, Arc<Report>, CommandText>,
     {
         let tick = self.begin_tick();
-        let news = std::mem::take(&mut self.news);
-        let outcome = robots.exchange(tick, news)?;
+        let outcome = robots.exchange(tick, self)?;
 
         Ok(self.end_tick(outcome))
     }
@@ -522,13 +520,12 @@ impl Simulation {
 
     /// Composes the news of the tick in progress, which contain exceptions only.
     fn compose_news(&mut self, verdicts: &[Verdict]) {
-        let restarted = self.scenario.restarts_at(self.now);
         let mut all = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             let is_refused = !verdicts.is_empty() && self.blocked[index];
-            // These know no proposal of theirs.
-            let is_new = self.silent.contains(name) || restarted.contains(name);
-            let is_corrected = is_refused || is_new;
+            // What a robot proposed that has missed the last tick did not count. An incarnation that takes part from this tick
+            // on is named: see `Self::news`.
+            let is_corrected = is_refused || self.silent.contains(name);
             let news = News {
                 epoch: self.epoch,
                 tick: self.now,
@@ -782,9 +779,16 @@ impl Simulation {
     /// The record of the end of the run, in which the expectations that are open are judged.
     #[must_use]
     pub fn end(&mut self, reason: End) -> TickRecord {
+        self.end_waiting(reason, Vec::new())
+    }
+
+    /// The record of the end of a run, as [`Self::end`]; `waited_for` are the robots for which the clock waited, if it was aborted.
+    #[must_use]
+    pub fn end_waiting(&mut self, reason: End, waited_for: Vec<WaitedFor>) -> TickRecord {
         let mut events = self.watches.end(reason);
         events.push(Event::End {
             reason,
+            waited_for,
             digest: self.digest.to_string(),
             seal: None,
         });
@@ -987,6 +991,16 @@ impl Simulation {
     #[must_use]
     pub fn digest(&self) -> String {
         self.digest.to_string()
+    }
+}
+
+impl Bulletin<News> for Simulation {
+    fn robots(&self) -> BTreeSet<RobotName> {
+        self.robots_with_news()
+    }
+
+    fn compose(&self, robot: &RobotName, naming: Naming) -> News {
+        self.news(robot, naming)
     }
 }
 

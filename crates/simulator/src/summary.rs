@@ -5,6 +5,7 @@ mod network;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use protocol::event::WaitedFor;
 use protocol::messages::{End, StateVariables, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,9 @@ pub struct Summary {
     pub version: String,
     /// How it ended; absent during the run.
     pub end: Option<End>,
+    /// If it was aborted, the robots for which the clock waited then.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub waited_for: Vec<WaitedFor>,
     /// Complete ticks after tick 0.
     pub ticks: Tick,
     /// Simulated time, seconds.
@@ -129,6 +133,7 @@ impl Summary {
             seed: simulation.scenario().seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             end: None,
+            waited_for: Vec::new(),
             ticks: 0,
             time_s: 0.0,
             guests: simulation.scenario().guests.count,
@@ -174,8 +179,14 @@ impl Summary {
                 };
                 self.expectations.insert(expectation.clone(), judged);
             }
-            Event::End { reason, digest, .. } => {
+            Event::End {
+                reason,
+                waited_for,
+                digest,
+                ..
+            } => {
                 self.end = Some(*reason);
+                self.waited_for.clone_from(waited_for);
                 self.digest.clone_from(digest);
             }
             // The time in which robots join is not part of the epoch.

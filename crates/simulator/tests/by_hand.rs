@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
-use lockstep::{Exchange, Outcome, Sent};
+use lockstep::{Bulletin, Exchange, Outcome, Sent};
 use protocol::event::Cause;
 use protocol::messages::{
     CommandText, Cut, FaultKind, Intervention, News, OnLate, Performative, Point, Report,
@@ -62,7 +62,7 @@ impl Exchange<News, Arc<Report>, CommandText> for Robots {
     fn exchange(
         &mut self,
         tick: Tick,
-        _news: BTreeMap<RobotName, News>,
+        _news: &dyn Bulletin<News>,
     ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
         let mut outcome = Outcome::default();
         for (robot, at) in &self.0 {

@@ -10,9 +10,9 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lockstep::{Exchange, Outcome};
+use lockstep::{Bulletin, Exchange, Outcome};
 use protocol::messages::{CommandText, End, News, Report};
-use protocol::{RobotName, RunName, Tick};
+use protocol::{RunName, Tick};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
 use simulator::recorder::{EVENTS, Observed, RECORDING, RunLock};
@@ -27,7 +27,7 @@ impl Exchange<News, Arc<Report>, CommandText> for Absent {
     fn exchange(
         &mut self,
         _tick: Tick,
-        _news: BTreeMap<RobotName, News>,
+        _news: &dyn Bulletin<News>,
     ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
         Ok(Outcome::default())
     }

@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
-use lockstep::{Exchange, Outcome, Sent};
+use lockstep::{Bulletin, Exchange, Naming, Outcome, Sent};
 use protocol::event::{Blocker, Cause};
 use protocol::messages::{
     CommandText, Delivery, News, Performative, Point, Report, SensedKind, StateVariables,
@@ -75,8 +75,13 @@ where
     fn exchange(
         &mut self,
         tick: Tick,
-        news: AllNews,
+        bulletin: &dyn Bulletin<News>,
     ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
+        let mut news = AllNews::new();
+        for name in bulletin.robots() {
+            let of_robot = bulletin.compose(&name, Naming::default());
+            news.insert(name, of_robot);
+        }
         let mut outcome = Outcome::default();
         let names: Vec<RobotName> = self.proposals.keys().cloned().collect();
         for name in names {

@@ -10,9 +10,11 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+mod again;
 mod chance;
 mod hall;
 mod plan;
+mod planned;
 mod process;
 mod reference;
 mod simulator;
@@ -37,7 +39,7 @@ fn seeds(default: u64) -> std::ops::Range<u64> {
     0..number("CARS_SCHEDULES").unwrap_or(default)
 }
 
-fn number(variable: &str) -> Option<u64> {
+pub(crate) fn number(variable: &str) -> Option<u64> {
     let text = std::env::var(variable).ok()?;
 
     Some(text.parse().expect("a number"))
@@ -128,6 +130,9 @@ fn every_schedule_is_a_run_that_the_rules_allow() {
         counts.lost,
         counts.missed,
         counts.aborted,
+        counts.first_ticks,
+        counts.joined_and_missed,
+        counts.forks,
     ];
     assert!(
         count < 1_000 || !happened.contains(&0),

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use lockstep::Lateness;
-use protocol::messages::OnLate;
+use protocol::messages::{FaultKind, OnLate};
 use protocol::{Epoch, RobotName, Tick};
+use scenario::{Fault, FaultEnd, Scenario};
 
 use crate::chance::Chance;
 use crate::hall::{Halls, TICKS};
@@ -203,6 +204,22 @@ impl Plan {
             }
         }
         plan
+    }
+
+    /// The scenario of an epoch, with the fault that it has in store.
+    pub(crate) fn scenario(&self, halls: &Halls, epoch: Epoch) -> Scenario {
+        let mut scenario = halls.scenario(self.hall, epoch).clone();
+        if let Some(stop) = &self.stop {
+            scenario.lateness.on_late = OnLate::Continue;
+            scenario.lateness.lose_after = stop.lose_after;
+            scenario.faults.push(Fault {
+                robot: stop.robot.clone(),
+                kind: FaultKind::Hang,
+                at: stop.from,
+                end: FaultEnd::At(stop.until),
+            });
+        }
+        scenario
     }
 
     /// The epoch that is the last one, if everything goes as planned.

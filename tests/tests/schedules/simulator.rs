@@ -7,12 +7,14 @@ use std::time::Duration;
 
 use lockstep::{Barrier, Lateness, Membership, Output, Sent, Stamp, Timer, Timing};
 use protocol::messages::{
-    Clock, Command, CommandText, End, FaultKind, JoinAnswer, JoinRequest, MAX_ENTRIES, PublicState,
+    Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, OnLate, PublicState,
     Report, Waiting,
 };
 use protocol::{Epoch, Generation, RobotName, RunName, Tick, encode};
+use simulator::record::Entry;
 use simulator::{Event as Recorded, Simulation, TickRecord};
 
+use crate::again::Again;
 use crate::plan::{Family, Flaw, MS, Micros, Plan, Point, S};
 use crate::reference::{Reference, Reports};
 use crate::star::{Bytes, Message};
@@ -41,6 +43,8 @@ pub(crate) struct Simulator {
     pub(crate) is_gathering: bool,
     /// The tick before which the last order of the scenario was carried out.
     ordered: Option<Tick>,
+    /// The record of the epoch.
+    recorded: Vec<Entry>,
     with_bodies: BTreeSet<RobotName>,
     operator: Vec<(RobotName, String)>,
     /// Commands of the operator that the next tick's record must show.
@@ -72,6 +76,7 @@ impl Simulator {
             stage: Stage::Robots,
             is_gathering: true,
             ordered: None,
+            recorded: Vec::new(),
             with_bodies: BTreeSet::new(),
             operator: Vec::new(),
             passed_on: 0,
@@ -93,8 +98,11 @@ impl World {
     /// Begins an epoch.
     pub(crate) fn begin_epoch(&mut self, epoch: Epoch) {
         let halls = self.halls.clone();
-        let scenario = halls.scenario(self.plan.hall, epoch);
+        let scenario = &self.plan.scenario(&halls, epoch);
+        self.check_again();
         let simulator = &mut self.simulator;
+        simulator.recorded.clear();
+        simulator.ordered = None;
         simulator.simulation =
             Simulation::new(scenario.clone(), epoch).expect("the hall can be set up");
         simulator.reference = Some(Reference::new(scenario, epoch));
@@ -156,12 +164,14 @@ impl World {
         if is_due && self.simulator.ordered != Some(next) {
             self.simulator.ordered = Some(next);
             let begins = next == stop.from;
-            let fault = begins.then_some(FaultKind::Hang);
-            self.simulator.barrier.fault(&stop.robot, fault);
-            self.stop_robot(&stop.robot, begins);
-            if begins {
-                self.simulator.simulation.stop(&stop.robot);
+            let orders = self.simulator.simulation.faults_due();
+            let simulation = &mut self.simulator.simulation;
+            simulation.note_faults(&orders, |_| OnLate::Continue);
+            for order in &orders {
+                let barrier = &mut self.simulator.barrier;
+                barrier.fault(&order.robot, order.lasting());
             }
+            self.stop_robot(&stop.robot, begins);
         }
         if next != stop.until || self.simulator.barrier.is_back(&stop.robot) {
             return true;
@@ -252,6 +262,7 @@ impl World {
         self.simulator.is_gathering = false;
 
         let record = self.simulator.simulation.end_tick(outcome.clone());
+        self.simulator.recorded.push(entry(outcome, &record));
         if let Some(tick) = expected
             && record.tick != tick
         {
@@ -330,6 +341,8 @@ impl World {
                     let joined = (epoch, tick, robot.clone(), *generation);
                     self.simulator.joined.push(joined);
                     self.counts.joined += 1;
+                    let has_missed = !outcome.reports.contains_key(robot);
+                    self.counts.joined_and_missed += u64::from(has_missed);
                 }
                 Membership::Lost(_) => self.counts.lost += 1,
             }
@@ -343,6 +356,8 @@ impl World {
             .filter(|name| !outcome.reports.contains_key(*name))
             .cloned()
             .collect();
+        let is_plain = missing.is_empty() && outcome.membership.is_empty();
+        self.counts.first_ticks += u64::from(tick == 0 && !is_plain);
         if missing.is_empty() {
             return;
         }
@@ -445,6 +460,26 @@ impl World {
         self.begin_epoch(epoch);
     }
 
+    /// The record of the epoch can be executed again, and forked.
+    pub(crate) fn check_again(&mut self) {
+        let recorded = std::mem::take(&mut self.simulator.recorded);
+        if recorded.is_empty() || self.failure.is_some() {
+            return;
+        }
+
+        let simulation = &self.simulator.simulation;
+        let again = Again {
+            scenario: simulation.scenario(),
+            epoch: simulation.epoch(),
+            digest: simulation.digest(),
+            recorded,
+        };
+        match again.check() {
+            Ok(forks) => self.counts.forks += forks,
+            Err(wrong) => self.fail_wrong(wrong),
+        }
+    }
+
     pub(crate) fn set_lateness(&mut self, lateness: Lateness) {
         if self.simulator.ended.is_none() {
             let simulator = &mut self.simulator;
@@ -482,6 +517,10 @@ impl World {
         let stamp = Stamp::from(&report);
         let commands = report.commands;
         let simulator = &mut self.simulator;
+        let is_of_epoch = stamp.epoch == simulator.simulation.epoch();
+        if is_of_epoch && simulator.barrier.is_behind(robot, stamp.generation) {
+            simulator.simulation.done_late(robot, stamp.tick);
+        }
         simulator.barrier.report(
             robot,
             stamp,
@@ -577,6 +616,21 @@ impl World {
         };
 
         Some(encode(&answer).into())
+    }
+}
+
+/// A tick as a record has it.
+fn entry(outcome: &Reports, record: &TickRecord) -> Entry {
+    let mut reports = BTreeMap::new();
+    for (name, (report, _)) in &outcome.reports {
+        reports.insert(name.clone(), report.as_ref().clone());
+    }
+
+    Entry {
+        tick: record.tick,
+        events: record.events.to_vec(),
+        reports: Some(reports),
+        ..Entry::default()
     }
 }
 

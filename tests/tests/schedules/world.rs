@@ -80,6 +80,12 @@ pub(crate) struct Counts {
     pub(crate) lost: u64,
     pub(crate) missed: u64,
     pub(crate) aborted: u64,
+    /// Ticks 0 that a robot missed, or in which one was replaced.
+    pub(crate) first_ticks: u64,
+    /// Robots that joined and missed the same tick.
+    pub(crate) joined_and_missed: u64,
+    /// Forks of records that came to the end of the record.
+    pub(crate) forks: u64,
 }
 
 impl Counts {
@@ -102,6 +108,9 @@ impl Counts {
         self.lost += other.lost;
         self.missed += other.missed;
         self.aborted += other.aborted;
+        self.first_ticks += other.first_ticks;
+        self.joined_and_missed += other.joined_and_missed;
+        self.forks += other.forks;
     }
 }
 
@@ -142,7 +151,7 @@ pub(crate) struct World {
 impl World {
     /// Executes a schedule to its end.
     pub(crate) fn execute(plan: Plan, halls: &Arc<Halls>) -> Came {
-        let scenario = halls.scenario(plan.hall, 1);
+        let scenario = &plan.scenario(halls, 1);
         let mut world = Self {
             simulator: Simulator::new(&plan, scenario),
             chance: Chance::new(plan.seed, "schedule"),
@@ -182,6 +191,7 @@ impl World {
             world.check_liveness();
         }
         world.judge();
+        world.check_again();
         world.came()
     }
 

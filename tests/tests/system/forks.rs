@@ -226,8 +226,9 @@ fn a_fork_that_cannot_be_made_is_refused_and_the_run_is_kept() {
         "none of the 2 elements is called",
     );
     refused(&["parent@30", "--set", "change=[]"], "further [[change]]");
-    let hang = r#"fault=[{ robot = "Leguin", do = "hang", at = "20 s", for = "1 s" }]"#;
-    refused(&["parent@30", "--set", hang], "needs a process of its own");
+    let slow = r#"fault=[{ robot = "Leguin", do = "slow", at = "20 s", until = "21 s" }]"#;
+    let slow = ["parent@30", "--set", slow, "--set", "on_late=continue"];
+    refused(&slow, "needs a process of its own");
 
     assert_same(("before", &before), ("after", &lab.bytes("parent")));
     assert!(!lab.out().join("parent-fork-30").exists());

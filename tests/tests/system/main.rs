@@ -43,6 +43,7 @@ mod recordings;
 mod replay;
 mod replayed;
 mod report;
+mod returns;
 mod secure;
 mod shell;
 mod statistics;

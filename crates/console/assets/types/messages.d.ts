@@ -90,6 +90,17 @@ export type Control =
       tick: number;
     }
   | {
+      /**
+       * How it ended, as the predicate of a sentence about the robot.
+       */
+      because: string;
+      do: "process_ended";
+      /**
+       * The robots.
+       */
+      robots: RobotName[];
+    }
+  | {
       do: "log";
     }
   | {
@@ -203,6 +214,9 @@ export type Reason =
   | "silent"
   | {
       waits_for: RobotName;
+    }
+  | {
+      ended: string;
     };
 /**
  * What the simulator is doing.

@@ -503,6 +503,7 @@ fn run_cells(event: &Event) -> Vec<Cell<'_>> {
         Event::Tick { digest, seal: _ } => vec![("digest", digest.as_str().into())],
         Event::End {
             reason,
+            waited_for: _,
             digest,
             seal: _,
         } => vec![

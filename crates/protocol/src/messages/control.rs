@@ -78,6 +78,14 @@ pub enum Control {
         /// Tick of the order.
         tick: Tick,
     },
+    /// The process that played these robots has ended, and the launcher starts no further one for them. Repeated until it is
+    /// answered; a process that joins later takes it back.
+    ProcessEnded {
+        /// The robots.
+        robots: Vec<RobotName>,
+        /// How it ended, as the predicate of a sentence about the robot.
+        because: String,
+    },
     /// The last lines of the log: answered with [`ControlAnswer::Log`].
     Log,
     /// Nothing but the status.
@@ -101,6 +109,10 @@ impl Message for Control {
                 setup: Some(setup), ..
             } => setup.check(),
             Self::Intervene { what } => what.check(),
+            Self::ProcessEnded { robots, because } => {
+                few(robots.len(), "robots")?;
+                short(because, "because")
+            }
             _ => Ok(()),
         }
     }
@@ -450,6 +462,8 @@ pub enum Reason {
     Silent,
     /// It waits for another robot's answer.
     WaitsFor(RobotName),
+    /// Its process has ended in this way, and no further one is started.
+    Ended(String),
 }
 
 impl std::fmt::Display for Reason {
@@ -459,6 +473,7 @@ impl std::fmt::Display for Reason {
             Self::Gone => f.write_str("is gone: its process or its link is down"),
             Self::Silent => f.write_str("is there but has not reported"),
             Self::WaitsFor(other) => write!(f, "waits for {other}"),
+            Self::Ended(how) => write!(f, "{how}, and no further process is started for it"),
         }
     }
 }

@@ -259,7 +259,7 @@ impl Stage {
             news.insert(robot.clone(), self.news(robot, is_blocked, commands));
         }
 
-        let outcome = self.host.exchange(self.tick, news).unwrap();
+        let outcome = self.host.exchange(self.tick, &news).unwrap();
         self.reports.clear();
         for (robot, (report, commands)) in outcome.reports {
             self.reports.insert(robot.clone(), report);

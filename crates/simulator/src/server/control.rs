@@ -93,6 +93,7 @@ impl Server {
             Control::Speed { factor } => self.pace.set_speed(*factor)?,
             Control::Seek { .. } => return Err(NOT_SOUGHT.to_owned()),
             Control::FaultsDone { epoch, tick } => self.orders.done(*epoch, *tick),
+            Control::ProcessEnded { robots, because } => self.note_departed(robots, because)?,
             Control::Intervene { what } => self.intervene(what, simulation)?,
             Control::Late {
                 robot,
@@ -115,6 +116,26 @@ impl Server {
         Ok(())
     }
 
+    /// The launcher starts no further process for these robots.
+    fn note_departed(&mut self, robots: &[RobotName], because: &str) -> Result<(), String> {
+        self.check_known(robots)?;
+        for robot in robots {
+            self.departed.ended(robot, because);
+        }
+        Ok(())
+    }
+
+    fn check_known<'a>(
+        &self,
+        robots: impl IntoIterator<Item = &'a RobotName>,
+    ) -> Result<(), String> {
+        let mut robots = robots.into_iter();
+        match robots.find(|robot| !self.barrier.has(robot)) {
+            Some(unknown) => Err(format!("no robot of this run is called {unknown}")),
+            None => Ok(()),
+        }
+    }
+
     fn change_lateness(
         &mut self,
         robot: Option<&RobotName>,
@@ -122,9 +143,7 @@ impl Server {
         deadline_s: Option<f64>,
         simulation: &mut Simulation,
     ) -> Result<(), String> {
-        if let Some(unknown) = robot.filter(|robot| !self.barrier.has(robot)) {
-            return Err(format!("no robot of this run is called {unknown}"));
-        }
+        self.check_known(robot)?;
         if deadline_s.is_some_and(|deadline_s| deadline_s <= 0.0) {
             return Err("a deadline is more than zero".to_owned());
         }

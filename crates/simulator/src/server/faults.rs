@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bus::BusError;
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
-use protocol::{RobotName, encode};
+use protocol::{Epoch, RobotName, Tick, encode};
 
 use super::orders::Underway;
 use super::process::{REPEAT_AFTER, Server, Stage};
@@ -36,46 +36,59 @@ impl Server {
             orders.push(restart_order(&robot, true));
             then.push(restart_order(&robot, false));
         }
-        Ok((!orders.is_empty()).then(|| self.underway(simulation, orders, then)))
+        let next = (simulation.epoch(), simulation.tick() + 1);
+        Ok((!orders.is_empty()).then(|| self.underway(next, orders, then)))
+    }
+
+    /// Begins to end the faults of an epoch that is over, before tick 0 of the next one, if there are any.
+    pub(super) fn order_end_of_faults(&mut self, epoch: Epoch) -> Option<Underway> {
+        let [kills, ends] = self.orders.ending_all();
+        if kills.is_empty() {
+            return (!ends.is_empty()).then(|| self.underway((epoch, 0), ends, Vec::new()));
+        }
+        Some(self.underway((epoch, 0), kills, ends))
     }
 
     /// Has the fault of a robot ended for which the open tick waits. Only the wall clock would have ended it, so the record does
     /// not change.
     pub(super) fn recover_now(
-        &self,
+        &mut self,
         robot: &RobotName,
         kind: FaultKind,
         simulation: &Simulation,
     ) -> Result<(), BusError> {
+        let orders = vec![ProcessOrder {
+            robot: robot.clone(),
+            kind,
+            begins: false,
+            for_s: None,
+        }];
+        self.orders.note(&orders);
         self.orders.publisher.put(encode(&FaultOrder {
             epoch: simulation.epoch(),
             tick: simulation.tick() + 1,
-            orders: vec![ProcessOrder {
-                robot: robot.clone(),
-                kind,
-                begins: false,
-                for_s: None,
-            }],
+            orders,
         }))
     }
 
     /// Begins to have orders carried out, and then others.
     fn underway(
         &mut self,
-        simulation: &Simulation,
+        (epoch, tick): (Epoch, Tick),
         orders: Vec<ProcessOrder>,
         then: Vec<ProcessOrder>,
     ) -> Underway {
         for order in &orders {
             self.barrier.fault(&order.robot, order.lasting());
         }
+        self.orders.note(&orders);
 
         self.orders.done = None;
         let now = Instant::now();
         Underway {
             order: FaultOrder {
-                epoch: simulation.epoch(),
-                tick: simulation.tick() + 1,
+                epoch,
+                tick,
                 orders,
             },
             then,
@@ -86,10 +99,7 @@ impl Server {
     }
 
     /// Goes on with the order under way. Returns how long to wait before looking again; `None` when it is carried out.
-    pub(super) fn await_faults(
-        &mut self,
-        simulation: &Simulation,
-    ) -> Result<Option<Duration>, BusError> {
+    pub(super) fn await_faults(&mut self) -> Result<Option<Duration>, BusError> {
         let Stage::Faults(underway) = &mut self.stage else {
             return Ok(None);
         };
@@ -97,8 +107,8 @@ impl Server {
             let begun = underway.begun;
             return self.await_launcher(begun);
         };
+        let tick = underway.order.tick;
         if underway.begun.elapsed() > PATIENCE {
-            let tick = simulation.tick() + 1;
             tracing::error!("the faults before tick {tick} were not carried out in time");
             return Ok(None);
         }
@@ -107,17 +117,20 @@ impl Server {
             underway.put = Some(Instant::now());
             self.orders.publisher.put(encode(&underway.order))?;
         }
-        let is_done = self.orders.done == Some((underway.order.epoch, underway.order.tick));
+        let is_done = self.orders.done == Some((underway.order.epoch, tick));
         let mut is_carried_out = is_done;
         for order in &underway.order.orders {
-            is_carried_out &= is_in_effect(&self.barrier, order);
+            // Before tick 0 robots are gathered, which waits for those whose faults are over.
+            let is_gathered = tick == 0 && !order.begins;
+            is_carried_out &= is_gathered || is_in_effect(&self.barrier, order);
         }
         if is_carried_out {
             let then = std::mem::take(&mut underway.then);
             if then.is_empty() {
                 return Ok(None);
             }
-            let underway = self.underway(simulation, then, Vec::new());
+            let before = (underway.order.epoch, tick);
+            let underway = self.underway(before, then, Vec::new());
             self.stage = Stage::Faults(underway);
             return Ok(Some(Duration::ZERO));
         }

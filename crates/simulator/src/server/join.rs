@@ -56,8 +56,12 @@ impl Server {
         let run = self.options.run.clone();
         let admission = self
             .barrier
-            .join(name, &request.instance, &mut self.outputs)
-            .map_err(|refused| self.explain(refused, name))?;
+            .join(name, &request.instance, &mut self.outputs);
+        if admission == Err(Refused::NameTaken) {
+            self.departed.refused(name);
+        }
+        let admission = admission.map_err(|refused| self.explain(refused, name))?;
+        self.orders.joined(name);
         if request.bodies {
             self.with_bodies.insert(name.clone());
         } else {

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use bus::Publisher;
-use protocol::messages::{FaultOrder, ProcessOrder};
-use protocol::{Epoch, Tick};
+use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
+use protocol::{Epoch, RobotName, Tick};
 
 /// Orders to the launcher.
 pub(super) struct Orders {
@@ -12,6 +12,8 @@ pub(super) struct Orders {
     /// The order that has been carried out last.
     pub(super) done: Option<(Epoch, Tick)>,
     pub(super) has_complained: bool,
+    /// Orders that began a fault which no order has ended.
+    in_effect: Vec<ProcessOrder>,
 }
 
 impl Orders {
@@ -20,7 +22,48 @@ impl Orders {
             publisher,
             done: None,
             has_complained: false,
+            in_effect: Vec::new(),
         }
+    }
+
+    /// Notes orders that are about to be put.
+    pub(super) fn note(&mut self, orders: &[ProcessOrder]) {
+        for order in orders {
+            self.in_effect
+                .retain(|begun| (&begun.robot, begun.kind) != (&order.robot, order.kind));
+            if order.begins {
+                self.in_effect.push(order.clone());
+            }
+        }
+    }
+
+    /// A process has joined as this robot: if the launcher has killed one for a time, that time is over.
+    pub(super) fn joined(&mut self, robot: &RobotName) {
+        self.in_effect.retain(|begun| {
+            let is_over = begun.kind == FaultKind::Crash && begun.for_s.is_some();
+            !(is_over && begun.robot == *robot)
+        });
+    }
+
+    /// The orders that end all faults in effect, in two steps. A process that is to be killed, and perhaps is not yet, is killed
+    /// first: otherwise it may join the next epoch and die in it.
+    pub(super) fn ending_all(&self) -> [Vec<ProcessOrder>; 2] {
+        let mut kills = Vec::new();
+        let mut ends = Vec::new();
+        for begun in &self.in_effect {
+            if begun.kind == FaultKind::Crash {
+                kills.push(ProcessOrder {
+                    for_s: None,
+                    ..begun.clone()
+                });
+            }
+            ends.push(ProcessOrder {
+                begins: false,
+                for_s: None,
+                ..begun.clone()
+            });
+        }
+        [kills, ends]
     }
 
     /// The launcher has carried out an order.

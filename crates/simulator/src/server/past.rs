@@ -97,14 +97,11 @@ impl Past {
             return Attendance::default();
         };
 
-        let absent = next
-            .missed()
-            .filter(|robot| !self.is_done_late(robot, next.tick));
-        Attendance {
-            joined: next.joined().cloned().collect(),
-            absent: absent.cloned().collect(),
-            lost: next.lost().cloned().collect(),
-        }
+        let mut attendance = next.attendance();
+        attendance
+            .absent
+            .retain(|robot| !self.is_done_late(robot, next.tick));
+        attendance
     }
 
     /// The robots that take part again from the next tick on.

@@ -20,6 +20,8 @@ use crate::summary::{Summary, Wall};
 use config::diagnostic::FileError;
 use scenario::Scenario;
 
+use super::control::refuse;
+use super::departed::{Departed, Wait};
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
 use super::orders::{Orders, Underway};
@@ -186,6 +188,7 @@ pub struct Server {
     news: BTreeMap<RobotName, Publisher>,
     pub(super) observers: Observers,
     viewers: Viewers,
+    pub(super) departed: Departed,
     pub(super) orders: Orders,
     pub(super) pace: Pace,
     pub(super) barrier: Barrier<Arc<Report>, CommandText>,
@@ -288,6 +291,7 @@ impl Server {
             news,
             observers: Observers::new(&bus, &keys)?,
             viewers: Viewers::default(),
+            departed: Departed::default(),
             orders: Orders::new(bus.publisher(&keys.faults())?),
             pace: Pace::new(options.speed, options.is_paused),
             barrier,
@@ -477,7 +481,22 @@ impl Server {
             simulation.list_bodies(name, true);
         }
 
+        for query in std::mem::take(&mut self.deferred) {
+            refuse(
+                &query,
+                "the epoch is over, and another one begins from the scenario as it is",
+            );
+        }
+
         self.pace.gather();
+        self.gather(simulation);
+        if let Some(underway) = self.order_end_of_faults(simulation.epoch()) {
+            self.stage = Stage::Faults(underway);
+        }
+    }
+
+    /// Begins to wait for the robots of the roster.
+    fn gather(&mut self, simulation: &Simulation) {
         self.stage = Stage::Robots;
         self.waiting_since = Instant::now();
         let lateness = simulation.scenario().lateness.to_lockstep();
@@ -500,6 +519,11 @@ impl Server {
                 self.barrier.timer(&timer, &mut self.outputs);
             }
             self.carry_out(simulation, recorder)?;
+            let standby = match self.endless_wait() {
+                Wait::Sound => None,
+                Wait::Standby(left) => Some(left),
+                Wait::Endless => return Err(Interrupt::End(End::Aborted)),
+            };
             if simulation.tick() >= simulation.scenario().ticks && !self.is_waiting_for_robots() {
                 return Err(Interrupt::End(End::Finished));
             }
@@ -510,7 +534,7 @@ impl Server {
 
             match self.advance(simulation)? {
                 Next::Opened => {}
-                Next::Wait(patience) => return Ok(patience),
+                Next::Wait(patience) => return Ok(patience.into_iter().chain(standby).min()),
             }
         }
     }
@@ -543,9 +567,14 @@ impl Server {
                     return Ok(Next::Opened);
                 }
             }
-            Stage::Faults(_) => {
-                if let Some(patience) = self.await_faults(simulation)? {
+            Stage::Faults(underway) => {
+                let is_before_tick_zero = underway.order.tick == 0;
+                if let Some(patience) = self.await_faults()? {
                     return Ok(Next::Wait(Some(patience)));
+                }
+                if is_before_tick_zero {
+                    self.gather(simulation);
+                    return Ok(Next::Opened);
                 }
             }
         }
@@ -603,6 +632,8 @@ impl Server {
         while !self.outputs.is_empty() {
             for output in std::mem::take(&mut self.outputs) {
                 match output {
+                    // The faults of the epoch before are ended first, and then robots are gathered once more.
+                    Output::Gathered if matches!(self.stage, Stage::Faults(_)) => {}
                     Output::Gathered => self.begin(simulation),
                     Output::Grant { news, clock } => self.put(simulation, &news, clock)?,
                     Output::Complete(outcome) => self.complete(outcome, simulation, recorder)?,
@@ -863,7 +894,15 @@ impl Server {
         simulation: &mut Simulation,
         recorder: &mut Recorder,
     ) -> Result<Summary, FileError> {
-        let record = simulation.end(end);
+        let mut waited_for = Vec::new();
+        if end == End::Aborted {
+            waited_for = self.waited_for();
+            for robot in &waited_for {
+                let tick = simulation.tick();
+                tracing::error!("the run is aborted after tick {tick}, because {robot}");
+            }
+        }
+        let record = simulation.end_waiting(end, waited_for);
         let lines = recorder.write(simulation, &record)?;
         self.observers.log(&lines);
         self.observers.frame(simulation, &self.status(simulation));
@@ -1049,6 +1088,9 @@ impl Server {
             return;
         };
 
+        if is_present {
+            self.departed.is_here(&name);
+        }
         self.barrier.token(&name, is_present, &mut self.outputs);
     }
 

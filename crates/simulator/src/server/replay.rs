@@ -406,7 +406,8 @@ impl Replay {
             | Control::Load { .. }
             | Control::Late { .. }
             | Control::Intervene { .. }
-            | Control::FaultsDone { .. } => {
+            | Control::FaultsDone { .. }
+            | Control::ProcessEnded { .. } => {
                 return Err(format!("{}: it cannot be changed", self.what_it_is()));
             }
             Control::Step { .. } | Control::Setup | Control::Log | Control::Stop => {
