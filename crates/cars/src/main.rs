@@ -35,6 +35,7 @@ mod verify;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use miette::IntoDiagnostic;
 
 /// The Cooperative Affective Robot Simulator.
 ///
@@ -114,6 +115,12 @@ enum Subcommands {
     Man(man::ManArgs),
     #[command(hide = true)]
     Child(exec::ChildArgs),
+    /// The process beside a launcher that ends what is left if the launcher is killed.
+    #[command(hide = true)]
+    Guard {
+        /// Identifies the launch.
+        launch: String,
+    },
     #[command(hide = true)]
     ReplayRobot(replay_robot::ReplayRobotArgs),
     #[command(hide = true)]
@@ -174,6 +181,10 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Man(args) => man::man(&args, Cli::command()),
 
         Subcommands::Child(args) => Ok(exec::child(&args)),
+        Subcommands::Guard { launch } => {
+            ::launch::guard(&launch).into_diagnostic()?;
+            Ok(ExitCode::SUCCESS)
+        }
         Subcommands::ReplayRobot(args) => replay_robot::take_part(&args),
         Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
         Subcommands::BenchEcho(args) => bench::tcp::echo(&args),

@@ -18,10 +18,11 @@ use super::compose;
 use super::endpoint;
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
+use super::leftovers::Leftovers;
 use super::link::ProcessLink;
 use super::observe::{Observer, Watch};
 use super::options::RunOptions;
-use super::plan::{self, Execution, Planned};
+use super::plan::{self, Execution, Part, Planned};
 use super::screen::{Screen, ScreenOptions};
 use super::secure::Secured;
 use super::signals;
@@ -359,7 +360,11 @@ impl Launch {
         endpoint: &str,
         folder: &RunFolder,
     ) -> miette::Result<Outcome> {
+        let leftovers = Leftovers::guarded();
         for process in planned.iter_mut().filter(|process| !process.is_extern) {
+            if process.part == Part::Robots {
+                process.command.env.extend([leftovers.mark(&process.name)]);
+            }
             process.tie();
         }
 
@@ -369,14 +374,23 @@ impl Launch {
         let names = planned.iter().map(|planned| planned.name.clone()).collect();
         let look = ScreenOptions::here(names, self.options.is_quiet);
         let wants_world = look.has_bar;
-        let screen = Screen::open(look);
+        let screen = Screen::open(look)
+            .into_diagnostic()
+            .wrap_err("no thread for the terminal")?;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
             .into_diagnostic()?;
 
-        let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.handle());
-        let has_faults = self.scenario.concerns_processes();
+        let (gone_sender, gone) = std::sync::mpsc::channel();
+        let supervisor = Supervisor::new(
+            planned,
+            &folder.file(LOGS),
+            grace,
+            screen.handle(),
+            leftovers,
+            gone_sender,
+        );
         let watch = Watch {
             run: self.run.clone(),
             endpoint: connectable(endpoint),
@@ -384,9 +398,11 @@ impl Launch {
             wants_world,
             screen: screen.handle(),
             faults: supervisor.queue(),
+            gone,
         };
-        let is_needed = !self.options.is_quiet || has_faults || self.options.has_console;
-        let observer = is_needed.then(|| Observer::start(watch));
+        let observer = Observer::start(watch)
+            .into_diagnostic()
+            .wrap_err("the run cannot be observed")?;
         let outcome = runtime
             .block_on(async {
                 signals::listen(&supervisor.queue())?;
@@ -394,9 +410,7 @@ impl Launch {
             })
             .into_diagnostic()?;
 
-        if let Some(observer) = observer {
-            observer.finish();
-        }
+        observer.finish();
         screen.finish();
         Ok(outcome)
     }

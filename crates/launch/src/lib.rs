@@ -10,8 +10,10 @@ pub mod exec;
 mod file;
 mod launched;
 mod launching;
+mod leftovers;
 mod lines;
 mod link;
+mod log;
 pub mod net;
 mod observe;
 mod options;
@@ -27,6 +29,7 @@ mod tail;
 
 pub use ending::{Failure, code_of};
 pub use file::{LaunchFile, Process, is_launch_file, scenario_file};
+pub use leftovers::guard;
 pub use launching::{Launch, LaunchOptions, What};
 pub use link::{LinkError, ProcessLink};
 pub use options::RunOptions;

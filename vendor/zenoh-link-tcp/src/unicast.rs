@@ -74,9 +74,7 @@ impl LinkUnicastTcp {
 
         // Set the TCP linger option
         #[allow(deprecated)]
-        if let Err(err) = socket.set_linger(Some(Duration::from_secs(
-            (*TCP_LINGER_TIMEOUT).try_into().unwrap(),
-        ))) {
+        if let Err(err) = socket.set_linger(Some(Duration::from_secs(TCP_LINGER_TIMEOUT))) {
             tracing::warn!(
                 "Unable to set LINGER option on TCP link {} => {}: {}",
                 src_addr,
