@@ -14,6 +14,7 @@ mod export;
 mod fork;
 mod hunt;
 mod init;
+mod kind;
 mod launch;
 mod man;
 mod named;
@@ -21,6 +22,7 @@ mod net;
 mod new;
 mod output;
 mod programs;
+mod remarks;
 mod replay;
 mod replay_robot;
 mod report;
@@ -65,7 +67,7 @@ enum Subcommands {
     ///
     /// The exit status is 0 if nothing was found, and 1 if an expectation failed.
     Hunt(hunt::HuntArgs),
-    /// Check scenario and launch files without running anything.
+    /// Check files of every kind without running anything.
     Check(check::CheckArgs),
     /// Execute a recorded run again in this process, and compare it with its record tick by tick.
     Verify(verify::VerifyArgs),

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use bus::check_exposure;
 use bus::endpoint::connectable;
+use bus::{check_exposure, check_run};
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use miette::{IntoDiagnostic, WrapErr, miette};
@@ -131,6 +131,9 @@ impl Launch {
         options: LaunchOptions,
     ) -> miette::Result<Self> {
         let secured = secured(&options, &file)?;
+        if let Some(secured) = &secured {
+            check_run(&secured.config_of(file::SIMULATOR), &run).into_diagnostic()?;
+        }
 
         Ok(Self {
             what,
@@ -278,7 +281,8 @@ impl Launch {
             return Ok(endpoint.clone());
         }
 
-        let port = match self.options.connect_port {
+        // Port 0 is any free one, as for other programs.
+        let port = match self.options.connect_port.filter(|port| *port != 0) {
             Some(port) => port,
             None => endpoint::free_port()
                 .into_diagnostic()
@@ -312,7 +316,8 @@ impl Launch {
     /// outcome.
     pub fn play(&self, mut notice: impl FnMut(&str)) -> miette::Result<(Outcome, RunFolder)> {
         // A free port may be taken before the simulator binds it, if only by a connection that has ended since.
-        let may_choose = self.options.listen.is_none() && self.options.connect_port.is_none();
+        let is_chosen = self.options.connect_port.is_some_and(|port| port != 0);
+        let may_choose = self.options.listen.is_none() && !is_chosen;
         let mut ports_left = if may_choose { PORTS } else { 1 };
         loop {
             let endpoint = self.endpoint()?;
