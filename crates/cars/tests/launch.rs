@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use nix::sys::signal::{Signal, kill};
+use nix::sys::signal::{SigSet, Signal, kill};
 use nix::unistd::Pid;
 
 const SCENARIO: &str = "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n";
@@ -281,6 +281,22 @@ fn a_program_that_is_nowhere_is_said_before_anything_starts() {
 
     assert_eq!(output.status.code(), Some(1));
     assert!(!folder.path("started").exists());
+}
+
+#[test]
+fn a_program_starts_with_no_signal_blocked() {
+    let asking: SigSet = [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP]
+        .into_iter()
+        .collect();
+    asking.thread_block().unwrap();
+    let parent = std::process::id().to_string();
+    let output = Command::new(env!("CARGO_BIN_EXE_cars"))
+        .args(["child", &parent, "--", "cat", "/proc/self/status"])
+        .output();
+    asking.thread_unblock().unwrap();
+
+    let status = text(&output.unwrap().stdout);
+    assert!(status.contains("SigBlk:\t0000000000000000"), "{status}");
 }
 
 #[test]
