@@ -81,8 +81,9 @@ fn advise(endpoint: &str, reason: &str) -> String {
     };
 
     let address = address.trim_matches('/');
-    let is_address = host_and_port(address)
-        .is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0));
+    let is_address = host_and_port(address).is_some_and(|(host, port)| {
+        !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0)
+    });
     let meant = if is_address { address } else { "HOST:PORT" };
     format!("{endpoint:?} is not an endpoint: {reason}; write {protocol}/{meant}")
 }
@@ -237,7 +238,10 @@ mod tests {
             ("http://127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
             ("https://hall:7447", "write tls/hall:7447"),
             ("ws/127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
-            ("udp/127.0.0.1:7447", "the protocols are tcp, tls, unixsock-stream"),
+            (
+                "udp/127.0.0.1:7447",
+                "the protocols are tcp, tls, unixsock-stream",
+            ),
             ("TCP/127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
             ("127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
             ("localhost:7447", "write tcp/localhost:7447"),

@@ -731,7 +731,10 @@ pub fn check_run(file: &Path, run: &RunName) -> Result<(), BusError> {
     for rule in rules {
         let keys = rule.get("key_exprs").and_then(serde_json::Value::as_array);
         for key in keys.into_iter().flatten().filter_map(|key| key.as_str()) {
-            match key.strip_prefix("cars/").and_then(|rest| rest.split('/').next()) {
+            match key
+                .strip_prefix("cars/")
+                .and_then(|rest| rest.split('/').next())
+            {
                 Some(name) if name != "*" && name != "**" => admitted.insert(name.to_owned()),
                 _ => return Ok(()),
             };
@@ -915,7 +918,10 @@ mod tests {
         std::fs::write(&file, one).unwrap();
         assert!(check_run(&file, &run("one")).is_ok());
         let refused = check_run(&file, &run("two")).unwrap_err().to_string();
-        assert!(refused.contains("for run one, and this is run two"), "{refused}");
+        assert!(
+            refused.contains("for run one, and this is run two"),
+            "{refused}"
+        );
 
         let any = simulator_config(&Keys::of_any_run(), &robots(), &credentials());
         std::fs::write(&file, any).unwrap();

@@ -100,7 +100,9 @@ fn describe_parameters(path: &Path) -> miette::Result<String> {
         .iter()
         .find(|class| class.eq_ignore_ascii_case(stem));
     let Some(class) = class else {
-        return Ok(format!("{number}, for a class that decides about them itself"));
+        return Ok(format!(
+            "{number}, for a class that decides about them itself"
+        ));
     };
 
     let scenario = Scenario::parse(&scenario_with(class, path), Path::new(""))?;
@@ -120,7 +122,10 @@ fn scenario_with(class: &str, parameters: &Path) -> Source {
     let parameters = toml::Value::from(parameters.display().to_string());
     let mut text = String::new();
     for (index, name) in robots::CLASSES.iter().enumerate() {
-        text += &format!("[[robot]]\nname = \"{name}\"\nat = [\"{} m\", \"5 m\"]\n", 2 + 2 * index);
+        text += &format!(
+            "[[robot]]\nname = \"{name}\"\nat = [\"{} m\", \"5 m\"]\n",
+            2 + 2 * index
+        );
         if *name == class {
             text += &format!("params_from = {parameters}\n");
         }

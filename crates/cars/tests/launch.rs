@@ -327,12 +327,18 @@ fn an_endpoint_that_nobody_could_use_is_refused_before_anything_is_made() {
         let stderr = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{stderr}");
         // Words are wrapped.
-        let words: Vec<&str> = stderr.split_whitespace().filter(|word| *word != "│").collect();
+        let words: Vec<&str> = stderr
+            .split_whitespace()
+            .filter(|word| *word != "│")
+            .collect();
         assert!(words.join(" ").contains(reason), "{stderr}");
         assert!(!folder.path("started").exists() && !folder.path("runs").exists());
     }
 
-    let output = folder.cars(&["--dry-run", "--connect-port", "0"]).output().unwrap();
+    let output = folder
+        .cars(&["--dry-run", "--connect-port", "0"])
+        .output()
+        .unwrap();
     let stdout = text(&output.stdout);
     assert!(stdout.contains("--listen=tcp/127.0.0.1:"), "{stdout}");
     assert!(!stdout.contains("--listen=tcp/127.0.0.1:0 "), "{stdout}");
@@ -347,7 +353,11 @@ fn check(folder: &Folder, files: &[&str]) -> (String, String, bool) {
         .args(files)
         .output()
         .unwrap();
-    (text(&output.stdout), text(&output.stderr), output.status.success())
+    (
+        text(&output.stdout),
+        text(&output.stderr),
+        output.status.success(),
+    )
 }
 
 #[test]
@@ -358,12 +368,21 @@ fn check_reads_files_of_every_kind() {
         "links.toml",
         "[[link_fault]]\nrobot = \"Rosie\"\nat = \"1 s\"\nfor = \"2 s\"\ndo = \"cut\"\n",
     );
-    write("butler.toml", "refiller = \"Leguin\"\ntreat_capacity = 12\n");
+    write(
+        "butler.toml",
+        "refiller = \"Leguin\"\ntreat_capacity = 12\n",
+    );
     write("rosie.toml", "pace = \"1 ft/s\"\n");
     write("roster.txt", "# two\nButler\n\nLeguin\n");
     write("CARSConfig", "Butler\n");
 
-    let files = ["links.toml", "butler.toml", "rosie.toml", "roster.txt", "CARSConfig"];
+    let files = [
+        "links.toml",
+        "butler.toml",
+        "rosie.toml",
+        "roster.txt",
+        "CARSConfig",
+    ];
     let (stdout, stderr, is_good) = check(&folder, &files);
     assert!(is_good, "{stderr}");
     let expected = "ok links.toml: 1 fault of a link\n\
@@ -373,7 +392,10 @@ fn check_reads_files_of_every_kind() {
                     ok CARSConfig: a roster: 1 robot, 100 guests, 1200 ticks\n";
     assert_eq!(stdout, expected);
 
-    write("links.toml", "[[link_fault]]\nrobot = \"Rosie\"\nat = \"1 s\"\nfor = \"0 s\"\ndo = \"cut\"\n");
+    write(
+        "links.toml",
+        "[[link_fault]]\nrobot = \"Rosie\"\nat = \"1 s\"\nfor = \"0 s\"\ndo = \"cut\"\n",
+    );
     write("butler.toml", "policy = \"nonsense\"\n");
     write("roster.txt", "Butler\n../Leguin\n");
     for (file, reason) in [

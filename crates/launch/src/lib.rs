@@ -29,8 +29,8 @@ mod tail;
 
 pub use ending::{Failure, code_of};
 pub use file::{LaunchFile, Process, is_launch_file, scenario_file};
-pub use leftovers::guard;
 pub use launching::{Launch, LaunchOptions, What};
+pub use leftovers::guard;
 pub use link::{LinkError, ProcessLink};
 pub use options::RunOptions;
 pub use plan::{CommandLine, Part, Planned};

@@ -227,7 +227,10 @@ mod tests {
         let text = read(folder.path());
         assert!(text.len() <= 10_000, "{}", text.len());
         let kept = text.bytes().filter(|byte| *byte == b'x').count();
-        assert!(text.contains(&format!("[{} bytes", 700_000 - kept)), "{text}");
+        assert!(
+            text.contains(&format!("[{} bytes", 700_000 - kept)),
+            "{text}"
+        );
     }
 
     #[test]

@@ -389,8 +389,7 @@ mod tests {
     fn shown(look: ScreenOptions, show: impl FnOnce(&ScreenHandle)) -> (String, String) {
         let out = Buffer::default();
         let err = Buffer::default();
-        let screen =
-            Screen::to(look, Box::new(out.clone()), Box::new(err.clone()), None).unwrap();
+        let screen = Screen::to(look, Box::new(out.clone()), Box::new(err.clone()), None).unwrap();
         show(&screen.handle());
         screen.finish();
         (out.text(), err.text())

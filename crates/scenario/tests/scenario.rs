@@ -439,7 +439,11 @@ fn people_are_told_what_is_rounded_and_what_never_begins() {
     ] {
         let remarks = remarks(text);
         assert_eq!(remarks.len(), 1, "{text}: {remarks:?}");
-        assert!(remarks[0].contains(&format!("hall.toml{place}")), "{}", remarks[0]);
+        assert!(
+            remarks[0].contains(&format!("hall.toml{place}")),
+            "{}",
+            remarks[0]
+        );
         assert!(remarks[0].contains(words), "{}", remarks[0]);
     }
 }
@@ -454,15 +458,24 @@ fn what_lies_between_two_ticks_is_refused_with_the_reason() {
         shown(&parse(&text).unwrap_err())
     };
     let between = partition("10.1 s", "10.2 s");
-    assert!(between.contains("there is no tick from 10.1 s to 10.2 s"), "{between}");
+    assert!(
+        between.contains("there is no tick from 10.1 s to 10.2 s"),
+        "{between}"
+    );
     assert!(between.contains("both count as tick 20"), "{between}");
     assert!(between.contains("hall.toml:4:9"), "{between}");
     let backwards = partition("10.2 s", "10.1 s");
-    assert!(backwards.contains("it ends before it begins"), "{backwards}");
+    assert!(
+        backwards.contains("it ends before it begins"),
+        "{backwards}"
+    );
 
     let fault = format!(
         "on_late = \"continue\"\n[[fault]]\nrobot = \"A\"\ndo = \"hang\"\nat = \"10.1 s\"\nuntil = \"10.2 s\"\n{robots}"
     );
     let fault = shown(&parse(&fault).unwrap_err());
-    assert!(fault.contains("there is no tick from 10.1 s to 10.2 s"), "{fault}");
+    assert!(
+        fault.contains("there is no tick from 10.1 s to 10.2 s"),
+        "{fault}"
+    );
 }

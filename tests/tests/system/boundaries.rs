@@ -513,9 +513,18 @@ fn the_configuration_of_cargo_has_only_what_builds_and_tests_here_need() {
     assert_eq!(variables, ["CFLAGS", "RUST_TEST_THREADS"]);
 
     for (file, constant) in [
-        ("vendor/zenoh-link-tcp/src/lib.rs", "const TCP_LINGER_TIMEOUT: u64 = 0;"),
-        ("vendor/zenoh-link-tls/src/lib.rs", "const TLS_LINGER_TIMEOUT: u64 = 0;"),
-        ("vendor/zenoh-link-tls/src/lib.rs", "const TLS_ACCEPT_THROTTLE_TIME: u64 = 1000;"),
+        (
+            "vendor/zenoh-link-tcp/src/lib.rs",
+            "const TCP_LINGER_TIMEOUT: u64 = 0;",
+        ),
+        (
+            "vendor/zenoh-link-tls/src/lib.rs",
+            "const TLS_LINGER_TIMEOUT: u64 = 0;",
+        ),
+        (
+            "vendor/zenoh-link-tls/src/lib.rs",
+            "const TLS_ACCEPT_THROTTLE_TIME: u64 = 1000;",
+        ),
     ] {
         let text = std::fs::read_to_string(root().join(file)).unwrap();
         assert!(text.contains(constant), "{constant} is not in {file}");

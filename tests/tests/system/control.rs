@@ -329,7 +329,14 @@ fn orders_are_carried_out_whatever_a_launch_prints() {
 fn a_run_with_orders_is_resumed_without_a_word_and_without_a_console() {
     let lab = Lab::new();
     let run = "orders-resumed";
-    let quiet = ["--duration", "30 s", "--speed", "max", "--quiet", "--no-console"];
+    let quiet = [
+        "--duration",
+        "30 s",
+        "--speed",
+        "max",
+        "--quiet",
+        "--no-console",
+    ];
     let mut launch = paused(&lab, run, &quiet);
     lab.step(run, 10);
     lab.ctl(run, &["restart", "Leguin"]);
@@ -340,7 +347,15 @@ fn a_run_with_orders_is_resumed_without_a_word_and_without_a_console() {
 
     let mut launch = lab.start(
         run,
-        &["launch", "--resume", run, "--quiet", "--no-console", "--speed", "max"],
+        &[
+            "launch",
+            "--resume",
+            run,
+            "--quiet",
+            "--no-console",
+            "--speed",
+            "max",
+        ],
     );
     launch.finish();
     assert_eq!(lab.summary(run)["ticks"], 60);

@@ -14,7 +14,10 @@ fn launch_file(lab: &Lab, status: u8, more: &str) -> String {
     let text = format!(
         "scenario = {:?}\n[[process]]\nname = \"Butler\"\ncommand = [\"cars-butler\"]\n\
          [[process]]\nname = \"Leguin\"\ncommand = [\"sh\", \"-c\", '''{script}''']\n{more}\n",
-        root().join("configs/hors_doeuvres.toml").display().to_string()
+        root()
+            .join("configs/hors_doeuvres.toml")
+            .display()
+            .to_string()
     );
     lab.write("launch.toml", &text).to_str().unwrap().to_owned()
 }
@@ -23,14 +26,33 @@ fn launch_file(lab: &Lab, status: u8, more: &str) -> String {
 fn a_run_ends_and_names_the_robot_that_no_process_follows() {
     for (run, status, more, because) in [
         ("ended-well", 0, "", "ended with exit status 0"),
-        ("ended-quiet", 0, "restart = \"on-failure\"", "ended with exit status 0"),
-        ("ended-optional", 3, "required = false", "ended with exit status 3"),
+        (
+            "ended-quiet",
+            0,
+            "restart = \"on-failure\"",
+            "ended with exit status 0",
+        ),
+        (
+            "ended-optional",
+            3,
+            "required = false",
+            "ended with exit status 3",
+        ),
     ] {
         let lab = Lab::new();
         let file = launch_file(&lab, status, more);
         let mut launch = lab.start(
             run,
-            &["launch", &file, "--duration", "600 s", "--speed", "10", "--no-console", "--paused"],
+            &[
+                "launch",
+                &file,
+                "--duration",
+                "600 s",
+                "--speed",
+                "10",
+                "--no-console",
+                "--paused",
+            ],
         );
         lab.until_ready(run);
         lab.step(run, 5);
@@ -45,7 +67,10 @@ fn a_run_ends_and_names_the_robot_that_no_process_follows() {
         );
 
         let events = lab.events(run);
-        let end = events.iter().rev().find(|event| event.to_string().contains("waited_for"));
+        let end = events
+            .iter()
+            .rev()
+            .find(|event| event.to_string().contains("waited_for"));
         let end = end.unwrap_or_else(|| panic!("{events:?}")).to_string();
         assert!(end.contains("Leguin") && end.contains(because), "{end}");
     }
@@ -59,8 +84,16 @@ fn where_the_clock_does_not_wait_the_run_goes_on_without_it() {
     let mut launch = lab.start(
         run,
         &[
-            "launch", &file, "--duration", "60 s", "--speed", "max", "--no-console", "--paused",
-            "--set", "on_late=\"continue\"",
+            "launch",
+            &file,
+            "--duration",
+            "60 s",
+            "--speed",
+            "max",
+            "--no-console",
+            "--paused",
+            "--set",
+            "on_late=\"continue\"",
         ],
     );
     lab.until_ready(run);

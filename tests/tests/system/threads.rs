@@ -10,9 +10,20 @@ const NOBODY_ELSE: &str = "54321";
 /// A program of the project as a user who may have no further thread.
 fn without_threads(program: &str, args: &[&str]) -> Command {
     let mut command = Command::new("setpriv");
-    let user = ["--reuid", NOBODY_ELSE, "--regid", NOBODY_ELSE, "--clear-groups"];
-    command.args(user).args(["sh", "-c", "ulimit -u 1; exec \"$0\" \"$@\""]);
-    command.arg(programs().join(program)).args(args).current_dir(root());
+    let user = [
+        "--reuid",
+        NOBODY_ELSE,
+        "--regid",
+        NOBODY_ELSE,
+        "--clear-groups",
+    ];
+    command
+        .args(user)
+        .args(["sh", "-c", "ulimit -u 1; exec \"$0\" \"$@\""]);
+    command
+        .arg(programs().join(program))
+        .args(args)
+        .current_dir(root());
     command
 }
 
@@ -44,7 +55,11 @@ fn no_threads_are_an_error_and_no_panic() {
     for (program, args) in programs {
         let output = without_threads(program, args).output().unwrap();
         let stderr = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{program} {args:?}: {stderr}");
+        assert_eq!(
+            output.status.code(),
+            Some(1),
+            "{program} {args:?}: {stderr}"
+        );
         assert!(!stderr.contains("panicked"), "{program} {args:?}: {stderr}");
         assert!(
             stderr.contains("thread") || stderr.contains("temporarily unavailable"),

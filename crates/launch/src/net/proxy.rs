@@ -443,7 +443,12 @@ mod tests {
     #[test]
     fn addresses_are_endpoints() {
         assert!(address("tcp/127.0.0.1:7447").is_ok());
-        for bad in ["127.0.0.1:7447", "tcp/localhost", "udp/127.0.0.1:1", "http://127.0.0.1:1"] {
+        for bad in [
+            "127.0.0.1:7447",
+            "tcp/localhost",
+            "udp/127.0.0.1:1",
+            "http://127.0.0.1:1",
+        ] {
             let refused = address(bad).unwrap_err().to_string();
             assert!(refused.contains("not an address such as"), "{refused}");
         }

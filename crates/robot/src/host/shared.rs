@@ -386,7 +386,10 @@ impl Inner {
         );
         self.file(
             name,
-            vec![Action::SetTimer(RobotTimer::JoinPatience, self.join_patience)],
+            vec![Action::SetTimer(
+                RobotTimer::JoinPatience,
+                self.join_patience,
+            )],
         );
         true
     }
