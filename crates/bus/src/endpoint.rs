@@ -22,6 +22,72 @@ fn host_and_port(address: &str) -> Option<(&str, &str)> {
     Some((bare.unwrap_or(host), port))
 }
 
+/// The protocols of endpoints, as this project has them compiled.
+const PROTOCOLS: [&str; 3] = ["tcp", TLS, SOCKET_FILE];
+/// Protocol of socket files, the address of which is a path.
+const SOCKET_FILE: &str = "unixsock-stream";
+
+/// Checks that sessions can listen or connect at an endpoint.
+///
+/// ```
+/// use bus::endpoint::check;
+/// assert!(check("tcp/127.0.0.1:7447").is_ok());
+/// assert!(check("tcp://127.0.0.1:7447").unwrap_err().contains("write tcp/127.0.0.1:7447"));
+/// ```
+///
+/// # Errors
+/// What is wrong with it, and how it is written.
+pub fn check(endpoint: &str) -> Result<(), String> {
+    let Some((protocol, address)) = parts(endpoint) else {
+        return Err(advise(endpoint, "it does not begin with a protocol"));
+    };
+    if endpoint.contains("://") {
+        return Err(advise(endpoint, "it is not written as a URL"));
+    }
+    if !PROTOCOLS.contains(&protocol) {
+        let reason = format!("the protocols are {}", PROTOCOLS.join(", "));
+        return Err(advise(endpoint, &reason));
+    }
+    if protocol == SOCKET_FILE {
+        return if address.is_empty() {
+            Err(format!("{endpoint:?} names no socket file"))
+        } else {
+            Ok(())
+        };
+    }
+
+    let (host, port) = host_and_port(address).unwrap_or((address, ""));
+    if host.is_empty() {
+        return Err(advise(endpoint, "it has no host"));
+    }
+    match port.parse::<u16>() {
+        Ok(0) => Err(format!(
+            "{endpoint:?} has port 0, which is any free port, and the others could not know which: name one from 1 to 65535"
+        )),
+        Ok(_) => Ok(()),
+        Err(_) => Err(advise(endpoint, "it has no port from 1 to 65535")),
+    }
+}
+
+/// What is wrong with an endpoint, and how it may have been meant.
+fn advise(endpoint: &str, reason: &str) -> String {
+    let (protocol, address) = match endpoint.split_once("://") {
+        Some((protocol, address)) => (protocol, address),
+        None => endpoint.split_once('/').unwrap_or(("", endpoint)),
+    };
+    let protocol = match protocol {
+        TLS | "https" | "wss" => TLS,
+        _ => "tcp",
+    };
+
+    let address = address.trim_matches('/');
+    let is_address = host_and_port(address).is_some_and(|(host, port)| {
+        !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0)
+    });
+    let meant = if is_address { address } else { "HOST:PORT" };
+    format!("{endpoint:?} is not an endpoint: {reason}; write {protocol}/{meant}")
+}
+
 /// Whether what is said there is encrypted.
 #[must_use]
 pub fn is_tls(endpoint: &str) -> bool {
@@ -85,7 +151,7 @@ pub fn is_local(endpoint: &str) -> bool {
     let Some((protocol, address)) = parts(endpoint) else {
         return false;
     };
-    if protocol == "unixsock-stream" {
+    if protocol == SOCKET_FILE {
         return true;
     }
     let is_loopback = |host: &str| match host.parse::<IpAddr>() {
@@ -149,6 +215,51 @@ mod tests {
             "",
         ] {
             assert!(!is_local(reachable), "{reachable}");
+        }
+    }
+
+    #[test]
+    fn endpoints_that_nobody_could_use_are_refused_with_advice() {
+        for good in [
+            "tcp/127.0.0.1:7447",
+            "tcp/[::1]:7447",
+            "tls/hall.example:1",
+            "tcp/localhost:65535?rel=1#so_sndbuf=65000",
+            "unixsock-stream//tmp/cars.sock",
+            "unixsock-stream/x.sock",
+        ] {
+            assert_eq!(check(good), Ok(()), "{good}");
+        }
+
+        for (bad, advice) in [
+            ("tcp://127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
+            ("tcp://localhost:7447/", "write tcp/localhost:7447"),
+            ("tls://hall.example:7447", "write tls/hall.example:7447"),
+            ("http://127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
+            ("https://hall:7447", "write tls/hall:7447"),
+            ("ws/127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
+            (
+                "udp/127.0.0.1:7447",
+                "the protocols are tcp, tls, unixsock-stream",
+            ),
+            ("TCP/127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
+            ("127.0.0.1:7447", "write tcp/127.0.0.1:7447"),
+            ("localhost:7447", "write tcp/localhost:7447"),
+            ("7447", "write tcp/HOST:PORT"),
+            ("tcp/127.0.0.1", "no port"),
+            ("tcp/127.0.0.1:", "no port"),
+            ("tcp/127.0.0.1:65536", "no port"),
+            ("tcp/127.0.0.1:-1", "no port"),
+            ("tcp/:7447", "no host"),
+            ("tcp/[]:7447", "no host"),
+            ("tcp/127.0.0.1:0", "any free port"),
+            ("tls/[::1]:00", "any free port"),
+            ("tcp/127.0.0.1:0#so_sndbuf=65000", "any free port"),
+            ("unixsock-stream/", "no socket file"),
+            ("", "write tcp/HOST:PORT"),
+        ] {
+            let refused = check(bad).unwrap_err();
+            assert!(refused.contains(advice), "{bad}: {refused}");
         }
     }
 

@@ -15,6 +15,31 @@ pub enum BusError {
         /// The reason, from the middleware.
         reason: String,
     },
+    /// An endpoint cannot be used, for this reason.
+    #[error("{0}")]
+    BadEndpoint(String),
+    /// The access control of a configuration file is that of other runs.
+    #[error(
+        "the certificates in {file} are for run {admitted}, and this is run {run}: say --run {admitted}, or make others by \
+         `cars secure init` with --run {run}, or without --run for any run"
+    )]
+    OtherRun {
+        /// The configuration file.
+        file: String,
+        /// The run.
+        run: String,
+        /// The runs that it admits.
+        admitted: String,
+    },
+    /// The file with a private key can be changed by others.
+    #[error("{0}")]
+    Unprotected(String),
+    /// The system starts no further threads.
+    #[error(
+        "no thread can be started for the network: {0}; the limits of processes and threads (`ulimit -u`, pids.max of the \
+         control group) are reached"
+    )]
+    NoThreads(std::io::Error),
     /// A simulator would be open to a network.
     #[error(
         "{0} can be reached from other machines, and every process that reaches it may control the run and pose as any robot; \

@@ -9,6 +9,7 @@ mod declared;
 pub mod endpoint;
 mod error;
 mod middleware;
+mod protection;
 mod qos;
 mod reason;
 mod reply;
@@ -21,7 +22,8 @@ pub use protocol::DEFAULT_ENDPOINT;
 
 pub use declared::Declared;
 pub use error::BusError;
-pub use middleware::{Bus, Publisher, Query, check_exposure};
+pub use middleware::{Bus, Publisher, Query, check_exposure, check_run};
+pub use protection::check_key_file;
 pub use qos::Qos;
 pub use reply::{QUERY_TIMEOUT, Reply};
 pub use role::Role;

@@ -1,10 +1,12 @@
 //! Sessions, publishers and queries, and the configuration of the middleware: the only file of the project that names it.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use protocol::RunName;
 use zenoh::bytes::ZBytes;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::key_expr::KeyExpr;
@@ -14,13 +16,14 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
 
 use crate::declared::Declared;
-use crate::endpoint::{bound_handshakes, is_local, is_tls, texts, with_setting};
+use crate::endpoint::{self, bound_handshakes, is_local, is_tls, texts, with_setting};
 use crate::error::BusError;
+use crate::protection::check_key_file;
 use crate::qos::Qos;
 use crate::reason::reason;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
-use crate::runtime::block;
+use crate::runtime::{block, check_threads};
 use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
 
 /// What else may be the matter with an encrypted endpoint.
@@ -59,8 +62,14 @@ impl Bus {
     /// and where to listen or connect in either case.
     ///
     /// # Errors
-    /// [`BusError::Open`] names the address that was tried and what went wrong.
+    /// [`BusError::Open`] names the address that was tried and what went wrong; other errors were found before it was tried.
     pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
+        for endpoint in role.endpoints() {
+            endpoint::check(endpoint).map_err(BusError::BadEndpoint)?;
+        }
+        if let Some(file) = overrides {
+            check_key_files(file)?;
+        }
         let (doing, endpoint) = match role {
             Role::Router {
                 listen,
@@ -98,6 +107,7 @@ impl Bus {
             reason,
         };
         let config = configuration(role, overrides).map_err(&failed)?;
+        check_threads().map_err(BusError::NoThreads)?;
         // The middleware tries again without a word when certificates do not fit.
         let hint = if is_tls(&endpoint) { TLS_HINT } else { "" };
         let session = zenoh::open(config)
@@ -620,6 +630,39 @@ fn from_file(file: &Path) -> Result<Config, String> {
     Config::from_file(file).map_err(|error| format!("{}: {}", file.display(), reason(&error)))
 }
 
+/// Settings with private keys: the keys themselves, or the names of files.
+const KEYS: [(&str, &str); 2] = [
+    (
+        "transport/link/tls/connect_private_key_base64",
+        "transport/link/tls/connect_private_key",
+    ),
+    (
+        "transport/link/tls/listen_private_key_base64",
+        "transport/link/tls/listen_private_key",
+    ),
+];
+
+/// Checks who may read and change the private keys of a configuration file. One that cannot be read is reported where it is used.
+fn check_key_files(file: &Path) -> Result<(), BusError> {
+    let Ok(config) = from_file(file) else {
+        return Ok(());
+    };
+    let text = |key: &str| match read(&config, key) {
+        Ok(serde_json::Value::String(text)) => Some(text),
+        _ => None,
+    };
+
+    if KEYS.iter().any(|(key, _)| text(key).is_some()) {
+        check_key_file(file)?;
+    }
+    for (_, named) in KEYS {
+        if let Some(key_file) = text(named) {
+            check_key_file(Path::new(&key_file))?;
+        }
+    }
+    Ok(())
+}
+
 /// An endpoint to listen at, with what an encrypted one needs in addition.
 fn listener(endpoint: &str) -> String {
     if is_tls(endpoint) {
@@ -643,13 +686,14 @@ fn relay_listens(listen: &[String], overrides: Option<&PathBuf>) -> Result<Vec<S
 /// Refuses to listen where strangers could connect, unless they need certificates, or `trusts_network`.
 ///
 /// # Errors
-/// [`BusError::Exposed`] says what it would mean, and what to do. [`BusError::Unencrypted`] if the configuration has
+/// [`BusError::BadEndpoint`] if it cannot be listened at. [`BusError::Exposed`] says what it would mean, and what to do. [`BusError::Unencrypted`] if the configuration has
 /// access control and the endpoint no certificates: it would refuse every client.
 pub fn check_exposure(
     listen: &str,
     overrides: Option<&PathBuf>,
     trusts_network: bool,
 ) -> Result<(), BusError> {
+    endpoint::check(listen).map_err(BusError::BadEndpoint)?;
     let guards = match overrides {
         Some(file) => guards(file).map_err(|reason| BusError::Open {
             doing: "listen at",
@@ -669,6 +713,41 @@ pub fn check_exposure(
     }
 
     Err(BusError::Exposed(listen.to_owned()))
+}
+
+/// Checks that the access control of a configuration file, if there is one, admits a run.
+///
+/// # Errors
+/// [`BusError::OtherRun`] if it admits other runs only: no robot could join.
+pub fn check_run(file: &Path, run: &RunName) -> Result<(), BusError> {
+    let Ok(config) = from_file(file) else {
+        return Ok(()); // Reported where it is used.
+    };
+    let Ok(serde_json::Value::Array(rules)) = read(&config, "access_control/rules") else {
+        return Ok(());
+    };
+
+    let mut admitted = BTreeSet::new();
+    for rule in rules {
+        let keys = rule.get("key_exprs").and_then(serde_json::Value::as_array);
+        for key in keys.into_iter().flatten().filter_map(|key| key.as_str()) {
+            match key
+                .strip_prefix("cars/")
+                .and_then(|rest| rest.split('/').next())
+            {
+                Some(name) if name != "*" && name != "**" => admitted.insert(name.to_owned()),
+                _ => return Ok(()),
+            };
+        }
+    }
+    if admitted.is_empty() || admitted.contains(run.as_str()) {
+        return Ok(());
+    }
+    Err(BusError::OtherRun {
+        file: file.display().to_string(),
+        run: run.to_string(),
+        admitted: admitted.into_iter().collect::<Vec<_>>().join(", "),
+    })
 }
 
 /// What a configuration file asks of those who connect.
@@ -825,6 +904,30 @@ mod tests {
             refused(DEFAULT_ENDPOINT, Some(&guarded), false),
             "unencrypted"
         );
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn certificates_of_another_run_are_refused() {
+        let folder = std::env::temp_dir().join(format!("cars-other-run-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("zenoh.json5");
+        let run = |name: &str| RunName::new(name).unwrap();
+
+        let one = simulator_config(&Keys::new(&run("one")), &robots(), &credentials());
+        std::fs::write(&file, one).unwrap();
+        assert!(check_run(&file, &run("one")).is_ok());
+        let refused = check_run(&file, &run("two")).unwrap_err().to_string();
+        assert!(
+            refused.contains("for run one, and this is run two"),
+            "{refused}"
+        );
+
+        let any = simulator_config(&Keys::of_any_run(), &robots(), &credentials());
+        std::fs::write(&file, any).unwrap();
+        assert!(check_run(&file, &run("two")).is_ok());
+        std::fs::write(&file, client_config("Butler", &credentials())).unwrap();
+        assert!(check_run(&file, &run("two")).is_ok());
         std::fs::remove_dir_all(&folder).unwrap();
     }
 

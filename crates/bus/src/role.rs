@@ -30,3 +30,17 @@ pub enum Role {
         trusts_network: bool,
     },
 }
+
+impl Role {
+    /// All endpoints at which it listens, or to which it connects.
+    pub(crate) fn endpoints(&self) -> impl Iterator<Item = &String> {
+        let (listen, connect): (&[String], &[String]) = match self {
+            Self::Router { listen, .. } => (std::slice::from_ref(listen), &[]),
+            Self::Client { connect, .. } => (&[], std::slice::from_ref(connect)),
+            Self::Relay {
+                listen, connect, ..
+            } => (listen, connect),
+        };
+        listen.iter().chain(connect)
+    }
+}

@@ -4,6 +4,8 @@
 //! crosses several threads. One shared worker gave 1.2 to 2 times the ticks per second at half the processor time.
 
 use std::os::unix::process::CommandExt;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::Builder;
 
 /// Environment variable that the middleware reads once, at its first use.
 pub const RUNTIME_VARIABLE: &str = "ZENOH_RUNTIME";
@@ -49,6 +51,35 @@ fn use_threads(wanted: &str) {
     }
     let error = command.args(arguments).env(RUNTIME_VARIABLE, wanted).exec();
     tracing::warn!(%error, "could not apply the lock-step thread set-up");
+}
+
+/// Threads that a session needs, with some to spare.
+const THREADS: usize = 8;
+
+/// Checks that the system starts the threads that the middleware needs: it panics where one cannot be started.
+///
+/// # Errors
+/// The system's reason.
+pub fn check_threads() -> std::io::Result<()> {
+    let all_started = Arc::new(Mutex::new(()));
+    let starting = all_started.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut threads = Vec::new();
+    let mut refused = Ok(());
+    for _ in 0..THREADS {
+        // Each lasts until all have been started, or one could not be.
+        let waits = all_started.clone();
+        match Builder::new().spawn(move || drop(waits.lock())) {
+            Ok(thread) => threads.push(thread),
+            Err(error) => refused = Err(error),
+        }
+    }
+    drop(starting);
+
+    // The system counts a thread until it has ended.
+    for thread in threads {
+        let _ended = thread.join();
+    }
+    refused
 }
 
 /// Whether this process sends on a thread of its own. Then a subscriber may put messages and take its time, and the process

@@ -1,26 +1,29 @@
-//! `cars check`: reads scenario, launch and experiment files as a run does, and runs nothing; compares the record of a run with
+//! `cars check`: reads files of every kind (`kind.rs`) as the commands do that take them, and runs nothing; compares the record of a run with
 //! its seals.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use config::Changes;
-use lab::experiment::{Experiment, Plan, Request, Robots, is_experiment_file};
+use config::{Changes, FileError, Source};
+use lab::experiment::{Experiment, Plan, Request, Robots};
 use lab::inspect::inspect;
-use launch::{LaunchFile, default_run_name, is_launch_file, scenario_file};
-use miette::miette;
-use scenario::Scenario;
+use lab::run::Local;
+use launch::{LaunchFile, default_run_name, scenario_file};
+use miette::{IntoDiagnostic, WrapErr, miette};
+use protocol::RunName;
+use scenario::{Scenario, roster};
 use simulator::RunFolder;
 use simulator::seal::Checked;
 use terminal::OutputError;
 
-use crate::named;
+use crate::kind::Kind;
+use crate::{named, remarks};
 
 /// `cars check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// Scenario files, launch files, experiment files, and folders of runs.
+    /// Scenarios, launch files, experiments, plans of faults of links, parameters of robots, rosters, and folders of runs.
     #[arg(required = true, value_parser = named::any())]
     files: Vec<PathBuf>,
 }
@@ -54,24 +57,97 @@ fn describe(path: &Path) -> miette::Result<String> {
     if path.is_dir() {
         return describe_run(path);
     }
-    if is_experiment_file(path)? {
-        return describe_experiment(path);
+
+    let kind = Kind::of(path)?;
+    if matches!(kind, Kind::Launch | Kind::Scenario) {
+        // As `cars run` and `cars launch` name it.
+        default_run_name(path)?;
     }
 
-    // As `cars run` and `cars launch` name it.
-    default_run_name(path)?;
+    match kind {
+        Kind::Experiment => describe_experiment(path),
+        Kind::Launch => describe_launch(path),
+        Kind::Links => {
+            let faults = launch::net::Plan::check(path)?;
+            Ok(count(faults, "fault of a link", "faults of links"))
+        }
+        Kind::Parameters => describe_parameters(path),
+        Kind::Roster => describe_roster(path),
+        Kind::Scenario => {
+            let changes = Changes::default();
+            let scenario = Scenario::load(path, &changes)?;
+            remarks::show(path, &changes);
+            Ok(content(&scenario))
+        }
+    }
+}
+
+fn describe_launch(path: &Path) -> miette::Result<String> {
     let changes = Changes::default();
-    if !is_launch_file(path)? {
-        let scenario = Scenario::load(path, &changes)?;
-        return Ok(content(&scenario));
-    }
-
     let file = LaunchFile::load(path)?;
     let scenario = file.load_scenario(&changes)?;
     file.check_robots(&scenario)?;
+    remarks::show(&file.scenario, &changes);
+    remarks::show_all(file.remarks(&scenario));
 
     let processes = count(file.processes.len(), "process", "processes");
     Ok(format!("{processes}, {}", content(&scenario)))
+}
+
+/// The parameters of a robot. Where its class comes with the programs, a robot of it takes them.
+fn describe_parameters(path: &Path) -> miette::Result<String> {
+    let source = Source::read(path)?;
+    let table: toml::Table = source.parse()?;
+    let number = count(table.len(), "parameter", "parameters");
+
+    let stem = path.file_stem().and_then(|stem| stem.to_str());
+    let stem = stem.unwrap_or_default();
+    let class = robots::CLASSES
+        .iter()
+        .find(|class| class.eq_ignore_ascii_case(stem));
+    let Some(class) = class else {
+        return Ok(format!(
+            "{number}, for a class that decides about them itself"
+        ));
+    };
+
+    let scenario = Scenario::parse(&scenario_with(class, path), Path::new(""))?;
+    let run = RunName::new("check").into_diagnostic()?;
+    let mut local = Local::new(scenario, &run)?;
+    local
+        .simulation
+        .init(&mut local.robots)
+        .into_diagnostic()
+        .wrap_err_with(|| path.display().to_string())?;
+    Ok(format!("{number}, which {class} takes"))
+}
+
+/// A scenario with a robot of each class; one has the parameters of a file.
+fn scenario_with(class: &str, parameters: &Path) -> Source {
+    let parameters = std::path::absolute(parameters).unwrap_or_else(|_| parameters.to_owned());
+    let parameters = toml::Value::from(parameters.display().to_string());
+    let mut text = String::new();
+    for (index, name) in robots::CLASSES.iter().enumerate() {
+        text += &format!(
+            "[[robot]]\nname = \"{name}\"\nat = [\"{} m\", \"5 m\"]\n",
+            2 + 2 * index
+        );
+        if *name == class {
+            text += &format!("params_from = {parameters}\n");
+        }
+    }
+
+    Source {
+        name: "a scenario with these parameters".to_owned(),
+        text,
+    }
+}
+
+/// A roster, as `cars launch --roster` takes it.
+fn describe_roster(path: &Path) -> miette::Result<String> {
+    let roster = Source::read(path)?;
+    let scenario = Scenario::parse(&roster::scenario_of(&roster)?, Path::new(""))?;
+    Ok(format!("a roster: {}", content(&scenario)))
 }
 
 /// An experiment, every scenario of which has been read, and begun where its robots can run in this process.

@@ -15,9 +15,8 @@ use simulator::RunFolder;
 use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
-use crate::named;
 use crate::replay_robot::open;
-use crate::table;
+use crate::{named, remarks, table};
 
 /// `cars launch`.
 #[derive(Debug, Args)]
@@ -56,7 +55,7 @@ pub(crate) struct LaunchArgs {
     /// Print nothing but warnings and errors.
     #[arg(long, short)]
     quiet: bool,
-    /// Port of the loopback interface at which the simulator listens; without it a free one.
+    /// Port of the loopback interface at which the simulator listens; without it, or with 0, a free one.
     #[arg(long, value_name = "PORT", conflicts_with = "listen")]
     connect_port: Option<u16>,
     /// Where the simulator listens. An address that other machines can reach needs --secure or --insecure.
@@ -161,7 +160,13 @@ impl LaunchArgs {
                 Launch::resume(folder.path(), options)
             }
             (None, Some(roster), _) => Launch::load(What::Roster(roster), options),
-            (None, None, Some(file)) => Launch::load(What::File(file), options),
+            (None, None, Some(file)) => {
+                let changes = options.run.changes();
+                let scenario = launch::scenario_file(&file)?;
+                let launch = Launch::load(What::File(file), options)?;
+                remarks::show(&scenario, &changes);
+                Ok(launch)
+            }
             (None, None, None) => Err(miette!("no file is given")),
         }
     }

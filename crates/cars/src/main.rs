@@ -14,6 +14,7 @@ mod export;
 mod fork;
 mod hunt;
 mod init;
+mod kind;
 mod launch;
 mod man;
 mod named;
@@ -21,6 +22,7 @@ mod net;
 mod new;
 mod output;
 mod programs;
+mod remarks;
 mod replay;
 mod replay_robot;
 mod report;
@@ -35,6 +37,7 @@ mod verify;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use miette::IntoDiagnostic;
 
 /// The Cooperative Affective Robot Simulator.
 ///
@@ -64,7 +67,7 @@ enum Subcommands {
     ///
     /// The exit status is 0 if nothing was found, and 1 if an expectation failed.
     Hunt(hunt::HuntArgs),
-    /// Check scenario and launch files without running anything.
+    /// Check files of every kind without running anything.
     Check(check::CheckArgs),
     /// Execute a recorded run again in this process, and compare it with its record tick by tick.
     Verify(verify::VerifyArgs),
@@ -114,6 +117,12 @@ enum Subcommands {
     Man(man::ManArgs),
     #[command(hide = true)]
     Child(exec::ChildArgs),
+    /// The process beside a launcher that ends what is left if the launcher is killed.
+    #[command(hide = true)]
+    Guard {
+        /// Identifies the launch.
+        launch: String,
+    },
     #[command(hide = true)]
     ReplayRobot(replay_robot::ReplayRobotArgs),
     #[command(hide = true)]
@@ -174,6 +183,10 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Man(args) => man::man(&args, Cli::command()),
 
         Subcommands::Child(args) => Ok(exec::child(&args)),
+        Subcommands::Guard { launch } => {
+            ::launch::guard(&launch).into_diagnostic()?;
+            Ok(ExitCode::SUCCESS)
+        }
         Subcommands::ReplayRobot(args) => replay_robot::take_part(&args),
         Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
         Subcommands::BenchEcho(args) => bench::tcp::echo(&args),

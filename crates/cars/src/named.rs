@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use config::shipped::{self, EXPERIMENTS, LAUNCHES, LINKS, SCENARIOS};
+use config::shipped::{self, EXPERIMENTS, LAUNCHES, LINKS, PARAMETERS, SCENARIOS};
 
 /// A launch file.
 pub(crate) fn launch() -> impl TypedValueParser<Value = PathBuf> {
@@ -22,7 +22,7 @@ pub(crate) fn scenario() -> impl TypedValueParser<Value = PathBuf> {
 
 /// A file of any kind that `cars check` reads.
 pub(crate) fn any() -> impl TypedValueParser<Value = PathBuf> {
-    parser(&[LAUNCHES, SCENARIOS, EXPERIMENTS])
+    parser(&[LAUNCHES, SCENARIOS, EXPERIMENTS, LINKS, PARAMETERS])
 }
 
 /// A plan of faults of real links.

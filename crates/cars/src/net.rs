@@ -106,7 +106,10 @@ fn proxy(args: ProxyArgs) -> miette::Result<ExitCode> {
 
     if let Some(plan) = plan {
         let proxy = proxy.clone();
-        std::thread::spawn(move || play_plan(&proxy, &plan, closes));
+        std::thread::Builder::new()
+            .spawn(move || play_plan(&proxy, &plan, closes))
+            .into_diagnostic()
+            .wrap_err("no thread can be started for the plan")?;
     }
     obey_input(&proxy, closes)?;
 

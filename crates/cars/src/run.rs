@@ -8,8 +8,7 @@ use lab::run::check_faults;
 use scenario::Scenario;
 
 use crate::execution::ExecutionArgs;
-use crate::named;
-use crate::table;
+use crate::{named, remarks, table};
 
 pub(crate) use lab::run::execute;
 
@@ -32,6 +31,7 @@ pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
     let file = launch::scenario_file(&args.file)?;
     let scenario = Scenario::load(&file, &options.changes())?;
     check_faults(&scenario, 0)?;
+    remarks::show(&file, &options.changes());
 
     let run = options.run_name(&args.file)?;
     let made = options.folder(&run, &scenario)?;

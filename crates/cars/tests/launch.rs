@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use nix::sys::signal::{Signal, kill};
+use nix::sys::signal::{SigSet, Signal, kill};
 use nix::unistd::Pid;
 
 const SCENARIO: &str = "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n";
@@ -281,6 +281,164 @@ fn a_program_that_is_nowhere_is_said_before_anything_starts() {
 
     assert_eq!(output.status.code(), Some(1));
     assert!(!folder.path("started").exists());
+}
+
+#[test]
+fn a_program_starts_with_no_signal_blocked() {
+    let asking: SigSet = [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP]
+        .into_iter()
+        .collect();
+    asking.thread_block().unwrap();
+    let parent = std::process::id().to_string();
+    let output = Command::new(env!("CARGO_BIN_EXE_cars"))
+        .args(["child", &parent, "--", "cat", "/proc/self/status"])
+        .output();
+    asking.thread_unblock().unwrap();
+
+    let status = text(&output.unwrap().stdout);
+    assert!(status.contains("SigBlk:\t0000000000000000"), "{status}");
+}
+
+#[test]
+fn nothing_is_left_when_the_launcher_is_killed() {
+    let butler = "sleep 600 & echo $! > $DIR/child; setsid sh -c \"echo \\$\\$ > $DIR/daemon; sleep 600\" & \
+                  until [ -s $DIR/child ] && [ -s $DIR/daemon ]; do sleep 0.01; done; touch $DIR/robot; sleep 600";
+    let folder = Folder::new(IN_ORDER, butler, "");
+    let mut launch = folder.cars(&[]).spawn().unwrap();
+    folder.wait_for("up");
+    folder.wait_for("robot");
+
+    launch.kill().unwrap();
+    launch.wait().unwrap();
+    folder.wait_for("record");
+    assert_gone(&folder.read("child"));
+    assert_gone(&folder.read("daemon"));
+}
+
+#[test]
+fn an_endpoint_that_nobody_could_use_is_refused_before_anything_is_made() {
+    let folder = Folder::new("touch $DIR/started", "true", "");
+    for (listen, reason) in [
+        ("tcp://127.0.0.1:7999", "write tcp/127.0.0.1:7999"),
+        ("127.0.0.1:7999", "write tcp/127.0.0.1:7999"),
+        ("tcp/127.0.0.1:0", "port 0"),
+    ] {
+        let output = folder.cars(&["--listen", listen]).output().unwrap();
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        // Words are wrapped.
+        let words: Vec<&str> = stderr
+            .split_whitespace()
+            .filter(|word| *word != "│")
+            .collect();
+        assert!(words.join(" ").contains(reason), "{stderr}");
+        assert!(!folder.path("started").exists() && !folder.path("runs").exists());
+    }
+
+    let output = folder
+        .cars(&["--dry-run", "--connect-port", "0"])
+        .output()
+        .unwrap();
+    let stdout = text(&output.stdout);
+    assert!(stdout.contains("--listen=tcp/127.0.0.1:"), "{stdout}");
+    assert!(!stdout.contains("--listen=tcp/127.0.0.1:0 "), "{stdout}");
+}
+
+/// Checks files in a folder; returns what is printed to both streams, and whether all can be used.
+fn check(folder: &Folder, files: &[&str]) -> (String, String, bool) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cars"));
+    let output = command
+        .current_dir(folder.0.path())
+        .arg("check")
+        .args(files)
+        .output()
+        .unwrap();
+    (
+        text(&output.stdout),
+        text(&output.stderr),
+        output.status.success(),
+    )
+}
+
+#[test]
+fn check_reads_files_of_every_kind() {
+    let folder = Folder::new("true", "true", "");
+    let write = |name: &str, text: &str| std::fs::write(folder.path(name), text).unwrap();
+    write(
+        "links.toml",
+        "[[link_fault]]\nrobot = \"Rosie\"\nat = \"1 s\"\nfor = \"2 s\"\ndo = \"cut\"\n",
+    );
+    write(
+        "butler.toml",
+        "refiller = \"Leguin\"\ntreat_capacity = 12\n",
+    );
+    write("rosie.toml", "pace = \"1 ft/s\"\n");
+    write("roster.txt", "# two\nButler\n\nLeguin\n");
+    write("CARSConfig", "Butler\n");
+
+    let files = [
+        "links.toml",
+        "butler.toml",
+        "rosie.toml",
+        "roster.txt",
+        "CARSConfig",
+    ];
+    let (stdout, stderr, is_good) = check(&folder, &files);
+    assert!(is_good, "{stderr}");
+    let expected = "ok links.toml: 1 fault of a link\n\
+                    ok butler.toml: 2 parameters, which Butler takes\n\
+                    ok rosie.toml: 1 parameter, for a class that decides about them itself\n\
+                    ok roster.txt: a roster: 2 robots, 100 guests, 1200 ticks\n\
+                    ok CARSConfig: a roster: 1 robot, 100 guests, 1200 ticks\n";
+    assert_eq!(stdout, expected);
+
+    write(
+        "links.toml",
+        "[[link_fault]]\nrobot = \"Rosie\"\nat = \"1 s\"\nfor = \"0 s\"\ndo = \"cut\"\n",
+    );
+    write("butler.toml", "policy = \"nonsense\"\n");
+    write("roster.txt", "Butler\n../Leguin\n");
+    for (file, reason) in [
+        ("links.toml", "more than zero"),
+        ("butler.toml", "nonsense"),
+        ("roster.txt", "roster.txt:2:1"),
+    ] {
+        let (_, stderr, is_good) = check(&folder, &[file]);
+        assert!(!is_good && stderr.contains(reason), "{file}: {stderr}");
+    }
+}
+
+#[test]
+fn a_name_that_looks_like_an_option_is_refused_where_it_is_written() {
+    let folder = Folder::new("true", "true", "");
+    let hall = folder.read("hall.toml").replace("Butler", "--help");
+    std::fs::write(folder.path("hall.toml"), hall).unwrap();
+    let (_, stderr, is_good) = check(&folder, &["hall.toml"]);
+    assert!(!is_good && stderr.contains("begins with '-'"), "{stderr}");
+
+    let launch = folder.read("launch.toml").replace("\"Butler\"", "\"-x\"");
+    std::fs::write(folder.path("launch.toml"), launch).unwrap();
+    let (_, stderr, is_good) = check(&folder, &["launch.toml"]);
+    assert!(!is_good && stderr.contains("launch.toml:7:"), "{stderr}");
+
+    let output = folder.cars(&["--run=--help"]).output().unwrap();
+    assert!(text(&output.stderr).contains("begins with '-'"));
+}
+
+#[test]
+fn check_warns_of_what_may_not_be_meant() {
+    let folder = Folder::new("true", "true", "required = false");
+    let (stdout, stderr, is_good) = check(&folder, &["launch.toml"]);
+    assert!(is_good && stdout.starts_with("ok launch.toml"), "{stderr}");
+    assert!(stderr.contains("launch.toml:9:"), "{stderr}");
+    assert!(stderr.contains("the clock waits for Butler"), "{stderr}");
+
+    let scenario = format!("on_late = \"continue\"\nduration = \"10.2 s\"\n{SCENARIO}");
+    std::fs::write(folder.path("hall.toml"), scenario).unwrap();
+    let (_, stderr, is_good) = check(&folder, &["launch.toml"]);
+    assert!(is_good && !stderr.contains("the clock waits"), "{stderr}");
+    assert!(stderr.contains("hall.toml:2:12"), "{stderr}");
+    assert!(stderr.contains("the run lasts 10 s"), "{stderr}");
 }
 
 #[test]

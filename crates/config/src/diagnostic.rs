@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::Path;
 
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use miette::{Diagnostic, LabeledSpan, NamedSource, Severity, SourceCode};
 use protocol::plain::{escape_line, escape_text};
 
 use crate::shipped;
@@ -18,6 +18,7 @@ const MAX_FILE_BYTES: u64 = 16 << 20;
 #[error("{message}")]
 pub struct FileError {
     message: String,
+    is_warning: bool,
     help: Option<String>,
     place: Option<Box<Place>>,
 }
@@ -30,6 +31,10 @@ struct Place {
 }
 
 impl Diagnostic for FileError {
+    fn severity(&self) -> Option<Severity> {
+        self.is_warning.then_some(Severity::Warning)
+    }
+
     fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
         self.help
             .as_ref()
@@ -54,6 +59,7 @@ impl FileError {
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             message: escape_text(&message.into()),
+            is_warning: false,
             help: None,
             place: None,
         }
@@ -81,8 +87,19 @@ impl FileError {
         };
         Self {
             message: format!("{name} cannot be used"),
+            is_warning: false,
             help: None,
             place: Some(Box::new(place)),
+        }
+    }
+
+    /// A remark about a place in a text that can be used.
+    #[must_use]
+    pub fn warning(source: &Source, span: Option<Range<usize>>, message: &str) -> Self {
+        Self {
+            message: format!("{} may not mean what it says", escape_line(&source.name)),
+            is_warning: true,
+            ..Self::at(source, span, message)
         }
     }
 

@@ -155,6 +155,8 @@ fn open_recording(path: &std::path::Path) -> Result<(Mode, Option<Past>), String
 }
 
 fn build_runtime() -> Result<Runtime, String> {
+    // The runtime panics where a thread cannot be started.
+    bus::runtime::check_threads().map_err(|error| format!("no thread can be started: {error}"))?;
     tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()

@@ -12,6 +12,7 @@ use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::Command;
 
+use nix::sys::signal::SigSet;
 use nix::unistd::getppid;
 
 /// Exit status of shells where a command is not found.
@@ -107,6 +108,11 @@ pub fn become_program(
     let Some((program, rest)) = command.split_first() else {
         return Err(StartError::NoProgram);
     };
+
+    // A parent that blocks signals waits for them itself. A blocked signal stays blocked in a program that does not know of it.
+    if let Err(error) = SigSet::empty().thread_set_mask() {
+        tracing::warn!("this program may not receive all signals: {error}");
+    }
     let error = Command::new(program).args(rest).exec();
     Err(StartError::NotStarted {
         program: program.display().to_string(),

@@ -17,7 +17,7 @@ use robot::{Host, HostError, HostOptions, Stopper};
 
 use crate::ending::code_of;
 use line::EndReason;
-use program::{ASKING, END_PATIENCE, Program};
+use program::{ASKING, END_PATIENCE, Program, start_thread};
 use proxy::Proxy;
 
 /// How long to wait for a signal that has killed the program: a signal to the process group reaches this process, too.
@@ -47,14 +47,14 @@ pub fn exec(
     command: &[OsString],
     silence: &str,
 ) -> miette::Result<Ended> {
-    // All later threads inherit the mask, so only the thread in `listen` receives these signals. The program does not
-    // inherit it.
+    // All later threads inherit the mask, so only the thread in `listen` receives these signals. So does the program, until
+    // `cars child` empties it.
     let asking: SigSet = ASKING.into_iter().collect();
     asking.thread_block().into_diagnostic()?;
 
     let stopper = Arc::new(OnceLock::new());
     let (program, events) = Program::start(name, command, stopper.clone())?;
-    let asked = listen(asking, &program, stopper.clone());
+    let asked = listen(asking, &program, stopper.clone())?;
     let proxy = Box::new(Proxy::new(
         program.clone(),
         events,
@@ -102,10 +102,10 @@ fn listen(
     asking: SigSet,
     program: &Arc<Program>,
     stopper: Arc<OnceLock<Stopper>>,
-) -> Receiver<Signal> {
+) -> miette::Result<Receiver<Signal>> {
     let (sender, asked) = sync_channel(1);
     let program = program.clone();
-    std::thread::spawn(move || {
+    start_thread(move || {
         let Ok(signal) = asking.wait() else { return };
         let _over = sender.send(signal);
         program.interrupt();
@@ -120,6 +120,6 @@ fn listen(
         // The main thread has not ended the process in time, so it hangs.
         program.kill();
         std::process::exit(code_of(signal).into());
-    });
-    asked
+    })?;
+    Ok(asked)
 }

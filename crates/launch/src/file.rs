@@ -10,7 +10,7 @@ use config::speed::SpeedError;
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use protocol::{RobotName, RunName};
-use scenario::Scenario;
+use scenario::{OnLate, Scenario};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -94,6 +94,8 @@ pub struct Process {
     pub backoff: Duration,
     /// Whether its failure ends the run.
     pub is_required: bool,
+    /// Place of `required` in the file.
+    required_span: Option<Range<usize>>,
     /// Whether the user starts it, instead of the launcher.
     pub is_extern: bool,
 }
@@ -160,8 +162,7 @@ struct RawProcess {
     #[serde(default)]
     restart: Restart,
     backoff: Option<Spanned<Time>>,
-    #[serde(default = "yes")]
-    required: bool,
+    required: Option<Spanned<bool>>,
     #[serde(default)]
     r#extern: bool,
 }
@@ -311,6 +312,27 @@ impl LaunchFile {
         Ok(())
     }
 
+    /// What people may want to know of a launch file that can be used: processes that are not required, and for which the clock
+    /// waits all the same.
+    #[must_use]
+    pub fn remarks(&self, scenario: &Scenario) -> Vec<FileError> {
+        let mut remarks = Vec::new();
+        for process in self.processes.iter().filter(|process| !process.is_required) {
+            let robots = process.robots.iter();
+            let mut awaited = robots.filter(|robot| scenario.lateness.of(robot) == OnLate::Wait);
+            if let Some(robot) = awaited.next() {
+                let text = format!(
+                    "the clock waits for {robot}: when this process has ended for good, the run ends"
+                );
+                let remark = FileError::warning(&self.source, process.required_span.clone(), &text);
+                remarks.push(remark.with_help(format!(
+                    "to let the run go on without it, say on_late = \"continue\" in the scenario, for all robots or for {robot}"
+                )));
+            }
+        }
+        remarks
+    }
+
     /// Checks that no process of a secured run has several robots: each robot has a certificate of its own.
     pub(crate) fn check_certificates(&self) -> Result<(), FileError> {
         for process in &self.processes {
@@ -350,6 +372,7 @@ impl Process {
             restart: Restart::Never,
             backoff: BACKOFF,
             is_required: true,
+            required_span: None,
             is_extern: false,
         }
     }
@@ -445,7 +468,8 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
         env: raw.env,
         restart: raw.restart,
         backoff,
-        is_required: raw.required,
+        required_span: raw.required.as_ref().map(Spanned::span),
+        is_required: raw.required.is_none_or(Spanned::into_inner),
         is_extern: raw.r#extern,
         ..Process::new(name.as_str(), check_command(source, raw.command)?)
     })

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use bus::check_exposure;
 use bus::endpoint::connectable;
+use bus::{check_exposure, check_run};
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use miette::{IntoDiagnostic, WrapErr, miette};
@@ -18,10 +18,11 @@ use super::compose;
 use super::endpoint;
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
+use super::leftovers::Leftovers;
 use super::link::ProcessLink;
 use super::observe::{Observer, Watch};
 use super::options::RunOptions;
-use super::plan::{self, Execution, Planned};
+use super::plan::{self, Execution, Part, Planned};
 use super::screen::{Screen, ScreenOptions};
 use super::secure::Secured;
 use super::signals;
@@ -135,6 +136,9 @@ impl Launch {
     ) -> miette::Result<Self> {
         check_texts(what.path(), &options)?;
         let secured = secured(&options, &file)?;
+        if let Some(secured) = &secured {
+            check_run(&secured.config_of(file::SIMULATOR), &run).into_diagnostic()?;
+        }
 
         Ok(Self {
             what,
@@ -315,7 +319,8 @@ impl Launch {
             return Ok(endpoint.clone());
         }
 
-        let port = match self.options.connect_port {
+        // Port 0 is any free one, as for other programs.
+        let port = match self.options.connect_port.filter(|port| *port != 0) {
             Some(port) => port,
             None => endpoint::free_port()
                 .into_diagnostic()
@@ -349,7 +354,8 @@ impl Launch {
     /// outcome.
     pub fn play(&mut self, mut notice: impl FnMut(&str)) -> miette::Result<(Outcome, RunFolder)> {
         // A free port may be taken before the simulator binds it, if only by a connection that has ended since.
-        let may_choose = self.options.listen.is_none() && self.options.connect_port.is_none();
+        let is_chosen = self.options.connect_port.is_some_and(|port| port != 0);
+        let may_choose = self.options.listen.is_none() && !is_chosen;
         let mut ports_left = if may_choose { PORTS } else { 1 };
         let mut endpoint = self.endpoint()?;
         // What cannot be launched leaves no folder.
@@ -400,7 +406,11 @@ impl Launch {
         endpoint: &str,
         folder: &RunFolder,
     ) -> miette::Result<Outcome> {
+        let leftovers = Leftovers::guarded();
         for process in planned.iter_mut().filter(|process| !process.is_extern) {
+            if process.part == Part::Robots {
+                process.command.env.extend([leftovers.mark(&process.name)]);
+            }
             process.tie();
         }
 
@@ -410,14 +420,23 @@ impl Launch {
         let names = planned.iter().map(|planned| planned.name.clone()).collect();
         let look = ScreenOptions::here(names, self.options.is_quiet);
         let wants_world = look.has_bar;
-        let screen = Screen::open(look);
+        let screen = Screen::open(look)
+            .into_diagnostic()
+            .wrap_err("no thread for the terminal")?;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
             .into_diagnostic()?;
 
-        let supervisor = Supervisor::new(planned, &folder.file(LOGS), grace, screen.handle());
-        let has_faults = self.scenario.concerns_processes();
+        let (gone_sender, gone) = std::sync::mpsc::channel();
+        let supervisor = Supervisor::new(
+            planned,
+            &folder.file(LOGS),
+            grace,
+            screen.handle(),
+            leftovers,
+            gone_sender,
+        );
         let watch = Watch {
             run: self.run.clone(),
             endpoint: connectable(endpoint),
@@ -425,9 +444,11 @@ impl Launch {
             wants_world,
             screen: screen.handle(),
             faults: supervisor.queue(),
+            gone,
         };
-        let is_needed = !self.options.is_quiet || has_faults || self.options.has_console;
-        let observer = is_needed.then(|| Observer::start(watch));
+        let observer = Observer::start(watch)
+            .into_diagnostic()
+            .wrap_err("the run cannot be observed")?;
         let outcome = runtime
             .block_on(async {
                 signals::listen(&supervisor.queue())?;
@@ -435,9 +456,7 @@ impl Launch {
             })
             .into_diagnostic()?;
 
-        if let Some(observer) = observer {
-            observer.finish();
-        }
+        observer.finish();
         screen.finish();
         Ok(outcome)
     }

@@ -1,22 +1,25 @@
 //! The launcher as an observer of the run: it subscribes like any observer and takes no part in ticks.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::Builder;
 use std::time::Duration;
 
-use bus::{Bus, BusError, Declared, Role};
+use bus::{Bus, BusError, Declared, Reply, Role};
 use protocol::keys::Keys;
 use protocol::messages::{Control, ControlAnswer, FaultOrder, LogRecord, Phase, WorldFrame};
-use protocol::{RunName, decode, encode};
+use protocol::{RobotName, RunName, decode, encode};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::bar::Progress;
 use super::screen::ScreenHandle;
-use super::supervise::{FaultsDone, SupervisorEvent};
+use super::supervise::{FaultsDone, Gone, SupervisorEvent};
 
 /// How long to try to reach the simulator; as long as robots do.
 const PATIENCE: Duration = Duration::from_secs(20);
+/// Wait before the simulator is told again what it has not answered.
+const REPORT_AGAIN: Duration = Duration::from_millis(200);
 /// How long to wait before reporting robots that have not joined.
 const GATHERING: Duration = Duration::from_secs(1);
 
@@ -31,38 +34,111 @@ pub(super) struct Watch {
     pub(super) screen: ScreenHandle,
     /// The supervisor's queue, for faults of processes: those of the scenario, and those that a person wants.
     pub(super) faults: UnboundedSender<SupervisorEvent>,
+    /// Robots without a process, from the supervisor. Closed when the launch is over.
+    pub(super) gone: Receiver<Gone>,
 }
 
 /// A running observer.
 pub(super) struct Observer {
-    /// Closed when the simulator's token is undeclared, or the observer could not connect.
+    state: Arc<Mutex<State>>,
+    /// Receives a word when the simulator's token is undeclared.
     ended: Receiver<()>,
+}
+
+/// How far an observer has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// It tries to reach the simulator.
+    Connecting,
+    /// It observes.
+    Observing,
+    /// The launch is over.
+    Over,
 }
 
 impl Observer {
     /// Starts to observe as soon as the simulator is reached. Connecting blocks, so it happens on a thread of its own,
-    /// which ends with the process.
-    pub(super) fn start(watch: Watch) -> Self {
+    /// which ends with the process. What a launch does for its simulator, such as faults of processes, depends on it: it
+    /// goes on trying for as long as the launch lasts.
+    ///
+    /// # Errors
+    /// If the system starts no further thread.
+    pub(super) fn start(watch: Watch) -> std::io::Result<Self> {
         let (end, ended) = std::sync::mpsc::channel();
-        std::thread::spawn(move || match watch.open(end) {
-            Ok(_watching) => loop {
-                std::thread::park();
-            },
-            Err(error) => watch
-                .screen
-                .notice(format!("the run cannot be observed: {error}")),
-        });
+        let state = Arc::new(Mutex::new(State::Connecting));
+        let observer = Self {
+            state: state.clone(),
+            ended,
+        };
+        let thread = Builder::new().name("observer".to_owned());
+        thread.spawn(move || watch.observe(&state, &end))?;
 
-        Self { ended }
+        Ok(observer)
     }
 
     /// Waits a short time until everything that the simulator has put is shown.
     pub(super) fn finish(&self) {
-        let _in_time = self.ended.recv_timeout(Duration::from_millis(500));
+        if advance(&self.state, State::Over) == State::Observing {
+            let _in_time = self.ended.recv_timeout(Duration::from_millis(500));
+        }
     }
 }
 
+/// Sets the state, which returns to no earlier one, and returns the one before.
+fn advance(state: &Mutex<State>, next: State) -> State {
+    let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+    let before = *state;
+    if before != State::Over {
+        *state = next;
+    }
+    before
+}
+
 impl Watch {
+    /// Observes until the launch is over.
+    fn observe(self, state: &Mutex<State>, end: &Sender<()>) {
+        while advance(state, State::Connecting) != State::Over {
+            match self.open(end.clone()) {
+                Ok((bus, _declared)) => {
+                    advance(state, State::Observing);
+                    for gone in &self.gone {
+                        self.report(&bus, gone);
+                    }
+                    // The launch is over. What the simulator still puts is shown.
+                    loop {
+                        std::thread::park();
+                    }
+                }
+                Err(error) => self
+                    .screen
+                    .notice(format!("the run cannot be observed: {error}")),
+            }
+        }
+    }
+
+    /// Reports robots without a process to the simulator until it answers, and to people if the run goes on.
+    fn report(&self, bus: &Bus, gone: Gone) {
+        let Gone { robots, because } = gone;
+        let key = Keys::new(&self.run).control();
+        let names: Vec<&str> = robots.iter().map(RobotName::as_str).collect();
+        let text = format!("{} {because}, and no process follows", names.join(", "));
+        let control = encode(&Control::ProcessEnded { robots, because });
+
+        loop {
+            match bus.get(&key, "", Some(control.clone())) {
+                Ok(Some(answer)) => {
+                    // After its end a run needs no robots.
+                    if is_in_progress(&answer) {
+                        self.screen.notice(text);
+                    }
+                    return;
+                }
+                Ok(None) => std::thread::sleep(REPORT_AGAIN),
+                Err(error) => return tracing::warn!("{error}"),
+            }
+        }
+    }
+
     fn open(&self, end: Sender<()>) -> Result<(Bus, Vec<Declared>), BusError> {
         let role = Role::Client {
             connect: self.endpoint.clone(),
@@ -132,12 +208,24 @@ impl Watch {
     }
 }
 
-/// Drops `end` when the simulator's token is undeclared, which wakes [`Observer::finish`].
+/// Whether the run goes on, as an answer to a control request says.
+fn is_in_progress(answer: &Reply) -> bool {
+    let Ok(body) = &answer.result else {
+        return false;
+    };
+    match decode(&answer.key, "the simulator", body) {
+        Ok(ControlAnswer::Done(status)) => status.phase != Phase::Ended,
+        _ => false,
+    }
+}
+
+/// Wakes [`Observer::finish`] when the simulator's token is undeclared.
 fn watch_token(bus: &Bus, keys: &Keys, end: Sender<()>) -> Result<Declared, BusError> {
-    let end = Mutex::new(Some(end));
+    let end = Mutex::new(end);
     bus.liveliness(&keys.alive_sim(), move |_, is_declared| {
-        if !is_declared && let Ok(mut end) = end.lock() {
-            end.take();
+        if !is_declared && let Ok(end) = end.lock() {
+            // The launch may be over.
+            let _woken = end.send(());
         }
     })
 }
@@ -171,9 +259,13 @@ fn subscribe_faults(
 
 /// Sends a control request on a thread of its own: the caller must not wait for the simulator.
 fn get_later(session: Bus, key: String, control: Control) {
-    std::thread::spawn(move || {
+    let get = move || {
         if let Err(error) = session.get(&key, "", Some(encode(&control))) {
             tracing::warn!("{error}");
         }
-    });
+    };
+    // Without an answer the simulator repeats its order.
+    if let Err(error) = Builder::new().spawn(get) {
+        tracing::warn!("the simulator is not answered: {error}");
+    }
 }

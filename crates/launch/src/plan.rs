@@ -25,6 +25,11 @@ pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
 /// it was killed and is started again.
 const KEEP_VARIABLE: &str = "CARS_CONSOLE_KEEP";
 
+/// Environment variable with the time for which a robot tries to reach the simulator and to join, seconds.
+const PATIENCE_VARIABLE: &str = "CARS_PATIENCE_S";
+/// Its default. All robots of a launch are started at the same time: of more robots than this, each adds a second.
+const PATIENCE_S: usize = 20;
+
 /// A command line with its environment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandLine {
@@ -157,6 +162,13 @@ fn client(
     let mut env = process.env.clone();
     env.insert("CARS_RUN".to_owned(), execution.run.to_string());
     env.insert("CARS_CONNECT".to_owned(), connectable(execution.endpoint));
+
+    let robots = file.processes.iter().map(|process| process.robots.len());
+    let robots: usize = robots.sum();
+    if robots > PATIENCE_S && std::env::var_os(PATIENCE_VARIABLE).is_none() {
+        let patience = env.entry(PATIENCE_VARIABLE.to_owned());
+        patience.or_insert_with(|| robots.to_string());
+    }
 
     // A process has the certificate of its robot; the console has one of its own.
     let name = if process.name == CONSOLE {

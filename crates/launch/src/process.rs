@@ -1,12 +1,7 @@
 //! One process: its group, its output, its end. The rest of a group is killed when its leader exits, and every group is
 //! killed when the launcher's task ends.
 
-use std::fs::{File, Permissions};
-use std::io::Write;
-use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
-use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
-use std::sync::Arc;
 use std::time::Duration;
 
 use nix::sys::signal::{Signal, killpg};
@@ -15,6 +10,7 @@ use process_wrap::tokio::{ChildWrapper, CommandWrap, KillOnDrop, ProcessGroup};
 use tokio::io::{AsyncRead, AsyncReadExt};
 
 use super::lines::Lines;
+use super::log::ProcessLog;
 use super::plan::CommandLine;
 use super::screen::ScreenHandle;
 use super::tail::Tail;
@@ -24,7 +20,7 @@ const REST_OF_OUTPUT: Duration = Duration::from_millis(500);
 
 /// A process group, by its leader.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Group(Pid);
+pub(super) struct Group(pub(super) Pid);
 
 impl Group {
     /// Sends a signal to every process of the group, if there is one left.
@@ -49,10 +45,7 @@ pub(super) struct Output {
     pub(super) screen: ScreenHandle,
     /// Index of the process.
     pub(super) index: usize,
-    /// Path of its log.
-    pub(super) log: PathBuf,
-    /// Whether only the owner may read the log.
-    pub(super) is_private: bool,
+    pub(super) log: ProcessLog,
     pub(super) tail: Tail,
 }
 
@@ -117,18 +110,13 @@ pub(super) async fn watch_stops(group: Group, name: String, screen: ScreenHandle
 impl Started {
     /// Waits for the exit of the process and the end of its output.
     pub(super) async fn run(mut self, output: Output) -> std::io::Result<ExitStatus> {
-        let file = Arc::new(open_log(&output.log, output.is_private)?);
+        output.log.open()?;
         let mut copies = Vec::new();
         if let Some(pipe) = self.child.stdout().take() {
-            copies.push(tokio::spawn(copy(
-                pipe,
-                file.clone(),
-                output.clone(),
-                false,
-            )));
+            copies.push(tokio::spawn(copy(pipe, output.clone(), false)));
         }
         if let Some(pipe) = self.child.stderr().take() {
-            copies.push(tokio::spawn(copy(pipe, file, output, true)));
+            copies.push(tokio::spawn(copy(pipe, output, true)));
         }
         let status = self.child.wait().await;
 
@@ -142,30 +130,14 @@ impl Started {
     }
 }
 
-/// Opens the log to append: two pipes write to it, and so does a restarted process.
-fn open_log(path: &Path, is_private: bool) -> std::io::Result<File> {
-    let mode = if is_private { 0o600 } else { 0o666 };
-    let log = File::options()
-        .create(true)
-        .append(true)
-        .mode(mode)
-        .open(path)?;
-
-    if is_private {
-        // An earlier log that could not be removed has the permissions of then.
-        log.set_permissions(Permissions::from_mode(mode))?;
-    }
-    Ok(log)
-}
-
 /// Copies a pipe: bytes to the log, lines to the terminal.
-async fn copy(mut pipe: impl AsyncRead + Unpin, log: Arc<File>, output: Output, is_error: bool) {
+async fn copy(mut pipe: impl AsyncRead + Unpin, output: Output, is_error: bool) {
     let mut buffer = vec![0; 16 * 1024];
     let mut lines = Lines::default();
     while let Ok(read @ 1..) = pipe.read(&mut buffer).await {
         let bytes = &buffer[..read];
         // A full disk must not stop a robot; the terminal still has the lines.
-        let _unwritten = (&*log).write_all(bytes);
+        let _unwritten = output.log.append(bytes);
         lines.push(bytes, |line| show(&output, line, is_error));
     }
     lines.finish(|line| show(&output, line, is_error));

@@ -52,6 +52,11 @@ impl Budget {
         }
     }
 
+    /// Whether no restart is left.
+    pub(super) fn is_exhausted(&self) -> bool {
+        self.recent.len() >= BUDGET
+    }
+
     /// Spends one restart. Returns the wait before it and its number among the recent ones, or `None` if the budget is
     /// exhausted.
     pub(super) fn spend(&mut self, now: Instant) -> Option<(Duration, usize)> {

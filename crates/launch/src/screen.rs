@@ -5,7 +5,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
-use std::thread::JoinHandle;
+use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use protocol::event::log_line;
@@ -120,7 +120,10 @@ pub(super) struct Screen {
 
 impl Screen {
     /// Starts the thread, which writes to the standard output and the standard error.
-    pub(super) fn open(look: ScreenOptions) -> Self {
+    ///
+    /// # Errors
+    /// If the system starts no further thread.
+    pub(super) fn open(look: ScreenOptions) -> std::io::Result<Self> {
         let bar = look.has_bar.then(|| Bar::new(look.has_colors_err));
         Self::to(
             look,
@@ -130,7 +133,12 @@ impl Screen {
         )
     }
 
-    fn to(look: ScreenOptions, out: Writer, err: Writer, bar: Option<Bar>) -> Self {
+    fn to(
+        look: ScreenOptions,
+        out: Writer,
+        err: Writer,
+        bar: Option<Bar>,
+    ) -> std::io::Result<Self> {
         let (queue, shows) = std::sync::mpsc::channel();
         let handle = ScreenHandle {
             queue,
@@ -146,10 +154,10 @@ impl Screen {
             handle: handle.clone(),
         };
 
-        Self {
-            handle,
-            thread: std::thread::spawn(move || painter.paint(&shows)),
-        }
+        let thread = Builder::new()
+            .name("screen".to_owned())
+            .spawn(move || painter.paint(&shows))?;
+        Ok(Self { handle, thread })
     }
 
     /// A handle to queue what is to be shown.
@@ -381,7 +389,7 @@ mod tests {
     fn shown(look: ScreenOptions, show: impl FnOnce(&ScreenHandle)) -> (String, String) {
         let out = Buffer::default();
         let err = Buffer::default();
-        let screen = Screen::to(look, Box::new(out.clone()), Box::new(err.clone()), None);
+        let screen = Screen::to(look, Box::new(out.clone()), Box::new(err.clone()), None).unwrap();
         show(&screen.handle());
         screen.finish();
         (out.text(), err.text())
@@ -455,7 +463,8 @@ mod tests {
             Box::new(Stuck(terminal.clone())),
             Box::new(err.clone()),
             None,
-        );
+        )
+        .unwrap();
 
         for _ in 0..3 * MAX_WAITING {
             screen.handle().log(record("busy"));

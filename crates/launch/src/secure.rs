@@ -10,6 +10,7 @@ use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+use bus::check_key_file;
 use bus::secure::{Credentials, client_config, simulator_config};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::access::{CONSOLE, RESERVED, SIMULATOR};
@@ -299,6 +300,8 @@ impl Secured {
                     "{name} has no certificate: there is no {file}"
                 ));
             }
+            // The key by itself; each program checks its own configuration file.
+            check_key_file(&secured.folder.join(name).join(KEY)).into_diagnostic()?;
         }
 
         Ok(secured)

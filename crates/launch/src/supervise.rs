@@ -1,19 +1,27 @@
 //! Supervises the processes of a run: starts, restarts and ends them. It works with processes and signals only, not with
 //! the bus.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
+use protocol::RobotName;
 use protocol::messages::{FaultKind, ProcessOrder};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
 use super::ending::{Ended, Failure};
+use super::leftovers::Leftovers;
+use super::log::{LIMIT_BYTES, ProcessLog};
 use super::plan::{Part, Planned};
 use super::process::{self, Group, Output};
 use super::restart::{BUDGET, Budget};
 use super::screen::ScreenHandle;
 use super::tail::Tail;
+
+/// Longest description of an end for the simulator, characters.
+const MAX_REASON: usize = 1000;
 
 /// An event of the supervisor's loop. Processes are named by their indices.
 #[derive(Debug)]
@@ -41,6 +49,14 @@ impl std::fmt::Debug for FaultsDone {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("FaultsDone")
     }
+}
+
+/// Robots whose process has ended in the middle of the run, and for which no further one is started.
+#[derive(Debug)]
+pub(super) struct Gone {
+    pub(super) robots: Vec<RobotName>,
+    /// How it ended, as the predicate of a sentence.
+    pub(super) because: String,
 }
 
 /// Phase of the end of a run. Phases only advance.
@@ -75,6 +91,7 @@ struct Supervised {
     budget: Budget,
     /// Its process group while it runs.
     group: Option<Group>,
+    log: ProcessLog,
     tail: Tail,
     /// Whether the scenario has killed it, so that its exit is not a failure.
     is_down: bool,
@@ -83,11 +100,16 @@ struct Supervised {
 }
 
 impl Supervised {
-    fn new(planned: Planned) -> Self {
+    fn new(planned: Planned, logs: &Path) -> Self {
+        // The console prints its token.
+        let is_private = planned.part == Part::Observer;
+        let log = log_of(logs, &planned.name);
+
         Self {
             budget: Budget::new(planned.backoff),
             planned,
             group: None,
+            log: ProcessLog::new(log, is_private, LIMIT_BYTES),
             tail: Tail::default(),
             is_down: false,
             is_slow: false,
@@ -107,6 +129,9 @@ pub(super) struct Supervisor {
     logs: PathBuf,
     grace: Duration,
     screen: ScreenHandle,
+    leftovers: Leftovers,
+    /// Robots without a process, for the simulator.
+    gone: Sender<Gone>,
     queue: UnboundedSender<SupervisorEvent>,
     events: UnboundedReceiver<SupervisorEvent>,
     stage: Shutdown,
@@ -115,20 +140,27 @@ pub(super) struct Supervisor {
 
 impl Supervisor {
     /// Prepares to run these processes. `logs` is the folder of their logs; `grace` is how long a process may take to exit
-    /// after SIGTERM.
+    /// after SIGTERM; `gone` receives the robots that have lost their process for good.
     pub(super) fn new(
         planned: Vec<Planned>,
         logs: &Path,
         grace: Duration,
         screen: ScreenHandle,
+        leftovers: Leftovers,
+        gone: Sender<Gone>,
     ) -> Self {
         let (queue, events) = tokio::sync::mpsc::unbounded_channel();
 
         Self {
-            processes: planned.into_iter().map(Supervised::new).collect(),
+            processes: planned
+                .into_iter()
+                .map(|planned| Supervised::new(planned, logs))
+                .collect(),
             logs: logs.to_owned(),
             grace,
             screen,
+            leftovers,
+            gone,
             queue,
             events,
             stage: Shutdown::Running,
@@ -163,6 +195,8 @@ impl Supervisor {
             }
         }
 
+        let killed = self.leftovers.kill_all();
+        self.notice_killed("the robots' processes", killed);
         self.outcome
     }
 
@@ -210,6 +244,9 @@ impl Supervisor {
         };
 
         supervised.group = Some(started.group);
+        if supervised.planned.part == Part::Robots {
+            self.leftovers.add(started.group.0);
+        }
         if supervised.planned.part == Part::Simulator {
             let name = supervised.planned.name.clone();
             let screen = self.screen.clone();
@@ -218,9 +255,7 @@ impl Supervisor {
         let output = Output {
             screen: self.screen.clone(),
             index,
-            log: log_of(&self.logs, &supervised.planned.name),
-            // The console prints its token.
-            is_private: supervised.planned.part == Part::Observer,
+            log: supervised.log.clone(),
             tail: supervised.tail.clone(),
         };
         tokio::spawn(async move {
@@ -233,9 +268,9 @@ impl Supervisor {
     }
 
     fn on_ended(&mut self, index: usize, ended: &Ended) {
-        let process = &mut self.processes[index];
-        process.group = None;
+        self.forget_group(index);
 
+        let process = &self.processes[index];
         if process.planned.part == Part::Simulator {
             self.on_simulator_ended(index, ended);
         } else if process.is_down {
@@ -246,6 +281,35 @@ impl Supervisor {
             self.notice(format!(
                 "{} {ended} at the end of the run",
                 self.name(index)
+            ));
+        }
+    }
+
+    /// Forgets the group of a process that has ended, and kills what has left the group.
+    fn forget_group(&mut self, index: usize) {
+        let process = &mut self.processes[index];
+        let Some(group) = process.group.take() else {
+            return;
+        };
+        if process.planned.part != Part::Robots {
+            return;
+        }
+
+        self.leftovers.remove(group.0);
+        // At the end of the run all are killed together.
+        if self.stage == Shutdown::Running {
+            let name = self.name(index);
+            let killed = self.leftovers.kill_of(name);
+            self.notice_killed(name, killed);
+        }
+    }
+
+    fn notice_killed(&self, whose: &str, killed: BTreeSet<String>) {
+        if !killed.is_empty() {
+            let programs: Vec<String> = killed.into_iter().collect();
+            self.notice(format!(
+                "killed what {whose} left behind: {}",
+                programs.join(", ")
             ));
         }
     }
@@ -281,19 +345,44 @@ impl Supervisor {
             return;
         }
 
-        let name = self.name(index);
-        if !ended.has_failed() {
-            // Robots exit when the run is over, often before the simulator does.
-            tracing::debug!("{name} {ended}");
-        } else if self.processes[index].planned.is_required {
+        if ended.has_failed() && self.processes[index].planned.is_required {
             self.fail(index, ended);
             self.stop();
         } else {
+            self.on_gone(index, ended);
+        }
+    }
+
+    /// Handles the exit of a process that no other one follows. Robots also exit when the run is over, often before the
+    /// simulator does, which knows.
+    fn on_gone(&self, index: usize, ended: &Ended) {
+        let Planned {
+            part, robots, name, ..
+        } = &self.processes[index].planned;
+        if *part == Part::Robots {
+            // The observer lasts as long as the supervisor.
+            let _over = self.gone.send(Gone {
+                robots: robots.clone(),
+                because: self.because(index, ended),
+            });
+        }
+
+        if ended.has_failed() {
             let log = log_of(&self.logs, name);
             self.notice(format!(
-                "{name} {ended}; it is not required, and the run continues without it (its log: {})",
+                "{name} {ended}; it is not required (its log: {})",
                 log.display()
             ));
+        }
+    }
+
+    /// How a process has ended for good, as the predicate of a sentence.
+    fn because(&self, index: usize, ended: &Ended) -> String {
+        let ended: String = ended.to_string().chars().take(MAX_REASON).collect();
+        if self.processes[index].budget.is_exhausted() {
+            format!("{ended}, and has been restarted {BUDGET} times already")
+        } else {
+            ended
         }
     }
 

@@ -60,6 +60,10 @@ fn checked(name: &str) -> Result<String, BadName> {
             "only letters, digits, '_', '-' and '.' may stand in it, and no leading '.'",
         );
     }
+    // Names are arguments of programs, also of programs that others write.
+    if name.starts_with('-') {
+        return refuse("it begins with '-', as an option of a command does");
+    }
 
     Ok(name.to_owned())
 }
@@ -87,7 +91,7 @@ macro_rules! name_type {
         pub struct $type(std::sync::Arc<str>);
 
         impl $type {
-            /// Checks a name: 1 to 64 letters, digits, `_`, `-` or `.`, not beginning with `.`, and not reserved.
+            /// Checks a name: 1 to 64 letters, digits, `_`, `-` or `.`, not beginning with `.` or `-`, and not reserved.
             ///
             /// # Errors
             /// [`BadName`] says what is wrong with it.
@@ -212,7 +216,12 @@ mod tests {
         for bad in ["", "a/b", "*", "a b", "..", "\u{e9}", &"x".repeat(65)] {
             assert!(RobotName::new(bad).is_err(), "{bad:?} was accepted");
         }
-        for good in ["Butler", "r-2_d.2", &"x".repeat(64)] {
+        for bad in ["-", "--help", "-Butler", "--"] {
+            let refused = RobotName::new(bad).unwrap_err().to_string();
+            assert!(refused.contains("begins with '-'"), "{refused}");
+            assert!(RunName::new(bad).is_err(), "{bad:?} was accepted");
+        }
+        for good in ["Butler", "a-", "_-", "r-2_d.2", &"x".repeat(64)] {
             assert_eq!(RobotName::new(good).unwrap().as_str(), good);
         }
     }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use protocol::{Event, Tick};
@@ -86,18 +86,20 @@ impl Writer {
     /// [`WriteError`] if the file cannot be written.
     pub fn create(path: &Path, header: &Header, scenario: &str) -> Result<Self, WriteError> {
         let encoder = Encoder::new(header);
-        let file = begin(path, header, scenario, &encoder).map_err(|error| WriteError {
+        let failed = |error| WriteError {
             path: path.to_owned(),
             error,
-        })?;
+        };
+        let file = begin(path, header, scenario, &encoder).map_err(failed)?;
 
         let queue = Arc::new(Queue::default());
         let tasks = queue.clone();
+        let thread = Builder::new().spawn(move || write(file, &tasks));
         Ok(Self {
             path: path.to_owned(),
             encoder,
             queue,
-            thread: Some(std::thread::spawn(move || write(file, &tasks))),
+            thread: Some(thread.map_err(failed)?),
         })
     }
 

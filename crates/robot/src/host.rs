@@ -84,6 +84,19 @@ pub enum HostError {
         /// Where it was looked for.
         connect: String,
     },
+    /// The simulator of the run is there, and does not admit a robot.
+    #[error(
+        "the simulator of run {run} at {connect} has not admitted {name} in time: it is under load (--patience-s or \
+         CARS_PATIENCE_S give it more time), or its access control does not know {name}"
+    )]
+    NotAdmitted {
+        /// The robot.
+        name: RobotName,
+        /// The run.
+        run: RunName,
+        /// Where the simulator is.
+        connect: String,
+    },
     /// The simulator went away and did not come back.
     #[error("the simulator has been gone for {0:?}")]
     SimulatorGone(Duration),
@@ -268,7 +281,7 @@ impl Host {
                         "the simulator, or the link to it, is gone: waiting for it up to {patience_s} s"
                     );
                 }
-                shared.each(|participant, actions| participant.simulator(is_present, actions));
+                shared.simulator(is_present);
             })?;
         self.declared.extend([clock, simulator]);
         Ok(())
@@ -539,6 +552,11 @@ impl Host {
                     .get(name)
                     .map(|member| member.explanation.clone())
                     .unwrap_or_default(),
+            },
+            Leave::NoSimulator if self.shared.has_simulator() => HostError::NotAdmitted {
+                name: name.clone(),
+                run: self.options.run.clone(),
+                connect: self.options.connect.clone(),
             },
             Leave::NoSimulator => HostError::NoSimulator {
                 run: self.options.run.clone(),

@@ -64,6 +64,19 @@ impl Scenario {
         Ok(scenario)
     }
 
+    /// What people may want to know of a scenario file that can be used: times that are not those of ticks, and what never
+    /// begins, with file, line and caret.
+    ///
+    /// # Errors
+    /// [`FileError`] as [`Self::load`].
+    pub fn remarks(path: &Path, changes: &Changes) -> Result<Vec<FileError>, FileError> {
+        let mut source = Source::read(path)?;
+        if !changes.is_empty() {
+            source = changes.apply(&source)?;
+        }
+        source.parse::<raw::Scenario>()?.remarks(&source)
+    }
+
     /// Reads and checks the text of a scenario. Files that it names are relative to `folder`.
     ///
     /// # Errors

@@ -75,12 +75,4 @@ impl Scenario {
         let restarts = faults.filter(|fault| fault.is_restart() && fault.at == tick);
         restarts.map(|fault| fault.robot.clone()).collect()
     }
-
-    /// Whether processes have to be killed or stopped for the run.
-    #[must_use]
-    pub fn concerns_processes(&self) -> bool {
-        let has_faults =
-            |change: &Change| !change.faults.is_empty() || !change.restarted.is_empty();
-        !self.faults.is_empty() || self.changes.iter().any(has_faults)
-    }
 }

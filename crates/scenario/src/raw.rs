@@ -5,6 +5,7 @@ mod expect;
 pub(super) mod fault;
 mod network;
 mod range;
+mod times;
 mod unplaced;
 pub(super) mod words;
 
@@ -24,6 +25,7 @@ use change::{ChangeTable, ParentTable};
 use fault::FaultTable;
 use network::NetworkTable;
 use range::Range;
+use times::Times;
 use unplaced::unplaced;
 
 pub(super) use expect::Expectations;
@@ -153,6 +155,26 @@ impl Scenario {
         folder: Option<&Path>,
     ) -> Result<checked::Scenario, FileError> {
         self.check_from(source, folder, 0)
+    }
+
+    /// Remarks about a scenario that can be used: times that are rounded, and what never begins.
+    pub(super) fn remarks(&self, source: &Source) -> Result<Vec<FileError>, FileError> {
+        let tick_s = self.tick_s(source)?;
+        let mut times = Times::new(source, tick_s, self.ticks(source, tick_s)?);
+
+        if let Some(duration) = &self.duration {
+            times.duration(duration);
+        }
+        for fault in &self.faults {
+            fault.get_ref().remark(&mut times);
+        }
+        if let Some(network) = &self.network {
+            network.get_ref().remark(&mut times);
+        }
+        for change in &self.changes {
+            change.get_ref().remark(&mut times);
+        }
+        Ok(times.remarks)
     }
 
     /// Checks the scenario of a run in which tick `settled` is the next one: what was checked before the run began is not

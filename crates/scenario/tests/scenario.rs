@@ -388,3 +388,94 @@ fn expectations_do_not_change_while_a_run_goes_on() {
     let error = shown(&expecting(&format!("{change}{entry}")).unwrap_err());
     assert!(error.contains("only the network, faults, rules"), "{error}");
 }
+
+/// The remarks about a scenario as people see them.
+fn remarks(text: &str) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("hall.toml");
+    let robots = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"5 m\", \"5 m\"]\n";
+    std::fs::write(&file, format!("{text}\n{robots}")).unwrap();
+    Scenario::load(&file, &Changes::default()).unwrap();
+    let remarks = Scenario::remarks(&file, &Changes::default()).unwrap();
+    remarks.iter().map(shown).collect()
+}
+
+#[test]
+fn people_are_told_what_is_rounded_and_what_never_begins() {
+    let quiet = "duration = \"60 s\"\ntick = \"0.1 s\"\non_late = \"continue\"\n\
+                 [[fault]]\nrobot = \"A\"\ndo = \"hang\"\nat = \"60 s\"\n\
+                 [[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"0.3 s\"\nuntil = \"59.7 s\"\n\
+                 [[change]]\nat = \"0.7 s\"\nset = [\"network.commands.loss=1\"]\n";
+    assert_eq!(remarks(quiet), [""; 0]);
+
+    for (text, place, words) in [
+        ("duration = \"10.3 s\"", ":1:12", "the run lasts 10.5 s"),
+        ("duration = \"10.2 s\"", ":1:12", "the run lasts 10 s"),
+        (
+            "duration = \"10 s\"\n[[fault]]\nrobot = \"A\"\ndo = \"restart\"\nat = \"10.5 s\"",
+            ":5:6",
+            "this fault never begins: the run ends at 10 s",
+        ),
+        (
+            "[[fault]]\nrobot = \"A\"\ndo = \"restart\"\nat = \"10.1 s\"",
+            ":4:6",
+            "it counts as 10 s, tick 20",
+        ),
+        (
+            "on_late = \"continue\"\n[[fault]]\nrobot = \"A\"\ndo = \"hang\"\nat = \"10 s\"\nuntil = \"10.8 s\"",
+            ":6:9",
+            "it counts as 11 s, tick 22",
+        ),
+        (
+            "duration = \"10 s\"\n[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"11 s\"",
+            ":4:8",
+            "this partition never begins",
+        ),
+        (
+            "duration = \"10 s\"\n[[change]]\nat = \"11 s\"\nset = [\"network.commands.loss=1\"]",
+            ":3:6",
+            "this change never begins",
+        ),
+    ] {
+        let remarks = remarks(text);
+        assert_eq!(remarks.len(), 1, "{text}: {remarks:?}");
+        assert!(
+            remarks[0].contains(&format!("hall.toml{place}")),
+            "{}",
+            remarks[0]
+        );
+        assert!(remarks[0].contains(words), "{}", remarks[0]);
+    }
+}
+
+#[test]
+fn what_lies_between_two_ticks_is_refused_with_the_reason() {
+    let robots = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"5 m\", \"5 m\"]\n";
+    let partition = |from: &str, until: &str| {
+        let text = format!(
+            "[[network.partition]]\ngroups = [[\"A\"], [\"B\"]]\nfrom = \"{from}\"\nuntil = \"{until}\"\n{robots}"
+        );
+        shown(&parse(&text).unwrap_err())
+    };
+    let between = partition("10.1 s", "10.2 s");
+    assert!(
+        between.contains("there is no tick from 10.1 s to 10.2 s"),
+        "{between}"
+    );
+    assert!(between.contains("both count as tick 20"), "{between}");
+    assert!(between.contains("hall.toml:4:9"), "{between}");
+    let backwards = partition("10.2 s", "10.1 s");
+    assert!(
+        backwards.contains("it ends before it begins"),
+        "{backwards}"
+    );
+
+    let fault = format!(
+        "on_late = \"continue\"\n[[fault]]\nrobot = \"A\"\ndo = \"hang\"\nat = \"10.1 s\"\nuntil = \"10.2 s\"\n{robots}"
+    );
+    let fault = shown(&parse(&fault).unwrap_err());
+    assert!(
+        fault.contains("there is no tick from 10.1 s to 10.2 s"),
+        "{fault}"
+    );
+}

@@ -7,7 +7,7 @@ use crate::recorder::{ENDPOINT, OPERATOR_CONFIG};
 use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
 use crate::{IfTaken, RunFolder, RunLock, Summary};
 use bus::endpoint::connectable;
-use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure};
+use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure, check_run};
 use clap::{Command, CommandFactory, Parser, ValueEnum};
 use config::units::Time;
 use config::{Speed, shipped};
@@ -139,6 +139,9 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
 
     // Before anything is made: a refusal leaves nothing behind.
     check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
+    if let Some(config) = &args.zenoh_config {
+        check_run(config, &args.run).into_diagnostic()?;
+    }
     let role = Role::Router {
         listen: args.listen.clone(),
         trusts_network: args.insecure,

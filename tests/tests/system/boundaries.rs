@@ -497,3 +497,36 @@ fn cycles_of_imports_are_found() {
     let found: Vec<String> = cycles().into_iter().collect();
     assert_eq!(found, ["crate", "crate::c"]);
 }
+
+/// A build elsewhere, of a robot of one's own or by `cargo install`, does not read `.cargo/config.toml`: what the product needs
+/// is not there.
+#[test]
+fn the_configuration_of_cargo_has_only_what_builds_and_tests_here_need() {
+    let text = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap();
+    let config: toml::Table = text.parse().unwrap();
+    let tables: Vec<&String> = config.keys().collect();
+    assert_eq!(tables, ["env"]);
+
+    let variables = config["env"].as_table().unwrap();
+    let variables: Vec<&str> = variables.keys().map(String::as_str).collect();
+    // Without CFLAGS more of zstd is compiled, which recordings do not use.
+    assert_eq!(variables, ["CFLAGS", "RUST_TEST_THREADS"]);
+
+    for (file, constant) in [
+        (
+            "vendor/zenoh-link-tcp/src/lib.rs",
+            "const TCP_LINGER_TIMEOUT: u64 = 0;",
+        ),
+        (
+            "vendor/zenoh-link-tls/src/lib.rs",
+            "const TLS_LINGER_TIMEOUT: u64 = 0;",
+        ),
+        (
+            "vendor/zenoh-link-tls/src/lib.rs",
+            "const TLS_ACCEPT_THROTTLE_TIME: u64 = 1000;",
+        ),
+    ] {
+        let text = std::fs::read_to_string(root().join(file)).unwrap();
+        assert!(text.contains(constant), "{constant} is not in {file}");
+    }
+}

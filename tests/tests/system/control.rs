@@ -300,3 +300,64 @@ fn a_step_is_answered_although_others_ask_meanwhile() {
     lab.ctl("ctl-asked", &["stop"]);
     launch.wait();
 }
+
+/// What a launch needs does not depend on what it prints.
+#[test]
+fn orders_are_carried_out_whatever_a_launch_prints() {
+    for (run, more) in [
+        ("orders-quiet", &["--quiet", "--no-console"][..]),
+        ("orders-silent-console", &["--quiet"]),
+        ("orders-no-console", &["--no-console"]),
+    ] {
+        let lab = Lab::new();
+        let mut args = vec!["--duration", "30 s", "--speed", "max"];
+        args.extend(more);
+        let mut launch = paused(&lab, run, &args);
+        lab.step(run, 10);
+        lab.ctl(run, &["restart", "Leguin"]);
+        lab.step(run, 10);
+        lab.ctl(run, &["hang", "Butler", "--for", "0.2 s"]);
+        lab.ctl(run, &["start"]);
+        launch.finish();
+
+        lab.ok(&["verify", &lab.out().join(run).display().to_string()]);
+    }
+}
+
+/// A run with orders by hand is resumed in the same way.
+#[test]
+fn a_run_with_orders_is_resumed_without_a_word_and_without_a_console() {
+    let lab = Lab::new();
+    let run = "orders-resumed";
+    let quiet = [
+        "--duration",
+        "30 s",
+        "--speed",
+        "max",
+        "--quiet",
+        "--no-console",
+    ];
+    let mut launch = paused(&lab, run, &quiet);
+    lab.step(run, 10);
+    lab.ctl(run, &["restart", "Leguin"]);
+    lab.step(run, 20);
+    let simulator = launch.process("cars-sim");
+    send(simulator, Signal::SIGKILL);
+    assert!(!launch.wait().success());
+
+    let mut launch = lab.start(
+        run,
+        &[
+            "launch",
+            "--resume",
+            run,
+            "--quiet",
+            "--no-console",
+            "--speed",
+            "max",
+        ],
+    );
+    launch.finish();
+    assert_eq!(lab.summary(run)["ticks"], 60);
+    lab.ok(&["verify", &lab.out().join(run).display().to_string()]);
+}

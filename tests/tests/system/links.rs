@@ -277,7 +277,7 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
     nothing_is_left(run, &player);
 }
 
-/// Closing a connection that is cut must not keep the simulator from hearing all others (`.cargo/config.toml`).
+/// Closing a connection that is cut must not keep the simulator from hearing all others (`vendor/zenoh-link-tcp`).
 #[test]
 fn several_links_cut_at_once_hold_up_nobody_else() {
     if !has_namespaces("several") {

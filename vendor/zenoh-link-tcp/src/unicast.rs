@@ -13,7 +13,7 @@
 //
 #[cfg(all(feature = "uring", target_os = "linux"))]
 use std::os::fd::{AsRawFd, RawFd};
-use std::{cell::UnsafeCell, convert::TryInto, fmt, net::SocketAddr, sync::Arc, time::Duration};
+use std::{cell::UnsafeCell, fmt, net::SocketAddr, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
 use tokio::{
@@ -74,9 +74,7 @@ impl LinkUnicastTcp {
 
         // Set the TCP linger option
         #[allow(deprecated)]
-        if let Err(err) = socket.set_linger(Some(Duration::from_secs(
-            (*TCP_LINGER_TIMEOUT).try_into().unwrap(),
-        ))) {
+        if let Err(err) = socket.set_linger(Some(Duration::from_secs(TCP_LINGER_TIMEOUT))) {
             tracing::warn!(
                 "Unable to set LINGER option on TCP link {} => {}: {}",
                 src_addr,

@@ -14,7 +14,6 @@
 #[cfg(all(feature = "uring", target_os = "linux"))]
 use std::os::fd::RawFd;
 use std::{
-    convert::TryInto,
     fmt::{self, Debug},
     net::SocketAddr,
     sync::Arc,
@@ -98,9 +97,7 @@ impl LinkUnicastTls {
 
         // Set the TLS linger option
         #[allow(deprecated)]
-        if let Err(err) = tcp_stream.set_linger(Some(Duration::from_secs(
-            (*TLS_LINGER_TIMEOUT).try_into().unwrap(),
-        ))) {
+        if let Err(err) = tcp_stream.set_linger(Some(Duration::from_secs(TLS_LINGER_TIMEOUT))) {
             tracing::warn!(
                 "Unable to set LINGER option on TLS link {} => {}: {}",
                 src_addr,
@@ -591,7 +588,7 @@ async fn accept_task(
                         //       Linux systems this limit can be changed by using the "ulimit" command line
                         //       tool. In case of systemd-based systems, this can be changed by using the
                         //       "sysctl" command line tool.
-                        tokio::time::sleep(Duration::from_micros(*TLS_ACCEPT_THROTTLE_TIME)).await;
+                        tokio::time::sleep(Duration::from_micros(TLS_ACCEPT_THROTTLE_TIME)).await;
                     }
                 }
             }

@@ -18,6 +18,7 @@ use std::process::Command;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::Builder;
 
 use crate::findings::{Findings, Verdicts};
 use crate::kit::{CannotRun, Kit};
@@ -131,19 +132,22 @@ fn all(kit: &Kit, wanted: &[Rule]) -> Result<(Verdicts, Option<AnswerTimes>), Ca
         .collect();
     let next = AtomicUsize::new(0);
     let all = Mutex::new(findings);
-    std::thread::scope(|scope| {
-        for _ in 0..WORKERS {
-            scope.spawn(|| {
-                while let Some(check) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let mut own = Findings::default();
-                    let end = (check.run)(kit, &mut own);
-                    own.close(check.rules, end);
-                    all.lock()
-                        .unwrap_or_else(PoisonError::into_inner)
-                        .merge(own);
-                }
-            });
+    let work = || {
+        while let Some(check) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let mut own = Findings::default();
+            let end = (check.run)(kit, &mut own);
+            own.close(check.rules, end);
+            all.lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .merge(own);
         }
+    };
+    std::thread::scope(|scope| {
+        // This thread is a worker, too, so the checks are made even if the system starts no other one.
+        for _ in 1..WORKERS {
+            let _fewer_at_once = Builder::new().spawn_scoped(scope, work);
+        }
+        work();
     });
 
     let findings = all.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -1,6 +1,7 @@
 //! Plays on several threads whose result does not depend on their number.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::Builder;
 
 /// The result of `play` for each item, in their order. Items that are not begun when `stop` is set have none.
 pub(super) fn all<T: Sync, R: Send>(
@@ -24,19 +25,20 @@ pub(super) fn all<T: Sync, R: Send>(
 
     let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
     std::thread::scope(|scope| {
+        // This thread is a worker, too, so the work is done even if the system starts no other one.
         let mut workers = Vec::new();
-        for _ in 0..jobs.min(items.len()) {
-            workers.push(scope.spawn(work));
+        for _ in 1..jobs.min(items.len()) {
+            workers.extend(Builder::new().spawn_scoped(scope, work));
         }
+        let mut all_done = work();
         for worker in workers {
             match worker.join() {
-                Ok(done) => {
-                    for (index, result) in done {
-                        results[index] = Some(result);
-                    }
-                }
+                Ok(done) => all_done.extend(done),
                 Err(panic) => std::panic::resume_unwind(panic),
             }
+        }
+        for (index, result) in all_done {
+            results[index] = Some(result);
         }
     });
     results

@@ -90,22 +90,22 @@ impl Program {
         let (reading, rest) = sync_channel::<()>(1);
         if let Some(stdout) = stdout {
             let reading = reading.clone();
-            std::thread::spawn(move || {
+            start_thread(move || {
                 read_lines(stdout, &queue);
                 drop(reading);
-            });
+            })?;
         }
         if let Some(stderr) = stderr {
             let tail = program.tail.clone();
             let name = name.clone();
-            std::thread::spawn(move || {
+            start_thread(move || {
                 forward(stderr, &name, &tail);
                 drop(reading);
-            });
+            })?;
         }
 
         let watched = program.clone();
-        std::thread::spawn(move || watched.watch(Pid::from_raw(pid), &rest, &stopper));
+        start_thread(move || watched.watch(Pid::from_raw(pid), &rest, &stopper))?;
         Ok((program, events))
     }
 
@@ -124,10 +124,14 @@ impl Program {
 
         // Between two ticks no thread receives events of the program.
         if let Some(stopper) = stopper.get().cloned() {
-            std::thread::spawn(move || {
+            let stop = stopper.clone();
+            let stops_later = start_thread(move || {
                 std::thread::sleep(LAST_REPORT);
-                stopper.stop();
+                stop.stop();
             });
+            if stops_later.is_err() {
+                stopper.stop();
+            }
         }
 
         let _over = self.queue.send(ProgramEvent::Ended);
@@ -191,10 +195,14 @@ impl Program {
     pub(super) fn end(self: &Arc<Self>, reason: EndReason) {
         // A program that does not read blocks this thread until it is killed.
         let program = self.clone();
-        std::thread::spawn(move || {
+        let says_so = start_thread(move || {
             let _gone = program.send(&ToProgram::End { reason });
             drop(lock(&program.stdin).take());
         });
+        if says_so.is_err() {
+            // The end of its input is all that it learns.
+            drop(lock(&self.stdin).take());
+        }
 
         if self.wait(END_PATIENCE).is_none() {
             self.kill();
@@ -207,6 +215,18 @@ impl Program {
         // Killing a program that has exited fails, which is fine.
         let _gone = lock(&self.child).kill();
     }
+}
+
+/// Starts a thread.
+///
+/// # Errors
+/// If the system starts no further one.
+pub(super) fn start_thread(work: impl FnOnce() + Send + 'static) -> miette::Result<()> {
+    let started = std::thread::Builder::new().spawn(work);
+    started
+        .into_diagnostic()
+        .wrap_err("no thread can be started")?;
+    Ok(())
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -81,6 +81,18 @@ impl Plan {
         Self::parse(&Source::read(path)?, robots)
     }
 
+    /// Reads a plan for the links of any robots; returns the number of its faults.
+    ///
+    /// # Errors
+    /// [`FileError`] with line and caret.
+    pub fn check(path: &Path) -> Result<usize, FileError> {
+        let source = Source::read(path)?;
+        let raw: RawPlan = source.parse()?;
+        let named = raw.faults.iter().map(|fault| fault.robot.get_ref().clone());
+        let robots = named.collect();
+        Ok(Self::parse(&source, &robots)?.faults.len())
+    }
+
     /// The partitions of a scenario as cuts of real links, at `speed` simulated seconds per second. Every link leads to the
     /// simulator, so a robot that is cut off from the others is cut off from the simulator, too. The largest group keeps
     /// its links (the first one of equals), and all other groups lose theirs.

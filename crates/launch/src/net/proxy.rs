@@ -6,6 +6,7 @@ use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use bus::endpoint::TLS;
@@ -30,15 +31,28 @@ const SLICES_PER_S: u64 = 20;
 
 /// An endpoint is not an address of TCP.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not an address such as tcp/127.0.0.1:7447")]
-pub struct AddressError(String);
+pub enum AddressError {
+    /// It is not an address.
+    #[error("{0:?} is not an address such as tcp/127.0.0.1:7447")]
+    NotAnAddress(String),
+    /// It is written as a URL.
+    #[error("{0:?} is not written as a URL: write {1}")]
+    Url(String, String),
+}
 
 /// The address of an endpoint of TCP, or of TLS, which passes a proxy unchanged.
 ///
 /// # Errors
 /// [`AddressError`] if the protocol is another one, or the host is a name.
 pub fn address(endpoint: &str) -> Result<SocketAddr, AddressError> {
-    let bad = || AddressError(endpoint.to_owned());
+    let bad = || AddressError::NotAnAddress(endpoint.to_owned());
+    if let Some((protocol, address)) = endpoint.split_once("://") {
+        let meant = format!("{protocol}/{}", address.trim_end_matches('/'));
+        return match self::address(&meant) {
+            Ok(_) => Err(AddressError::Url(endpoint.to_owned(), meant)),
+            Err(_) => Err(bad()),
+        };
+    }
     let (protocol, address) = endpoint.split_once('/').ok_or_else(bad)?;
     if !["tcp", TLS].contains(&protocol) {
         return Err(bad());
@@ -86,7 +100,7 @@ impl Proxy {
         };
         let gate = proxy.gate.clone();
         let open = proxy.open.clone();
-        std::thread::spawn(move || accept(&listener, to, &gate, &open));
+        Builder::new().spawn(move || accept(&listener, to, &gate, &open))?;
         Ok(proxy)
     }
 
@@ -145,12 +159,17 @@ fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<C
 
         let gate = gate.clone();
         let open = open.clone();
-        std::thread::spawn(move || {
-            if let Err(error) = forward(id, client, to, &gate, &open) {
+        let forwarded = open.clone();
+        let forwards = move || {
+            if let Err(error) = forward(id, client, to, &gate, &forwarded) {
                 tracing::debug!("a connection through the proxy: {error}");
             }
+            forwarded.with(|open| open.remove(&id));
+        };
+        if let Err(error) = Builder::new().spawn(forwards) {
+            tracing::warn!("a connection through the proxy is closed: {error}");
             open.with(|open| open.remove(&id));
-        });
+        }
     }
 }
 
@@ -179,8 +198,8 @@ fn forward(
         server.try_clone()?,
         gate.clone(),
         number,
-    );
-    let back = pipe(server, client, gate.clone(), number + 1);
+    )?;
+    let back = pipe(server, client, gate.clone(), number + 1)?;
     for writer in [there, back] {
         drop(writer.join());
     }
@@ -197,11 +216,12 @@ fn pipe(
     to: TcpStream,
     gate: Arc<Gate>,
     number: u64,
-) -> std::thread::JoinHandle<()> {
+) -> std::io::Result<JoinHandle<()>> {
     let (send, pieces) = sync_channel(MAX_PIECES);
     let reader = gate.clone();
-    std::thread::spawn(move || read(from, &send, &reader, number));
-    std::thread::spawn(move || write(to, &pieces, &gate))
+    let writer = Builder::new().spawn(move || write(to, &pieces, &gate))?;
+    Builder::new().spawn(move || read(from, &send, &reader, number))?;
+    Ok(writer)
 }
 
 fn read(mut from: TcpStream, send: &SyncSender<Piece>, gate: &Gate, number: u64) {
@@ -423,8 +443,18 @@ mod tests {
     #[test]
     fn addresses_are_endpoints() {
         assert!(address("tcp/127.0.0.1:7447").is_ok());
-        for bad in ["127.0.0.1:7447", "tcp/localhost", "udp/127.0.0.1:1"] {
-            assert!(address(bad).is_err(), "{bad}");
+        for bad in [
+            "127.0.0.1:7447",
+            "tcp/localhost",
+            "udp/127.0.0.1:1",
+            "http://127.0.0.1:1",
+        ] {
+            let refused = address(bad).unwrap_err().to_string();
+            assert!(refused.contains("not an address such as"), "{refused}");
+        }
+        for url in ["tcp://127.0.0.1:7447", "tcp://127.0.0.1:7447/"] {
+            let refused = address(url).unwrap_err().to_string();
+            assert!(refused.contains("write tcp/127.0.0.1:7447"), "{refused}");
         }
     }
 }

@@ -63,13 +63,26 @@ impl Hall {
 
     /// Runs to the end; the signals are sent once the files `ready` are there.
     fn run(&self, ready: &[&str], signals: &[Signal]) -> Outcome {
-        let screen = Screen::open(quiet());
+        self.run_and_report(ready, signals).0
+    }
+
+    /// The same, with the robots for which the simulator was told that no process follows.
+    fn run_and_report(&self, ready: &[&str], signals: &[Signal]) -> (Outcome, Vec<String>) {
+        let screen = Screen::open(quiet()).unwrap();
+        let (sender, gone) = std::sync::mpsc::channel();
+        let leftovers = Leftovers::unguarded();
+        let mut planned = self.planned.clone();
+        for process in &mut planned {
+            process.command.env.extend([leftovers.mark(&process.name)]);
+        }
         let outcome = runtime().block_on(async {
             let supervisor = Supervisor::new(
-                self.planned.clone(),
+                planned,
                 self.folder.path(),
                 self.grace,
                 screen.handle(),
+                leftovers,
+                sender,
             );
             let queue = supervisor.queue();
             let running = tokio::spawn(supervisor.run());
@@ -81,7 +94,11 @@ impl Hall {
         });
 
         screen.finish();
-        outcome
+        let gone = gone.iter().map(|gone| {
+            let robots: Vec<&str> = gone.robots.iter().map(RobotName::as_str).collect();
+            format!("{} {}", robots.join(" and "), gone.because)
+        });
+        (outcome, gone.collect())
     }
 }
 
@@ -115,7 +132,7 @@ fn shell(name: &str, script: &str) -> Planned {
         is_required: true,
         is_extern: false,
         part: Part::Robots,
-        robots: Vec::new(),
+        robots: RobotName::new(name).into_iter().collect(),
     }
 }
 
@@ -310,6 +327,129 @@ fn what_a_process_started_ends_with_it() {
     assert_gone(&hall.read("grandchild"));
 }
 
+#[test]
+fn a_child_in_a_session_of_its_own_ends_with_the_run() {
+    let robot = "setsid sleep 600 & setsid sh -c 'echo $$ > $DIR/daemon; sleep 600' & \
+                 until [ -s $DIR/daemon ]; do sleep 0.01; done; touch $DIR/up; sleep 600";
+    let hall = Hall::new("until [ -e $DIR/up ]; do sleep 0.01; done").with(shell("Butler", robot));
+    let hall = Hall {
+        grace: Duration::from_millis(100),
+        ..hall
+    };
+    assert_eq!(hall.run(&[], &[]).failure, None);
+    assert_gone(&hall.read("daemon"));
+}
+
+#[test]
+fn a_child_in_a_session_of_its_own_ends_with_its_robot() {
+    let robot = "setsid sh -c 'echo $$ > $DIR/daemon; sleep 600' & \
+                 until [ -s $DIR/daemon ]; do sleep 0.01; done; touch $DIR/left";
+    // The simulator ends when the daemon has.
+    let simulator = "until [ -e $DIR/left ]; do sleep 0.01; done; \
+                     while kill -0 $(cat $DIR/daemon) 2> /dev/null; do sleep 0.01; done";
+    let hall = Hall::new(simulator).with(shell("Butler", robot));
+    assert_eq!(hall.run(&[], &[]).failure, None);
+    assert_gone(&hall.read("daemon"));
+}
+
+/// Ends when the robot has.
+const WHILE_BUTLER: &str = "until [ -e $DIR/left ]; do sleep 0.01; done; sleep 0.3";
+
+#[test]
+fn the_simulator_is_told_of_robots_that_no_process_follows() {
+    let over = "touch $DIR/left; exit 0";
+    let broken = "touch $DIR/left; exit 3";
+    let told = |butler: Planned| {
+        let hall = Hall::new(WHILE_BUTLER).with(butler);
+        let (outcome, gone) = hall.run_and_report(&[], &[]);
+        assert_eq!(outcome.failure, None);
+        gone
+    };
+
+    assert_eq!(
+        told(shell("Butler", over)),
+        ["Butler ended with exit status 0"]
+    );
+    assert_eq!(
+        told(Planned {
+            restart: Restart::OnFailure,
+            ..shell("Butler", over)
+        }),
+        ["Butler ended with exit status 0"]
+    );
+    assert_eq!(
+        told(Planned {
+            is_required: false,
+            ..shell("Butler", broken)
+        }),
+        ["Butler ended with exit status 3"]
+    );
+    assert_eq!(
+        told(Planned {
+            is_required: false,
+            restart: Restart::Always,
+            ..shell("Butler", broken)
+        }),
+        ["Butler ended with exit status 3, and has been restarted 5 times already"]
+    );
+    let missing = Planned {
+        is_required: false,
+        ..shell("Butler", "")
+    };
+    let missing = Planned {
+        command: CommandLine {
+            program: "/nowhere/robot".into(),
+            ..missing.command
+        },
+        ..missing
+    };
+    let hall = Hall::new("sleep 0.5").with(missing);
+    let (_, gone) = hall.run_and_report(&[], &[]);
+    assert!(
+        gone[0].starts_with("Butler did not start (/nowhere/robot cannot be started"),
+        "{gone:?}"
+    );
+}
+
+#[test]
+fn the_simulator_is_not_told_of_robots_that_a_process_follows() {
+    let restarted = Planned {
+        restart: Restart::Always,
+        backoff: Duration::from_secs(600),
+        ..shell("Butler", "touch $DIR/left; exit 0")
+    };
+    let observer = Planned {
+        part: Part::Observer,
+        robots: Vec::new(),
+        ..shell("console", "touch $DIR/closed; exit 0")
+    };
+    let at_the_end = shell("Leguin", "until [ -e $DIR/over ]; do sleep 0.01; done");
+    let simulator = "until [ -e $DIR/left ] && [ -e $DIR/closed ]; do sleep 0.01; done; \
+                     sleep 0.3; (sleep 0.3; touch $DIR/over) < /dev/null > /dev/null 2>&1 &";
+    let hall = Hall::new(simulator)
+        .with(restarted)
+        .with(observer)
+        .with(at_the_end);
+    let (outcome, gone) = hall.run_and_report(&[], &[]);
+    assert_eq!(outcome.failure, None);
+    assert_eq!(gone, [""; 0]);
+}
+
+#[test]
+fn the_log_of_a_process_is_bounded() {
+    let robot = "echo first; yes 'a line of a robot that prints without an end' | head -c 200000000; echo last";
+    let hall = Hall::new("until [ -e $DIR/left ]; do sleep 0.05; done")
+        .with(shell("Butler", &format!("{robot}; touch $DIR/left")));
+    assert_eq!(hall.run(&[], &[]).failure, None);
+
+    let log = hall.read("Butler.log");
+    assert!(log.len() as u64 <= LIMIT_BYTES, "{} bytes", log.len());
+    assert!(log.len() as u64 > LIMIT_BYTES / 2, "{} bytes", log.len());
+    assert!(log.starts_with("first\na line"));
+    assert!(log.ends_with("\nlast\n"), "{:?}", &log[log.len() - 60..]);
+    assert!(log.contains(" bytes are left out here"));
+}
+
 /// Hears SIGTERM and does not care; so does what it started.
 const DEAF: &str = "trap '' TERM; (sleep 600; true) & echo $! > $DIR/grandchild; echo $$ > $DIR/own; touch $DIR/deaf; wait";
 
@@ -376,7 +516,7 @@ fn asked_twice_all_are_killed_at_once() {
 #[test]
 fn no_process_is_left_behind_when_the_launcher_panics() {
     let hall = Hall::new(FOREVER).with(shell("Butler", DEAF));
-    let screen = Screen::open(quiet());
+    let screen = Screen::open(quiet()).unwrap();
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         runtime().block_on(async {
             let grace = Duration::from_secs(600);
@@ -385,6 +525,8 @@ fn no_process_is_left_behind_when_the_launcher_panics() {
                 hall.folder.path(),
                 grace,
                 screen.handle(),
+                Leftovers::unguarded(),
+                std::sync::mpsc::channel().0,
             );
             tokio::spawn(supervisor.run());
             Hall::ready(hall.folder.path(), &["deaf"]).await;

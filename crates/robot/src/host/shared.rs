@@ -42,7 +42,16 @@ struct Inner {
     is_robot_waiting: bool,
     /// Whether the host is to look why it cannot go on.
     is_over: bool,
+    /// Whether the simulator's token is declared.
+    has_simulator: bool,
+    /// How long a robot tries to join, and how often that was extended because the simulator is there.
+    join_patience: Duration,
+    extensions: BTreeMap<RobotName, u32>,
 }
+
+/// How often a robot goes on trying to join a simulator that is there but has not admitted it: it may be under load, or the
+/// robots are many.
+const EXTENSIONS: u32 = 9;
 
 /// Which thread asks for something to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,6 +130,9 @@ impl Shared {
             sleeps_until: None,
             is_robot_waiting: false,
             is_over: false,
+            has_simulator: false,
+            join_patience: patience.join,
+            extensions: BTreeMap::new(),
         };
         for name in names {
             let mut actions = Vec::new();
@@ -196,6 +208,17 @@ impl Shared {
         if has_earlier_timer || has_actions && !is_run {
             self.has_work.notify_one();
         }
+    }
+
+    /// The simulator's token was declared or undeclared.
+    pub(super) fn simulator(&self, is_present: bool) {
+        self.lock().has_simulator = is_present;
+        self.each(|participant, actions| participant.simulator(is_present, actions));
+    }
+
+    /// Whether the simulator's token is declared.
+    pub(super) fn has_simulator(&self) -> bool {
+        self.lock().has_simulator
     }
 
     /// Wakes the host's own thread because the host cannot go on.
@@ -346,6 +369,31 @@ impl Inner {
     }
 
     /// Fires the timers that are due.
+    /// Whether a robot that has not been admitted in time goes on trying: the simulator is there.
+    fn extends(&mut self, name: &RobotName) -> bool {
+        let participant = self.participants.get(name);
+        let is_admitted = participant.is_none_or(|robot| robot.admission().is_some());
+        let extensions = self.extensions.entry(name.clone()).or_default();
+        if is_admitted || !self.has_simulator || *extensions == EXTENSIONS {
+            return false;
+        }
+
+        *extensions += 1;
+        let waited_s = self.join_patience.as_secs_f64() * f64::from(*extensions);
+        tracing::warn!(
+            "the simulator is there and has not admitted {name} for {waited_s} s: it is under load, or its access \
+             control does not know {name}"
+        );
+        self.file(
+            name,
+            vec![Action::SetTimer(
+                RobotTimer::JoinPatience,
+                self.join_patience,
+            )],
+        );
+        true
+    }
+
     fn fire(&mut self) {
         let now = Instant::now();
         while let Some((name, timer)) = self
@@ -355,6 +403,9 @@ impl Inner {
             .map(|(key, _)| key.clone())
         {
             self.timers.remove(&(name.clone(), timer));
+            if timer == RobotTimer::JoinPatience && self.extends(&name) {
+                continue;
+            }
             self.feed(&name, |participant, actions| {
                 participant.timer(timer, actions);
             });

@@ -12,6 +12,7 @@ use super::super::change::{Change, Parent};
 use super::super::checked;
 use super::super::fault::Fault;
 use super::super::network::ticks;
+use super::times::Times;
 use super::unplaced::unplaced;
 
 /// Most changes of a scenario.
@@ -22,7 +23,7 @@ const NOT_CHANGED: [&str; 2] = ["change", "parent"];
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ChangeTable {
-    at: Time,
+    at: Spanned<Time>,
     set: Vec<Spanned<String>>,
 }
 
@@ -51,7 +52,7 @@ pub(super) fn check(
     }
 
     let mut tables = raw;
-    tables.sort_by_key(|table| ticks(table.get_ref().at.0, scenario.tick_s));
+    tables.sort_by_key(|table| ticks(table.get_ref().at.get_ref().0, scenario.tick_s));
     let mut content: toml::Table = source.parse()?;
     for table in NOT_CHANGED {
         content.remove(table);
@@ -62,7 +63,7 @@ pub(super) fn check(
     for entry in tables {
         let span = Some(entry.span());
         let table = entry.into_inner();
-        let at = ticks(table.at.0, scenario.tick_s);
+        let at = ticks(table.at.get_ref().0, scenario.tick_s);
         if at < 1 {
             let reason =
                 "a change is in effect from the first tick on or later; before, it is the scenario";
@@ -173,13 +174,18 @@ fn change(
 }
 
 impl ChangeTable {
+    /// Remarks about its time.
+    pub(super) fn remark(&self, times: &mut Times<'_>) {
+        times.begins("change", &self.at);
+    }
+
     pub(super) fn of(change: &Change, tick_s: f64) -> Self {
         let mut set = Vec::new();
         for change in &change.set {
             set.push(unplaced(change.to_string()));
         }
         Self {
-            at: Time(change.at as f64 * tick_s),
+            at: unplaced(Time(change.at as f64 * tick_s)),
             set,
         }
     }

@@ -13,6 +13,9 @@ use super::super::checked::RobotSpec;
 use super::super::fault::{Fault, FaultEnd};
 use super::super::lateness::Lateness;
 use super::super::network::ticks;
+use super::times;
+use super::times::Times;
+use super::unplaced::unplaced;
 
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 10_000;
@@ -25,8 +28,8 @@ pub(super) struct FaultTable {
     robot: Spanned<RobotName>,
     #[serde(rename = "do")]
     kind: FaultKind,
-    at: Time,
-    until: Option<Time>,
+    at: Spanned<Time>,
+    until: Option<Spanned<Time>>,
     #[serde(rename = "for")]
     lasting: Option<Time>,
 }
@@ -70,16 +73,18 @@ fn check_fault(
         return Err(format!("no robot of this scenario is called {robot}"));
     }
 
-    let at = ticks(raw.at.0, tick_s);
+    let at_time = *raw.at.get_ref();
+    let until_time = raw.until.as_ref().map(|until| *until.get_ref());
+    let at = ticks(at_time.0, tick_s);
     if at < 1 {
         return Err("a fault begins after the first tick".to_owned());
     }
 
-    let end = end(raw.until, raw.lasting, tick_s)?;
-    if let FaultEnd::At(until) = end
+    let end = end(until_time, raw.lasting, tick_s)?;
+    if let (FaultEnd::At(until), Some(until_time)) = (end, until_time)
         && until <= at
     {
-        return Err("it ends before it begins: `until` comes after `at`".to_owned());
+        return Err(times::no_tick_between("at", at_time, until_time, tick_s));
     }
     if at >= settled {
         check_end(&robot, raw.kind, end, lateness.of(&robot))?;
@@ -142,17 +147,25 @@ fn check_end(
 }
 
 impl FaultTable {
+    /// Remarks about its times.
+    pub(super) fn remark(&self, times: &mut Times<'_>) {
+        times.begins("fault", &self.at);
+        if let Some(until) = &self.until {
+            times.on_tick(until);
+        }
+    }
+
     pub(super) fn of(fault: &Fault, tick_s: f64) -> Self {
         let mut table = Self {
-            robot: Spanned::new(0..0, fault.robot.clone()),
+            robot: unplaced(fault.robot.clone()),
             kind: fault.kind,
-            at: Time(fault.at as f64 * tick_s),
+            at: unplaced(Time(fault.at as f64 * tick_s)),
             until: None,
             lasting: None,
         };
 
         match fault.end {
-            FaultEnd::At(tick) => table.until = Some(Time(tick as f64 * tick_s)),
+            FaultEnd::At(tick) => table.until = Some(unplaced(Time(tick as f64 * tick_s))),
             FaultEnd::After(wall_s) => table.lasting = Some(Time(wall_s)),
             FaultEnd::Never => {}
         }

@@ -14,6 +14,8 @@ use super::super::network::{
     Burst, Channel, Counted, LinkRule, LostCommand, Network, Partition, ticks,
 };
 use super::range::Range;
+use super::times;
+use super::times::Times;
 use super::unplaced::unplaced;
 
 /// Longest delay of a command, ticks.
@@ -71,8 +73,8 @@ struct LinkTable {
 #[serde(deny_unknown_fields)]
 struct PartitionTable {
     groups: Vec<Vec<Spanned<RobotName>>>,
-    from: Time,
-    until: Option<Time>,
+    from: Spanned<Time>,
+    until: Option<Spanned<Time>>,
     one_way: Option<bool>,
     cuts: Option<Vec<Cuts>>,
 }
@@ -234,10 +236,14 @@ impl Checker<'_> {
         let raw = raw.into_inner();
         let groups = self.groups(&span, raw.groups)?;
 
-        let from = self.tick(&span, raw.from)?;
-        let until = raw.until.map(|time| self.tick(&span, time)).transpose()?;
-        if until.is_some_and(|until| until <= from) {
-            return Err(self.refuse(span, "it ends before it begins: `until` comes after `from`"));
+        let from = self.tick(&raw.from)?;
+        let until = raw.until.as_ref().map(|time| self.tick(time)).transpose()?;
+        if let Some(until_time) = &raw.until
+            && until.is_some_and(|until| until <= from)
+        {
+            let (begin, end) = (*raw.from.get_ref(), *until_time.get_ref());
+            let reason = times::no_tick_between("from", begin, end, self.tick_s);
+            return Err(self.refuse(until_time.span(), &reason));
         }
 
         let cuts = raw
@@ -285,15 +291,27 @@ impl Checker<'_> {
         Ok(groups)
     }
 
-    fn tick(&self, span: &std::ops::Range<usize>, time: Time) -> Result<u64, FileError> {
-        if time.0 >= 0.0 && time.0.is_finite() {
-            return Ok(ticks(time.0, self.tick_s));
+    fn tick(&self, time: &Spanned<Time>) -> Result<u64, FileError> {
+        let Time(time_s) = *time.get_ref();
+        if time_s >= 0.0 && time_s.is_finite() {
+            return Ok(ticks(time_s, self.tick_s));
         }
-        Err(self.refuse(span.clone(), "a time is not before the beginning"))
+        Err(self.refuse(time.span(), "a time is not before the beginning"))
     }
 }
 
 impl NetworkTable {
+    /// Remarks about the times of its partitions.
+    pub(super) fn remark(&self, times: &mut Times<'_>) {
+        for partition in &self.partitions {
+            let partition = partition.get_ref();
+            times.begins("partition", &partition.from);
+            if let Some(until) = &partition.until {
+                times.on_tick(until);
+            }
+        }
+    }
+
     /// The table of a network; a perfect one needs none.
     pub(super) fn of(network: &Network, tick_s: f64) -> Option<Spanned<Self>> {
         if *network == Network::default() {
@@ -351,7 +369,7 @@ impl PartitionTable {
             cuts.push(Cuts::Queries);
         }
 
-        let time = |tick: u64| Time(tick as f64 * tick_s);
+        let time = |tick: u64| unplaced(Time(tick as f64 * tick_s));
         Self {
             groups,
             from: time(partition.from),

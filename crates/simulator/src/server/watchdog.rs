@@ -43,7 +43,7 @@ impl Watchdog {
         let activity = Arc::new(Mutex::new(Activity::default()));
         let watched = activity.clone();
         let (ends_thread, end) = std::sync::mpsc::sync_channel(0);
-        std::thread::spawn(move || {
+        let watch = move || {
             loop {
                 let before = Instant::now();
                 if end.recv_timeout(LOOK_EVERY) != Err(RecvTimeoutError::Timeout) {
@@ -55,7 +55,11 @@ impl Watchdog {
                     report(line);
                 }
             }
-        });
+        };
+        // It is for people only: the run does not need it.
+        if let Err(error) = std::thread::Builder::new().spawn(watch) {
+            tracing::warn!("what holds the clock will not be reported: {error}");
+        }
 
         Self {
             activity,
