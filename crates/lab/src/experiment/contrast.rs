@@ -203,10 +203,10 @@ mod tests {
                     let mut measures = BTreeMap::new();
                     for measure in &experiment.measures {
                         let number = f64::from(seed * seed) + own * f64::from(seed);
-                        let time_s = if is_stalled { 60.0 } else { 600.0 };
-                        let measured = Measured {
-                            value: if measure.is_time() { time_s } else { number },
-                            is_censored: measure.is_time() && !is_stalled,
+                        let measured = match (measure.is_time(), is_stalled) {
+                            (false, _) => Measured::Value { value: number },
+                            (true, true) => Measured::Reached { time_s: 60.0 },
+                            (true, false) => Measured::NotReached { waited_s: 600.0 },
                         };
                         measures.insert(measure.name.clone(), measured);
                     }

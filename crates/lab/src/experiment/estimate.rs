@@ -81,9 +81,14 @@ pub(super) fn numbers(
     condition: &str,
     arm: &str,
 ) -> BTreeMap<u64, f64> {
-    let runs = runs_of(outcomes, condition, arm);
-    runs.map(|run| (run.seed, run.measures[&measure.name].value))
-        .collect()
+    let mut numbers = BTreeMap::new();
+    for run in runs_of(outcomes, condition, arm) {
+        if let Some(value) = run.measures[&measure.name].value() {
+            numbers.insert(run.seed, value);
+        }
+    }
+
+    numbers
 }
 
 /// The times of the runs of an arm under a condition, by seed.
@@ -95,12 +100,9 @@ pub(super) fn times(
 ) -> BTreeMap<u64, TimeTo> {
     let mut times = BTreeMap::new();
     for run in runs_of(outcomes, condition, arm) {
-        let measured = run.measures[&measure.name];
-        let time = TimeTo {
-            time_s: measured.value,
-            is_event: !measured.is_censored,
-        };
-        times.insert(run.seed, time);
+        if let Some((time_s, is_event)) = run.measures[&measure.name].time() {
+            times.insert(run.seed, TimeTo { time_s, is_event });
+        }
     }
 
     times

@@ -309,9 +309,11 @@ impl Columns {
 
         for (name, measured) in &outcome.measures {
             let (number, censored) = &self.measures[name];
-            row.push((number, measured.value.into()));
+            let time = measured.time();
+            let value = measured.value().or(time.map(|(time_s, _)| time_s));
+            row.push((number, value.into()));
             if let Some(censored) = censored {
-                row.push((censored, measured.is_censored.into()));
+                row.push((censored, time.map(|(_, is_event)| !is_event).into()));
             }
         }
 

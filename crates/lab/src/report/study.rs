@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use observe::Measure;
+use observe::{Measure, Measured};
 use report::Estimate;
 use statistics::{Survival, TimeTo};
 
@@ -96,7 +96,7 @@ impl<'a> Study<'a> {
     pub(super) fn numbers(&self, measure: &Measure, place: CellPlace) -> Vec<f64> {
         let runs = self.runs(place).iter();
         runs.filter_map(|run| run.measures.get(&measure.name))
-            .map(|measured| measured.value)
+            .filter_map(Measured::value)
             .collect()
     }
 
@@ -104,11 +104,9 @@ impl<'a> Study<'a> {
     pub(super) fn times(&self, measure: &Measure, place: CellPlace) -> Vec<TimeTo> {
         let mut times = Vec::new();
         for run in self.runs(place) {
-            if let Some(measured) = run.measures.get(&measure.name) {
-                times.push(TimeTo {
-                    time_s: measured.value,
-                    is_event: !measured.is_censored,
-                });
+            let measured = run.measures.get(&measure.name);
+            if let Some((time_s, is_event)) = measured.and_then(Measured::time) {
+                times.push(TimeTo { time_s, is_event });
             }
         }
         times
