@@ -11,6 +11,9 @@ const MAX_EXACT: usize = 14;
 /// Name of the stream of random signs.
 const STREAM: &str = "statistics/signs";
 
+/// Sums that are equal in exact numbers may differ by this share of the sum of all sizes.
+const ROUNDING: f64 = 1e-11;
+
 /// The two-sided sign-flip test of the mean of paired differences: if the arms did not differ, each difference could as well
 /// have the other sign (Fisher 1935).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -27,8 +30,7 @@ impl SignFlip {
     pub fn of(differences: &[f64]) -> Self {
         let sum: f64 = differences.iter().sum();
         let total: f64 = differences.iter().map(|value| value.abs()).sum();
-        // Sums that are equal in exact numbers may differ in their last bits.
-        let threshold = sum.abs() - 1e-12 * total;
+        let threshold = sum.abs() - ROUNDING * total;
 
         if differences.len() <= MAX_EXACT {
             let all = 1_u64 << differences.len();
@@ -59,6 +61,16 @@ impl SignFlip {
             p: f64::from(extreme) / f64::from(FLIPS + 1),
             is_exact: false,
         }
+    }
+}
+
+/// The smallest p value that so many pairs can have: where all of their differences have one sign.
+#[must_use]
+pub fn least_p(pairs: usize) -> f64 {
+    match i32::try_from(pairs) {
+        Ok(0) => 1.0,
+        Ok(few) if pairs <= MAX_EXACT => libm::scalbn(2.0, -few),
+        _ => 1.0 / f64::from(FLIPS + 1),
     }
 }
 
@@ -128,6 +140,14 @@ mod tests {
         assert!(found.is_exact);
         assert_eq!(SignFlip::of(&[0.0; 8]).p, 1.0);
         assert_eq!(SignFlip::of(&[]).p, 1.0);
+    }
+
+    #[test]
+    fn no_p_value_is_less_than_the_least() {
+        for pairs in 0..=14 {
+            assert_eq!(SignFlip::of(&vec![0.3; pairs]).p, least_p(pairs), "{pairs}");
+        }
+        assert_eq!(least_p(65), SignFlip::of(&[0.3; 65]).p);
     }
 
     #[test]
