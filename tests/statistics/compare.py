@@ -29,7 +29,8 @@ def compare_sample(sample):
     ends = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
     same_estimate(sample["difference"], values.mean(), ends, len(values))
     hall = hall_interval(values)
-    ends = (min(ends[0], hall[0]), max(ends[1], hall[1]))
+    most = 2 * (ends[1] - values.mean())
+    ends = (min(ends[0], max(hall[0], values.mean() - most)), max(ends[1], min(hall[1], values.mean() + most)))
     same_estimate(sample["mean"], values.mean(), ends, len(values))
 
     for p, found in sample["quantiles"]:

@@ -50,7 +50,12 @@ fn main() -> miette::Result<()> {
         }
     }
 
-    let runs = |rates: &[f64]| format!("{} runs of 600 s per second and core", Estimate::mean(rates));
+    let runs = |rates: &[f64]| {
+        format!(
+            "{} runs of 600 s per second and core",
+            Estimate::mean(rates)
+        )
+    };
     println!("bare loop:  {}", runs(&bare));
     println!("experiment: {}", runs(&measured));
     println!(

@@ -12,6 +12,10 @@ pub const MIN_VALUES: usize = 3;
 /// Values that are equal in exact numbers may differ in their last bits: by this share of the largest.
 const ROUNDING: f64 = 1e-12;
 
+/// How far an end may be from a skewed mean, in half widths of Student's t. Hall's transformation by itself makes intervals of
+/// few values up to several times as long, which adds less than 1 % to their coverage.
+const LONGEST: f64 = 2.0;
+
 /// An estimate with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
@@ -54,13 +58,18 @@ struct Moments {
 
 impl Estimate {
     /// The mean of independent values: Student's t, and beyond it on the side to which the values are skewed the interval of
-    /// Hall's transformation. With few runs, t by itself misses the mean of skewed values, such as the longest wait of a run.
+    /// Hall's transformation, up to twice as far. With few runs, t by itself misses the mean of skewed values, such as the longest
+    /// wait of a run.
     #[must_use]
     pub fn mean(values: &[f64]) -> Self {
         Self::of(values, |moments| {
             let (low, high) = moments.student();
             let (hall_low, hall_high) = moments.hall();
-            (low.min(hall_low), high.max(hall_high))
+            let most = LONGEST * (high - moments.mean);
+            (
+                low.min(hall_low.max(moments.mean - most)),
+                high.max(hall_high.min(moments.mean + most)),
+            )
         })
     }
 

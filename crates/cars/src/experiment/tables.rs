@@ -5,6 +5,7 @@ use lab::experiment::{
 };
 use miette::IntoDiagnostic;
 use tabled::builder::Builder;
+use tabled::settings::formatting::AlignmentStrategy;
 use tabled::settings::object::Columns;
 use tabled::settings::{Alignment, Style};
 
@@ -63,7 +64,7 @@ fn render(experiment: &Experiment, cells: &[Cell]) -> tabled::Table {
         if measure.column.is_some() {
             head.push(measure.title());
             if measure.is_time() {
-                head.push("median time to it, s".to_owned());
+                head.push("median time\nto it, s".to_owned());
             }
         }
     }
@@ -109,8 +110,8 @@ fn render_contrasts(experiment: &Experiment, measure: &Measure, contrasts: &[&Co
         "pairs".to_owned(),
     ];
     if measure.is_time() {
-        head.push("runs with it, points".to_owned());
-        head.push("mean time to it, s".to_owned());
+        head.push("runs with it,\npoints".to_owned());
+        head.push("mean time\nto it, s".to_owned());
     } else {
         head.push("difference".to_owned());
     }
@@ -148,11 +149,14 @@ fn render_contrasts(experiment: &Experiment, measure: &Measure, contrasts: &[&Co
     }
 
     let comparisons = contrasts.first().map_or(0, |one| one.comparisons);
-    let plural = if comparisons == 1 { "" } else { "s" };
-    let mut text = format!(
-        "{}: p after Holm over the {comparisons} comparison{plural} of this measure",
-        measure.title()
-    );
+    let mut text = match comparisons {
+        0 => format!("{}: no comparison can be made", measure.title()),
+        1 => format!("{}: one comparison, so p is not corrected", measure.title()),
+        _ => format!(
+            "{}: p after Holm over the {comparisons} comparisons of this measure",
+            measure.title()
+        ),
+    };
     let least_p = least_p_holm(contrasts);
     if comparisons > 0 && least_p >= SHOWN_P {
         text += &format!(
@@ -170,7 +174,8 @@ fn pairs(contrast: &Contrast) -> String {
         (&contrast.baseline, contrast.excluded_baseline),
     ] {
         if !excluded.is_none() {
-            lines.push(format!("{arm}: {excluded}"));
+            lines.push(format!("{arm}:"));
+            lines.push(excluded.to_string().replace(", ", "\n"));
         }
     }
     lines.join("\n")
@@ -212,6 +217,7 @@ fn table(head: Vec<String>, rows: Vec<Vec<String>>) -> tabled::Table {
     let mut table = table.build();
     table
         .with(Style::rounded())
-        .modify(Columns::new(2..), Alignment::right());
+        .modify(Columns::new(2..), Alignment::right())
+        .modify(Columns::new(2..), AlignmentStrategy::PerLine);
     table
 }

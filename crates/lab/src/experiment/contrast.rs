@@ -129,7 +129,7 @@ impl Contrast {
         match self.difference {
             Difference::Number { .. } | Difference::Time { .. } => None,
             Difference::NoPair if self.n == 0 => Some("no pair".to_owned()),
-            Difference::NoPair => Some(format!("only {} of {MIN_VALUES} pairs", self.n)),
+            Difference::NoPair => Some("too few pairs".to_owned()),
             Difference::NotFinite => Some("not finite".to_owned()),
         }
     }
