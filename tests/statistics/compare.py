@@ -1,21 +1,19 @@
 """Compares the laboratory's statistics with SciPy and lifelines.
 
-Standard input is JSON: samples and pairs of samples, each with what the laboratory found. Fails at the first difference;
-otherwise prints how many samples, pairs and intervals of pairs were compared.
+Standard input is JSON: samples, pairs of samples, and shares, each with what the laboratory found. Fails at the first difference;
+otherwise prints how many of each were compared.
 """
 
 import json
 import math
 import sys
 import warnings
-from types import SimpleNamespace
 
 import numpy
 import pandas
 from lifelines import KaplanMeierFitter
-from lifelines.statistics import logrank_test
 from lifelines.utils import median_survival_times, restricted_mean_survival_time
-from scipy import stats
+from scipy import optimize, stats
 
 EXACT = {"rel_tol": 1e-9, "abs_tol": 1e-9}
 # Largest distance of a share of 20,000 draws from the share of all, in standard errors.
@@ -28,11 +26,12 @@ def same(found, expected, what, **tolerance):
 
 def compare_sample(sample):
     values = numpy.array(sample["values"])
-    estimate = sample["estimate"]
-    interval = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
-    same(estimate["mean"], values.mean(), "mean")
-    same(estimate["half_width"], (interval.high - interval.low) / 2, "half width")
-    assert estimate["n"] == len(values)
+    ends = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
+    same_estimate(sample["difference"], values.mean(), ends, len(values))
+    hall = hall_interval(values)
+    most = 2 * (ends[1] - values.mean())
+    ends = (min(ends[0], max(hall[0], values.mean() - most)), max(ends[1], min(hall[1], values.mean() + most)))
+    same_estimate(sample["mean"], values.mean(), ends, len(values))
 
     for p, found in sample["quantiles"]:
         same(found, numpy.quantile(values, p), f"quantile {p}")
@@ -43,7 +42,31 @@ def compare_sample(sample):
 
     same(sample["dominance"], numpy.sign(values).mean(), "Cliff's delta")
     compare_sign_flip(values, sample["sign_flip"])
-    compare_interval(values, sample)
+
+
+def same_estimate(found, value, ends, n, **tolerance):
+    same(found["value"], value, "value", **tolerance)
+    assert (found["n"], found["interval"]) == (n, "ends")
+    same(found["low"], ends[0], "low", **tolerance)
+    same(found["high"], ends[1], "high", **tolerance)
+
+
+def hall_interval(values):
+    """The means at which Hall's transformed statistic, which rises with the mean that is not there, is the quantile of t."""
+    n = len(values)
+    deviation = values.std(ddof=1)
+    skewness = stats.skew(values, bias=False)
+    quantile = stats.t.ppf(0.975, n - 1) / math.sqrt(n)
+
+    def transformed(mean):
+        t = (values.mean() - mean) / deviation
+        return t + skewness * t**2 / 3 + skewness**2 * t**3 / 27 + skewness / (6 * n)
+
+    far = 1e3 * deviation
+    return [
+        optimize.brentq(lambda mean: transformed(mean) - end, values.mean() - far, values.mean() + far, xtol=1e-13)
+        for end in (quantile, -quantile)
+    ]
 
 
 def compare_sign_flip(values, found):
@@ -61,59 +84,31 @@ def compare_sign_flip(values, found):
     assert abs(found["p"] - expected) < ERRORS * error, f"sign flip: {found}, not {expected}"
 
 
-def compare_interval(values, sample):
-    found = sample["bootstrapped"]
-    low, high = found["interval"]["bca"]["low"], found["interval"]["bca"]["high"]
-    same(found["value"], values.mean(), "mean of the bootstrap")
-
-    drawn = distribution(sample["resampled"], values.mean())
-    expected = stats.bootstrap(
-        (values,), numpy.mean, method="BCa", n_resamples=0, bootstrap_result=drawn
-    ).confidence_interval
-    same(low, expected.low, "BCa of the same resamples, low")
-    same(high, expected.high, "BCa of the same resamples, high")
-
-    own = stats.bootstrap((values,), numpy.mean, method="BCa", n_resamples=10_000, rng=1).confidence_interval
-    # The share below an end varies by a few thousandths, with it the end by a few hundredths of the width; with few values,
-    # resamples take few different ones.
-    width = expected.high - expected.low
-    tolerance = (0.1 if len(values) > 3 else 0.35) * width
-    same(low, own.low, "BCa of other resamples, low", abs_tol=tolerance)
-    same(high, own.high, "BCa of other resamples, high", abs_tol=tolerance)
-
-
-def distribution(resampled, value):
-    """The resamples as SciPy takes them. It compares them with the value to the last bit, in which equal ones may differ."""
-    resampled = numpy.array(resampled)
-    resampled[numpy.isclose(resampled, value, rtol=1e-12, atol=1e-12)] = value
-    return SimpleNamespace(bootstrap_distribution=resampled)
-
-
 def fit(times):
     return KaplanMeierFitter().fit([time for time, _ in times], [is_event for _, is_event in times])
 
 
 def compare_pair(pair):
-    """Returns whether there is an interval of the difference in restricted means."""
     arm, baseline = pair["arm"], pair["baseline"]
     compare_survival(fit(arm), pair["survival"])
 
-    expected = logrank_test(
-        [time for time, _ in arm],
-        [time for time, _ in baseline],
-        [is_event for _, is_event in arm],
-        [is_event for _, is_event in baseline],
-    )
-    same(pair["log_rank"]["chi_square"], expected.test_statistic, "log-rank")
-    same(pair["log_rank"]["p"], expected.p_value, "p of the log-rank test")
-
-    share = numpy.mean([is_event for _, is_event in arm]) - numpy.mean([is_event for _, is_event in baseline])
-    same(pair["share"], share, "share of events")
     until = pair["until_s"]
     longest = max(time for time, _ in arm + baseline)
     assert until == min(longest, known_until(arm), known_until(baseline))
-    same(pair["restricted_mean_s"], restricted_mean_survival_time(fit(arm), until), "restricted mean")
-    return compare_restricted(arm, baseline, until, pair)
+    compare_times(arm + baseline, until, pair["differences_s"])
+
+
+def compare_times(both, until, differences):
+    """The differences of pseudo-values of restricted means (Andersen, Hansen and Klein 2004)."""
+    n = len(both)
+    whole = restricted_mean_survival_time(fit(both), until)
+    values = []
+    for index in range(n):
+        others = both[:index] + both[index + 1 :]
+        values.append(n * whole - (n - 1) * restricted_mean_survival_time(fit(others), until))
+    expected = numpy.array(values[: n // 2]) - numpy.array(values[n // 2 :])
+    for found, difference in zip(differences, expected, strict=True):
+        same(found, difference, "difference of times", rel_tol=1e-7, abs_tol=1e-7)
 
 
 def known_until(times):
@@ -133,52 +128,71 @@ def compare_survival(expected, found):
         assert list(curve[column]) == list(table[name]), column
     assert (found["n"], found["events"]) == (int(curve["at_risk"].iloc[0]), int(curve["events"].sum()))
 
-    bands = expected.confidence_interval_
+    # Greenwood's variance as a share of the square of the curve, and the number of runs without censoring that have it.
+    greenwood = 0.0
+    effective = len(curve)
     for time, step in curve.iterrows():
-        same(step["share"], expected.survival_function_["KM_estimate"][time], f"share at {time}")
-        # lifelines has 1 where the share is 0, and the variance is not defined.
-        if step["share"] > 1e-9:
-            same(step["low"], bands.iloc[:, 0][time], f"low at {time}")
-            same(step["high"], bands.iloc[:, 1][time], f"high at {time}")
+        at_risk, events, share = step["at_risk"], step["events"], step["share"]
+        same(share, expected.survival_function_["KM_estimate"][time], f"share at {time}")
+        if events < at_risk:
+            greenwood += events / (at_risk * (at_risk - events))
+        if share > 1 - 1e-12:
+            effective = at_risk
+        elif share > 1e-9:
+            effective = (1 - share) / (share * greenwood)
+        # At the ends 0 and 1 the interval is given by its formula as well.
+        low, high = wilson(max(share, 0.0), effective)
+        same(step["low"], max(low, 0.0), f"low at {time}")
+        same(step["high"], min(high, 1.0), f"high at {time}")
 
     # lifelines compares with one half to the last bit.
     shares = expected.survival_function_["KM_estimate"]
     shares = shares.mask(numpy.isclose(shares, 0.5), 0.5)
     same(open_time(found["median_s"]), median_survival_times(shares), "median")
-    limits = median_survival_times(bands[shares > 1e-9]).iloc[0]
-    ends = [open_time(found["median_low_s"]), open_time(found["median_high_s"])]
-    if curve["share"].iloc[-1] < 1e-9 and math.isinf(limits.iloc[0]):
-        # The lower band falls to one half only where the share is 0.
-        limits.iloc[0] = curve.index[-1]
-    same(ends[0], limits.iloc[0], "lower end of the median")
-    same(ends[1], limits.iloc[1], "upper end of the median")
+    for end, name in [("low", "median_low_s"), ("high", "median_high_s")]:
+        reached = [time for time, value in curve[end].items() if value <= 0.5 + 1e-9]
+        same(open_time(found[name]), min(reached, default=math.inf), name)
+
+
+def wilson(share, n):
+    """The shares whose score is the quantile of the normal distribution: the roots of a quadratic equation."""
+    z = stats.norm.ppf(0.975)
+    roots = numpy.roots([1 + z**2 / n, -(2 * share + z**2 / n), share**2])
+    return sorted(float(root.real) for root in roots)
 
 
 def open_time(time):
     return math.inf if time is None else time
 
 
-def compare_restricted(arm, baseline, until, pair):
-    def difference(indices):
-        resampled = [fit([times[index] for index in indices]) for times in (arm, baseline)]
-        means = [restricted_mean_survival_time(times, until) for times in resampled]
-        return means[0] - means[1]
+def compare_share(share):
+    n, more, fewer = share["n"], share["only_arm"], share["only_baseline"]
+    interval = stats.binomtest(more, n).proportion_ci(method="wilson")
+    same_estimate(share["share"], more / n, interval, n)
+    ends = tango(more, fewer, n)
+    same_estimate(share["difference"], (more - fewer) / n, ends, n, rel_tol=1e-5, abs_tol=1e-5)
 
-    found = pair["restricted"]
-    indices = numpy.arange(len(arm))
-    same(found["value"], difference(indices), "difference of restricted means")
-    if found["interval"] == "all_equal":
-        assert numpy.ptp(pair["restricted_resampled"]) < 1e-9
-        return False
 
-    drawn = distribution(pair["restricted_resampled"], difference(indices))
-    expected = stats.bootstrap(
-        (indices,), difference, method="BCa", n_resamples=0, bootstrap_result=drawn, vectorized=False
-    ).confidence_interval
-    ends = found["interval"]["bca"]
-    same(ends["low"], expected.low, "BCa of restricted means, low")
-    same(ends["high"], expected.high, "BCa of restricted means, high")
-    return True
+def tango(more, fewer, n):
+    """The differences whose score is the quantile of the normal distribution, the other parameter by maximum likelihood."""
+
+    def score(difference):
+        low, high = max(0.0, -difference), (1 - difference) / 2
+
+        def unlikely(only_baseline):
+            shares = [only_baseline + difference, only_baseline, 1 - 2 * only_baseline - difference]
+            counts = [more, fewer, n - more - fewer]
+            return -sum(count * math.log(max(share, 1e-300)) for count, share in zip(counts, shares) if count)
+
+        only_baseline = optimize.minimize_scalar(unlikely, bounds=(low, high), options={"xatol": 1e-14}, method="bounded").x
+        variance = n * (2 * only_baseline + difference * (1 - difference))
+        return (more - fewer - n * difference) / math.sqrt(max(variance, 1e-300))
+
+    value = (more - fewer) / n
+    z = stats.norm.ppf(0.975)
+    low = -1.0 if value == -1 else optimize.brentq(lambda difference: score(difference) - z, -1 + 1e-9, value, xtol=1e-12)
+    high = 1.0 if value == 1 else optimize.brentq(lambda difference: score(difference) + z, value, 1 - 1e-9, xtol=1e-12)
+    return low, high
 
 
 def main():
@@ -187,8 +201,11 @@ def main():
     found = json.load(sys.stdin)
     for sample in found["samples"]:
         compare_sample(sample)
-    intervals = [compare_pair(pair) for pair in found["pairs"]]
-    print(json.dumps({"samples": len(found["samples"]), "pairs": len(intervals), "intervals": sum(intervals)}))
+    for pair in found["pairs"]:
+        compare_pair(pair)
+    for share in found["shares"]:
+        compare_share(share)
+    print(json.dumps({kind: len(found[kind]) for kind in ("samples", "pairs", "shares")}))
 
 
 if __name__ == "__main__":

@@ -50,12 +50,17 @@ fn main() -> miette::Result<()> {
         }
     }
 
-    let runs = |rates: &[f64]| format!("{} runs of 600 s per second and core", Estimate::of(rates));
+    let runs = |rates: &[f64]| {
+        format!(
+            "{} runs of 600 s per second and core",
+            Estimate::mean(rates)
+        )
+    };
     println!("bare loop:  {}", runs(&bare));
     println!("experiment: {}", runs(&measured));
     println!(
         "cost: {} %, {rounds} rounds of {RUNS} runs",
-        Estimate::of(&costs)
+        Estimate::mean(&costs)
     );
     Ok(())
 }

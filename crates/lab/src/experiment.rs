@@ -21,9 +21,11 @@ mod store;
 pub mod submit;
 mod unit;
 
+pub use observe::Measure;
+
 pub use condition::{Condition, ConditionError, Conditions, Factor, Value};
-pub use contrast::{Contrast, Difference};
-pub use estimate::{Cell, Estimated};
+pub use contrast::{Contrast, Difference, SHOWN_P, least_p_holm};
+pub use estimate::{Cell, Estimated, Excluded};
 pub use file::{Arm, Experiment, MAX_UNITS, is_experiment_file};
 pub use outcome::{Measured, Outcome};
 pub use plan::{Key, LaunchText, PLAN, Plan, Program, Request, Robots, Unit};

@@ -11,7 +11,7 @@ use protocol::{Event, RobotName, Tick};
 pub use expect::{Expectation, Judgment, Watch, Watches};
 pub use measure::{Kind, Measure, MeasureError, Measured};
 pub use pattern::{Pattern, PatternError};
-pub use probe::{MissingNumber, Probe};
+pub use probe::Probe;
 
 /// A complete tick of a run, or its end.
 pub struct Observation<'a> {

@@ -87,14 +87,17 @@ pub struct TimeTo {
 pub struct Between {
     /// Begins a pair, unless one is open.
     pub begin: Pattern,
-    /// Ends the pair that is open. A pair that is open at the end of the run ends there.
+    /// Ends the pair that is open.
     pub end: Pattern,
     /// The number of the durations that is taken.
     #[serde(rename = "as")]
     pub number: OfDurations,
+    /// Whether a pair that is open at the end of the run counts as one that ends there. Otherwise its duration is not known.
+    #[serde(default)]
+    pub until_end: bool,
 }
 
-/// A number of several durations; 0 where there are none.
+/// A number of several durations. Of none, their mean and the longest do not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OfDurations {
@@ -104,7 +107,7 @@ pub enum OfDurations {
     Max,
     /// Their sum, seconds.
     Sum,
-    /// How many there are.
+    /// How many have ended.
     Count,
 }
 
@@ -174,13 +177,101 @@ pub struct Counter {
     pub variable: String,
 }
 
-/// The number of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
-    /// The number. For a time that did not come, the time that was waited for it.
-    pub value: f64,
-    /// Whether it is a time that did not come before the end of the run. Other numbers are never censored.
-    pub is_censored: bool,
+/// What a measure gives for one run: a number, or why there is none.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "state", rename_all = "snake_case")]
+pub enum Measured {
+    /// A number, which is finite.
+    Value {
+        /// The number.
+        value: f64,
+    },
+    /// A time whose event came.
+    Reached {
+        /// The time, seconds.
+        time_s: f64,
+    },
+    /// A time whose event did not come before the end of the run: it is censored.
+    NotReached {
+        /// How long the run waited for the event, seconds.
+        waited_s: f64,
+    },
+    /// A time that never began, because what it begins after did not happen. The run says nothing about it.
+    NotAtRisk,
+    /// The mean or the longest of durations of which the run has none.
+    NoPair,
+    /// The mean, the longest or the sum of durations one of which had not ended at the end of the run.
+    Unfinished {
+        /// The number if that duration had ended at the end of the run: the real one is not smaller.
+        at_least: f64,
+    },
+    /// The run has no such number.
+    Missing {
+        /// The reason, for people.
+        reason: String,
+    },
+}
+
+impl Measured {
+    /// The number, or the time that came; `None` in all other states.
+    #[must_use]
+    pub fn value(&self) -> Option<f64> {
+        match self {
+            Self::Value { value } => Some(*value),
+            Self::Reached { time_s } => Some(*time_s),
+            _ => None,
+        }
+    }
+
+    /// A time as an analysis of survival takes it, with whether its event came; `None` for a run that was not at risk, and for
+    /// what is no time.
+    #[must_use]
+    pub fn time(&self) -> Option<(f64, bool)> {
+        match self {
+            Self::Reached { time_s } => Some((*time_s, true)),
+            Self::NotReached { waited_s } => Some((*waited_s, false)),
+            _ => None,
+        }
+    }
+
+    /// The state in a word, for tables.
+    #[must_use]
+    pub fn state(&self) -> &'static str {
+        match self {
+            Self::Value { .. } => "value",
+            Self::Reached { .. } => "reached",
+            Self::NotReached { .. } => "not reached",
+            Self::NotAtRisk => "not at risk",
+            Self::NoPair => "no pair",
+            Self::Unfinished { .. } => "unfinished",
+            Self::Missing { .. } => "missing",
+        }
+    }
+}
+
+impl std::fmt::Display for Measured {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Value { value } => write!(f, "{value}"),
+            Self::Reached { time_s } => write!(f, "{time_s}"),
+            Self::NotReached { waited_s } => write!(f, "not reached within {waited_s}"),
+            Self::Unfinished { at_least } => write!(f, "unfinished, at least {at_least}"),
+            Self::Missing { reason } => write!(f, "missing: {reason}"),
+            Self::NotAtRisk | Self::NoPair => f.write_str(self.state()),
+        }
+    }
+}
+
+impl From<f64> for Measured {
+    /// A number, if it is finite.
+    fn from(value: f64) -> Self {
+        if value.is_finite() {
+            return Self::Value { value };
+        }
+        Self::Missing {
+            reason: "it is not a finite number".to_owned(),
+        }
+    }
 }
 
 /// A measure that cannot be taken of any run.

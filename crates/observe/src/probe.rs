@@ -9,31 +9,6 @@ use crate::measure::{
     States, TimeTo, When,
 };
 
-/// A number that a run does not have.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum MissingNumber {
-    /// The summary of the run has no such number.
-    #[error("the measure \"{measure}\": the summary of a run has no number `{path}`")]
-    Summary {
-        /// Name of the measure.
-        measure: String,
-        /// Path in the summary.
-        path: String,
-    },
-    /// The robot has no such number.
-    #[error(
-        "the measure \"{measure}\": {robot} has no number `{variable}` among its state variables"
-    )]
-    Variable {
-        /// Name of the measure.
-        measure: String,
-        /// The robot.
-        robot: RobotName,
-        /// Name of the variable.
-        variable: String,
-    },
-}
-
 /// A measure of one run.
 #[derive(Debug)]
 pub struct Probe<'a> {
@@ -112,57 +87,35 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// The number at the end of the run, the summary of which is given as JSON.
-    ///
-    /// # Errors
-    /// [`MissingNumber`] if the run has no such number.
-    pub fn measured(&self, summary: &Value) -> Result<Measured, MissingNumber> {
+    /// What the measure gives at the end of the run, the summary of which is given as JSON.
+    #[must_use]
+    pub fn measured(&self, summary: &Value) -> Measured {
         let now_s = self.now_s;
         match &self.tally {
-            Tally::Summary(path) => {
-                let parts: Vec<&str> = path.split('.').collect();
-                let number = sum(summary, &parts).ok_or_else(|| MissingNumber::Summary {
-                    measure: self.measure.name.clone(),
-                    path: (*path).to_owned(),
-                })?;
-                Ok(certain(number))
-            }
-            Tally::Count(tally) => Ok(certain(tally.count as f64)),
-            Tally::Time(tally) => Ok(tally.measured(now_s)),
-            Tally::Between(tally) => Ok(certain(tally.number(now_s))),
-            Tally::Share(tally) => Ok(certain(tally.share(now_s))),
-            Tally::Variable(tally) => {
-                let definition = tally.definition;
-                let number = tally
-                    .number(now_s)
-                    .ok_or_else(|| self.no_variable(&definition.robot, &definition.name))?;
-                Ok(certain(number))
-            }
-            Tally::Stalled(tally) => {
-                for (counter, value) in tally.definition.progress.iter().zip(&tally.values) {
-                    if value.is_none() {
-                        return Err(self.no_variable(&counter.robot, &counter.variable));
-                    }
-                }
-
-                Ok(tally.measured(now_s))
-            }
-        }
-    }
-
-    fn no_variable(&self, robot: &RobotName, variable: &str) -> MissingNumber {
-        MissingNumber::Variable {
-            measure: self.measure.name.clone(),
-            robot: robot.clone(),
-            variable: variable.to_owned(),
+            Tally::Summary(path) => summary_number(summary, path),
+            Tally::Count(tally) => Measured::from(tally.count as f64),
+            Tally::Time(tally) => tally.measured(now_s),
+            Tally::Between(tally) => tally.measured(now_s),
+            Tally::Share(tally) => Measured::from(tally.share(now_s)),
+            Tally::Variable(tally) => tally.measured(now_s),
+            Tally::Stalled(tally) => tally.measured(now_s),
         }
     }
 }
 
-fn certain(value: f64) -> Measured {
-    Measured {
-        value,
-        is_censored: false,
+fn summary_number(summary: &Value, path: &str) -> Measured {
+    let parts: Vec<&str> = path.split('.').collect();
+    match sum(summary, &parts) {
+        Some(number) => Measured::from(number),
+        None => Measured::Missing {
+            reason: format!("the summary of the run has no number `{path}`"),
+        },
+    }
+}
+
+fn no_variable(robot: &RobotName, variable: &str) -> Measured {
+    Measured::Missing {
+        reason: format!("{robot} has no number `{variable}` among its state variables"),
     }
 }
 
@@ -250,13 +203,15 @@ impl TimeTally<'_> {
         }
     }
 
-    /// A time that has not begun is censored at 0: the run was never at risk of the event, and contributes nothing to an
-    /// estimate of survival.
     fn measured(&self, now_s: f64) -> Measured {
-        let begun_s = self.begun_s.unwrap_or(now_s);
-        Measured {
-            value: self.reached_s.unwrap_or(now_s) - begun_s,
-            is_censored: self.reached_s.is_none(),
+        match (self.begun_s, self.reached_s) {
+            (None, _) => Measured::NotAtRisk,
+            (Some(begun_s), Some(reached_s)) => Measured::Reached {
+                time_s: reached_s - begun_s,
+            },
+            (Some(begun_s), None) => Measured::NotReached {
+                waited_s: now_s - begun_s,
+            },
         }
     }
 }
@@ -282,6 +237,17 @@ impl Durations {
         self.sum_s += duration_s;
         self.max_s = self.max_s.max(duration_s);
     }
+
+    /// A number of them; `None` if it does not exist.
+    fn number(&self, number: OfDurations) -> Option<f64> {
+        let has_any = self.count > 0;
+        match number {
+            OfDurations::Mean => has_any.then(|| self.sum_s / self.count as f64),
+            OfDurations::Max => has_any.then_some(self.max_s),
+            OfDurations::Sum => Some(self.sum_s),
+            OfDurations::Count => Some(self.count as f64),
+        }
+    }
 }
 
 impl BetweenTally<'_> {
@@ -299,18 +265,21 @@ impl BetweenTally<'_> {
         }
     }
 
-    fn number(&self, now_s: f64) -> f64 {
+    fn measured(&self, now_s: f64) -> Measured {
+        let definition = self.definition;
         let mut durations = self.durations;
-        if let Some(begun_s) = self.open_s {
+        let mut is_finished = true;
+        if let Some(begun_s) = self.open_s
+            && (definition.until_end || definition.number != OfDurations::Count)
+        {
             durations.add(now_s - begun_s);
+            is_finished = definition.until_end;
         }
 
-        match self.definition.number {
-            OfDurations::Mean if durations.count == 0 => 0.0,
-            OfDurations::Mean => durations.sum_s / durations.count as f64,
-            OfDurations::Max => durations.max_s,
-            OfDurations::Sum => durations.sum_s,
-            OfDurations::Count => durations.count as f64,
+        match durations.number(definition.number) {
+            None => Measured::NoPair,
+            Some(value) if is_finished => Measured::from(value),
+            Some(at_least) => Measured::Unfinished { at_least },
         }
     }
 }
@@ -411,10 +380,14 @@ impl VariableTally<'_> {
         }
     }
 
-    fn number(&self, now_s: f64) -> Option<f64> {
-        let values = self.values?;
+    fn measured(&self, now_s: f64) -> Measured {
+        let definition = self.definition;
+        let Some(values) = self.values else {
+            return no_variable(&definition.robot, &definition.name);
+        };
+
         let duration_s = now_s - values.begun_s;
-        Some(match self.definition.number {
+        Measured::from(match definition.number {
             OfValues::Mean if duration_s > 0.0 => values.area(now_s) / duration_s,
             OfValues::End | OfValues::Mean => values.last,
             OfValues::Max => values.max,
@@ -426,7 +399,7 @@ impl VariableTally<'_> {
 #[derive(Debug)]
 struct StalledTally<'a> {
     definition: &'a Stalled,
-    /// Values of the variables of progress at the last tick.
+    /// Last values of the variables of progress. A robot that is lost makes no progress.
     values: Vec<Option<f64>>,
     /// Time of the last progress, simulated seconds.
     progress_s: f64,
@@ -435,21 +408,28 @@ struct StalledTally<'a> {
 impl StalledTally<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
         for (counter, before) in self.definition.progress.iter().zip(&mut self.values) {
-            let now = number_of(observation, &counter.robot, &counter.variable);
-            if let (Some(before), Some(now)) = (*before, now)
-                && now > before
-            {
+            let Some(now) = number_of(observation, &counter.robot, &counter.variable) else {
+                continue;
+            };
+            if before.is_some_and(|before| now > before) {
                 self.progress_s = observation.time_s;
             }
-            *before = now;
+            *before = Some(now);
         }
     }
 
     fn measured(&self, now_s: f64) -> Measured {
-        let is_stalled = now_s - self.progress_s >= self.definition.lasting_s;
-        Measured {
-            value: if is_stalled { self.progress_s } else { now_s },
-            is_censored: !is_stalled,
+        for (counter, value) in self.definition.progress.iter().zip(&self.values) {
+            if value.is_none() {
+                return no_variable(&counter.robot, &counter.variable);
+            }
+        }
+
+        if now_s - self.progress_s < self.definition.lasting_s {
+            return Measured::NotReached { waited_s: now_s };
+        }
+        Measured::Reached {
+            time_s: self.progress_s,
         }
     }
 }
@@ -515,7 +495,7 @@ mod tests {
 
     /// Takes a measure of a run with these ticks, the last of which is observed again at the end. The condition lasts from
     /// 1 s to 2 s.
-    fn take(text: &str, ticks: &[Tick]) -> Result<Measured, MissingNumber> {
+    fn take(text: &str, ticks: &[Tick]) -> Measured {
         let measure = measure(text);
         let mut probe = Probe::new(&measure, (1.0, 2.0));
         let mut variables = BTreeMap::new();
@@ -554,10 +534,19 @@ mod tests {
         });
     }
 
+    fn reason_of(measured: Measured) -> String {
+        let Measured::Missing { reason } = measured else {
+            panic!("{measured:?}");
+        };
+        reason
+    }
+
     fn certain_of(text: &str, ticks: &[Tick]) -> f64 {
-        let measured = take(text, ticks).unwrap();
-        assert!(!measured.is_censored, "{text}");
-        measured.value
+        let measured = take(text, ticks);
+        let Measured::Value { value } = measured else {
+            panic!("{text}: {measured:?}");
+        };
+        value
     }
 
     #[test]
@@ -567,12 +556,12 @@ mod tests {
         let at = |path: &str| {
             let measure = measure(&format!("summary = '{path}'"));
             let probe = Probe::new(&measure, (0.0, 1.0));
-            probe.measured(&summary).map(|measured| measured.value)
+            probe.measured(&summary)
         };
-        assert_eq!(at("robots.A.sent.x"), Ok(2.0));
-        assert_eq!(at("robots.*.sent.*"), Ok(5.0));
+        assert_eq!(at("robots.A.sent.x"), Measured::from(2.0));
+        assert_eq!(at("robots.*.sent.*"), Measured::from(5.0));
         for missing in ["robots.A.sent", "robots.C.sent.x"] {
-            let error = at(missing).unwrap_err().to_string();
+            let error = reason_of(at(missing));
             assert!(error.contains(missing), "{error}");
         }
     }
@@ -606,14 +595,8 @@ mod tests {
         let after_z = "time = { to = { event = 'behavior', to = 'Y' }, after = { event = 'behavior', to = 'Z' } }";
         let y = enters("A", "X", "Y");
         let z = enters("A", "X", "Z");
-        let come = |value| Measured {
-            value,
-            is_censored: false,
-        };
-        let waited = |value| Measured {
-            value,
-            is_censored: true,
-        };
+        let come = |time_s| Measured::Reached { time_s };
+        let waited = |waited_s| Measured::NotReached { waited_s };
         let nothing = Tick::default();
         let both = happens(&[&y, &z]);
         let y = happens(&[&y]);
@@ -629,10 +612,10 @@ mod tests {
             (after_z, vec![&nothing, &both], come(0.0)),
             (after_z, vec![&nothing, &z, &nothing, &nothing], waited(1.0)),
             (after_z, vec![&nothing, &z], waited(0.0)),
-            (after_z, vec![&y, &nothing, &nothing], waited(0.0)),
+            (after_z, vec![&y, &nothing, &nothing], Measured::NotAtRisk),
         ] {
             let ticks: Vec<Tick> = ticks.into_iter().cloned().collect();
-            assert_eq!(take(text, &ticks).unwrap(), expected, "{text}: {ticks:?}");
+            assert_eq!(take(text, &ticks), expected, "{text}: {ticks:?}");
         }
     }
 
@@ -644,16 +627,18 @@ mod tests {
                     "between = {{ begin = {{ event = 'behavior', to = 'Y' }}, \
                      end = {{ event = 'behavior', from = 'Y' }}, as = '{number}' }}"
                 );
-                certain_of(&text, ticks)
+                take(&text, ticks)
             })
         };
+        let values = |values: [f64; 4]| values.map(Measured::from);
         let begin = enters("A", "X", "Y");
         let end = enters("A", "Y", "X");
         let again = enters("A", "Y", "Y");
         let nothing = Tick::default();
 
-        assert_eq!(numbers(&[nothing.clone(), happens(&[&end])]), [0.0; 4]);
-        let pairs = [
+        let no_pair = [Measured::NoPair, Measured::NoPair, 0.0.into(), 0.0.into()];
+        assert_eq!(numbers(&[nothing.clone(), happens(&[&end])]), no_pair);
+        let mut pairs = vec![
             happens(&[&begin]),
             happens(&[&begin]), // One is open.
             happens(&[&end, &begin]),
@@ -662,20 +647,32 @@ mod tests {
             happens(&[&end]),
             happens(&[&end]),
         ];
-        assert_eq!(numbers(&pairs), [1.25, 1.5, 2.5, 2.0]);
-        // A pair that is open lasts until the end, also where it begins there.
-        let open = [happens(&[&begin]), nothing.clone(), nothing.clone()];
-        assert_eq!(numbers(&open), [1.0, 1.0, 1.0, 1.0]);
-        assert_eq!(
-            numbers(&[nothing, happens(&[&begin])]),
-            [0.0, 0.0, 0.0, 1.0]
-        );
+        assert_eq!(numbers(&pairs), values([1.25, 1.5, 2.5, 2.0]));
         // Both in one tick, in the order of the record.
         let at_once = [Tick::default(), happens(&[&begin, &end]), Tick::default()];
-        assert_eq!(numbers(&at_once), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(numbers(&at_once), values([0.0, 0.0, 0.0, 1.0]));
+
+        // How long a pair lasts that is open at the end is not known, also where it begins there.
+        let unfinished = |[mean, max, sum]: [f64; 3], count: f64| {
+            let [mean, max, sum] =
+                [mean, max, sum].map(|at_least| Measured::Unfinished { at_least });
+            [mean, max, sum, count.into()]
+        };
+        let open = [happens(&[&begin]), nothing.clone(), nothing.clone()];
+        assert_eq!(numbers(&open), unfinished([1.0, 1.0, 1.0], 0.0));
+        let at_end = [nothing.clone(), happens(&[&begin])];
+        assert_eq!(numbers(&at_end), unfinished([0.0, 0.0, 0.0], 0.0));
+        pairs.push(happens(&[&begin]));
+        pairs.push(nothing);
+        assert_eq!(numbers(&pairs), unfinished([1.0, 1.5, 3.0], 2.0));
+        let until_end = "between = { begin = { event = 'behavior', to = 'Y' }, \
+                         end = { event = 'lost' }, as = 'count', until_end = true }";
+        assert_eq!(certain_of(until_end, &pairs), 1.0);
+        let until_end = until_end.replace("count", "sum");
+        assert_eq!(certain_of(&until_end, &pairs), 4.0);
         // One event may end a pair and begin the next.
         let chain = [happens(&[&begin]), happens(&[&again]), Tick::default()];
-        assert_eq!(numbers(&chain), [0.5, 0.5, 1.0, 2.0]);
+        assert_eq!(numbers(&chain), unfinished([0.5, 0.5, 1.0], 1.0));
     }
 
     #[test]
@@ -718,7 +715,7 @@ mod tests {
         for (robot, variable) in [("A", "w"), ("B", "v")] {
             let text =
                 format!("variable = {{ robot = '{robot}', name = '{variable}', as = 'end' }}");
-            let error = take(&text, &ticks).unwrap_err().to_string();
+            let error = reason_of(take(&text, &ticks));
             let expected = format!("{robot} has no number `{variable}`");
             assert!(error.contains(&expected), "{error}");
         }
@@ -734,21 +731,22 @@ mod tests {
             }
             run.push(has(v));
         }
-        take("stalled = { progress = ['A.v'], for = '2 s' }", &run).unwrap()
+        take("stalled = { progress = ['A.v'], for = '2 s' }", &run)
     }
 
     #[test]
     fn a_standstill_lasts_until_the_end() {
-        let at = |value, is_censored| Measured { value, is_censored };
-        assert_eq!(stalled(&[2, 6], 10), at(3.0, false));
-        assert_eq!(stalled(&[2, 7], 10), at(5.0, true));
-        assert_eq!(stalled(&[10], 10), at(5.0, true));
+        let at = |time_s| Measured::Reached { time_s };
+        let not_by = |waited_s| Measured::NotReached { waited_s };
+        assert_eq!(stalled(&[2, 6], 10), at(3.0));
+        assert_eq!(stalled(&[2, 7], 10), not_by(5.0));
+        assert_eq!(stalled(&[10], 10), not_by(5.0));
         // The first value is no progress.
-        assert_eq!(stalled(&[], 10), at(0.0, false));
-        assert_eq!(stalled(&[], 3), at(1.5, true));
+        assert_eq!(stalled(&[], 10), at(0.0));
+        assert_eq!(stalled(&[], 3), not_by(1.5));
 
         let error = take("stalled = { progress = ['A.w'], for = '2 s' }", &[has(1.0)]);
-        let error = error.unwrap_err().to_string();
+        let error = reason_of(error);
         assert!(error.contains("A has no number `w`"), "{error}");
     }
 
@@ -781,11 +779,21 @@ mod tests {
             let share = in_y / lasting.len() as f64;
             let area = f64::from(area) * TICK_S;
             let entered = certain_of("count = { event = 'behavior', to = 'Y' }", &ticks);
+            let is_open = behaviors.last() == Some(&1);
+            let ended = entered - f64::from(u8::from(is_open));
+
+            let sum = take(&format!("between = {{ {stays}, as = 'sum' }}"), &ticks);
+            let expected = in_y * TICK_S;
+            let is_right = match sum {
+                Measured::Value { value } => !is_open && (value - expected).abs() < 1e-9,
+                Measured::Unfinished { at_least } => is_open && (at_least - expected).abs() < 1e-9,
+                _ => false,
+            };
+            prop_assert!(is_right, "{sum:?}");
 
             for (text, expected) in [
                 ("share = { robot = 'A', behavior = 'Y' }".to_owned(), share),
-                (format!("between = {{ {stays}, as = 'sum' }}"), in_y * TICK_S),
-                (format!("between = {{ {stays}, as = 'count' }}"), entered),
+                (format!("between = {{ {stays}, as = 'count' }}"), ended),
                 ("variable = { robot = 'A', name = 'v', as = 'area' }".to_owned(), area),
                 ("variable = { robot = 'A', name = 'v', as = 'mean' }".to_owned(), area / run_s),
             ] {

@@ -33,7 +33,7 @@ pub struct IntervalRow {
     pub label: String,
     /// Index of the arm, which has its color and marker.
     pub arm: usize,
-    /// Its estimate; `None` if it has no run.
+    /// Its estimate; `None` if there is none.
     pub estimate: Option<Estimate>,
     /// Whether the marker is filled; otherwise it is hollow.
     pub is_filled: bool,
@@ -112,7 +112,7 @@ impl Intervals {
 
     fn numbers(&self, row: &IntervalRow) -> String {
         let Some(estimate) = row.estimate else {
-            return "no run".to_owned();
+            return "none".to_owned();
         };
         let value = typeset(estimate.value, self.decimals);
         match estimate.interval {

@@ -2,22 +2,25 @@
 //! arms whose runs are paired by seed. All of it is computed with + - * / , square roots and `libm`, and chance comes from
 //! named streams with fixed seeds: the same outcomes give the same numbers to the last bit on every platform.
 //!
-//! The code is our own because `statrs`, the crate for such distributions, calls the platform's `ln` and `exp`, and has
-//! neither the bootstrap nor survival. `tests/tests/system/statistics.rs` compares all of it with SciPy and lifelines.
+//! Intervals were chosen by their coverage, and tests by their p values where there is no difference, over measures of real
+//! runs: `docs/coverage.md`, from `tests/tests/system/coverage.rs`. The code is our own because `statrs`, the crate for such
+//! distributions, calls the platform's `ln` and `exp`, and has neither score intervals nor survival.
+//! `tests/tests/system/statistics.rs` compares all of it with SciPy and lifelines.
 
-mod bootstrap;
+mod digits;
 mod distribution;
+mod estimate;
 mod holm;
+mod paired_times;
 mod sample;
+mod shares;
 mod sign_flip;
 mod survival;
 
-pub use bootstrap::{Bootstrapped, Interval, RESAMPLES, bootstrap, resample};
+pub use digits::{decimals, fixed, signed};
+pub use estimate::{Estimate, Interval, MIN_VALUES};
 pub use holm::holm;
-pub use sample::{Estimate, Step, ecdf, quantile};
-pub use sign_flip::{FLIPS, SignFlip, dominance};
-pub use survival::{LogRank, RestrictedMeans, Survival, SurvivalStep, TimeTo, share_of_events};
-
-/// Fewest seeds of an experiment: with 8 pairs the smallest p value of a sign-flip test is 2 / 2^8 = 0.008, so that a
-/// difference can be shown at all.
-pub const MIN_SAMPLE: u64 = 8;
+pub use paired_times::PairedTimes;
+pub use sample::{Step, ecdf, quantile};
+pub use sign_flip::{FLIPS, SignFlip, dominance, least_p};
+pub use survival::{Survival, SurvivalStep, TimeTo};

@@ -2,6 +2,7 @@
 //! interrupted.
 
 mod folder;
+mod numbers;
 mod refused;
 mod teams;
 mod verdicts;

@@ -388,7 +388,7 @@ fn the_numbers_of_an_experiment_are_those_of_its_runs() {
             .iter()
             .filter(|run| run["condition"] == condition && run["arm"] == row[1]);
         let deadlocked = of_cell
-            .filter(|run| run["deadlock_censored"] == "false")
+            .filter(|run| run["deadlock_state"] == "reached")
             .count();
         assert_eq!(row[3], deadlocked.to_string());
     }

@@ -1,8 +1,11 @@
 //! Results as tables and as JSON.
 
-use lab::experiment::{Cell, Contrast, Difference, Estimated, Experiment, Results};
+use lab::experiment::{
+    Cell, Contrast, Difference, Estimated, Experiment, Measure, Results, SHOWN_P, least_p_holm,
+};
 use miette::IntoDiagnostic;
 use tabled::builder::Builder;
+use tabled::settings::formatting::AlignmentStrategy;
 use tabled::settings::object::Columns;
 use tabled::settings::{Alignment, Style};
 
@@ -37,11 +40,19 @@ pub(super) fn print(results: &Results) -> miette::Result<()> {
     let contrasts = experiment.contrast(&results.outcomes);
     if let Some(contrast) = contrasts.first() {
         let baseline = &contrast.baseline;
-        let table = render_contrasts(experiment, &contrasts);
         terminal::print(format_args!(
-            "\nDifference to \"{baseline}\", paired by seed: mean, 95 % confidence interval (bootstrap, BCa), and p value by\n\
-             Holm's procedure over all arms and conditions (sign flips; times: log-rank).\n\n{table}\n"
+            "\nDifference to \"{baseline}\", paired by seed, with 95 % confidence intervals (means:\n\
+             Student's t; shares of runs: Tango's score interval). p is that of the sign-flip\n\
+             test of the pairs, after Holm's correction over all comparisons of a measure.\n"
         ))?;
+    }
+    for measure in &experiment.measures {
+        let contrasts = contrasts.iter().filter(|one| one.measure == measure.name);
+        let contrasts: Vec<&Contrast> = contrasts.collect();
+        if !contrasts.is_empty() {
+            let text = render_contrasts(experiment, measure, &contrasts);
+            terminal::print(format_args!("\n{text}\n"))?;
+        }
     }
     Ok(())
 }
@@ -53,7 +64,7 @@ fn render(experiment: &Experiment, cells: &[Cell]) -> tabled::Table {
         if measure.column.is_some() {
             head.push(measure.title());
             if measure.is_time() {
-                head.push("median time to it, s".to_owned());
+                head.push("median time\nto it, s".to_owned());
             }
         }
     }
@@ -66,53 +77,108 @@ fn render(experiment: &Experiment, cells: &[Cell]) -> tabled::Table {
             continue;
         }
         let row = rows.of(&cell.condition, &cell.arm);
+        let mut lines = Vec::new();
+        let mut median = None;
         match &cell.estimate {
-            Estimated::Number { mean, .. } => row.push(mean.to_string()),
-            Estimated::Time(times) => {
-                row.push(format!("{} of {}", times.events, times.n));
-                row.push(times.to_string());
+            Estimated::Number { mean, .. } => lines.push(mean.to_string()),
+            Estimated::Time { survival, .. } if survival.n == 0 => {
+                lines.push("no run".to_owned());
+                median = Some(String::new());
+            }
+            Estimated::Time { share, survival } => {
+                let share = share.scaled(100.0);
+                lines.push(format!("{} of {}", survival.events, survival.n));
+                lines.push(format!("{share} %"));
+                median = Some(survival.to_string());
             }
         }
+
+        if !cell.excluded.is_none() {
+            lines.push(cell.excluded.to_string());
+        }
+        row.push(lines.join("\n"));
+        row.extend(median);
     }
     table(head, rows.0)
 }
 
-/// The differences to the baseline as a table; shares are in percentage points.
-fn render_contrasts(experiment: &Experiment, contrasts: &[Contrast]) -> tabled::Table {
-    let mut head = vec![experiment.conditions.head(), "arm".to_owned()];
-    for measure in &experiment.measures {
-        if measure.contrast {
-            let title = measure.title();
-            let unit = if measure.is_time() {
-                ", % of the runs"
-            } else {
-                ""
-            };
-            head.push(format!("{title}{unit}"));
+/// The differences to the baseline in a measure as a table, under a line about it.
+fn render_contrasts(experiment: &Experiment, measure: &Measure, contrasts: &[&Contrast]) -> String {
+    let mut head = vec![
+        experiment.conditions.head(),
+        "arm".to_owned(),
+        "pairs".to_owned(),
+    ];
+    if measure.is_time() {
+        head.push("runs with it,\npoints".to_owned());
+        head.push("mean time\nto it, s".to_owned());
+    } else {
+        head.push("difference".to_owned());
+    }
+    head.push("p".to_owned());
+
+    let mut rows = Vec::new();
+    for contrast in contrasts {
+        let mut row = vec![
+            contrast.condition.clone(),
+            contrast.arm.clone(),
+            pairs(contrast),
+        ];
+        match &contrast.difference {
+            Difference::Number { mean, .. } => row.push(mean.signed()),
+            Difference::Time {
+                share,
+                restricted_mean_s,
+                until_s,
+                ..
+            } => {
+                row.push(share.scaled(100.0).signed());
+                row.push(format!("{}\nup to {until_s} s", restricted_mean_s.signed()));
+            }
+            Difference::NoPair | Difference::NotFinite => {
+                row.push(contrast.no_difference().unwrap_or_default());
+                row.resize(head.len() - 1, String::new());
+            }
+        }
+        row.push(match contrast.p_holm {
+            Some(p) if p < 0.001 => "< 0.001".to_owned(),
+            Some(p) => format!("{p:.3}"),
+            None => String::new(),
+        });
+        rows.push(row);
+    }
+
+    let comparisons = contrasts.first().map_or(0, |one| one.comparisons);
+    let mut text = match comparisons {
+        0 => format!("{}: no comparison can be made", measure.title()),
+        1 => format!("{}: one comparison, so p is not corrected", measure.title()),
+        _ => format!(
+            "{}: p after Holm over the {comparisons} comparisons of this measure",
+            measure.title()
+        ),
+    };
+    let least_p = least_p_holm(contrasts);
+    if comparisons > 0 && least_p >= SHOWN_P {
+        text += &format!(
+            "\nso few pairs cannot show a difference: p is {least_p:.3} at least; play more seeds"
+        );
+    }
+    format!("{text}\n{}", table(head, rows))
+}
+
+/// Number of pairs, and the runs of both arms that have no number.
+fn pairs(contrast: &Contrast) -> String {
+    let mut lines = vec![contrast.n.to_string()];
+    for (arm, excluded) in [
+        (&contrast.arm, contrast.excluded),
+        (&contrast.baseline, contrast.excluded_baseline),
+    ] {
+        if !excluded.is_none() {
+            lines.push(format!("{arm}:"));
+            lines.push(excluded.to_string().replace(", ", "\n"));
         }
     }
-
-    let mut rows = Rows::default();
-    for contrast in contrasts {
-        let (difference, scale) = match &contrast.difference {
-            Difference::Number { mean, .. } => (mean, 1.0),
-            Difference::Time { share, .. } => (share, 100.0),
-        };
-        let interval = match difference.interval.bounds() {
-            Some((low, high)) => format!("[{:+.1}, {:+.1}]", low * scale, high * scale),
-            None => format!("({})", difference.interval),
-        };
-
-        let value = difference.value * scale;
-        let p = match contrast.p_holm {
-            p if p < 0.001 => "< 0.001".to_owned(),
-            p => format!("{p:.3}"),
-        };
-        let n = contrast.n;
-        let row = rows.of(&contrast.condition, &contrast.arm);
-        row.push(format!("{value:+.1} {interval}\np {p}, n {n}"));
-    }
-    table(head, rows.0)
+    lines.join("\n")
 }
 
 /// The rows of a table, which begin with the names of their condition and their arm.
@@ -151,6 +217,7 @@ fn table(head: Vec<String>, rows: Vec<Vec<String>>) -> tabled::Table {
     let mut table = table.build();
     table
         .with(Style::rounded())
-        .modify(Columns::new(2..), Alignment::right());
+        .modify(Columns::new(2..), Alignment::right())
+        .modify(Columns::new(2..), AlignmentStrategy::PerLine);
     table
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use observe::Measure;
+use observe::{Measure, Measured};
 use serde::Serialize;
 use statistics::{Estimate, Survival, TimeTo, quantile};
 
@@ -21,6 +21,8 @@ pub struct Cell {
     /// Its estimate.
     #[serde(flatten)]
     pub estimate: Estimated,
+    /// The runs that it is not of.
+    pub excluded: Excluded,
 }
 
 /// The estimate of a measure; each has its number of runs.
@@ -30,13 +32,102 @@ pub enum Estimated {
     /// Of a number of each run.
     Number {
         /// Mean with interval.
-        #[serde(flatten)]
         mean: Estimate,
-        /// Smallest value, lower quartile, median, upper quartile and largest value.
-        quartiles: [f64; 5],
+        /// Smallest value, lower quartile, median, upper quartile and largest value; `None` without values.
+        quartiles: Option<[f64; 5]>,
     },
     /// Of the time to an event, which some runs do not reach.
-    Time(Survival),
+    Time {
+        /// Share of the runs at risk that have the event by their end.
+        share: Estimate,
+        /// The curve of the runs at risk.
+        #[serde(flatten)]
+        survival: Survival,
+    },
+}
+
+/// How many runs were played and have no number, by the reason.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Excluded {
+    /// What the time begins with never happened.
+    pub not_at_risk: usize,
+    /// No pair of events, whose durations have no mean and no maximum.
+    pub no_pair: usize,
+    /// A pair of events was open at the end, so the number is known to be larger than some other.
+    pub unfinished: usize,
+    /// The run has no such number.
+    pub missing: usize,
+}
+
+impl Excluded {
+    pub(super) fn of<'a>(measured: impl Iterator<Item = &'a Measured>) -> Self {
+        let mut excluded = Self::default();
+        for one in measured {
+            match one {
+                Measured::Value { .. } | Measured::Reached { .. } | Measured::NotReached { .. } => {
+                }
+                Measured::NotAtRisk => excluded.not_at_risk += 1,
+                Measured::NoPair => excluded.no_pair += 1,
+                Measured::Unfinished { .. } => excluded.unfinished += 1,
+                Measured::Missing { .. } => excluded.missing += 1,
+            }
+        }
+        excluded
+    }
+
+    /// Whether every run has a number.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl std::fmt::Display for Excluded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut parts = Vec::new();
+        for (count, what) in [
+            (self.not_at_risk, "not at risk"),
+            (self.no_pair, "no pair"),
+            (self.unfinished, "unfinished"),
+            (self.missing, "missing"),
+        ] {
+            if count > 0 {
+                parts.push(format!("{count} {what}"));
+            }
+        }
+        f.write_str(&parts.join(", "))
+    }
+}
+
+impl Estimated {
+    /// The estimate of what was measured in some runs.
+    #[must_use]
+    pub fn of(measure: &Measure, measured: &[&Measured]) -> Self {
+        if measure.is_time() {
+            let times: Vec<TimeTo> = measured.iter().filter_map(|one| time_of(one)).collect();
+            let survival = Survival::of(&times);
+            return Self::Time {
+                share: Estimate::share(survival.events, survival.n),
+                survival,
+            };
+        }
+
+        let numbers: Vec<f64> = measured.iter().filter_map(|one| one.value()).collect();
+        let quarter = |place: f64| quantile(&numbers, place / 4.0).unwrap_or(f64::NAN);
+        Self::Number {
+            mean: Estimate::mean(&numbers),
+            quartiles: (!numbers.is_empty()).then(|| [0.0, 1.0, 2.0, 3.0, 4.0].map(quarter)),
+        }
+    }
+
+    /// Number of runs that it is of.
+    #[must_use]
+    pub fn n(&self) -> usize {
+        match self {
+            Self::Number { mean, .. } => mean.n,
+            Self::Time { survival, .. } => survival.n,
+        }
+    }
 }
 
 impl Experiment {
@@ -47,14 +138,18 @@ impl Experiment {
         for measure in &self.measures {
             for condition in conditions_of(outcomes) {
                 for arm in &self.arms {
-                    if let Some(estimate) = estimated(outcomes, measure, condition, &arm.name) {
-                        cells.push(Cell {
-                            measure: measure.name.clone(),
-                            condition: condition.to_owned(),
-                            arm: arm.name.clone(),
-                            estimate,
-                        });
+                    let measured = by_seed(outcomes, measure, condition, &arm.name);
+                    if measured.is_empty() {
+                        continue;
                     }
+                    let measured: Vec<&Measured> = measured.into_values().collect();
+                    cells.push(Cell {
+                        measure: measure.name.clone(),
+                        condition: condition.to_owned(),
+                        arm: arm.name.clone(),
+                        estimate: Estimated::of(measure, &measured),
+                        excluded: Excluded::of(measured.iter().copied()),
+                    });
                 }
             }
         }
@@ -74,69 +169,27 @@ pub(super) fn conditions_of(outcomes: &[Outcome]) -> Vec<&str> {
     conditions
 }
 
-/// The numbers of the runs of an arm under a condition, by seed.
-pub(super) fn numbers(
-    outcomes: &[Outcome],
-    measure: &Measure,
-    condition: &str,
-    arm: &str,
-) -> BTreeMap<u64, f64> {
-    let runs = runs_of(outcomes, condition, arm);
-    runs.map(|run| (run.seed, run.measures[&measure.name].value))
-        .collect()
-}
-
-/// The times of the runs of an arm under a condition, by seed.
-pub(super) fn times(
-    outcomes: &[Outcome],
-    measure: &Measure,
-    condition: &str,
-    arm: &str,
-) -> BTreeMap<u64, TimeTo> {
-    let mut times = BTreeMap::new();
-    for run in runs_of(outcomes, condition, arm) {
-        let measured = run.measures[&measure.name];
-        let time = TimeTo {
-            time_s: measured.value,
-            is_event: !measured.is_censored,
-        };
-        times.insert(run.seed, time);
-    }
-
-    times
-}
-
-/// The estimate of a measure; `None` without runs.
-fn estimated(
-    outcomes: &[Outcome],
-    measure: &Measure,
-    condition: &str,
-    arm: &str,
-) -> Option<Estimated> {
-    if measure.is_time() {
-        let times = times(outcomes, measure, condition, arm);
-        let times: Vec<TimeTo> = times.into_values().collect();
-        return (!times.is_empty()).then(|| Estimated::Time(Survival::of(&times)));
-    }
-
-    let numbers = numbers(outcomes, measure, condition, arm);
-    let numbers: Vec<f64> = numbers.into_values().collect();
-    let mut quartiles = [0.0; 5];
-    for (quarter, value) in quartiles.iter_mut().enumerate() {
-        *value = quantile(&numbers, quarter as f64 / 4.0)?;
-    }
-    Some(Estimated::Number {
-        mean: Estimate::of(&numbers),
-        quartiles,
-    })
-}
-
-fn runs_of<'a>(
+/// What was measured in the runs of an arm under a condition, by seed.
+pub(super) fn by_seed<'a>(
     outcomes: &'a [Outcome],
-    condition: &'a str,
-    arm: &'a str,
-) -> impl Iterator<Item = &'a Outcome> {
-    outcomes
-        .iter()
-        .filter(move |run| run.condition == condition && run.arm == arm)
+    measure: &Measure,
+    condition: &str,
+    arm: &str,
+) -> BTreeMap<u64, &'a Measured> {
+    let mut measured = BTreeMap::new();
+    for run in outcomes {
+        if run.condition == condition
+            && run.arm == arm
+            && let Some(one) = run.measures.get(&measure.name)
+        {
+            measured.insert(run.seed, one);
+        }
+    }
+    measured
+}
+
+/// The time of a run that was at risk.
+pub(super) fn time_of(measured: &Measured) -> Option<TimeTo> {
+    let (time_s, is_event) = measured.time()?;
+    Some(TimeTo { time_s, is_event })
 }

@@ -25,6 +25,8 @@ use crate::export::draft::{Draft, unwritable};
 pub const PLAN: &str = "plan.json";
 /// The experiment file as it was planned, for people.
 const FILE: &str = "experiment.toml";
+/// How units are measured. It is a part of the identity of a unit, so units that were measured otherwise are played again.
+const MEASURING: u32 = 2;
 
 /// An experiment and what its options change.
 #[derive(Debug, Clone)]
@@ -728,7 +730,7 @@ fn describe_seeds(seeds: &[u64]) -> String {
 
 /// Digest of what is measured, without what is only shown.
 fn digest_of_measures(experiment: &Experiment) -> String {
-    let mut text = String::new();
+    let mut text = format!("{MEASURING}\n");
     for measure in &experiment.measures {
         let _infallible = writeln!(text, "{:?} {:?}", measure.name, measure.kind);
     }

@@ -223,8 +223,8 @@ struct Columns {
     all: Vec<Column>,
     /// Columns of factors, by the names of the factors.
     levels: BTreeMap<String, Column>,
-    /// Columns of measures: the number, and whether it is censored.
-    measures: BTreeMap<String, (String, Option<String>)>,
+    /// Columns of measures: the number, and its state.
+    measures: BTreeMap<String, (String, String)>,
     /// Columns of verdicts.
     verdicts: BTreeMap<String, String>,
 }
@@ -254,12 +254,8 @@ impl Columns {
 
         for measure in &results.plan.experiment.measures {
             let number = columns.add_named(&measure.name, "measure", Type::Real).name;
-            let mut censored = None;
-            if measure.is_time() {
-                let name = format!("{number}_censored");
-                censored = Some(columns.add_named(&name, "measure", Type::Flag).name);
-            }
-            let names = (number, censored);
+            let state = columns.add_named(&format!("{number}_state"), "measure", Type::Text);
+            let names = (number, state.name);
             columns.measures.insert(measure.name.clone(), names);
         }
         let verdicts = results.outcomes.iter().flat_map(|run| run.verdicts.keys());
@@ -308,11 +304,11 @@ impl Columns {
         row.push(("digest", outcome.digest.as_str().into()));
 
         for (name, measured) in &outcome.measures {
-            let (number, censored) = &self.measures[name];
-            row.push((number, measured.value.into()));
-            if let Some(censored) = censored {
-                row.push((censored, measured.is_censored.into()));
-            }
+            let (number, state) = &self.measures[name];
+            let time = measured.time();
+            let value = measured.value().or(time.map(|(time_s, _)| time_s));
+            row.push((number, value.into()));
+            row.push((state, measured.state().into()));
         }
 
         for (name, verdict) in &outcome.verdicts {

@@ -305,10 +305,7 @@ mod tests {
     }
 
     fn played(value: f64) -> unit::Result {
-        let measured = Measured {
-            value,
-            is_censored: false,
-        };
+        let measured = Measured::Value { value };
         Ok(Played {
             digest: "d".to_owned(),
             measures: BTreeMap::from([("m".to_owned(), measured)]),

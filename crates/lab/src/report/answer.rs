@@ -3,18 +3,19 @@
 use std::collections::BTreeMap;
 
 use observe::Measure;
-use report::{Part, decimals_for, fixed};
-use statistics::Bootstrapped;
+use report::Part;
+use statistics::{Estimate, Interval};
 
 use super::study::{Study, is_shown, label};
-use crate::experiment::{Contrast, Difference};
+use crate::experiment::{Contrast, Difference, SHOWN_P, least_p_holm};
 
 /// Most comparisons that a sentence names.
 const MOST_NAMED: usize = 8;
 
 /// What all comparisons show, in one or two sentences.
 pub(super) fn lead(study: &Study<'_>) -> Vec<Part> {
-    let all = study.contrasts.len();
+    let tested = study.contrasts.iter().filter(|one| one.p_holm.is_some());
+    let all = tested.count();
     let Some(first) = study.contrasts.first() else {
         return vec![Part::text(
             "No arms are compared: the experiment has no baseline, or no measure with `contrast = true`, or no seed was played in both arms. Its estimates are below.",
@@ -30,30 +31,37 @@ pub(super) fn lead(study: &Study<'_>) -> Vec<Part> {
     parts.push(Part::text(format!("Of {all} comparisons with the arm ")));
     parts.push(Part::strong(&first.baseline));
     parts.push(Part::text(format!(
-        ", {shown} show a difference after Holm's correction: "
+        ", {shown} show a difference after Holm's correction over the comparisons of each measure: "
     )));
     let mut counts = Vec::new();
     for measure in study.measures() {
         let contrasts = study.contrasts_of(measure);
-        if !contrasts.is_empty() {
+        if let Some(first) = contrasts.first() {
             let shown = contrasts
                 .iter()
                 .filter(|contrast| is_shown(contrast))
                 .count();
             counts.push(format!(
                 "{shown} of {} in {}",
-                contrasts.len(),
+                first.comparisons,
                 label(measure)
             ));
         }
     }
     parts.push(Part::text(format!("{}.", counts.join(", "))));
+    if all < study.contrasts.len() {
+        parts.push(Part::text(format!(
+            " {} more cannot be made: there are too few pairs of runs with a number, or their differences are not finite.",
+            study.contrasts.len() - all
+        )));
+    }
     parts
 }
 
 /// What the comparisons in a measure show: a sentence for each arm and direction, and what is not shown.
 pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Vec<Part>> {
-    let contrasts = study.contrasts_of(measure);
+    let mut contrasts = study.contrasts_of(measure);
+    contrasts.retain(|contrast| contrast.p_holm.is_some());
     let mut shown: BTreeMap<(usize, bool), Vec<&Contrast>> = BTreeMap::new();
     let mut others = 0;
     for contrast in &contrasts {
@@ -86,6 +94,7 @@ fn direction(difference: &Difference) -> f64 {
         Difference::Time {
             restricted_mean_s, ..
         } => restricted_mean_s.value,
+        Difference::NoPair | Difference::NotFinite => f64::NAN,
     }
 }
 
@@ -146,38 +155,32 @@ fn numbers(measure: &Measure, contrast: &Contrast) -> String {
     let unit = measure.unit.as_ref();
     let unit = unit.map_or_else(String::new, |unit| format!("\u{a0}{unit}"));
     let difference = match &contrast.difference {
-        Difference::Number { mean, .. } => with_interval(mean, 1.0, &unit),
-        Difference::Time { share, .. } => with_interval(share, 100.0, " points"),
+        Difference::Number { mean, .. } => with_interval(mean, &unit),
+        Difference::Time {
+            share,
+            restricted_mean_s,
+            ..
+        } => format!(
+            "{}, {}",
+            with_interval(&share.scaled(100.0), " points"),
+            with_interval(restricted_mean_s, "\u{a0}s")
+        ),
+        Difference::NoPair | Difference::NotFinite => String::new(),
     };
-    format!(
-        "{difference}, n = {}, {}",
-        contrast.n,
-        p_value(contrast.p_holm)
-    )
+    let p = contrast.p_holm.map_or_else(String::new, p_value);
+    format!("{difference}, n = {}, {p}", contrast.n)
 }
 
 /// A difference with its sign and its interval.
-fn with_interval(difference: &Bootstrapped, factor: f64, unit: &str) -> String {
-    let bounds = difference.interval.bounds();
-    let width = bounds.map_or(difference.value, |(low, high)| high - low);
-    let decimals = decimals_for(width * factor * 5.0);
-    let value = signed(difference.value * factor, decimals);
-    match bounds {
-        Some((low, high)) => format!(
-            "{value}{unit} [{},\u{a0}{}]",
-            signed(low * factor, decimals),
-            signed(high * factor, decimals)
-        ),
-        None => format!("{value}{unit}, the same in every pair"),
-    }
-}
-
-fn signed(value: f64, decimals: usize) -> String {
-    let text = fixed(value, decimals);
-    match text.strip_prefix('-') {
-        Some(positive) => format!("−{positive}"),
-        None if text.bytes().all(|byte| matches!(byte, b'0' | b'.')) => text,
-        None => format!("+{text}"),
+fn with_interval(difference: &Estimate, unit: &str) -> String {
+    let decimals = difference.decimals();
+    let number = |value| statistics::signed(value, decimals).replace('-', "\u{2212}");
+    let value = number(difference.value);
+    match difference.interval {
+        Interval::Ends { low, high } => {
+            format!("{value}{unit} [{},\u{a0}{}]", number(low), number(high))
+        }
+        _ => format!("{value}{unit} in every pair"),
     }
 }
 
@@ -203,19 +206,16 @@ fn not_shown(measure: &Measure, contrasts: &[&Contrast], others: usize) -> Vec<P
         )
     };
     let mut text = format!(
-        "{what}: p is not below 0.05 after the correction{}. This is no evidence that there is none; the intervals show how large one \
-         could be.",
+        "{what}: p is not below {SHOWN_P} after the correction{}. This is no evidence that there is none; the intervals show how \
+         large one could be.",
         with_zero(contrasts)
     );
 
-    let pairs = contrasts
-        .iter()
-        .map(|contrast| contrast.n)
-        .max()
-        .unwrap_or(0);
-    if !measure.is_time() && least_p(pairs) * all as f64 >= 0.05 {
+    let least_p = least_p_holm(contrasts);
+    if least_p >= SHOWN_P {
         text += &format!(
-            " With {pairs} pairs no difference can be shown in any of {all} comparisons: play more seeds."
+            " With so few pairs no difference can be shown in any of {all} comparisons: the least that p can be is {least_p:.3}. Play \
+             more seeds."
         );
     }
     vec![Part::text(text)]
@@ -231,10 +231,11 @@ fn with_zero(contrasts: &[&Contrast]) -> String {
             Difference::Time {
                 restricted_mean_s, ..
             } => restricted_mean_s,
+            Difference::NoPair | Difference::NotFinite => continue,
         };
 
         all += 1;
-        let bounds = difference.interval.bounds();
+        let bounds = difference.bounds();
         let bounds = bounds.unwrap_or((difference.value, difference.value));
         count += usize::from(bounds.0 <= 0.0 && bounds.1 >= 0.0);
     }
@@ -244,13 +245,4 @@ fn with_zero(contrasts: &[&Contrast]) -> String {
     } else {
         format!(", and {count} of {all} intervals include zero")
     }
-}
-
-/// The smallest p value of a sign-flip test of so many pairs.
-fn least_p(pairs: usize) -> f64 {
-    let mut p = 2.0;
-    for _ in 0..pairs {
-        p /= 2.0;
-    }
-    p
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use miette::{IntoDiagnostic, miette};
-use observe::Measure;
+use observe::{Measure, Measured};
 use protocol::RunName;
 use report::{Cell, Column, Figure, Page, Part, State, Table};
 use simulator::{EpochFiles, RunFolder};
@@ -309,7 +309,12 @@ fn typical_and_worst<'a>(
     study: &Study<'a>,
     measure: &Measure,
 ) -> Option<(&'a Outcome, &'a Outcome)> {
-    let value = |outcome: &Outcome| outcome.measures.get(&measure.name).map(|one| one.value);
+    let value = |outcome: &Outcome| {
+        let measured = outcome.measures.get(&measure.name)?;
+        measured
+            .value()
+            .or(measured.time().map(|(time_s, _)| time_s))
+    };
     let baseline = baseline_name(study);
     let outcomes = &study.results.outcomes;
     let mut values: Vec<f64> = outcomes
@@ -356,7 +361,7 @@ fn write_example(
     let measured = outcome
         .measures
         .get(&measure.name)
-        .map_or(f64::NAN, |one| one.value);
+        .map_or("missing".to_owned(), Measured::to_string);
     page.paragraph(&[
         Part::text(format!("Unit {}: arm ", outcome.unit)),
         Part::strong(&outcome.arm),

@@ -9,12 +9,12 @@ use report::{
     Panel, Part, Step, Steps, Table, Trend, TrendLine, TrendPoint, decimals_for, fixed,
     round_range,
 };
-use statistics::{Bootstrapped, Survival, ecdf, quantile};
+use statistics::{Interval, ecdf};
 
 use super::limits::{MOST_PANELS, limited};
-use super::study::{CellPlace, Study, axis, is_shown, label, level_number, named};
-use super::words::capitalized;
-use crate::experiment::{Contrast, Difference};
+use super::study::{CellPlace, Study, axis, drawn, is_shown, label, level_number, named};
+use super::words::{capitalized, counted};
+use crate::experiment::{Contrast, Difference, Estimated};
 
 /// Most rows of a table.
 const MOST_ROWS: usize = 500;
@@ -32,13 +32,24 @@ pub(super) enum Of {
     Time,
 }
 
+impl Of {
+    /// How the intervals of such differences are made.
+    fn interval(self) -> &'static str {
+        match self {
+            Self::Mean => "Student's t",
+            Self::Share => "Tango's score interval",
+            Self::Time => "Student's t, and Hall's transformation where pairs are skewed",
+        }
+    }
+}
+
 /// Estimates of the arms under each condition.
 pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
     let range = estimates_range(study, measure);
     let mut caption = vec![Part::text(format!(
         "{} {}.",
         estimated(measure),
-        sample_sizes(study)
+        sample_sizes(study, measure)
     ))];
     let lines = lines(study);
     let (panels, sentence) = if lines.is_empty() {
@@ -79,12 +90,12 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
 fn estimated(measure: &Measure) -> String {
     if measure.is_time() {
         format!(
-            "Percentage of runs with {} by the end of the run, from the survival curve, with 95 % intervals (Greenwood, log(-log));",
+            "Percentage of runs with {} by the end of the run, of those at risk, with 95 % intervals (score intervals);",
             label(measure)
         )
     } else {
         format!(
-            "{}: means over the seeds with 95 % intervals (Student's t);",
+            "{}: means over the seeds with 95 % intervals (Student's t, and Hall's transformation where runs are skewed);",
             capitalized(&axis(measure))
         )
     }
@@ -92,42 +103,56 @@ fn estimated(measure: &Measure) -> String {
 
 /// What differences beside estimates are.
 fn differences_in_words(study: &Study<'_>, measure: &Measure) -> String {
+    let what = if measure.is_time() {
+        Of::Share
+    } else {
+        Of::Mean
+    };
     let contrasts = study.contrasts_of(measure);
     let baseline = contrasts.first().map_or("", |one| &one.baseline);
 
     format!(
-        " Differences to {baseline} are paired by seed{}, with 95 % intervals (BCa bootstrap), and filled where p < 0.05 after Holm's \
-         correction of {} comparisons ({}).",
+        " Differences to {baseline} are paired by seed{}, with 95 % intervals ({}), and filled where p < 0.05 after {}.",
         if measure.is_time() {
             ", in percentage points"
         } else {
             ""
         },
-        contrasts.len(),
-        test_of(measure)
+        what.interval(),
+        correction(&contrasts)
     )
 }
 
-/// How differences in a measure are tested.
-fn test_of(measure: &Measure) -> &'static str {
-    if measure.is_time() {
-        "log-rank test"
-    } else {
-        "sign-flip test of the pairs"
-    }
+/// How differences are tested.
+fn correction(contrasts: &[&Contrast]) -> String {
+    let comparisons = contrasts.first().map_or(0, |one| one.comparisons);
+    format!(
+        "Holm's correction over {} in this measure (sign-flip test of the pairs)",
+        counted(comparisons, "comparison")
+    )
 }
 
-/// How many runs each arm has under each condition.
-fn sample_sizes(study: &Study<'_>) -> String {
+/// How many runs of each arm under each condition have a number, and how many have none.
+fn sample_sizes(study: &Study<'_>, measure: &Measure) -> String {
     let mut sizes = BTreeSet::new();
+    let mut excluded = 0;
     for place in places(study) {
-        sizes.insert(study.runs(place).len());
+        let size = study
+            .cell(measure, place)
+            .map_or(0, |cell| cell.estimate.n());
+        sizes.insert(size);
+        excluded += study.runs(place).len() - size;
     }
-    match (sizes.first(), sizes.last()) {
+
+    let text = match (sizes.first(), sizes.last()) {
         (Some(least), Some(most)) if least == most => format!("n = {least} runs each"),
         (Some(least), Some(most)) => format!("n = {least} to {most} runs"),
         _ => "n = 0".to_owned(),
+    };
+    if excluded == 0 {
+        return text;
     }
+    format!("{text}; {excluded} runs have no number, see the table")
 }
 
 /// All cells of the design.
@@ -296,10 +321,12 @@ fn trend_of_differences(study: &Study<'_>, measure: &Measure, line: &Line<'_>) -
         let mut points = Vec::new();
         for level in &line.levels {
             let condition = &study.conditions[level.condition];
-            if let Some(contrast) = study.contrast(measure, condition, of) {
+            if let Some(contrast) = study.contrast(measure, condition, of)
+                && let Some(estimate) = difference(contrast, what)
+            {
                 points.push(TrendPoint {
                     x: level.x,
-                    estimate: difference(contrast, what),
+                    estimate: drawn(&estimate),
                     is_filled: is_shown(contrast),
                 });
             }
@@ -350,7 +377,8 @@ fn trend_of_differences(study: &Study<'_>, measure: &Measure, line: &Line<'_>) -
 fn differences_range(study: &Study<'_>, measure: &Measure, what: Of) -> (f64, f64) {
     let mut values = Vec::new();
     for contrast in study.contrasts_of(measure) {
-        values.extend(ends(difference(contrast, what)));
+        let estimate = difference(contrast, what);
+        values.extend(estimate.iter().flat_map(|one| ends(drawn(one))));
     }
     widened(&values, false)
 }
@@ -440,51 +468,65 @@ fn estimates_table(study: &Study<'_>, measure: &Measure) -> Table {
         ]
     };
     columns.extend(names.iter().map(|name| Column::number(name)));
+    columns.push(Column::text("runs without a number"));
     let mut table = Table::new(columns);
 
     for (condition, arm) in places(study).into_iter().take(MOST_ROWS) {
-        let place = (condition, arm);
-        let Some(estimate) = study.estimate(measure, place) else {
+        let Some(cell) = study.cell(measure, (condition, arm)) else {
             continue;
         };
         let mut row = vec![
             Cell::text(study.heading(&study.conditions[condition])),
             Cell::text(&study.arms[arm].name),
-            Cell::Count(estimate.n as u64),
+            Cell::Count(cell.estimate.n() as u64),
         ];
-        if measure.is_time() {
-            let survival = Survival::of(&study.times(measure, place));
-            row.push(Cell::Count(survival.events as u64));
-            row.push(Cell::Number(estimate.value, 1));
-            row.extend(interval_cells(estimate.interval, 1));
-            for time_s in [
-                survival.median_s,
-                survival.median_low_s,
-                survival.median_high_s,
-            ] {
-                row.push(
-                    time_s.map_or(Cell::text("not reached"), |time_s| Cell::Number(time_s, 1)),
-                );
+        match &cell.estimate {
+            Estimated::Time { share, survival } => {
+                row.push(Cell::Count(survival.events as u64));
+                row.extend(estimate_cells(&share.scaled(100.0)));
+                for time_s in [
+                    survival.median_s,
+                    survival.median_low_s,
+                    survival.median_high_s,
+                ] {
+                    row.push(match time_s {
+                        Some(time_s) => Cell::Number(time_s, 1),
+                        None if survival.n == 0 => Cell::Empty,
+                        None => Cell::text("not reached"),
+                    });
+                }
             }
-        } else {
-            let numbers = study.numbers(measure, place);
-            row.push(Cell::Number(estimate.value, 2));
-            row.extend(interval_cells(estimate.interval, 2));
-            for quarter in 0..5 {
-                let value = quantile(&numbers, f64::from(quarter) / 4.0);
-                row.push(value.map_or(Cell::Empty, |value| Cell::Number(value, 2)));
+            Estimated::Number { mean, quartiles } => {
+                let decimals = mean.decimals();
+                row.extend(estimate_cells(mean));
+                match quartiles {
+                    Some(quartiles) => {
+                        row.extend(quartiles.map(|value| Cell::Number(value, decimals)));
+                    }
+                    None => row.extend([const { Cell::Empty }; 5]),
+                }
             }
         }
+        row.push(Cell::text(cell.excluded.to_string()));
         table.rows.push(row);
     }
     table
 }
 
-fn interval_cells(interval: Option<(f64, f64)>, decimals: usize) -> [Cell; 2] {
-    match interval {
-        Some((low, high)) => [Cell::Number(low, decimals), Cell::Number(high, decimals)],
-        None => [Cell::Empty, Cell::Empty],
-    }
+/// An estimate and its interval, or why there is none.
+fn estimate_cells(estimate: &statistics::Estimate) -> [Cell; 3] {
+    let decimals = estimate.decimals();
+    let number = |value| Cell::Number(value, decimals);
+    let (value, why) = match estimate.interval {
+        Interval::Ends { low, high } => {
+            return [number(estimate.value), number(low), number(high)];
+        }
+        Interval::AllEqual => (number(estimate.value), "all equal"),
+        Interval::TooFew if estimate.n == 0 => (Cell::Empty, ""),
+        Interval::TooFew => (number(estimate.value), "too few"),
+        Interval::NotFinite => (Cell::Empty, "not finite"),
+    };
+    [value, Cell::text(why), Cell::Empty]
 }
 
 /// Differences of the arms to the baseline under each condition; `None` if there are none.
@@ -500,10 +542,11 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, what: Of) -> Opt
         let mut rows = Vec::new();
         for (arm, of) in study.arms.iter().enumerate() {
             if let Some(contrast) = study.contrast(measure, condition, of) {
+                let estimate = difference(contrast, what);
                 rows.push(IntervalRow {
                     label: of.name.clone(),
                     arm: look(study, arm),
-                    estimate: Some(difference(contrast, what)),
+                    estimate: estimate.as_ref().map(drawn),
                     is_filled: is_shown(contrast),
                 });
             }
@@ -539,17 +582,16 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, what: Of) -> Opt
             horizons(&contrasts)
         ),
     };
-    let n = contrasts
-        .iter()
-        .map(|contrast| contrast.n)
-        .max()
-        .unwrap_or(0);
+    let pairs: BTreeSet<usize> = contrasts.iter().map(|contrast| contrast.n).collect();
+    let n = match (pairs.first(), pairs.last()) {
+        (Some(least), Some(most)) if least < most => format!("{least} to {most} pairs"),
+        (_, most) => format!("{} pairs each", most.unwrap_or(&0)),
+    };
     let mut caption = format!(
-        "Differences to {} in {of}, paired by seed, with 95 % intervals (BCa bootstrap). Filled markers: p < 0.05 after Holm's \
-         correction of {} comparisons ({}). n = {n} pairs each.",
+        "Differences to {} in {of}, paired by seed, with 95 % intervals ({}). Filled markers: p < 0.05 after {}. n = {n}.",
         first.baseline,
-        contrasts.len(),
-        test_of(measure)
+        what.interval(),
+        correction(&contrasts)
     );
     let (panels, sentence) = limited(panels, compared, "conditions");
     caption += &sentence;
@@ -588,21 +630,15 @@ fn difference_axis(measure: &Measure, what: Of, baseline: &str) -> String {
     }
 }
 
-fn difference(contrast: &Contrast, what: Of) -> Estimate {
-    let factor = if what == Of::Share { 100.0 } else { 1.0 };
-    let Bootstrapped { value, interval } = match &contrast.difference {
-        Difference::Number { mean, .. } => mean,
-        Difference::Time { share, .. } if what == Of::Share => share,
+/// The difference of a contrast, shares in percentage points; `None` if there is none.
+fn difference(contrast: &Contrast, what: Of) -> Option<statistics::Estimate> {
+    match &contrast.difference {
+        Difference::Number { mean, .. } => Some(*mean),
+        Difference::Time { share, .. } if what == Of::Share => Some(share.scaled(100.0)),
         Difference::Time {
             restricted_mean_s, ..
-        } => restricted_mean_s,
-    };
-
-    let bounds = interval.bounds();
-    Estimate {
-        value: value * factor,
-        interval: bounds.map(|(low, high)| (low * factor, high * factor)),
-        n: contrast.n,
+        } => Some(*restricted_mean_s),
+        Difference::NoPair | Difference::NotFinite => None,
     }
 }
 
@@ -617,24 +653,32 @@ fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], what: Of) -> Ta
         Column::number("effect size"),
         Column::number("p"),
         Column::number("p after Holm"),
+        Column::text("runs of the arm without a number"),
+        Column::text("of the baseline"),
     ]);
     for contrast in contrasts.iter().take(MOST_ROWS) {
-        let estimate = difference(contrast, what);
-        let effect = match &contrast.difference {
-            Difference::Number { dominance, .. } => Cell::Number(*dominance, 2),
-            Difference::Time { .. } => Cell::Empty,
-        };
-
         let mut row = vec![
             Cell::text(study.heading_of(&contrast.condition)),
             Cell::text(&contrast.arm),
             Cell::Count(contrast.n as u64),
-            Cell::Number(estimate.value, 2),
         ];
-        row.extend(interval_cells(estimate.interval, 2));
-        row.push(effect);
-        row.push(Cell::Number(contrast.difference.p(), 4));
-        row.push(Cell::Number(contrast.p_holm, 4));
+        match difference(contrast, what) {
+            Some(estimate) => row.extend(estimate_cells(&estimate)),
+            None => row.extend([
+                Cell::Empty,
+                Cell::text(contrast.no_difference().unwrap_or_default()),
+                Cell::Empty,
+            ]),
+        }
+        row.push(match &contrast.difference {
+            Difference::Number { dominance, .. } => Cell::Number(*dominance, 2),
+            _ => Cell::Empty,
+        });
+        for p in [contrast.difference.p(), contrast.p_holm] {
+            row.push(p.map_or(Cell::Empty, |p| Cell::Number(p, 4)));
+        }
+        row.push(Cell::text(contrast.excluded.to_string()));
+        row.push(Cell::text(contrast.excluded_baseline.to_string()));
         table.rows.push(row);
     }
 
@@ -653,11 +697,13 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
         let mut curves = Vec::new();
         for (arm, of) in study.arms.iter().enumerate() {
             let sample = study.times(measure, (condition, arm));
-            if sample.is_empty() {
+            let cell = study.cell(measure, (condition, arm));
+            let Some(Estimated::Time { survival, .. }) = cell.map(|cell| &cell.estimate) else {
+                continue;
+            };
+            if survival.n == 0 {
                 continue;
             }
-
-            let survival = Survival::of(&sample);
             let mut steps = Vec::new();
             let mut censored = Vec::new();
             for step in &survival.curve {
@@ -704,10 +750,10 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
     }
 
     let mut caption = format!(
-        "Share of runs without {} over time (Kaplan-Meier) with 95 % bands (Greenwood, log(-log)). Ticks on a curve are runs that \
-         ended without it. Below, the number of runs at risk. {}.",
+        "Share of the runs at risk without {} over time (Kaplan-Meier) with 95 % bands (score intervals with Greenwood's variance). \
+         Ticks on a curve are runs that ended without it. Below, the number of runs at risk. {}.",
         label(measure),
-        sample_sizes(study)
+        sample_sizes(study, measure)
     );
     let (panels, sentence) = limited(panels, study.conditions.len(), "conditions");
     caption += &sentence;
@@ -768,7 +814,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
     let mut caption = format!(
         "Empirical distribution functions of {}. {}.",
         label(measure),
-        sample_sizes(study)
+        sample_sizes(study, measure)
     );
     let (panels, sentence) = limited(panels, study.conditions.len(), "conditions");
     caption += &sentence;
@@ -831,7 +877,7 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
     let caption = format!(
         "{} by {rows} and {columns}, a map for each arm; darker is more. {}.{sentence}",
         capitalized(&axis(measure)),
-        sample_sizes(study)
+        sample_sizes(study, measure)
     );
     Some(Figure {
         panels,
@@ -949,10 +995,9 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
             });
         }
     }
-    let caption = format!(
+    let caption = String::from(
         "Verdicts about the expectations: runs that pass of all runs, and how many fail or are undecided (open), because the run \
-         ended first. Darker is a larger share of runs that fail. {}.",
-        sample_sizes(study)
+         ended first. Darker is a larger share of runs that fail.",
     );
     Some(Figure {
         panels,

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use observe::Measure;
+use observe::{Measure, Measured};
 use report::Estimate;
-use statistics::{Survival, TimeTo};
+use statistics::TimeTo;
 
-use crate::experiment::{Arm, Condition, Contrast, Outcome, Results, Shown};
-
-/// Largest p value, after Holm's correction, of a difference that is stated.
-const SHOWN_P: f64 = 0.05;
+use crate::experiment::{
+    Arm, Cell, Condition, Contrast, Estimated, Outcome, Results, SHOWN_P, Shown,
+};
 
 /// Most arms that are shown.
 const MOST_ARMS: usize = 24;
@@ -22,6 +21,8 @@ pub(super) struct Study<'a> {
     pub(super) arms: &'a [Arm],
     /// Names of the factors.
     pub(super) factors: Vec<&'a str>,
+    /// The estimates, by measure, condition and arm.
+    estimates: BTreeMap<[String; 3], Cell>,
     pub(super) contrasts: Vec<Contrast>,
     /// The runs of an arm under a condition, by their indices.
     cells: BTreeMap<(usize, usize), Vec<&'a Outcome>>,
@@ -50,6 +51,16 @@ impl<'a> Study<'a> {
             }
         }
 
+        let mut estimates = BTreeMap::new();
+        for cell in experiment.estimate(&results.outcomes) {
+            let place = [
+                cell.measure.clone(),
+                cell.condition.clone(),
+                cell.arm.clone(),
+            ];
+            estimates.insert(place, cell);
+        }
+
         let first = conditions.first().map(|condition| &condition.levels);
         let factors = first.into_iter().flatten().map(|(name, _)| name.as_str());
         Self {
@@ -57,6 +68,7 @@ impl<'a> Study<'a> {
             conditions,
             arms: &experiment.arms[..experiment.arms.len().min(MOST_ARMS)],
             factors: factors.collect(),
+            estimates,
             contrasts: experiment.contrast(&results.outcomes),
             cells,
         }
@@ -96,7 +108,7 @@ impl<'a> Study<'a> {
     pub(super) fn numbers(&self, measure: &Measure, place: CellPlace) -> Vec<f64> {
         let runs = self.runs(place).iter();
         runs.filter_map(|run| run.measures.get(&measure.name))
-            .map(|measured| measured.value)
+            .filter_map(Measured::value)
             .collect()
     }
 
@@ -104,32 +116,29 @@ impl<'a> Study<'a> {
     pub(super) fn times(&self, measure: &Measure, place: CellPlace) -> Vec<TimeTo> {
         let mut times = Vec::new();
         for run in self.runs(place) {
-            if let Some(measured) = run.measures.get(&measure.name) {
-                times.push(TimeTo {
-                    time_s: measured.value,
-                    is_event: !measured.is_censored,
-                });
+            let measured = run.measures.get(&measure.name);
+            if let Some((time_s, is_event)) = measured.and_then(Measured::time) {
+                times.push(TimeTo { time_s, is_event });
             }
         }
         times
     }
 
-    /// The mean of a measure, or the percentage of runs with its event by the end of the curve; `None` without runs.
-    pub(super) fn estimate(&self, measure: &Measure, place: CellPlace) -> Option<Estimate> {
-        if measure.is_time() {
-            let times = self.times(measure, place);
-            return (!times.is_empty()).then(|| share_with_event(&times));
-        }
+    /// The estimate of a measure; `None` without runs.
+    pub(super) fn cell(&self, measure: &Measure, (condition, arm): CellPlace) -> Option<&Cell> {
+        let condition = self.conditions[condition].name.clone();
+        let arm = self.arms[arm].name.clone();
+        self.estimates.get(&[measure.name.clone(), condition, arm])
+    }
 
-        let numbers = self.numbers(measure, place);
-        let estimate = statistics::Estimate::of(&numbers);
-        let half_width = estimate.half_width;
-        let ends = (estimate.mean - half_width, estimate.mean + half_width);
-        (!numbers.is_empty()).then_some(Estimate {
-            value: estimate.mean,
-            interval: half_width.is_finite().then_some(ends),
-            n: numbers.len(),
-        })
+    /// The mean of a measure, or the percentage of runs at risk with its event by their end; `None` where there is no
+    /// finite number.
+    pub(super) fn estimate(&self, measure: &Measure, place: CellPlace) -> Option<Estimate> {
+        let estimate = match &self.cell(measure, place)?.estimate {
+            Estimated::Number { mean, .. } => *mean,
+            Estimated::Time { share, .. } => share.scaled(100.0),
+        };
+        estimate.value.is_finite().then(|| drawn(&estimate))
     }
 
     /// The contrast of an arm with the baseline.
@@ -184,21 +193,18 @@ pub(super) fn named<'a>(levels: impl IntoIterator<Item = &'a (String, String)>) 
     parts.join(", ")
 }
 
-/// Percentage of runs with the event, from the survival curve.
-fn share_with_event(times: &[TimeTo]) -> Estimate {
-    let survival = Survival::of(times);
-    let last = survival.curve.last();
-    let percent = |without: f64| 100.0 * (1.0 - without);
+/// An estimate as charts take it.
+pub(super) fn drawn(estimate: &statistics::Estimate) -> Estimate {
     Estimate {
-        value: percent(last.map_or(1.0, |step| step.share)),
-        interval: last.map(|step| (percent(step.high), percent(step.low))),
-        n: survival.n,
+        value: estimate.value,
+        interval: estimate.bounds(),
+        n: estimate.n,
     }
 }
 
 /// Whether a contrast is stated as a difference.
 pub(super) fn is_shown(contrast: &Contrast) -> bool {
-    contrast.p_holm < SHOWN_P
+    contrast.p_holm.is_some_and(|p| p < SHOWN_P)
 }
 
 /// Name of a measure for people.

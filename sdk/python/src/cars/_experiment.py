@@ -46,7 +46,7 @@ class Experiment:
 
     @property
     def results(self) -> Frame:
-        """A row for each unit: condition, arm, seed, measures, verdicts."""
+        """A row for each unit: condition, arm, seed, measures with their states, verdicts."""
         return self.frame()
 
     def frame(self, kind: Optional[str] = None) -> Frame:
@@ -58,12 +58,19 @@ class Experiment:
 
     @property
     def estimates(self) -> Frame:
-        """A row for each measure of each arm under each condition: the mean or the times, with intervals."""
+        """A row for each measure of each arm under each condition: the mean or the times, with intervals.
+
+        ``mean.interval`` is ``ends`` where there is an interval, ``mean.low`` to ``mean.high``; otherwise it says why there is
+        none. ``excluded.not_at_risk`` and the like are how many runs have no number.
+        """
         return of_rows(self._written["estimates"])
 
     @property
     def contrasts(self) -> Frame:
-        """A row for each difference to the baseline, with its interval and p value."""
+        """A row for each difference to the baseline, with its interval and p value.
+
+        ``kind`` is ``no_pair`` or ``not_finite`` where nothing can be compared: there, ``p_holm`` is missing.
+        """
         return of_rows(self._written["contrasts"])
 
     @property

@@ -82,7 +82,7 @@ fn mean_of(all: &Value, condition: &str, arm: &str, measure: &str) -> f64 {
     let cell = cells.find(|cell| {
         cell["condition"] == condition && cell["arm"] == arm && cell["measure"] == measure
     });
-    cell.unwrap()["mean"].as_f64().unwrap()
+    cell.unwrap()["mean"]["value"].as_f64().unwrap()
 }
 
 /// Plays a shipped experiment with other values of its factor, and returns the means by condition, arm and measure.
