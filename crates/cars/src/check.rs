@@ -14,6 +14,7 @@ use simulator::RunFolder;
 use simulator::seal::{self, Checked};
 use terminal::OutputError;
 
+use crate::experiment::equal_arms;
 use crate::named;
 
 /// `cars check`.
@@ -80,6 +81,7 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
         experiment,
         set: Vec::new(),
         robots: Robots::InProcess,
+        origin: None,
     })?;
     let needs_processes = plan.needs_processes()?;
     if needs_processes.is_none() {
@@ -92,6 +94,9 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
     let measures = count(experiment.measures.len(), "measure", "measures");
     let seeds = experiment.seeds.len();
     let mut text = format!("{arms}, {conditions}, {seeds} seeds, {measures}");
+    for (one, other) in plan.equal_arms() {
+        text += &format!("; {}", equal_arms(one, other));
+    }
     if let Some(reason) = needs_processes {
         text += &format!("; to be played with --processes: {reason}");
     }
