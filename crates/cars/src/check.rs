@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use config::{Changes, FileError};
+use config::{Changes, FileError, Source};
 use lab::experiment::{Experiment, Plan, Request, Robots, is_experiment_file};
 use lab::folder::recorded_epochs;
 use launch::{LaunchFile, is_launch_file, scenario_file};
+use miette::miette;
 use scenario::Scenario;
 use simulator::RunFolder;
 use simulator::seal::{self, Checked};
@@ -56,6 +57,13 @@ fn describe(path: &Path) -> miette::Result<String> {
     }
     if is_experiment_file(path)? {
         return describe_experiment(path);
+    }
+    let content: serde_json::Value = Source::read(path)?.parse()?;
+    if content.as_object().is_some_and(serde_json::Map::is_empty) {
+        return Err(miette!(
+            "{} is empty: it is neither a scenario nor a launch file nor an experiment",
+            path.display()
+        ));
     }
 
     let changes = Changes::default();

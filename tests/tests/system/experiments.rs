@@ -3,6 +3,7 @@
 
 mod folder;
 mod refused;
+mod states;
 mod teams;
 mod verdicts;
 

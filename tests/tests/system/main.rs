@@ -44,6 +44,7 @@ mod replayed;
 mod report;
 mod secure;
 mod shell;
+mod states;
 mod statistics;
 mod stay;
 mod temporary;
