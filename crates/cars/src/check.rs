@@ -58,8 +58,8 @@ fn describe(path: &Path) -> miette::Result<String> {
     if is_experiment_file(path)? {
         return describe_experiment(path);
     }
-    let content: serde_json::Value = Source::read(path)?.parse()?;
-    if content.as_object().is_some_and(serde_json::Map::is_empty) {
+    let file: serde_json::Value = Source::read(path)?.parse()?;
+    if file.as_object().is_some_and(serde_json::Map::is_empty) {
         return Err(miette!(
             "{} is empty: it is neither a scenario nor a launch file nor an experiment",
             path.display()

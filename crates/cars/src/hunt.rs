@@ -11,7 +11,8 @@ use config::units::Time;
 use config::{Changes, Override};
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::hunt::{
-    Budget, Coverage, Fate, Feature, Finding, Link, Kind, Options, Progress, Report, Subject, hunt as go,
+    Budget, Coverage, Fate, Feature, Finding, Kind, Link, Options, Progress, Report, Subject,
+    hunt as go,
 };
 use lab::shell;
 use miette::IntoDiagnostic;
