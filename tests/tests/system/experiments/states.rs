@@ -2,7 +2,7 @@
 
 use system_tests::{Lab, root};
 
-use super::{HALL, cars, json, ok, rows};
+use super::{HALL, cars, in_one_line, json, ok, rows};
 
 /// An experiment of two arms about the hall with these measures.
 fn experiment(lab: &Lab, measures: &str) -> String {
@@ -104,7 +104,9 @@ fn arms_that_are_the_same_are_named() {
     let said = "the arms \"plain\" and \"again\" play the same runs under every condition";
     let printed = ok(&["run", &file, "-o", out.to_str().unwrap()]);
     assert!(printed.contains(said), "{printed}");
-    assert!(lab.ok(&["check", &file]).contains(said));
+    let (code, printed) = lab.cars_without_out(&["check", &file]);
+    assert_eq!(code, 0, "{printed}");
+    assert!(in_one_line(&printed).contains(said), "{printed}");
 }
 
 #[test]
@@ -119,7 +121,9 @@ fn an_empty_file_is_refused_with_a_reason() {
             printed.contains("is empty: it is not an experiment"),
             "{printed}"
         );
-        let (_, printed) = lab.fails(&["check", file]);
+        let (code, printed) = lab.cars_without_out(&["check", file]);
+        assert_eq!(code, 1, "{printed}");
+        let printed = in_one_line(&printed);
         assert!(
             printed.contains("is empty: it is neither a scenario"),
             "{printed}"
